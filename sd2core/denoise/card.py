@@ -21,41 +21,21 @@ TrainedOn = Literal["simulated", "real"]
 
 @dataclass(frozen=True)
 class ModelCard:
-    """Description of a trained denoiser, without its weights.
+    """Description of a trained denoiser, without its weights."""
 
-    Parameters
-    ----------
-    model : str
-        A name of :data:`sd2core.denoise.registry.MODELS` or ``FILTERS``.
-    options : mapping
-        Options of the network.
-    null_bins : tuple of int
-        Bins that are zero on purpose, in the input and in the result.
-    trained_on : {"simulated", "real"}
-    unit : str
-        Meaning of the value 1 in the result.
-    title : str
-        Name in lists; the file's name if it is empty.
-    about : mapping
-        ``data``, ``command``, ``metrics``, ``limits`` and other content for JSON.
-    parameters : int
-        Number of learned parameters; known when the card comes from a file.
-    path : Path, optional
-        File that holds the card.
-    """
-
-    model: str
-    options: Mapping[str, Any]
+    model: str  # A name of :data:`sd2core.denoise.registry.MODELS` or ``FILTERS``.
+    options: Mapping[str, Any]  # Options of the network.
     scaling: Scaling
     axis: VelocityAxis
-    null_bins: tuple[int, ...]
+    null_bins: tuple[int, ...]  # Bins that are zero on purpose, in the input and in the result.
     frame_rate_hz: float
     trained_on: TrainedOn
-    unit: str = "power"
-    title: str = ""
+    unit: str = "power"  # Meaning of the value 1 in the result.
+    title: str = ""  # Name in lists; the file's name if it is empty.
+    # ``data``, ``command``, ``metrics``, ``limits`` and other content for JSON.
     about: Mapping[str, Any] = field(default_factory=dict)
-    parameters: int = 0
-    path: Path | None = None
+    parameters: int = 0  # Number of learned parameters; known when the card comes from a file.
+    path: Path | None = None  # File that holds the card.
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.frame_rate_hz) and self.frame_rate_hz > 0):
@@ -96,10 +76,7 @@ class ModelCard:
     def from_json(cls, content: dict[str, Any], path: Path | None = None) -> ModelCard:
         """Card from the content of :meth:`to_json`.
 
-        Raises
-        ------
-        Sd2Error
-            For other content, or a newer version.
+        Raises Sd2Error for other content, or a newer version.
         """
         where = "The model" if path is None else str(path)
         try:

@@ -126,14 +126,7 @@ class SerialS4Denoiser(S4Denoiser):
 class GruDenoiser(Denoiser):
     """Baseline: linear layer, GRU layers (K. Cho et al., EMNLP 2014), linear layer; causal.
 
-    Parameters
-    ----------
-    channels : int
-        Width of all layers.
-    depth : int
-        Number of GRU layers.
-    dropout : float
-        Between layers, while training.
+    All layers have ``channels`` units; ``dropout`` is between layers, while training.
     """
 
     def __init__(

@@ -21,22 +21,10 @@ _EXPECTED = "a model file (.safetensors) written by `sd2 train`"
 
 
 def save_model(path: Path, trained: TrainedDenoiser) -> ModelCard:
-    """Write a model to one file, in one step.
+    """Write a model to one file, in one step, and return the card as written.
 
-    Parameters
-    ----------
-    path : Path
-        Ends in ``.safetensors``.
-
-    Returns
-    -------
-    ModelCard
-        Card as written to the file.
-
-    Raises
-    ------
-    Sd2Error
-        When the name ends otherwise, or the card holds what JSON cannot.
+    Raises Sd2Error when the name does not end in ``.safetensors``, or the card holds what JSON
+    cannot.
     """
     from sd2core.denoise.model import parameter_count
 
@@ -96,10 +84,7 @@ def load_model(model: Path | str) -> TrainedDenoiser:
 def find_model(model: Path | str) -> Path:
     """File of a model that is given by path or by name.
 
-    Raises
-    ------
-    Sd2Error
-        If there is no such model.
+    Raises Sd2Error if there is no such model.
     """
     path = Path(model)
     if path.is_file():

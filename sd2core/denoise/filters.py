@@ -59,10 +59,7 @@ class _Neighbourhood(Denoiser):
 class MedianDenoiser(_Neighbourhood):
     """Median over the last frames and the neighbouring bins, times one number.
 
-    Parameters
-    ----------
-    frames, width : int
-        Odd.
+    ``frames`` and ``width`` are odd.
     """
 
     def __init__(self, bins: int, *, frames: int = 5, width: int = 3) -> None:
@@ -78,13 +75,8 @@ class MedianDenoiser(_Neighbourhood):
 class WienerDenoiser(_Neighbourhood):
     """Causal linear filter of least squared error (N. Wiener, 1949), and a mean per bin.
 
-    The same weights for all bins; they solve the Wiener–Hopf equations of the training
-    takes.
-
-    Parameters
-    ----------
-    frames, width : int
-        Extent of the filter; width is odd.
+    The same weights for all bins; they solve the Wiener–Hopf equations of the training takes. The
+    filter spans ``frames`` by ``width`` cells; the width is odd.
     """
 
     def __init__(self, bins: int, *, frames: int = 9, width: int = 5) -> None:
@@ -107,12 +99,8 @@ def fit_median(
 ) -> MedianDenoiser:
     """Choose the median filter, and its gain, of least squared error.
 
-    Parameters
-    ----------
-    inputs, targets : sequence of float32 arrays, shape (frames, bins)
-        Compressed, one per take. Only some of many takes are used.
-    null_bins : sequence of int
-        Bins that do not count.
+    Inputs and targets are compressed, (frames, bins), one per take; only some of many takes are
+    used. ``null_bins`` do not count.
     """
     stride = max(1, sum(map(len, inputs)) // _MEDIAN_FRAMES)
     bins = inputs[0].shape[1]
@@ -142,16 +130,9 @@ def fit_wiener(
     frames: int = 9,
     width: int = 5,
 ) -> WienerDenoiser:
-    """Fit the Wiener filter in closed form.
+    """Fit a Wiener filter of ``frames`` by ``width`` cells in closed form.
 
-    Parameters
-    ----------
-    inputs, targets : sequence of float32 arrays, shape (frames, bins)
-        Compressed, one per take.
-    null_bins : sequence of int
-        Bins that do not count.
-    frames, width : int
-        Extent of the filter.
+    Inputs and targets are compressed, (frames, bins), one per take. ``null_bins`` do not count.
     """
     bins = inputs[0].shape[1]
     counted = _counted(bins, null_bins)

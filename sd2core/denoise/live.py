@@ -88,14 +88,10 @@ class TrainedDenoiser:
     def as_denoised(
         self, doppler: DopplerMap, energies: NDArray[np.float32], resampled: bool
     ) -> DopplerMap:
-        """Denoised map from a synthetic one and its denoised energies.
+        """Denoised map from a synthetic one and its denoised energies, (frames, bins).
 
-        Parameters
-        ----------
-        energies : float32 array, shape (frames, bins)
-            Changed: bins that the radar does not see are emptied.
-        resampled : bool
-            True if frames were interpolated to the model's rate and back.
+        The energies are changed: bins that the radar does not see are emptied. ``resampled`` is
+        True if frames were interpolated to the model's rate and back.
         """
         energies[:, list(doppler.unseen_bins)] = 0.0
         return replace(
@@ -216,14 +212,9 @@ class TrainedDenoiser:
 class LiveDenoiser:
     """Denoiser of single frames, without delay.
 
-    A causal model gives the result for the whole map. A model of fixed windows gets
-    the last frames only and denoises the newest, at the window's border, where it
+    A causal model gives the result for the whole map (``equals_batch`` is True). A model of fixed
+    windows gets the last frames only and denoises the newest, at the window's border, where it
     knows less than in the middle: its result differs from that for the whole map.
-
-    Attributes
-    ----------
-    equals_batch : bool
-        True if results are those for the whole map.
     """
 
     def __init__(self, trained: TrainedDenoiser) -> None:
@@ -241,17 +232,9 @@ class LiveDenoiser:
             self._state = network.initial_state(1) if self.equals_batch else None
 
     def step(self, energies: NDArray[np.float32], present: bool = True) -> NDArray[np.float32]:
-        """Denoise the next frame.
+        """Denoise the next frame, (bins,).
 
-        Parameters
-        ----------
-        energies : float32 array, shape (bins,)
-        present : bool
-            False without a person: the result is empty, and a new clip begins.
-
-        Returns
-        -------
-        float32 array, shape (bins,)
+        Without a person (``present`` False) the result is empty, and a new clip begins.
         """
         values = np.array(energies, dtype=np.float32)
         if values.shape != (self._card.axis.bins,):
@@ -268,17 +251,9 @@ class LiveDenoiser:
     def advance(
         self, energies: NDArray[np.float32], present: NDArray[np.bool_] | None = None
     ) -> NDArray[np.float32]:
-        """Denoise the next frames, with the result of :meth:`step` at less cost.
+        """Denoise the next frames, (frames, bins), with the result of :meth:`step` at less cost.
 
-        Parameters
-        ----------
-        energies : float32 array, shape (frames, bins)
-        present : bool array, shape (frames,), optional
-            See :meth:`step`; None: everywhere.
-
-        Returns
-        -------
-        float32 array, shape (frames, bins)
+        ``present`` is as for :meth:`step`, one per frame; None: a person is in all.
         """
         there = Presence.of(present, len(energies)).there
         answers = np.zeros(energies.shape, np.float32)

@@ -32,13 +32,9 @@ def denoise_long(
     A causal model continues from its last state; one of fixed windows gets the windows that it
     would get in the whole map. So results are equal to the rounding of single precision.
 
-    Parameters
-    ----------
-    runs : list of (int, int)
-        Frames that are clips of their own, from :func:`matching.clips`.
-    times_s : float64 array, shape (T,)
-    write : callable
-        Called for the frames of all runs, in their order.
+    ``runs`` are half-open ranges of frames that are clips of their own, from
+    :func:`~sd2core.denoise.resample_to_model.clips`; ``times_s`` are the times of all frames, and
+    ``write`` is called for the frames of all runs, in their order.
     """
     rate_hz = trained.card.frame_rate_hz
     for start, stop in runs:

@@ -29,37 +29,17 @@ from sd2core.sensor import VelocityAxis
 
 @dataclass(frozen=True)
 class VelocityError:
-    """Error of one velocity per frame.
+    """Error e of one velocity per frame; the velocities are NaN if no frame can be judged."""
 
-    Parameters
-    ----------
-    mae_mps : float
-        Mean of |e|; NaN if no frame can be judged, as are all that follow.
-    sd_mps : float
-        Standard deviation σ of e about its mean.
-    sd_absolute_mps : float
-        Standard deviation of |e|.
-    bias_mps : float
-        Mean of e.
-    correlation : float
-        Pearson correlation of estimate and target; NaN if one of them does not vary.
-    frames : int
-        Frames that were judged.
-    empty_target : int
-        Frames left out because the target is empty.
-    empty_estimate : int
-        Judged frames in which the estimate is empty and counts as 0 m/s.
-    """
-
-    mae_mps: float
-    sd_mps: float
-    sd_absolute_mps: float
-    bias_mps: float
+    mae_mps: float  # Mean of |e|.
+    sd_mps: float  # Standard deviation σ of e about its mean.
+    sd_absolute_mps: float  # Standard deviation of |e|.
+    bias_mps: float  # Mean of e.
     rmse_mps: float
-    correlation: float
-    frames: int
-    empty_target: int
-    empty_estimate: int
+    correlation: float  # Pearson correlation; NaN if the estimate or the target does not vary.
+    frames: int  # Frames that were judged.
+    empty_target: int  # Frames left out because the target is empty.
+    empty_estimate: int  # Judged frames in which the estimate is empty and counts as 0 m/s.
 
     def to_json(self) -> dict[str, float | int]:
         """Errors by name."""
@@ -68,23 +48,14 @@ class VelocityError:
 
 @dataclass(frozen=True)
 class MapError:
-    """Error of whole maps.
+    """Error of whole maps."""
 
-    Parameters
-    ----------
-    relative_l1 : float
-        Σ|x̂ − x| / Σx of the energies; 0 when both are empty, infinite when only the
-        estimate is not.
-    rmse_compressed : float
-        Root mean square error of compressed values, over the bins that are not nulled;
-        1 for an empty estimate of maps like those of the training.
-    correlation : float
-        Pearson's, of compressed values over all these cells; NaN where one of the maps
-        does not vary.
-    """
-
+    # Σ|x̂ − x| / Σx of the energies; 0 when both are empty, infinite when only the estimate is not.
     relative_l1: float
+    # Root mean square error of compressed values, over the bins that are not nulled; 1 for an empty
+    # estimate of maps like those of the training.
     rmse_compressed: float
+    # Pearson's, of compressed values over all these cells; NaN where one of the maps does not vary.
     correlation: float
 
     def to_json(self) -> dict[str, float]:
@@ -99,12 +70,8 @@ def velocity_error(
 ) -> VelocityError:
     """Compare velocities frame by frame; the definition is at the head of this module.
 
-    Parameters
-    ----------
-    estimate_mps, target_mps : float64 array, shape (frames,)
-        NaN where a frame is empty.
-    frames : bool array, shape (frames,), optional
-        Only these, e.g. those of one gesture.
+    A velocity is NaN where its frame is empty. ``frames`` limits it to some frames, e.g. those of
+    one gesture.
     """
     if estimate_mps.shape != target_mps.shape:
         raise Sd2Error(
@@ -165,16 +132,9 @@ def map_error(
     compression: Compression,
     null_bins: tuple[int, ...] = (),
 ) -> MapError:
-    """Error of all cells.
+    """Error of all cells of two maps of energies, (frames, bins), in the unit of the target.
 
-    Parameters
-    ----------
-    estimate, target : float array, shape (frames, bins)
-        Energies in the unit of the target.
-    compression : Compression
-        Compression of the model's targets.
-    null_bins : tuple of int
-        Bins that are ignored.
+    ``compression`` is that of the model's targets; ``null_bins`` are ignored.
     """
     if estimate.shape != target.shape:
         raise Sd2Error(f"The maps are of shape {estimate.shape} and {target.shape}", "the same")
@@ -199,14 +159,8 @@ def stands_out(
     noise, and its velocity says nothing. The noise is the median of all cells of the
     take, which holds as long as movement fills less than half of them.
 
-    Parameters
-    ----------
-    energies : float array, shape (frames, bins)
-        Energies of one take.
-    null_bins : tuple of int
-        Bins that are ignored.
-    factor : float
-        Least ratio of energies above the noise; 10 is 10 dB.
+    ``energies``, (frames, bins), are those of one take; ``null_bins`` are ignored; ``factor`` is
+    the least ratio of energies above the noise (10 is 10 dB).
     """
     counted = np.delete(energies, list(null_bins), axis=1)
     if not counted.size:

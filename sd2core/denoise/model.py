@@ -16,25 +16,11 @@ class Denoiser(nn.Module):
 
     A causal subclass implements :meth:`chunk` and :meth:`initial_state`, another one
     :meth:`forward`.
-
-    Parameters
-    ----------
-    bins : int
-        Velocity bins.
-
-    Attributes
-    ----------
-    causal : bool
-        True if a frame depends on itself and earlier frames only.
-    window : int or None
-        Frames that it looks at together; None for any length.
-    longest : int
-        Frames that are computed at once in use; longer clips in pieces.
     """
 
-    causal: bool = True
-    window: int | None = None
-    longest: int = 8192
+    causal: bool = True  # True if a frame depends on itself and earlier frames only.
+    window: int | None = None  # Frames that it looks at together; None for any length.
+    longest: int = 8192  # Frames that are computed at once in use; longer clips in pieces.
 
     def __init__(self, bins: int) -> None:
         super().__init__()

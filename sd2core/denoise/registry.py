@@ -99,15 +99,8 @@ _LARGEST = 4096
 def options(name: str, match: Match = "parameters") -> dict[str, Any]:
     """Default options of a model.
 
-    Parameters
-    ----------
-    match : {"parameters", "time"}
-        Comparable to the S4 in the number of parameters, or in the time of a training step.
-
-    Raises
-    ------
-    Sd2Error
-        When there is no such model.
+    ``match`` makes it comparable to the S4 in the number of parameters, or in the time of a
+    training step. Raises Sd2Error when there is no such model.
     """
     entry = _entry(name)
     return {**entry.options, **(entry.same_time if match == "time" else {})}
@@ -119,21 +112,10 @@ def summary(name: str) -> str:
 
 
 def build(name: str, bins: int = 32, **given: Any) -> Denoiser:
-    """Create a model with fresh weights.
+    """Create a model of :data:`MODELS` or :data:`FILTERS` with fresh weights.
 
-    Parameters
-    ----------
-    name : str
-        One of :data:`MODELS` or :data:`FILTERS`.
-    bins : int
-        Velocity bins.
-    **given
-        Options in place of :func:`options`.
-
-    Raises
-    ------
-    Sd2Error
-        When there is no such model or option, or an option is not of its kind.
+    Options that are not given come from :func:`options`. Raises Sd2Error when there is no such
+    model or option, or an option is not of its kind.
     """
     entry = _entry(name)
     for option, value in given.items():
@@ -152,12 +134,7 @@ def fit_filter(
 ) -> tuple[Denoiser, dict[str, Any]]:
     """Fit one of :data:`FILTERS`; returns it and its options.
 
-    Parameters
-    ----------
-    inputs, targets : sequence of float32 arrays, shape (frames, bins)
-        Compressed values of the takes to learn from.
-    null_bins : sequence of int
-        Bins that do not count.
+    Inputs and targets are compressed, (frames, bins), one per take. ``null_bins`` do not count.
     """
     from sd2core.denoise import filters
 

@@ -110,12 +110,7 @@ def clips(
 ) -> list[tuple[int, int]]:
     """Half-open runs of marked frames between which no time is missing.
 
-    Parameters
-    ----------
-    times_s : float64 array, shape (frames,)
-    there : bool array, shape (frames,)
-    frame_rate_hz : float
-        Frame rate of the model.
+    ``frame_rate_hz`` is that of the model.
     """
     longest_s = _BREAK_FRAMES * max(Timebase(times_s).frame_duration_s, 1 / frame_rate_hz)
     breaks = np.flatnonzero(np.diff(times_s) > longest_s) + 1

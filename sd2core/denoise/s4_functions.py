@@ -82,15 +82,8 @@ def vandermonde_product(poles: Tensor, weights: Tensor, length: int) -> Tensor:
     zˡ = zⁱ (zᵐ)ʲ: some 2√L powers (baby steps i and giant steps j) and one real matrix product do
     the same.
 
-    Parameters
-    ----------
-    poles : (H, n) complex128
-    weights : (H, q, n) complex128
-        q sums share the powers of their poles.
-
-    Returns
-    -------
-    (H, q, length) float64
+    Poles, (H, n), are shared by q sums with the weights (H, q, n), both complex128; the result is
+    (H, q, length) float64.
     """
     sums: Tensor = _VandermondeProduct.apply(poles, weights, length)
     return sums
@@ -232,16 +225,8 @@ def woodbury_quotient(series: Tensor, points: int, radius: float) -> Tensor:
     division itself is harmless when d is positive real (Re d ≥ 0 for |z| ≤ 1), as it is when the
     loop comes from P (…)⁻¹ P*: then |1 + (1 + z) d| has no zero there.
 
-    Parameters
-    ----------
-    series : (H, 4, L) float64
-        a, b, c, d, already damped: term l times radiusˡ.
-    points, radius
-        From `damping_circle`.
-
-    Returns
-    -------
-    (H, L) float64, not damped.
+    ``series``, (H, 4, L) float64, holds a, b, c, d already damped: term l times radiusˡ. Points and
+    radius are those of `damping_circle`. The result, (H, L) float64, is not damped.
     """
     closed: Tensor = _WoodburyQuotient.apply(series, points, radius)
     return closed
@@ -324,14 +309,7 @@ def causal_convolution(signal: Tensor, kernel: Tensor) -> Tensor:
 
     y[h, b, t] = Σ kernel[h, l] signal[h, b, t − l] for l = 0 … t.
 
-    Parameters
-    ----------
-    signal : (H, B, L) float32 or float64
-    kernel : (H, L), of the same type
-
-    Returns
-    -------
-    (H, B, L)
+    The signal and the result are (H, B, L), the kernel (H, L), all float32 or all float64.
     """
     _, signals, length = signal.shape
     short = length < _LONGEST_PRODUCT and signals >= _FEWEST_SIGNALS
@@ -410,13 +388,8 @@ def mix_gated(
     Residual + a · sigmoid(b), where (a, b) = weight · gelu(signal) + bias. One step of autograd
     instead of six, and no copy made only to be differentiated.
 
-    Parameters
-    ----------
-    signal, residual : (H, …), contiguous
-    weight : (2H, H)
-    bias : (2H,)
-    share : broadcast to signal, optional
-        Multiplies what the activation lets through (dropout).
+    Signal and residual are (H, …) and contiguous, the weight (2H, H), the bias (2H,). ``share``,
+    broadcast to the signal, multiplies what the activation lets through (dropout).
     """
     mixed: Tensor = _MixGated.apply(signal, residual, weight, bias, share)
     return mixed

@@ -28,16 +28,11 @@ from sd2core.errors import Sd2Error
 
 
 def legs_matrices(state_size: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """HiPPO-LegS in its own (dense, real) basis: x′ = A x + B u.
+    """HiPPO-LegS in its own (dense, real) basis: x′ = A x + B u; A is (N, N), B is (N,).
 
     A[n, k] = −√((2n + 1)(2k + 1)) below the diagonal, −(n + 1) on it and 0 above, and
     B[n] = √(2n + 1). The SD² paper prints A without its minus sign; that system has eigenvalues
     1 … N instead of −1 … −N, and its kernel grows past 1e48.
-
-    Returns
-    -------
-    A : (N, N) float64
-    B : (N,) float64
     """
     order = np.arange(state_size)
     root = np.sqrt(2 * order + 1.0)
@@ -47,25 +42,15 @@ def legs_matrices(state_size: int) -> tuple[NDArray[np.float64], NDArray[np.floa
 
 @dataclass(frozen=True, eq=False)
 class NPLR:
-    """Normal-plus-low-rank form A = V (Λ − p pᵀ) V*, one of each conjugate pair of Λ kept.
+    """Normal-plus-low-rank form A = V (Λ − p pᵀ) V*, one of each conjugate pair of Λ kept."""
 
-    Attributes
-    ----------
-    poles : (N/2,) complex128
-        Λ: every real part is −1/2, imaginary parts positive and ascending.
-    low_rank : (N/2,) float64
-        p = V* P with P[n] = √(n + 1/2). The phases of V are chosen so that it is real and
-        positive, which makes the form unique.
-    inputs : (N/2,) complex128
-        V* B, which is √2 p.
-    basis : (N, N/2) complex128
-        The columns of V that belong to `poles`; orthonormal.
-    """
-
+    # Λ, (N/2,): every real part is −1/2, imaginary parts positive and ascending.
     poles: NDArray[np.complex128]
+    # p = V* P, (N/2,), with P[n] = √(n + 1/2). The phases of V are chosen so that it is real and
+    # positive, which makes the form unique.
     low_rank: NDArray[np.float64]
-    inputs: NDArray[np.complex128]
-    basis: NDArray[np.complex128]
+    inputs: NDArray[np.complex128]  # V* B, (N/2,), which is √2 p.
+    basis: NDArray[np.complex128]  # Columns of V that belong to `poles`, (N, N/2); orthonormal.
 
 
 @lru_cache(maxsize=16)
@@ -115,21 +100,11 @@ def _orthonormal_with_conjugates(vectors: NDArray[np.complex128]) -> NDArray[np.
 
 
 class StateMatrix(NamedTuple):
-    """A = V (Λ − p pᵀ) V* and V* B; of every conjugate pair one is kept.
+    """A = V (Λ − p pᵀ) V* and V* B, all (…, N/2); of every conjugate pair one is kept."""
 
-    Attributes
-    ----------
-    poles : (…, N/2) complex
-        Λ, real parts negative.
-    low_rank : (…, N/2) real
-        p. Any p can be made real by turning the phases of the basis.
-    inputs : (…, N/2) complex
-        V* B.
-    """
-
-    poles: Tensor
-    low_rank: Tensor
-    inputs: Tensor
+    poles: Tensor  # Λ, complex, real parts negative.
+    low_rank: Tensor  # p, real. Any p can be made real by turning the phases of the basis.
+    inputs: Tensor  # V* B, complex.
 
 
 def legs_state_matrix(state_size: int, device: torch.device | str | None = None) -> StateMatrix:
@@ -240,15 +215,8 @@ def diagonal_kernel(A: Tensor, B: Tensor, C: Tensor, dt: Tensor | float, length:
     Ā = exp(Δ A), B̄ = (exp(Δ A) − 1) / A · B (Gu et al. 2022, S4D: zero-order hold), whose
     limit Δ B is taken at A → 0.
 
-    Parameters
-    ----------
-    A, B, C : (H, N/2) or (N/2,) complex64 or complex128
-        One of each conjugate pair, hence the 2 Re. Re A ≤ 0.
-    dt : (H,) or () float
-
-    Returns
-    -------
-    (H, length) or (length,) float32 or float64, by the type of C.
+    A, B and C, (H, N/2) or (N/2,), hold one of each conjugate pair, hence the 2 Re; Re A ≤ 0. The
+    result is (H, length) or (length,), float32 or float64 by the type of C.
     """
     check_length(length)
     precision = C.real.dtype

@@ -210,20 +210,9 @@ class S4Layer(nn.Module):
     mixing is a gated linear unit over channels. So nothing but the state space looks at other
     frames, and a stack of such layers can run live.
 
-    Parameters
-    ----------
-    channels : int
-        H.
-    state_size : int
-        N, even.
-    kernel : {"legs", "diagonal"}
-    bidirectional : bool
-        A second kernel looks ahead; such a layer cannot run live.
-    dropout : float
-        Share of channels that a training step leaves out, the same ones for all frames.
-    dt_min, dt_max : float
-        Range of the state spaces' first steps, see
-        :class:`~sd2core.denoise.s4_layer.StateSpace`.
+    With ``bidirectional`` a second kernel looks ahead; such a layer cannot run live. ``dropout`` is
+    the share of channels that a training step leaves out, the same ones for all frames. The other
+    arguments are those of :class:`StateSpace`.
     """
 
     def __init__(

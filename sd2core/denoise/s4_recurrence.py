@@ -23,25 +23,15 @@ class Recurrence(NamedTuple):
 
     y = x·w + D u, x′ = Λ̄ x + (u, −x·s) (B̄, q).
 
-    Everything is real, pairs (Re, Im) interleaved; N is twice the number of pairs and k is 2 for
-    a system with a loop, otherwise 1.
-
-    Attributes
-    ----------
-    poles : (H, 1, N/2) complex128
-        Λ̄, the diagonal of Ā.
-    watch : (H, N, k) float64
-        w, what the state adds to this output (C Ā), and −s, what it feeds around the loop.
-    drive : (H, k, N) float64
-        B̄ and q.
-    direct : (H, 1) float64
-        D and what passes the state at once, C B̄.
+    Everything but the poles is real, pairs (Re, Im) interleaved; N is twice the number of pairs and
+    k is 2 for a system with a loop, otherwise 1.
     """
 
-    poles: Tensor
+    poles: Tensor  # Λ̄, the diagonal of Ā; (H, 1, N/2) complex128.
+    # w, what the state adds to this output (C Ā), and −s, what it feeds around the loop; (H, N, k).
     watch: Tensor
-    drive: Tensor
-    direct: Tensor
+    drive: Tensor  # B̄ and q; (H, k, N).
+    direct: Tensor  # D and what passes the state at once, C B̄; (H, 1).
 
     def initial_state(self, batch: int) -> Tensor:
         """Zero state, (H, batch, N) float64."""
@@ -60,24 +50,12 @@ class Recurrence(NamedTuple):
 
 
 class Block(NamedTuple):
-    """Recurrence that advances by `BLOCK` frames at once.
+    """Recurrence that advances by `BLOCK` frames at once."""
 
-    Attributes
-    ----------
-    response : (H, m, m)
-        [j, l]: input j on output l.
-    watch : (H, N, m)
-        State on outputs.
-    drive : (H, m, N)
-        Inputs on the state after the block.
-    across : (H, N, N)
-        State on the state after the block.
-    """
-
-    response: Tensor
-    watch: Tensor
-    drive: Tensor
-    across: Tensor
+    response: Tensor  # [j, l]: input j on output l; (H, m, m).
+    watch: Tensor  # State on outputs; (H, N, m).
+    drive: Tensor  # Inputs on the state after the block; (H, m, N).
+    across: Tensor  # State on the state after the block; (H, N, N).
 
     def run(self, signal: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
         """Advance by whole blocks: (H, B, n m) and (H, B, N) → (H, B, n m), next state; float64.

@@ -25,18 +25,10 @@ EXPONENT = 0.5
 
 @dataclass(frozen=True)
 class Compression:
-    """Compression of energies, y = (x / reference)^exponent, and its inverse.
+    """Compression of energies, y = (x / reference)^exponent, and its inverse."""
 
-    Parameters
-    ----------
-    reference : float
-        Energy that becomes 1.
-    exponent : float
-        Above 0, up to 1. 1/2 turns power into amplitude.
-    """
-
-    reference: float
-    exponent: float = EXPONENT
+    reference: float  # Energy that becomes 1.
+    exponent: float = EXPONENT  # Above 0, up to 1. 1/2 turns power into amplitude.
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.reference) and self.reference > 0):
@@ -57,17 +49,8 @@ class Compression:
         amplitude (p = 1/2) is the mean energy. So an error of 1 on compressed values is
         that of an empty result.
 
-        Parameters
-        ----------
-        stretches : iterable of float arrays, shape (frames, bins)
-            Energies of the training data.
-        null_bins : sequence of int
-            Bins that are always zero, which are ignored.
-
-        Raises
-        ------
-        Sd2Error
-            When there is no energy at all.
+        ``stretches`` are energies of the training data, (frames, bins); ``null_bins``, which are
+        always zero, are ignored. Raises Sd2Error when there is no energy at all.
         """
         total, cells = 0.0, 0
         for values in stretches:
@@ -131,10 +114,7 @@ class Scaling:
     def from_json(cls, content: dict[str, Any]) -> Scaling:
         """Scaling from the content of :meth:`to_json`.
 
-        Raises
-        ------
-        KeyError, TypeError, ValueError, Sd2Error
-            For other content.
+        Raises KeyError, TypeError, ValueError or Sd2Error for other content.
         """
         if content["law"] != "power":
             raise ValueError(f"scaling law {content['law']!r}")

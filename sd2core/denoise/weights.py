@@ -26,11 +26,8 @@ _LONGEST_HEADER = 4 << 20
 def write_weights(path: Path, network: nn.Module, description: Mapping[str, Any]) -> None:
     """Write one file, in one step.
 
-    Raises
-    ------
-    Sd2Error
-        When the name does not end in ``.safetensors``, or the description holds what JSON
-        cannot.
+    Raises Sd2Error when the name does not end in ``.safetensors``, or the description holds what
+    JSON cannot.
     """
     from safetensors.torch import save
 
@@ -53,15 +50,8 @@ def write_weights(path: Path, network: nn.Module, description: Mapping[str, Any]
 def read_header(path: Path, expected: str) -> tuple[dict[str, Any], Shapes]:
     """Read description and shapes; the weights stay on disk, and torch is not needed.
 
-    Parameters
-    ----------
-    expected : str
-        Kind of file that is expected, for messages.
-
-    Raises
-    ------
-    Sd2Error
-        When it is missing, damaged, cut short or of another program.
+    ``expected`` names the kind of file in messages. Raises Sd2Error when the file is missing,
+    damaged, cut short or of another program.
     """
     try:
         with path.open("rb") as stream:
@@ -104,10 +94,7 @@ def read_header(path: Path, expected: str) -> tuple[dict[str, Any], Shapes]:
 def format_of(path: Path) -> str:
     """Format named in a model file, or an empty string.
 
-    Raises
-    ------
-    Sd2Error
-        When it is no model file.
+    Raises Sd2Error when it is no model file.
     """
     return str(read_header(path, "a model file (.safetensors)")[0].get("format", ""))
 
@@ -115,17 +102,8 @@ def format_of(path: Path) -> str:
 def read_weights(path: Path, network: nn.Module, name: str, shapes: Shapes, expected: str) -> None:
     """Load the weights of a file into a network that was built from its description.
 
-    Parameters
-    ----------
-    name : str
-        Name of the model in the file.
-    shapes : mapping
-        Shapes from :func:`read_header`.
-
-    Raises
-    ------
-    Sd2Error
-        If they are of another network, or are no finite numbers.
+    ``name`` is the model's name in the file; ``shapes`` come from :func:`read_header`. Raises
+    Sd2Error if they are of another network, or are not finite.
     """
     import torch
     from safetensors import SafetensorError

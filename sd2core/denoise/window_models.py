@@ -157,10 +157,7 @@ class SwinDenoiser(Denoiser):
 class WindowBlock(nn.Module):
     """Attention within windows, then a perceptron, both with a residual connection.
 
-    Parameters
-    ----------
-    shifted : bool
-        True to move windows by half their size, so that neighbours meet.
+    ``shifted`` moves the windows by half their size, so that neighbours meet.
     """
 
     def __init__(self, channels: int, shifted: bool, dropout: float) -> None:
