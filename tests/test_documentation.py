@@ -16,7 +16,7 @@ REPOSITORY = Path(__file__).resolve().parent.parent
 DOCUMENTS = [
     REPOSITORY / name
     for name in ("README.md", "CONTRIBUTING.md", "resources/README.md", "tools/README.md")
-] + sorted((REPOSITORY / "docs").glob("*.md"))
+] + sorted((REPOSITORY / "docs").rglob("*.md"))
 
 
 def command_lines() -> Iterator[str]:
