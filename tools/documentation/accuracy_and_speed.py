@@ -42,7 +42,7 @@ make accuracy
 ```
 
 on {machine}. Running it again gives other times, and nearly the same errors. What the settings are
-is [decision 14](decisions/0014-the-ladder.md); `sd2 ladder MESH` and the Trade panel measure the
+is [decision 14](decisions/0014-the-ladder.md); `sd2 ladder MESH` and the Accuracy panel measure the
 same on a scene of one's own.
 
 **L1** is the sum of the absolute differences between a map and the reference, over the sum of the

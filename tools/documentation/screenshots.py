@@ -45,7 +45,7 @@ def far_in_the_dark(window: MainWindow) -> None:
 
 
 def trade(window: MainWindow) -> None:
-    """The Trade panel on the sample, measured, for a tolerance of 2 %."""
+    """The Accuracy panel on the sample, measured, for a tolerance of 2 %."""
     window.resize(1280, 960)
     window.session.playback.seek(1.9)
     window.features.accuracy.model.set_tolerance(0.02)
