@@ -26,27 +26,16 @@ from sd2core.scattering.visibility import facing_mask
 
 @dataclass(frozen=True, eq=False)
 class Scatterers:
-    """Visibility and weights of the vertices in some frames; all vertices count by default.
-
-    Parameters
-    ----------
-    normals : int8 array, shape (n, 3, V), or None
-        Only vertices whose normal faces the sensor count.
-    mask : uint8 array, shape (n, V), or None
-        Only marked vertices count.
-    areas : float32 array, shape (n, V), or None
-        A vertex counts by its area in m².
-    area_vectors : float32 array, shape (n, 3, V), or None
-        A vertex counts by the area in m² that it turns towards the sensor.
-    vertex_counts : float32 array, shape (V,), or None
-        Number of vertices that each stands for; None: itself only.
-    """
+    """Visibility and weights of the V vertices in n frames; all vertices count by default."""
 
     normals: NDArray[np.int8] | None = None
-    mask: NDArray[np.uint8] | None = None
-    areas: NDArray[np.float32] | None = None
+    """Shape (n, 3, V): only vertices whose normal faces the sensor count."""
+    mask: NDArray[np.uint8] | None = None  # (n, V): only marked ones count
+    areas: NDArray[np.float32] | None = None  # (n, V) in m²: a vertex counts by its area
     area_vectors: NDArray[np.float32] | None = None
+    """Shape (n, 3, V): a vertex counts by the area in m² that it turns towards the sensor."""
     vertex_counts: NDArray[np.float32] | None = None
+    """Shape (V,): number of vertices that each stands for; None: itself only."""
 
     def seen(
         self, row: int, points: NDArray[Any], sensor: NDArray[np.float64]
@@ -87,25 +76,17 @@ class Scatterers:
 
 @dataclass(frozen=True, eq=False)
 class Frames:
-    """Consecutive prepared frames, as the kernels take them.
-
-    Parameters
-    ----------
-    positions : float32 or float64 array, shape (knots, 3, V)
-        Relative to the clip's origin; velocities have their precision.
-    centre : int64 array, shape (n,)
-        Knot of every frame.
-    before, after : int64 array, shape (n, samples)
-        Knots between which each velocity sample of a frame is measured.
-    duration_s : float64 array, shape (n, samples)
-        Time between the two; 0 where there is nothing to measure.
-    """
+    """Consecutive prepared frames, as the kernels take them."""
 
     positions: NDArray[Any]
-    centre: NDArray[np.int64]
+    """Shape (knots, 3, V), float32 or float64, relative to the clip's origin; velocities have
+    their precision."""
+    centre: NDArray[np.int64]  # (n,): knot of every frame
     before: NDArray[np.int64]
+    """Knots, shape (n, samples), between which each velocity sample of a frame is measured."""
     after: NDArray[np.int64]
     duration_s: NDArray[np.float64]
+    """Time between the two, (n, samples); 0 where there is nothing to measure."""
 
     def __len__(self) -> int:
         return len(self.centre)
@@ -123,17 +104,11 @@ class Frames:
 
 @dataclass(frozen=True)
 class Counting:
-    """Velocity axis and range law of the counting.
-
-    Parameters
-    ----------
-    beyond : int
-        DROP, WRAP or CLIP.
-    """
+    """Velocity axis and range law of the counting."""
 
     bins: int
     v_max_mps: float
-    beyond: int
+    beyond: int  # DROP, WRAP or CLIP
     range_exponent: float
     reference_range_m: float
 
@@ -146,20 +121,13 @@ class Counting:
 
 @dataclass(frozen=True, eq=False)
 class Counts:
-    """Result of counting some frames.
-
-    Parameters
-    ----------
-    histogram : float64 array, shape (n, bins)
-        Vertices, or their weights, per bin; the mean over a frame's samples.
-    visible, beyond : float64 array, shape (n,)
-        Number of visible vertices, and of those beyond the axis; a vertex that
-        stands for several counts as many.
-    """
+    """Result of counting some frames."""
 
     histogram: NDArray[np.float64]
+    """Vertices, or their weights, per bin, shape (n, bins); the mean over a frame's samples."""
     visible: NDArray[np.float64]
-    beyond: NDArray[np.float64]
+    """Number of visible vertices, shape (n,); a vertex that stands for several counts as many."""
+    beyond: NDArray[np.float64]  # those of them beyond the axis
 
     @classmethod
     def empty(cls, frames: int, bins: int) -> Counts:
@@ -172,24 +140,14 @@ class Counts:
 
 
 def relative_range(positions: NDArray[Any], sensor: NDArray[np.float64]) -> NDArray[Any]:
-    """Range of each vertex less the sensor's distance from the clip's origin.
+    """Range (V,) of each vertex less the sensor's distance from the clip's origin.
 
     |p − s| − |s| = p·(p − 2s) / (|p − s| + |s|). The differences between vertices and knots
     stay at the body's own scale, so the difference of two is the exact change of range of
-    :func:`radial_velocity` however far the sensor is, with one range per vertex and knot. Its
-    rounding error is a few roundings of the largest coordinate
-    (:func:`sd2core.numerics.precision.velocity_error_mps`).
-
-    Parameters
-    ----------
-    positions : float32 or float64 array, shape (3, V)
-        Relative to the clip's origin.
-    sensor : float64 array, shape (3,)
-
-    Returns
-    -------
-    float array, shape (V,)
-        In the precision of the positions.
+    :func:`radial_velocity` however far the sensor is, with one range per vertex and knot.
+    Its rounding error is a few roundings of the largest coordinate
+    (:func:`sd2core.numerics.precision.velocity_error_mps`). Positions (3, V) are relative
+    to the clip's origin; the result has their precision.
     """
     x, y, z = positions
     sx, sy, sz = place = sensor.astype(positions.dtype)
@@ -261,16 +219,9 @@ def count(
     scatterers: Scatterers,
     into: Counts,
 ) -> None:
-    """Count some frames, compiled.
+    """Count some frames, compiled; ``into`` has as many frames and is zero at first.
 
-    Parameters
-    ----------
-    sensor : float64 array, shape (3,)
-        In the frame of the positions.
-    scatterers : Scatterers
-        Of the same frames.
-    into : Counts
-        Of as many frames; zero at first.
+    The sensor is in the frame of the positions.
     """
     normals, mask, areas = scatterers.normals, scatterers.mask, scatterers.areas
     vectors, heads = scatterers.area_vectors, scatterers.vertex_counts
@@ -310,16 +261,10 @@ _NO_HEADS = np.empty(0, np.float32)
 def mark_needed(
     frames: Frames, sensor: NDArray[np.float64], counting: Counting, live: NDArray[np.uint8]
 ) -> NDArray[np.uint8]:
-    """Mark the vertices whose visibility can change the histogram, compiled.
+    """Mark the vertices (n, V) whose visibility can change the histogram, compiled.
 
-    Parameters
-    ----------
-    live : uint8 array, shape (bins + 1,)
-        1 for bins that are kept; the last entry is for velocities beyond the axis.
-
-    Returns
-    -------
-    uint8 array, shape (n, V)
+    ``live`` (bins + 1,) is 1 for bins that are kept; its last entry is for velocities
+    beyond the axis.
     """
     needed = np.zeros((len(frames), frames.positions.shape[2]), np.uint8)
     needed_kernel(

@@ -49,12 +49,8 @@ class _BlockMask:
 class VisibilityMasks:
     """Visibility of a mesh from any place; masks are kept in the mesh's byte budget.
 
-    Calls may come from several threads. All visibility but none needs faces.
-
-    Parameters
-    ----------
-    counting : Counting
-        Determines the vertices that cannot change the map.
+    Calls may come from several threads. All visibility but none needs faces. ``counting``
+    determines the vertices that cannot change the map.
     """
 
     def __init__(self, prepared: PreparedMesh, counting: Counting) -> None:
@@ -77,14 +73,10 @@ class VisibilityMasks:
     def for_rows(
         self, block: Block, rows: slice, position_m: Position, visibility: Visibility
     ) -> tuple[NDArray[np.uint8] | None, Quality]:
-        """Mask for counting some of a block's frames, and the visibility that was used.
+        """Mask (n, V) for counting some of a block's frames, and the visibility that was used.
 
-        Returns
-        -------
-        mask : uint8 array, shape (n, V), or None
-            None for ``none`` and ``facing``, which counting tests by itself.
-        quality : {"none", "facing", "depth", "frozen", "exact"}
-            ``facing`` for ``frozen`` if no mask is kept.
+        The mask is None for ``none`` and ``facing``, which counting tests by itself.
+        Visibility is ``facing`` for ``frozen`` if no mask is kept.
         """
         if visibility == "exact" or visibility == "depth":
             return self._worked_out(block, rows, position_m, visibility), visibility

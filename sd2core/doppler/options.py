@@ -179,20 +179,10 @@ Examples
 def chosen_options(
     preset: str, bins: int | None, v_max_mps: float | None, given: Mapping[str, Any]
 ) -> SynthesisOptions:
-    """Preset with some options replaced.
+    """Preset with some options replaced, ``given`` by name.
 
-    Parameters
-    ----------
-    bins, v_max_mps : optional
-        Velocity axis. On another axis than the preset's the same velocities are nulled, unless
-        ``null_bins`` is given.
-    given : mapping
-        Other options by name.
-
-    Raises
-    ------
-    Sd2Error
-        For values that are not allowed.
+    On another axis than the preset's the same velocities are nulled, unless ``null_bins``
+    is given. Raises Sd2Error for values that are not allowed.
     """
     base = PRESETS[preset]
     axis = VelocityAxis(bins or base.axis.bins, v_max_mps or base.axis.v_max_mps)

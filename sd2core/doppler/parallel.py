@@ -28,13 +28,7 @@ class Ticket:
         self._lock = threading.Lock()
 
     def advance(self, amount: int) -> None:
-        """Report an amount of work as done.
-
-        Raises
-        ------
-        Cancelled
-            When the result is no longer wanted.
-        """
+        """Report an amount of work as done. Raises Cancelled if the result is no longer wanted."""
         if self._stopped.is_set():
             raise Cancelled
         with self._lock:
@@ -62,25 +56,13 @@ def run_jobs(
     progress: Progress,
     threads: int | None = None,
 ) -> float:
-    """Run all jobs and wait until they are done.
+    """Run all jobs, wait until they are done, and return their processor time in seconds.
 
-    ``progress`` is called in the calling thread, at least every 30 ms. When it
-    raises, or a job does, the others stop at their next report before the
-    exception goes on.
-
-    Parameters
-    ----------
-    total : int
-        Amount of work in all jobs.
-    threads : int, optional
-        Number of jobs that may run at once; by default as many as there are cores. 1 runs
-        them one after the other in the calling thread.
-
-    Returns
-    -------
-    float
-        Seconds of processor time of all threads together, which other programs on this machine
-        do not change.
+    ``progress`` is called in the calling thread, at least every 30 ms. When it raises, or a
+    job does, the others stop at their next report before the exception goes on. ``total``
+    is the amount of work in all jobs. By default there is a thread per core; 1 runs them
+    one after the other in the calling thread. The time is that of all threads together,
+    which other programs on this machine do not change.
     """
     progress(0, total)
     if threads == 1:

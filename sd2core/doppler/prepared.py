@@ -78,38 +78,25 @@ class ByteBudget:
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Prepared frames ``start`` to ``stop`` of a clip.
-
-    Parameters
-    ----------
-    first_knot : int
-        Number, in the whole clip, of the first knot in ``frames.positions``.
-    """
+    """Prepared frames ``start`` to ``stop`` of a clip."""
 
     index: int
     start: int
     stop: int
     frames: Frames
     first_knot: int
+    """Number, in the whole clip, of the first knot in ``frames.positions``."""
 
 
 @dataclass(eq=False)
 class PreparedMesh:
-    """Mesh as the kernels take it, block by block.
-
-    Attributes
-    ----------
-    origin_m : float64 array, shape (3,)
-        Origin of the prepared positions.
-    reach_m : float
-        Largest coordinate in the first frame.
-    """
+    """Mesh as the kernels take it, block by block."""
 
     mesh: MeshSequence
     options: SynthesisOptions
     budget: ByteBudget
-    reach_m: float = field(init=False)
-    origin_m: NDArray[np.float64] = field(init=False)
+    reach_m: float = field(init=False)  # largest coordinate in the first frame
+    origin_m: NDArray[np.float64] = field(init=False)  # of the prepared positions
 
     def __post_init__(self) -> None:
         self._reading = threading.Lock()

@@ -1,7 +1,7 @@
-"""The histogram in double precision, plainly: the truth that faster ways are measured by.
+"""Plain histogram in double precision: the truth that faster methods are measured by.
 
-Positions are the mesh's own, velocities and weights are worked out with NumPy, and
-every vertex is tested for occlusion. Nothing is shared with the compiled counting but the exact
+Positions are the mesh's own, velocities and weights are computed with NumPy, and every
+vertex is tested for occlusion. Nothing is shared with the compiled counting but the exact
 visibility, which decides in double precision.
 """
 
@@ -26,27 +26,16 @@ from sd2core.sensor import VirtualSensor
 def reference_stretch(
     mesh: MeshSequence, sensor: VirtualSensor, options: SynthesisOptions, start: int, stop: int
 ) -> NDArray[np.float64]:
-    """What ``Synthesizer.stretch`` gives as ``raw``, in double precision, always exact.
+    """Reference for ``Synthesizer.stretch(...).raw``: shares (bins, n) in double precision.
 
-    The two differ by the vertices within single precision of an edge between two
-    bins, which a velocity is right to: 7e-7 m per metre of a vertex's distance from
-    the middle of the first frame, over the time between the two knots that it is
-    measured between. Weights differ by 1e-6 of themselves.
+    The two differ by the vertices within single precision of an edge between two bins,
+    which a velocity is right to: 7e-7 m per metre of a vertex's distance from the middle of
+    the first frame, over the time between the two knots that it is measured between.
+    Weights differ by 1e-6 of themselves.
 
-    Parameters
-    ----------
-    mesh : MeshSequence
-        Without faces all vertices count: there is nothing to hide them.
-    sensor : VirtualSensor
-    options : SynthesisOptions
-        Visibility, its resolution and stride are not used, nor is the smoothing.
-    start, stop : int
-        Frames, half-open.
-
-    Returns
-    -------
-    float64 array, shape (bins, stop - start)
-        Shares, with nulled bins emptied.
+    Visibility is always exact: that of the options, its resolution and stride are not used,
+    nor is the smoothing. Without faces all vertices count. Frames are half-open; nulled
+    bins are emptied.
     """
     place = np.asarray(sensor.position_m, np.float64)
     first = mesh.frame(0).astype(np.float64)
@@ -75,10 +64,8 @@ def reference_velocities(
 ) -> NDArray[np.float64]:
     """Velocity of every vertex at each of a frame's moments, in double precision.
 
-    Returns
-    -------
-    float64 array, shape (moments, V)
-        m/s, positive when approaching; only moments that lie within the clip.
+    Shape (moments, V), m/s, positive when approaching; only moments that lie within the
+    clip.
     """
     return _at_frame(mesh, np.asarray(sensor.position_m, np.float64), options, frame)[0]
 
@@ -148,7 +135,7 @@ def _weights(
     points: NDArray[np.float64],
     place: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], float]:
-    """What each vertex counts before the range law, and what the map is a share of."""
+    """Weight of each vertex before the range law, and the total that the map is a share of."""
     if options.weight == "count" or mesh.faces is None:
         heads = np.ones(points.shape[1])
         if mesh.vertex_counts is not None:

@@ -28,21 +28,10 @@ def smooth(
 ) -> NDArray[np.float64]:
     """Smooth frames ``start`` to ``stop`` of a map along velocity and time.
 
-    Parameters
-    ----------
-    raw : float64 array, shape (bins, n)
-        Columns of the frames that :func:`frames_within_reach` names, from frame
-        ``first`` on, with nulled bins emptied.
-    times_s : float64 array, shape (T,)
-        Times of all frames.
-    options : SynthesisOptions
-        Names the widths, and the bins that are emptied again afterwards.
-    presence : Presence, optional
-        Of all frames. Nothing is smoothed across frames without a person.
-
-    Returns
-    -------
-    float64 array, shape (bins, stop - start)
+    ``raw`` (bins, n) holds the frames that :func:`frames_within_reach` names, from frame
+    ``first`` on, with nulled bins emptied. Times and presence are of all frames; nothing is
+    smoothed across frames without a person. The options name the widths, and the bins that
+    are emptied again afterwards.
     """
     values = velocity_kernel(options.axis.bins, options.velocity_sigma_bins) @ raw
     values = smooth_time(values, times_s, first, start, stop, options.time_sigma_s, presence)
@@ -86,20 +75,9 @@ def smooth_time(
 ) -> NDArray[np.float64]:
     """Gaussian mean over real times for frames ``start`` to ``stop``.
 
-    Parameters
-    ----------
-    values : float64 array, shape (bins, n)
-        Columns of the frames that :func:`frames_within_reach` names, from
-        frame ``first`` on.
-    times_s : float64 array, shape (T,)
-        Times of all frames, so that the result does not depend on how a
-        recording is cut.
-    presence : Presence, optional
-        Of all frames. The mean does not cross frames without a person.
-
-    Returns
-    -------
-    float64 array, shape (bins, stop - start)
+    ``values`` (bins, n) holds the frames that :func:`frames_within_reach` names, from frame
+    ``first`` on. Times and presence are of all frames, so that the result does not depend
+    on how a recording is cut; the mean does not cross frames without a person.
     """
     frames = np.arange(start, stop)
     if sigma_s == 0:

@@ -46,7 +46,6 @@ def velocities(
         Frames wanted.
     frame_count : int
         Length of the recording, where the zero padding begins.
-    sensor : float64 array, shape (3,)
     presence : Presence, optional
         Of all frames of the recording. Frames without a person cut it into recordings of
         their own.
@@ -107,12 +106,9 @@ def count(
     scatterers: Scatterers,
     into: Counts,
 ) -> None:
-    """Count some frames by these velocities, as :func:`histogram.count` does.
+    """Count some frames by these velocities (n, V), as :func:`histogram.count` does.
 
-    Parameters
-    ----------
-    velocity_mps : float64 array, shape (n, V)
-    edges_mps : float64 array, shape (bins + 1,)
+    The edges of the bins are of shape (bins + 1,).
     """
     heads = scatterers.heads(frames.positions.shape[2])
     numbers, beyond = place_in_bins(velocity_mps, edges_mps, counting)

@@ -21,21 +21,12 @@ _FASTEST_SHARE = 0.01
 
 @dataclass(frozen=True, eq=False)
 class SensorCoverage:
-    """Distances and velocities of the body as seen from each of N sensors.
+    """Distances and velocities of the body as seen from each of N sensors."""
 
-    Parameters
-    ----------
-    inside : bool array, shape (N,)
-        True if the sensor stands in the box around the body at some time.
-    farthest_m : array, shape (N,)
-        Largest distance to a corner of that box at any time.
-    fastest_mps : array, shape (N,)
-        Radial velocity, without its sign, that 1 % of the vertices exceed in some frame.
-    """
-
-    inside: NDArray[np.bool_]
-    farthest_m: NDArray[np.float64]
+    inside: NDArray[np.bool_]  # (N,); the sensor is in the box around the body at some time
+    farthest_m: NDArray[np.float64]  # largest distance to a corner of that box at any time
     fastest_mps: NDArray[np.float64]
+    """Radial velocity, without its sign, that 1 % of the vertices exceed in some frame."""
 
     def out_of_range(self, radar: RadarConfig) -> NDArray[np.bool_]:
         """Mask of sensors that see part of the body beyond the radar's range."""
@@ -52,34 +43,23 @@ class SensorCoverage:
 
 @dataclass(frozen=True, eq=False)
 class BodyExtent:
-    """Position and motion of a body in up to 100 frames with a person, spread over the clip.
-
-    Parameters
-    ----------
-    target_m : tuple of 3 floats
-        Point at which sensors aim: the mean over time of the median vertex, which lies in the
-        torso however the limbs move.
-    low_m, high_m : arrays, shape (n, 3)
-        Corners of the box around the body in each frame.
-    points_m, velocity_mps : float32 arrays, shape (n, k, 3)
-        Up to 200 vertices of each frame and their motion to the next one; zero where there
-        is no person in that.
-    """
+    """Position and motion of a body in up to 100 frames with a person, spread over the clip."""
 
     target_m: Vector
-    low_m: NDArray[np.float64]
+    """Point at which sensors aim: the mean over time of the median vertex, which lies in the torso
+    however the limbs move."""
+    low_m: NDArray[np.float64]  # (n, 3), corners of the box around the body
     high_m: NDArray[np.float64]
     points_m: NDArray[np.float32]
+    """Up to 200 vertices of each frame, shape (n, k, 3)."""
     velocity_mps: NDArray[np.float32]
+    """Their motion to the next frame; zero where that one has no person."""
 
     @classmethod
     def of(cls, mesh: MeshSequence) -> BodyExtent:
         """Extent of the body in a clip, which is read frame by frame.
 
-        Raises
-        ------
-        Sd2Error
-            If no frame has a person.
+        Raises Sd2Error if no frame has a person.
         """
         there = np.flatnonzero(mesh.presence.there)
         if not len(there):

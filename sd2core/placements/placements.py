@@ -37,19 +37,11 @@ Interval = tuple[float, float]
 
 @dataclass(frozen=True, order=True)
 class Place:
-    """One place of a sensor, as seen from the body.
+    """One place of a sensor, as seen from the body."""
 
-    Parameters
-    ----------
-    range_m : float
-        Distance from the target.
-    azimuth_deg, elevation_deg : float
-        Above -180 up to 180, and from -90 to 90.
-    """
-
-    range_m: float
-    azimuth_deg: float = 0.0
-    elevation_deg: float = 0.0
+    range_m: float  # distance from the target
+    azimuth_deg: float = 0.0  # above -180 up to 180
+    elevation_deg: float = 0.0  # from -90 to 90
 
     def sensor(self, target_m: Vector) -> VirtualSensor:
         """Sensor at this place, aimed at the target."""
@@ -128,7 +120,7 @@ class PlacementGrid(_Spec):
         )
 
     def as_dict(self) -> dict[str, Any]:
-        """What :func:`placements_from_dict` reads; plain values for JSON and TOML."""
+        """Plain values for JSON and TOML that :func:`placements_from_dict` reads."""
         return {
             "kind": self.kind,
             "ranges_m": list(self.ranges_m),
@@ -199,7 +191,7 @@ class PlacementCloud(_Spec):
         )
 
     def as_dict(self) -> dict[str, Any]:
-        """What :func:`placements_from_dict` reads; plain values for JSON and TOML."""
+        """Plain values for JSON and TOML that :func:`placements_from_dict` reads."""
         return {
             "kind": self.kind,
             "count": self.count,
@@ -214,18 +206,10 @@ Placements = PlacementGrid | PlacementCloud
 
 
 def placements_from_dict(content: object) -> Placements:
-    """Inverse of ``as_dict``.
+    """Inverse of ``as_dict``: placements from a mapping as JSON or TOML hold it.
 
-    Parameters
-    ----------
-    content : mapping
-        As JSON or TOML hold it. Keys that have a default may be absent; others than those of
-        ``as_dict`` are refused.
-
-    Raises
-    ------
-    Sd2Error
-        When a key is missing or unknown, or a value is not what it should be.
+    Keys that have a default may be absent; others than those of ``as_dict`` are refused.
+    Raises Sd2Error if a key is missing or unknown, or a value is not what it should be.
     """
     if not isinstance(content, Mapping):
         raise Sd2Error(f"The placements are {content!r}", 'a table with kind = "grid" or "cloud"')
@@ -250,10 +234,7 @@ def placements_from_dict(content: object) -> Placements:
 def read_placements(file: Path) -> Placements:
     """Read a spec: JSON of :func:`write_placements` or by hand, or TOML (``.toml``).
 
-    Raises
-    ------
-    Sd2Error
-        When the file cannot be read or holds something else; the message names it.
+    Raises Sd2Error, which names the file, if it cannot be read or holds something else.
     """
     file = Path(file)
     try:
@@ -342,22 +323,13 @@ _VALUE_BYTES, _TIME_BYTES = 4, 8
 
 @dataclass(frozen=True)
 class PlacementCost:
-    """Time and memory of one map per placement.
-
-    Parameters
-    ----------
-    maps, frames : int
-        Maps, and frames of each.
-    frame_ms : float
-        Measured time per frame on all cores of the plan that holds the tolerance.
-    bins : int
-        Velocity bins of a map.
-    """
+    """Time and memory of one map per placement."""
 
     maps: int
-    frames: int
+    frames: int  # of each map
     frame_ms: float
-    bins: int = 32
+    """Measured time per frame on all cores of the plan that holds the tolerance."""
+    bins: int = 32  # of a map, along velocity
 
     @property
     def map_s(self) -> float:

@@ -1,1 +1,1 @@
-"""What a sensor gets back from a moving mesh: velocity, visibility, amplitude."""
+"""Echo of a moving mesh at a sensor: velocity, visibility, amplitude."""

@@ -33,23 +33,10 @@ def depth_visibility(
     resolution: int,
     needed: NDArray[np.bool_],
 ) -> NDArray[np.bool_]:
-    """Which of the needed vertices of one frame the depth buffer lets through.
+    """Mark the needed vertices of one frame that are visible by the depth buffer, shape (V,).
 
-    Parameters
-    ----------
-    points : float array, shape (3, V)
-    faces : int32 array, shape (F, 3)
-    closed : bool
-        Whether they enclose a body, so that what faces away hides nothing more.
-    sensor : float64 array, shape (3,)
-    resolution : int
-        Pixels along each side of the buffer.
-    needed : bool array, shape (V,)
-
-    Returns
-    -------
-    bool array, shape (V,)
-        False where not needed.
+    Points are of shape (3, V), faces (F, 3). ``closed`` faces enclose a body, so that
+    back-facing ones hide nothing more. ``resolution`` is in pixels along each side.
     """
     place = np.asarray(points, np.float64)
     centre = 0.5 * (place.min(axis=1) + place.max(axis=1))

@@ -25,20 +25,7 @@ def exact_visibility(
     sensor: NDArray[np.float64],
     needed: NDArray[np.bool_],
 ) -> NDArray[np.bool_]:
-    """Which of the needed vertices of one frame nothing hides.
-
-    Parameters
-    ----------
-    points : float array, shape (3, V)
-    faces : int32 array, shape (F, 3)
-    sensor : float64 array, shape (3,)
-    needed : bool array, shape (V,)
-
-    Returns
-    -------
-    bool array, shape (V,)
-        False where not needed.
-    """
+    """Mark the needed vertices (V,) of one frame that no face (F, 3) hides; points are (3, V)."""
     seen = needed.copy()
     place = np.asarray(points, np.float64).T  # (V, 3)
     size = float(np.linalg.norm(np.ptp(place, axis=0)))
@@ -151,19 +138,10 @@ def crosses(
     sensor: NDArray[np.float64],
     contact: float,
 ) -> NDArray[np.bool_]:
-    """Whether each triangle crosses the open segment from its vertex to the sensor.
+    """Tell for each triangle if it crosses the open segment from its vertex to the sensor.
 
-    Parameters
-    ----------
-    place : float64 array, shape (V, 3)
-    corners : int32 array, shape (n, 3)
-    vertex : int array, shape (n,)
-    contact : float
-        Metres left out at both ends of the segment.
-
-    Returns
-    -------
-    bool array, shape (n,)
+    Places are of shape (V, 3), corners (n, 3), vertices (n,); ``contact`` metres are left
+    out at both ends of the segment.
     """
     start = place[vertex]
     ray = sensor - start

@@ -18,10 +18,7 @@ def facet_visibility(
 ) -> NDArray[np.bool_]:
     """Visible facets of every frame, (T, F); none where there is no person.
 
-    Raises
-    ------
-    Sd2Error
-        For a point cloud.
+    Raises Sd2Error for a point cloud.
     """
     if mesh.faces is None:
         raise Sd2Error("The mesh has no faces", "a surface, which alone can hide anything")
@@ -40,19 +37,7 @@ def facet_visibility(
 def visible_facets(
     vertices_m: NDArray[np.floating], faces: NDArray[np.int32], sensor_m: ArrayLike
 ) -> NDArray[np.bool_]:
-    """Visible facets of one frame.
-
-    Parameters
-    ----------
-    vertices_m : float array, shape (V, 3)
-    faces : int32 array, shape (F, 3)
-        Counter-clockwise seen from outside.
-    sensor_m : array_like, shape (3,)
-
-    Returns
-    -------
-    bool array, shape (F,)
-    """
+    """Visible facets (F,) of one frame; faces are counter-clockwise seen from outside."""
     # Around the body, because visibility is decided on single-precision coordinates.
     origin = np.rint(np.asarray(vertices_m[0], np.float64))
     vertices = np.asarray(vertices_m, np.float64) - origin

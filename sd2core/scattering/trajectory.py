@@ -83,17 +83,11 @@ class Trajectory:
     def knots(
         self, vertices: NDArray[Any], first_frame: int, first_knot: int, last_knot: int
     ) -> NDArray[Any]:
-        """Positions at knots ``first_knot`` to ``last_knot`` (exclusive).
+        """Positions (knots, V, 3) at knots ``first_knot`` to ``last_knot`` (exclusive).
 
-        Parameters
-        ----------
-        vertices : float array, shape (n, V, 3)
-            The frames that :meth:`frames_needed` names, from ``first_frame`` on.
-
-        Returns
-        -------
-        float array, shape (knots, V, 3)
-            The same array where nothing is to be done, otherwise float64.
+        ``vertices`` holds the frames that :meth:`frames_needed` names, from ``first_frame``
+        on. It is returned itself where nothing is to be done; otherwise the result is
+        float64.
         """
         if self.oversampling == 1 and self.smoothing_s == 0:
             return vertices[first_knot - first_frame : last_knot - first_frame]
@@ -140,11 +134,8 @@ def line_weights(
 ) -> tuple[int, NDArray[np.float64]] | None:
     """Weights of a Gaussian-weighted straight-line fit at ``time_s``.
 
-    Returns
-    -------
-    tuple of int and float64 array, or None
-        First frame and its and the following frames' weights; None when fewer
-        than two frames lie under the Gaussian.
+    Returns the first frame, and its and the following frames' weights; None when fewer than
+    two frames lie under the Gaussian.
     """
     reach = _REACH * sigma_s + _SLACK_S
     first = int(np.searchsorted(times_s, time_s - reach))

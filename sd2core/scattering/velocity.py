@@ -56,19 +56,11 @@ def _dot(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
 
 @dataclass(frozen=True, eq=False)
 class Stencil:
-    """Knots of a trajectory between which velocities are measured.
-
-    Parameters
-    ----------
-    before, after : int64 array, shape (n, moments)
-        Knot numbers.
-    duration_s : float64 array, shape (n, moments)
-        Time between the two; 0 where there is nothing to measure.
-    """
+    """Knots of a trajectory between which velocities are measured, shape (n, moments)."""
 
     before: NDArray[np.int64]
     after: NDArray[np.int64]
-    duration_s: NDArray[np.float64]
+    duration_s: NDArray[np.float64]  # 0 where there is nothing to measure
 
 
 def moments(
@@ -79,26 +71,15 @@ def moments(
 ) -> Stencil:
     """Knots between which the velocities of each frame are measured, on real times.
 
-    The moments of a frame are spread evenly and symmetrically around it. An odd
-    number are knots, each measured between its neighbours (one-sided at the two
-    ends of the clip, and next to frames without a person); an even number lie
-    midway between two knots, which they are measured between.
+    The moments of a frame are spread evenly and symmetrically around it. An odd number are
+    knots, each measured between its neighbours (one-sided at the two ends of the clip, and
+    next to frames without a person); an even number lie midway between two knots, which
+    they are measured between.
 
-    Parameters
-    ----------
-    times_s : float64 array, shape (knots,)
-    centres : int64 array, shape (n,)
-        Knot of each frame.
-    oversampling : int
-        Knots per frame.
-    presence : Presence, optional
-        Of the frames.
-
-    Returns
-    -------
-    Stencil
-        Of shape (n, oversampling). Where a moment lies outside the clip, or outside the
-        frame's stretch, both knots are its end, with a duration of 0.
+    ``centres`` (n,) are the knots of the frames, ``oversampling`` the knots per frame;
+    presence is that of the frames. The stencil has the shape (n, oversampling). Where a
+    moment lies outside the clip, or outside the frame's stretch, both knots are its end,
+    with a duration of 0.
     """
     half, odd = oversampling // 2, oversampling % 2
     begin = np.zeros((len(centres), 1), np.int64)
