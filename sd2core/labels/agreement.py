@@ -29,21 +29,13 @@ _ROUNDING_S = 1e-6
 
 @dataclass(frozen=True)
 class Kappa:
-    """Cohen's kappa, and what it is made of.
+    """Cohen's kappa with the agreements that it is computed from."""
 
-    Parameters
-    ----------
-    value : float or None
-        From -1 to 1, where 0 is chance. None where it is undefined: both gave one and
-        the same answer throughout, so that agreement was certain beforehand.
-    observed, expected : float
-        p_o and p_e.
-    frames : int
-    """
-
+    # From -1 to 1, where 0 is chance. None where it is undefined: both gave one and the same answer
+    # throughout, so that agreement was certain beforehand.
     value: float | None
-    observed: float
-    expected: float
+    observed: float  # Observed agreement p_o.
+    expected: float  # Agreement expected by chance p_e.
     frames: int
 
     @classmethod
@@ -63,23 +55,12 @@ class Kappa:
 
 @dataclass(frozen=True, eq=False)
 class FrameAgreement:
-    """Agreement frame by frame.
+    """Agreement frame by frame."""
 
-    Parameters
-    ----------
-    overall : Kappa
-        Of whole answers.
-    of_label : dict of str to Kappa
-        Presence or absence of every label that either used.
-    answers : tuple of Answer
-        Every answer that either gave, ``()`` first.
-    confusion : int64 array, shape (n, n)
-        Frames by the answer of a (rows) and of b (columns), in the order of `answers`.
-    """
-
-    overall: Kappa
-    of_label: dict[str, Kappa]
-    answers: tuple[Answer, ...]
+    overall: Kappa  # Kappa of whole answers.
+    of_label: dict[str, Kappa]  # Presence or absence of every label that either used.
+    answers: tuple[Answer, ...]  # Every answer that either gave, ``()`` first.
+    # Frames by the answer of a (rows) and of b (columns), in the order of `answers`.
     confusion: NDArray[np.int64]
 
 
@@ -103,14 +84,14 @@ def agreement(
     timebase : Timebase
         Frames of the recording. A frame has the labels that hold when it appears.
     min_iou : float
-        What a match must reach, above 0 and up to 1.
+        Intersection over union that a match must reach, above 0 and up to 1.
     track : str, optional
         Compare this one only.
 
     Raises
     ------
     Sd2Error
-        When `min_iou` is none, or a track is missing.
+        When `min_iou` is out of range, or a track is missing.
     """
     spans_a, spans_b = _spans(a, track, "first"), _spans(b, track, "second")
     return Agreement(

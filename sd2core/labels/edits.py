@@ -43,21 +43,11 @@ Side = Literal["start", "end"]
 
 @dataclass(frozen=True)
 class Edit:
-    """Result of an edit.
+    """Result of an edit."""
 
-    Parameters
-    ----------
-    name : str
-        Name of the step in the history, such as "Move span".
-    labels : Labels
-        After the edit.
-    ids : tuple of int
-        Spans that were made or changed, to be selected next.
-    """
-
-    name: str
-    labels: Labels
-    ids: tuple[int, ...] = ()
+    name: str  # Name of the step in the history, such as "Move span".
+    labels: Labels  # After the edit.
+    ids: tuple[int, ...] = ()  # Spans that were made or changed, to be selected next.
 
 
 def create(
@@ -162,12 +152,8 @@ def merge(labels: Labels, ids: Sequence[int]) -> Edit:
     """Merge spans of one track into one, from the first start to the last end.
 
     The earliest of them keeps its id and label. Notes and authors that differ are joined, and the
-    lowest confidence given holds.
-
-    Raises
-    ------
-    Sd2Error
-        When they are on several tracks, or another span of an exclusive track is between.
+    lowest confidence given holds. Raises Sd2Error when they are on several tracks, or another span
+    of an exclusive track is between.
     """
     parts = labels.these(ids)
     tracks = sorted({span.track for span in parts})

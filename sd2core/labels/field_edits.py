@@ -43,10 +43,7 @@ def set_confidence(labels: Labels, ids: Iterable[int], confidence: float | None)
 def set_track(labels: Labels, ids: Iterable[int], track: str) -> Edit:
     """Put spans on another track, at the times they have.
 
-    Raises
-    ------
-    Sd2Error
-        When they would overlap on an exclusive track; the message names both spans.
+    Raises Sd2Error when they would overlap on an exclusive track; the message names both spans.
     """
     labels.track(track)
     return _with(labels, ids, "Change track", track=track)
@@ -57,12 +54,8 @@ def accept(
 ) -> Edit:
     """Accept suggestions as spans of the user, on another track if one is named.
 
-    There they are clipped like new spans to the longest free part, in the order of time.
-
-    Raises
-    ------
-    Sd2Error
-        When one is no suggestion, or no frame of it is free; none is accepted then.
+    There they are clipped like new spans to the longest free part, in the order of time. Raises
+    Sd2Error when one is no suggestion, or no frame of it is free; none is accepted then.
     """
     frames, after = Frames.of(timebase), labels
     chosen = _suggestions(labels, ids)
@@ -107,14 +100,8 @@ def offer(
 ) -> Edit:
     """Put suggestions on a track of their own, in place of earlier ones.
 
-    Spans that were rejected or are labelled already are not suggested again.
-
-    Parameters
-    ----------
-    found : sequence of Span
-        Suggestions of a map; their edges are put on frames of the recording.
-    declined : sequence of Span
-        Suggestions rejected before.
+    The edges of the ``found`` are put on frames of the recording. Spans that were rejected
+    (``declined``) or are labelled already are not suggested again.
     """
     kept = [one for one in labels.spans if one.origin != "suggestion" or one.track != TRACK]
     known = [*declined, *(one for one in kept if one.origin != "suggestion")]
@@ -143,17 +130,9 @@ def take(
 ) -> Edit:
     """Accept suggestions on a track and with a label.
 
-    Those for which the track has no free time stay suggestions.
-
-    Parameters
-    ----------
-    keep_known : bool
-        Keep the label of suggestions that name a gesture or a label of the set.
-
-    Raises
-    ------
-    Sd2Error
-        When one is no suggestion, or none has free time.
+    Those for which the track has no free time stay suggestions. ``keep_known`` keeps the label of
+    suggestions that name a gesture or a label of the set. Raises Sd2Error when one is no
+    suggestion, or none has free time.
     """
     after, done, refusal = labels, [], None
     for one in ids:
@@ -222,10 +201,7 @@ def move_track(labels: Labels, name: str, place: int) -> Edit:
 def set_overlap(labels: Labels, name: str, overlap: Overlap) -> Edit:
     """Allow or forbid that spans of a track overlap.
 
-    Raises
-    ------
-    Sd2Error
-        When spans overlap on a track that forbids it; the message names two of them.
+    Raises Sd2Error when spans overlap on a track that forbids it; the message names two of them.
     """
     tracks = _with_track(labels, name, replace(labels.track(name), overlap=overlap))
     return _edit("Change overlaps of track", labels, replace(labels, tracks=tracks))

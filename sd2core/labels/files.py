@@ -83,7 +83,6 @@ def write_labels(
     ----------
     path : Path
         Usually ``labels.json`` in the folder of the recording.
-    labels : Labels
     timebase : Timebase, optional
         Frames of the recording, to write the frames of every span as well, for readers.
     recording, video : Path, optional

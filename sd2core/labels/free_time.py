@@ -20,18 +20,10 @@ Stretch = tuple[float, float]
 
 @dataclass(frozen=True, eq=False)
 class Frames:
-    """Edges of the frames of a recording.
+    """Edges of the frames of a recording."""
 
-    Parameters
-    ----------
-    times_s : ndarray, shape (T,)
-        Starts of the frames.
-    edges_s : ndarray, shape (T + 1,)
-        The same and the end of the last frame.
-    """
-
-    times_s: NDArray[np.float64]
-    edges_s: NDArray[np.float64]
+    times_s: NDArray[np.float64]  # Starts of the frames, (T,).
+    edges_s: NDArray[np.float64]  # The same and the end of the last frame, (T + 1,).
 
     @classmethod
     def of(cls, timebase: Timebase) -> Frames:
@@ -154,10 +146,7 @@ def clip_to_free(
 ) -> Stretch:
     """Return the longest free part of a stretch; all of it where spans may overlap.
 
-    Raises
-    ------
-    Sd2Error
-        When no frame of it is free.
+    Raises Sd2Error when no frame of it is free.
     """
     if labels.track(track).overlap == "free":
         return wanted
@@ -193,14 +182,8 @@ def snap(
     Frames are always near: were they to compete with spans, spans would hardly ever win. Of edges
     equally near, a span's goes before a suggestion's, then the earlier one.
 
-    Parameters
-    ----------
-    time_s : float
-        Time under the mouse.
-    within_s : float
-        Distance from which a span attracts, some pixels of the time axis; 0: only exact hits.
-    ignore : collection of int
-        Ids of spans that do not attract, such as those being dragged.
+    A span attracts from ``within_s``, some pixels of the time axis; 0: only exact hits. Spans to
+    ``ignore``, such as those being dragged, do not attract.
     """
     nearest = Frames.of(timebase).nearest(time_s)
     best: tuple[tuple[float, bool, float], Snap] | None = None

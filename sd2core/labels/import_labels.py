@@ -20,20 +20,12 @@ Way = Literal["replace", "add"]
 
 @dataclass(frozen=True)
 class Incoming:
-    """Labels of a file, fitted to a recording.
+    """Labels of a file, fitted to a recording."""
 
-    Parameters
-    ----------
-    labels : Labels
-        Labels to import: inside the recording, each span with at least one frame.
-    cut : tuple of Span
-        Spans of the file that reach beyond the recording and are cut at its ends.
-    outside : tuple of Span
-        Spans of the file without a frame of the recording, which are left out.
-    """
-
-    labels: Labels
+    labels: Labels  # Labels to import: inside the recording, each span with at least one frame.
+    # Spans of the file that reach beyond the recording and are cut at its ends.
     cut: tuple[Span, ...] = ()
+    # Spans of the file without a frame of the recording, which are left out.
     outside: tuple[Span, ...] = ()
 
     @classmethod
@@ -66,24 +58,10 @@ class Incoming:
 def take_in(labels: Labels, incoming: Incoming, way: Way, source: str) -> Edit:
     """Import the labels of a file into a recording.
 
-    Replacing takes the tracks, spans and numbers of the file, and its label set where it
-    brings one of its own. Adding leaves all that is there: the file's tracks come below it,
-    those whose names are taken with the name of the file, and what the file says of labels
-    that the set does not have is added to the set.
-
-    Parameters
-    ----------
-    labels : Labels
-        Of the recording.
-    incoming : Incoming
-    way : {"replace", "add"}
-    source : str
-        Name of the file, for tracks whose names are taken.
-
-    Raises
-    ------
-    Sd2Error
-        When there is nothing to take.
+    Replacing takes the tracks, spans and numbers of the file, and its label set where it brings one
+    of its own. Adding leaves all that is there: the file's tracks come below it, those whose names
+    are taken with the name of the file (``source``), and what the file says of labels that the set
+    does not have is added to the set. Raises Sd2Error when there is nothing to take.
     """
     brought = incoming.labels
     if not brought.spans and not incoming.outside and way == "add":

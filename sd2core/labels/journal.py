@@ -81,27 +81,13 @@ class Change(Entry):
 
 @dataclass(frozen=True)
 class Replayed:
-    """Labels replayed from a part, with ``edits`` that the user's file does not hold.
+    """Labels replayed from a part, with ``edits`` that the user's file does not hold."""
 
-    Parameters
-    ----------
-    recording : Path
-        Absolute path of the labelled recording or video.
-    labels : Labels
-        After the last whole edit.
-    edits : int
-        Number of unsaved edits.
-    last : str
-        Name of the last edit, such as "Move span".
-    time_unix_s : float
-        Time of the last edit.
-    """
-
-    recording: Path
-    labels: Labels
-    edits: int
-    last: str
-    time_unix_s: float
+    recording: Path  # Absolute path of the labelled recording or video.
+    labels: Labels  # After the last whole edit.
+    edits: int  # Number of unsaved edits.
+    last: str  # Name of the last edit, such as "Move span".
+    time_unix_s: float  # Time of the last edit.
 
 
 def packed(content: dict[str, Any]) -> bytes:
@@ -169,12 +155,8 @@ def change(name: str, time_unix_s: float, before: Labels, after: Labels) -> dict
 def replay(records: list[bytes]) -> Replayed:
     """Replay the edits of a part.
 
-    Raises
-    ------
-    ValueError
-        When a record holds something else than this version writes (pydantic's error).
-    Sd2Error
-        When the resulting labels are not valid.
+    Raises ValueError (pydantic's) when a record holds something else than this version writes;
+    Sd2Error when the resulting labels are not valid.
     """
     first = Head.model_validate_json(records[0])
     spans = {span.id: span for span in first.labels.spans}
@@ -203,23 +185,10 @@ SHORTEST_BYTES = 1 << 18
 class Journal:
     """Journal of one editing session; made by :meth:`.recovery.RecoveryPlace.begin`.
 
-    Parameters
-    ----------
-    folder : Path
-        Folder of the parts, ``SESSION-PART.journal``.
-    session : int
-    recording : Path
-    labels : Labels
-        As they are when the session begins.
-    unsaved : int
-        Number of edits that the user's file does not hold by then.
-    last : str
-        Name of the last of them.
-
-    Raises
-    ------
-    OSError
-        When the first part cannot be written. Editing may go on without a journal: tell the user.
+    ``folder`` holds the parts, ``SESSION-PART.journal``; ``labels`` are those at the beginning of
+    the session, with ``unsaved`` edits that the user's file does not hold by then, the last of them
+    called ``last``. Raises OSError when the first part cannot be written: editing may go on without
+    a journal, but tell the user.
     """
 
     def __init__(
@@ -248,10 +217,8 @@ class Journal:
     def write(self, name: str, labels: Labels) -> None:
         """Record an edit, an undo or a redo; on disk on return.
 
-        Raises
-        ------
-        OSError
-            When it cannot be written. The next one is tried in a new part, with all labels.
+        Raises OSError when it cannot be written. The next one is tried in a new part, with all
+        labels.
         """
         now_s = time.time()
         record = packed(change(name, now_s, self._labels, labels))

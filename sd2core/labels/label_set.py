@@ -13,23 +13,12 @@ LONGEST_NAME = 200
 
 @dataclass(frozen=True)
 class Label:
-    """Label with its colour, key and class.
+    """Label with its colour, key and class."""
 
-    Parameters
-    ----------
-    name : str
-        Not empty, at most :data:`LONGEST_NAME` characters, one line.
-    colour : str
-        ``#rrggbb``, lower case.
-    key : str
-        Character that marks with it, or empty.
-    gesture_class : str
-        Class that the classifier learns for it; empty for spans that are not learnt from.
-    """
-
-    name: str
-    colour: str
-    key: str = ""
+    name: str  # Not empty, at most :data:`LONGEST_NAME` characters, one line.
+    colour: str  # ``#rrggbb``, lower case.
+    key: str = ""  # Character that marks with it, or empty.
+    # Class that the classifier learns for it; empty for spans that are not learnt from.
     gesture_class: str = ""
 
     def __post_init__(self) -> None:

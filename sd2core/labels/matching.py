@@ -23,23 +23,15 @@ _ROUNDING = 1e-9
 class Match:
     """Pair of spans, one of a and one of b, taken for the same event.
 
-    Parameters
-    ----------
-    a, b : Span
-    iou : float
-        Intersection over union of their times.
-    start_difference_s, end_difference_s : float
-        b's edge less a's: positive when b is later.
-    start_difference_frames, end_difference_frames : int or None
-        The same in frames; None where a span lies outside the recording.
+    Differences are b's edge less a's: positive when b is later.
     """
 
     a: Span
     b: Span
-    iou: float
+    iou: float  # Intersection over union of their times.
     start_difference_s: float
     end_difference_s: float
-    start_difference_frames: int | None
+    start_difference_frames: int | None  # None where a span lies outside the recording.
     end_difference_frames: int | None
 
     @property
@@ -74,13 +66,9 @@ def match_spans(
 ) -> SpanAgreement:
     """Match spans one to one.
 
-    Of all ways to match, one with the most matches is taken; of these, one with the most
-    pairs of the same label; of these, one with the largest sum of IoU.
-
-    Raises
-    ------
-    Sd2Error
-        When `min_iou` is not above 0 and up to 1.
+    Of all ways to match, one with the most matches is taken; of these, one with the most pairs of
+    the same label; of these, one with the largest sum of IoU. Raises Sd2Error when `min_iou` is not
+    above 0 and up to 1.
     """
     if not 0.0 < min_iou <= 1.0:
         raise Sd2Error(f"The least IoU of a match is {min_iou:g}", "above 0 and up to 1")

@@ -174,13 +174,9 @@ class Holder:
 class RecoveryPlace:
     """Folder of the journals of one recording, and its lock.
 
-    Parameters
-    ----------
-    root : Path
-        Recovery folder of the program, made when it is needed. Locks hold between processes that
-        name the same folder: a folder of the user's keeps out that user's own windows only.
-    recording : Path
-        The labelled recording or video; a link is the same as its target.
+    ``root`` is the recovery folder of the program, made when it is needed. Locks hold between
+    processes that name the same folder: a folder of the user's keeps out that user's own windows
+    only. ``recording`` is the labelled recording or video; a link is the same as its target.
     """
 
     def __init__(self, root: Path, recording: Path) -> None:
@@ -204,10 +200,7 @@ class RecoveryPlace:
     def take(self) -> bool:
         """Take the lock; False where another process holds it, and the labels are read-only here.
 
-        Raises
-        ------
-        OSError
-            When the folder cannot be made or written to.
+        Raises OSError when the folder cannot be made or written to.
         """
         self._folder.mkdir(parents=True, exist_ok=True)
         lock = FileLock(self._folder / _LOCK_NAME)
@@ -243,19 +236,8 @@ class RecoveryPlace:
     def begin(self, labels: Labels, recovered: Offer | None = None) -> Journal:
         """Begin a session, with the labels of the user's file or of an offer.
 
-        Parameters
-        ----------
-        labels : Labels
-            Those that are edited from now on.
-        recovered : Offer, optional
-            Source of the labels; its files are deleted once the new journal is on disk.
-
-        Raises
-        ------
-        Sd2Error
-            When the place is not held.
-        OSError
-            When the journal cannot be written.
+        The files of the offer (``recovered``) are deleted once the new journal is on disk. Raises
+        Sd2Error when the place is not held; OSError when the journal cannot be written.
         """
         self._check_held()
         remove_leftovers(self._folder)

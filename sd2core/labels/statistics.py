@@ -27,28 +27,18 @@ NO_NUMBER = "–"
 
 @dataclass(frozen=True)
 class LabelStatistics:
-    """Statistics of the spans of one label.
-
-    Parameters
-    ----------
-    total_s : float
-        Sum of their durations: where spans overlap, an instant counts in each.
-    mean_s, sd_s, median_s, shortest_s, longest_s : float, optional
-        Of their durations; ``sd_s`` is the sample's (n - 1), None below two spans, the
-        others without any.
-    share : float, optional
-        Share of the recording that they cover, 0 to 1, overlaps counting once. None where the
-        length of the recording is unknown.
-    """
+    """Statistics of the spans of one label; durations are None without any span."""
 
     label: str
     count: int
-    total_s: float
+    total_s: float  # Sum of the durations: where spans overlap, an instant counts in each.
     mean_s: float | None
-    sd_s: float | None
+    sd_s: float | None  # The sample's (n - 1); None below two spans.
     median_s: float | None
     shortest_s: float | None
     longest_s: float | None
+    # Share of the recording that they cover, 0 to 1, overlaps counting once. None where the length
+    # of the recording is unknown.
     share: float | None
 
 
@@ -57,11 +47,7 @@ def label_statistics(
 ) -> list[LabelStatistics]:
     """Compute statistics of every label of the set, also those without a span, then of others.
 
-    Parameters
-    ----------
-    labels : Labels
-    extent_s : tuple of float, optional
-        Start and end of the recording.
+    ``extent_s``: start and end of the recording.
     """
     spans: dict[str, list[Span]] = {one.name: [] for one in labels.label_set.labels}
     unknown: dict[str, list[Span]] = {}

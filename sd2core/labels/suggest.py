@@ -85,15 +85,8 @@ def motion_energy_db(doppler: DopplerMap) -> NDArray[np.float64]:
     out. Energy is averaged over a tenth of a second, never across a pause or a gap
     without a person.
 
-    Returns
-    -------
-    float64 array, shape (frames,)
-        From 0 on; NaN in frames without a person.
-
-    Raises
-    ------
-    Sd2Error
-        When the map holds NaN, infinity or negative values.
+    From 0 on; NaN in frames without a person. Raises Sd2Error when the map holds NaN, infinity or
+    negative values.
     """
     values = doppler.values.astype(np.float64)  # (bins, T)
     good = np.isfinite(values) & (values >= 0)

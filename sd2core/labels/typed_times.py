@@ -22,10 +22,7 @@ _LONGEST_SHOWN = 40
 def typed_start(text: str, timebase: Timebase) -> float:
     """Parse the start of a span, in seconds.
 
-    Raises
-    ------
-    Sd2Error
-        When it is neither seconds nor a frame of the recording.
+    Raises Sd2Error when it is neither seconds nor a frame of the recording.
     """
     frame = _typed_frames(text)
     return _typed_seconds(text) if frame is None else timebase.time_of(_known(frame, timebase))

@@ -106,14 +106,13 @@ def read_labels(
 
     Parameters
     ----------
-    path : Path or str
     timebase : Timebase, optional
         Of the recording: for tables that have frames only, and for marks without a duration,
         which become the frame that is shown then.
     format : str, optional
         Name of one of :data:`FORMATS`; otherwise found by suffix and content.
     observation : str, optional
-        Which one, where the file has those of several videos (BORIS).
+        Id of the observation, where the file has those of several videos (BORIS).
 
     Returns
     -------
@@ -142,8 +141,6 @@ def write_labels(
 
     Parameters
     ----------
-    path : Path or str
-    labels : Labels
     timebase : Timebase
         Of the recording's video: for frame numbers and the length of the recording.
     format : str, optional
@@ -154,7 +151,7 @@ def write_labels(
     Returns
     -------
     list of Loss
-        What the file does not hold as it was; ``str(loss)`` is a sentence.
+        Losses: what the file does not hold unchanged; ``str(loss)`` is a sentence.
 
     Raises
     ------
@@ -174,10 +171,7 @@ def would_lose(
 ) -> list[Loss]:
     """Return what a file of a format would not hold, without leaving a file.
 
-    Raises
-    ------
-    Sd2Error
-        When the format cannot hold the times.
+    Raises Sd2Error when the format cannot hold the times.
     """
     with tempfile.TemporaryDirectory(prefix="sd2-") as folder:
         path = Path(folder) / f"labels{_named(format).suffixes[0]}"
@@ -187,10 +181,7 @@ def would_lose(
 def format_for(path: Path, *, writing: bool) -> LabelFormat:
     """Find the format of a file by its name, or by its content when it is read.
 
-    Raises
-    ------
-    Sd2Error
-        When that is not certain.
+    Raises Sd2Error when that is not certain.
     """
     suffix = path.suffix.lower()
     fitting = [one for one in FORMATS if suffix in one.suffixes]

@@ -43,10 +43,7 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
 def read(path: Path, timebase: Timebase | None = None, observation: str | None = None) -> Labels:
     """Read labels; a point label needs the timebase and becomes one frame.
 
-    Raises
-    ------
-    Sd2Error
-        Naming the line that is no label.
+    Raises Sd2Error naming the line that is no label.
     """
     rows: list[Row] = []
     for number, line in enumerate(read_text(path, _EXPECTED).split("\n"), start=1):

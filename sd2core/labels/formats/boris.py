@@ -49,10 +49,7 @@ _NO_SUBJECT = "No focal subject"
 def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = None) -> list[Loss]:
     """Write a project with one observation, called like the file; what it cannot hold is returned.
 
-    Parameters
-    ----------
-    media : Path, optional
-        The video; without one it is a live observation.
+    Without ``media``, the video, it is a live observation.
     """
     now = datetime.now().isoformat(timespec="seconds")
     lanes = lanes_of(labels, edges_s)
@@ -103,16 +100,8 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
 def read(path: Path, timebase: Timebase | None = None, observation: str | None = None) -> Labels:
     """Read the state events of one observation; point events become one frame each.
 
-    Parameters
-    ----------
-    observation : str, optional
-        Its id; needed when the project has several.
-
-    Raises
-    ------
-    Sd2Error
-        When the file is no project, the observation is not certain, or a state that has begun
-        does not end.
+    The observation's id is needed when the project has several. Raises Sd2Error when the file is no
+    project, the observation is not certain, or a state that has begun does not end.
     """
     project = _project(path)
     name = _chosen(path, project["observations"], observation)
@@ -159,10 +148,7 @@ def _entries(project: dict[str, Any], key: str) -> list[Any]:
 def observations(path: Path) -> tuple[str, ...]:
     """The ids of the observations of a project; there may be several, one per video.
 
-    Raises
-    ------
-    Sd2Error
-        When the file is no project.
+    Raises Sd2Error when the file is no project.
     """
     return tuple(_project(path)["observations"])
 

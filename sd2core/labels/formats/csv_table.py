@@ -104,13 +104,9 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
 def read(path: Path, timebase: Timebase | None = None, observation: str | None = None) -> Labels:
     """Read a table, of this program or another.
 
-    Separators may be commas, semicolons, tabs or bars; decimal points may be commas where these
-    do not separate. A table that has frames only needs the timebase.
-
-    Raises
-    ------
-    Sd2Error
-        When columns are missing or it is not certain what a number means.
+    Separators may be commas, semicolons, tabs or bars; decimal points may be commas where these do
+    not separate. A table that has frames only needs the timebase. Raises Sd2Error when columns are
+    missing or it is not certain what a number means.
     """
     text = read_text(path, _EXPECTED)
     heading, lines = _table(path, text)

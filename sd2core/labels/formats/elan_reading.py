@@ -43,11 +43,8 @@ _EXPECTED = "an ELAN file (.eaf)"
 def read(path: Path, timebase: Timebase | None = None, observation: str | None = None) -> Labels:
     """Read the tiers of a document; what depends on an annotation becomes its note.
 
-    Raises
-    ------
-    Sd2Error
-        When the file is no such document, has no times, or holds a document type: entities in
-        one can make a small file huge or name other files, and ELAN writes none.
+    Raises Sd2Error when the file is no such document, has no times, or holds a document type:
+    entities in one can make a small file huge or name other files, and ELAN writes none.
     """
     document = _document(path)
     slots = _slots(path, document)

@@ -27,52 +27,24 @@ DEFAULT_TRACK = "Gestures"
 
 @dataclass(frozen=True)
 class LabelFormat:
-    """Description of a label format.
+    """Description of a label format."""
 
-    Parameters
-    ----------
-    name : str
-        Name in code and on the command line.
-    title : str
-        Name on screen.
-    suffixes : tuple of str
-        Lower case, with the dot; the first is the usual one.
-    made_for : str
-        Programs that open it, with the version of the format.
-    keeps : frozenset of Aspect
-        Aspects that it holds besides start, end and label of each span.
-    resolution_s : float
-        Smallest step between times; 0 where they are kept exactly.
-    remark : str
-        A sentence on anything else to know; may be empty.
-    """
-
-    name: str
-    title: str
-    suffixes: tuple[str, ...]
-    made_for: str
-    keeps: frozenset[Aspect]
-    resolution_s: float = 0.0
-    remark: str = ""
+    name: str  # Name in code and on the command line.
+    title: str  # Name on screen.
+    suffixes: tuple[str, ...]  # Lower case, with the dot; the first is the usual one.
+    made_for: str  # Programs that open it, with the version of the format.
+    keeps: frozenset[Aspect]  # Aspects that it holds besides start, end and label of each span.
+    resolution_s: float = 0.0  # Smallest step between times; 0 where they are kept exactly.
+    remark: str = ""  # A sentence on anything else to know; may be empty.
 
 
 @dataclass(frozen=True)
 class Loss:
-    """Loss of a part of the labels in a file.
+    """Loss of a part of the labels in a file."""
 
-    Parameters
-    ----------
-    what : str
-        An :data:`Aspect`, or ``"times"``, ``"characters"`` or ``"spans"``.
-    count : int
-        Number of spans, tracks or sets concerned.
-    sentence : str
-        The same for readers.
-    """
-
-    what: str
-    count: int
-    sentence: str
+    what: str  # An :data:`Aspect`, or ``"times"``, ``"characters"`` or ``"spans"``.
+    count: int  # Number of spans, tracks or sets concerned.
+    sentence: str  # The same for readers.
 
     def __str__(self) -> str:
         return self.sentence

@@ -71,10 +71,7 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
 def read(path: Path, timebase: Timebase | None = None, observation: str | None = None) -> Labels:
     """Read annotations; those without a duration need the timebase and become one frame.
 
-    Raises
-    ------
-    Sd2Error
-        Naming the line that is no annotation.
+    Raises Sd2Error naming the line that is no annotation.
     """
     lines = [line.removesuffix("\r") for line in read_text(path, _EXPECTED).split("\n")]
     heading = [line for line in lines if line.startswith("#")]

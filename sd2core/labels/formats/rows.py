@@ -84,25 +84,13 @@ def assemble(
 ) -> Labels:
     """Make labels of rows.
 
-    A row without extent becomes the frame that is shown at that instant. Ids are kept where they
-    are positive and differ; the other spans are numbered after them, in the order of time.
+    A row without extent becomes the frame that is shown at that instant, for which the timebase is
+    needed. Ids are kept where they are positive and differ; the other spans are numbered after
+    them, in the order of time.
 
-    Parameters
-    ----------
-    path : Path
-        For messages.
-    rows : sequence of Row
-    tracks : iterable of (str, overlap or None)
-        In their order, also those without spans. Further ones of the rows follow. Where the
-        overlap is None it is ``"free"`` when spans do overlap, otherwise ``"exclusive"``.
-    label_set : LabelSet
-    timebase : Timebase, optional
-        Needed for rows without extent only.
-
-    Raises
-    ------
-    Sd2Error
-        Naming the file and the place, when a row is not a span.
+    ``tracks`` are given in their order, also those without spans; further ones of the rows follow.
+    Where the overlap is None it is ``"free"`` when spans do overlap, otherwise ``"exclusive"``.
+    Raises Sd2Error naming the file (``path``) and the place, when a row is not a span.
     """
     ids = _ids(rows)
     spans = tuple(_span(path, row, number, timebase) for row, number in zip(rows, ids, strict=True))

@@ -65,10 +65,7 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
 def read(path: Path, timebase: Timebase | None = None, observation: str | None = None) -> Labels:
     """Read all tiers; a point needs the timebase and becomes one frame.
 
-    Raises
-    ------
-    Sd2Error
-        When the file is no TextGrid in text form, or ends too early.
+    Raises Sd2Error when the file is no TextGrid in text form, or ends too early.
     """
     tokens = _Tokens(path, read_text(path, _EXPECTED))
     tokens.heading()

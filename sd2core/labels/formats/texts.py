@@ -22,10 +22,7 @@ _MARKS = (
 def read_content(path: Path, expected: str) -> bytes:
     """Read a whole file; ``expected`` describes it for the message: ``"an ELAN file"``.
 
-    Raises
-    ------
-    Sd2Error
-        When it is missing, a folder, empty or larger than :data:`LARGEST_BYTES`.
+    Raises Sd2Error when it is missing, a folder, empty or larger than :data:`LARGEST_BYTES`.
     """
     try:
         if path.is_dir():
@@ -50,10 +47,7 @@ def read_content(path: Path, expected: str) -> bytes:
 def read_text(path: Path, expected: str) -> str:
     """Read a text in UTF-8, or in UTF-16 with a byte order mark; line ends stay as they are.
 
-    Raises
-    ------
-    Sd2Error
-        As :func:`read_content`, and when the file is no such text.
+    Raises Sd2Error as :func:`read_content`, and when the file is no such text.
     """
     content = read_content(path, expected)
     encoding = "utf-8"
