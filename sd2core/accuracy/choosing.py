@@ -31,29 +31,20 @@ _COUNTING_REPEATS = 4
 
 @dataclass(eq=False)
 class Survey:
-    """Error and cost of single settings on one scene.
-
-    Parameters
-    ----------
-    base : AccuracyPlan
-        Highest accuracy in every setting but the frame rate, which would slow down all others.
-    change : dict of AccuracyPlan to float
-        Relative L1 after smoothing on the frames to choose on: of ``base`` with one
-        setting lowered, against ``base``; of ``base`` at several frame rates, against
-        the reference.
-    mask_ms, count_ms : dict of AccuracyPlan to float
-        Milliseconds of processor time per frame for visibility, and for counting.
-    cost_share : dict of float to float
-        Cost of a share of the vertices, as a share of the cost of all.
-    """
+    """Error and cost of single settings on one scene."""
 
     trial: Trial
     base: AccuracyPlan
+    """Highest accuracy in every setting but the frame rate, which would slow down all others."""
     facts: SceneFacts
     change: dict[AccuracyPlan, float] = field(default_factory=dict)
+    """Relative L1 after smoothing on the frames to choose on: of ``base`` with one setting
+    lowered, against ``base``; of ``base`` at several frame rates, against the reference."""
     mask_ms: dict[AccuracyPlan, float] = field(default_factory=dict)
-    count_ms: dict[AccuracyPlan, float] = field(default_factory=dict)
+    """Milliseconds of processor time per frame for visibility."""
+    count_ms: dict[AccuracyPlan, float] = field(default_factory=dict)  # the same for counting
     cost_share: dict[float, float] = field(default_factory=lambda: {1.0: 1.0})
+    """Cost of a share of the vertices, as a share of the cost of all."""
 
     def forecast_error(self, plan: AccuracyPlan) -> float:
         """Sum of the errors of a plan's settings: more than their error together."""
@@ -98,17 +89,10 @@ def survey_scene(
 ) -> Survey:
     """Measure error and cost of each setting alone.
 
-    Parameters
-    ----------
-    options : SynthesisOptions
-        For what a plan does not choose.
-    progress : Progress
-        Counts what was tried; may raise Cancelled.
-    like : Survey, optional
-        Survey of the same mesh with the same options from another place: saves sampling and
-        decimating again.
-    trial : Trial, optional
-        Trial of the same scene, if there is one already.
+    ``options`` are for what a plan does not choose. ``like`` is a survey of the same mesh
+    with the same options from another place: it saves sampling and decimating again.
+    ``trial`` is one of the same scene, if there is one already. Progress counts the tries
+    and may raise Cancelled.
     """
     surface = mesh.faces is not None
     if trial is None and like is not None:
@@ -273,10 +257,7 @@ def choose(
 def check_options(mesh: MeshSequence, options: SynthesisOptions | None) -> SynthesisOptions:
     """Options for which plans can be compared: the paper's unless others are given.
 
-    Raises
-    ------
-    Sd2Error
-        For Vid2Doppler's velocities, which have no settings to choose from.
+    Raises Sd2Error for Vid2Doppler's velocities, which have no settings to choose from.
     """
     options = options or PRESETS["paper"]
     if options.velocity != "central":

@@ -163,24 +163,15 @@ _MOST_CUTS = 3
 
 @dataclass(eq=False)
 class WaveTrial:
-    """FMCW plans on the sampled frames of one scene.
+    """FMCW plans on the sampled frames of one scene."""
 
-    Parameters
-    ----------
-    mesh : MeshSequence
-        With faces.
-    options : SynthesisOptions
-        Only the axis and the smoothing along velocity are used.
-    wave : WaveOptions
-        For what a plan does not choose: surface, antennas, mirror.
-    """
-
-    mesh: MeshSequence
+    mesh: MeshSequence  # with faces
     sensor: VirtualSensor
     options: SynthesisOptions
+    """Only the axis and the smoothing along velocity are used."""
     frames: tuple[int, ...]
     config: RadarConfig = PAPER_RADAR
-    wave: WaveOptions = field(default_factory=WaveOptions)
+    wave: WaveOptions = field(default_factory=WaveOptions)  # for what a plan does not choose
 
     def __post_init__(self) -> None:
         self._meshes: dict[float, MeshSequence] = {}

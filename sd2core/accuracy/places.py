@@ -42,20 +42,13 @@ are timed, take up to half as long again as those of whole maps, and plans often
 
 @dataclass(frozen=True)
 class PlacedPlan:
-    """A plan for all places around a mesh.
-
-    Parameters
-    ----------
-    error_l1 : float
-        The largest on the places that were checked; 0 for the most accurate plan, against
-        which errors are measured.
-    reasons : tuple of str
-        Sentences.
-    """
+    """A plan for all places around a mesh."""
 
     plan: AccuracyPlan
     error_l1: float
-    reasons: tuple[str, ...]
+    """The largest on the places that were checked; 0 for the most accurate plan, against which
+    errors are measured."""
+    reasons: tuple[str, ...]  # sentences
 
     def provenance(self) -> dict[str, Any]:
         """Entries for the metadata of a map."""
@@ -79,24 +72,12 @@ def choose_for_places(
     """Choose the cheapest plan that holds a tolerance at all these places.
 
     Chosen at the first place and checked at the others; where it does not hold, another one
-    is chosen there. Where choosing is estimated to take longer than it saves, maps are
-    made as the options say, if that holds, or with the most accurate plan, which does.
+    is chosen there. Where choosing is estimated to take longer than it saves, maps are made
+    as the options say, if that holds, or with the most accurate plan, which does.
 
-    Parameters
-    ----------
-    places : sequence of VirtualSensor
-        A few, see :func:`spread`.
-    frames : int
-        Of all maps that are to be made, together.
-    tolerance : float
-        As :func:`~sd2core.accuracy.choosing.choose` has it.
-    progress : Progress
-        May raise Cancelled.
-
-    Raises
-    ------
-    Sd2Error
-        As :func:`~sd2core.accuracy.choosing.choose`.
+    ``places`` are a few, see :func:`spread`; ``frames`` are those of all maps that are to
+    be made, together. Tolerance and errors are those of
+    :func:`~sd2core.accuracy.choosing.choose`; progress may raise Cancelled.
     """
     options = check_options(mesh, options)
     search = _Search(mesh, places, tolerance, options, progress)

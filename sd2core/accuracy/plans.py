@@ -149,13 +149,7 @@ class AccuracyPlan:
 
     @classmethod
     def from_json(cls, content: dict[str, Any]) -> AccuracyPlan:
-        """A plan from :meth:`to_json`.
-
-        Raises
-        ------
-        Sd2Error
-            For settings that this version does not know.
-        """
+        """A plan from :meth:`to_json`. Raises Sd2Error for settings that are unknown here."""
         unknown = set(content) - {field.name for field in fields(cls)}
         if unknown:
             raise Sd2Error(f"A plan names {', '.join(sorted(unknown))}", "settings of this version")
@@ -199,14 +193,9 @@ def counting_plans(
 ) -> Iterator[AccuracyPlan]:
     """Plans of every combination of the counting settings, without reused masks.
 
-    Parameters
-    ----------
-    surface : bool
-        False for a point cloud, which has no visibility and cannot be decimated.
-    range_law : bool
-        True if there is a range law to apply by vertex or by frame.
-    vertices_kept : sequence of float
-        Shares that the surface can be decimated to, and 1: a few faces cannot be.
+    ``surface`` is False for a point cloud, which has no visibility and cannot be decimated;
+    ``range_law`` if there is none to apply by vertex or by frame. ``vertices_kept`` are the
+    shares that the surface can be decimated to, and 1: a few faces cannot be.
     """
     laws: tuple[RangeLaw, ...] = ("vertex", "frame") if range_law else ("vertex",)
     for sight, kept, factor, law in product(

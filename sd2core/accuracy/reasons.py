@@ -16,29 +16,17 @@ from sd2core.progress import Progress, silent
 
 @dataclass(frozen=True)
 class SceneFacts:
-    """Motion and distance of the vertices in the sampled frames, all counted alike.
+    """Motion and distance of the vertices in the sampled frames, all counted alike."""
 
-    Parameters
-    ----------
-    still_share : float
-        Vertices that never leave the nulled bins.
-    beyond_share : float
-        Velocities that lie beyond the axis.
-    range_spread : float
-        From the 5th to the 95th percentile of the ranges within a frame, relative
-        to their median; median over frames.
-    motion_bins : float
-        Bins by which a velocity changes from one frame to the next; mean over
-        the vertices that leave the nulled bins.
-    empty : bool
-        True if nothing that is seen leaves the nulled bins.
-    """
-
-    still_share: float
-    beyond_share: float
+    still_share: float  # vertices that never leave the nulled bins
+    beyond_share: float  # velocities beyond the axis
     range_spread: float
+    """From the 5th to the 95th percentile of the ranges within a frame, relative to their median;
+    median over frames."""
     motion_bins: float
-    empty: bool
+    """Bins by which a velocity changes from one frame to the next; mean over the vertices that
+    leave the nulled bins."""
+    empty: bool  # nothing that is seen leaves the nulled bins
 
 
 def scene_facts(trial: Trial, progress: Progress = silent) -> SceneFacts:
@@ -125,15 +113,8 @@ def reasons_for(
 ) -> tuple[Reason, ...]:
     """Explain the settings of a chosen plan.
 
-    Parameters
-    ----------
-    base : AccuracyPlan
-        Highest accuracy in every setting but the frame rate.
-    change : mapping
-        Relative L1 after smoothing of what was tried: of plans that differ from
-        ``base`` in one setting, and of frame rates.
-    v_max_mps : float
-        End of the axis.
+    ``base`` and ``change`` are those of :class:`~sd2core.accuracy.choosing.Survey`;
+    ``v_max_mps`` is the end of the axis.
     """
     found: list[Reason] = []
 

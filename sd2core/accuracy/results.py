@@ -284,18 +284,10 @@ def compute_errors(
     reference_smooth: NDArray[np.float64],
     axis: VelocityAxis,
 ) -> Errors:
-    """Compare a map with its reference, before and after smoothing.
+    """Compare a map (bins, n) with its reference, before and after smoothing; none is negative.
 
-    Parameters
-    ----------
-    raw, reference_raw, smooth, reference_smooth : float64 arrays, shape (bins, n)
-        Not negative.
-
-    Returns
-    -------
-    Errors
-        A frame that is empty in the map but not in the reference has peak and
-        mean velocity 0, and all its energy in wrong bins.
+    A frame that is empty in the map but not in the reference has peak and mean velocity 0,
+    and all its energy in wrong bins.
     """
     energy = reference_smooth.sum(axis=0)
     moving = (energy > 0) & (energy >= _MOVING * energy.mean())
@@ -346,10 +338,7 @@ _COLOURS = {"none": "#888888", "facing": "#b35806", "depth": "#2166ac", "exact":
 def plot_cost_and_error(measurement: Measurement, choice: Choice | None = None) -> Figure:
     """Plot error after smoothing against milliseconds per frame, both axes logarithmic.
 
-    Parameters
-    ----------
-    choice : Choice, optional
-        Marked, with its tolerance as a line.
+    A choice is marked, with its tolerance as a line.
     """
     from matplotlib.figure import Figure
 

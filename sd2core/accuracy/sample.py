@@ -46,21 +46,15 @@ class Run:
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """Runs of frames, from the liveliest to the quieter ones of a clip.
-
-    Parameters
-    ----------
-    frames : intp array, shape (n,)
-        Frames of the clip that are read: every run with the frames around it,
-        which its velocities, smoothing and reused masks look at.
-    chosen_on, checked_on : tuple of Run
-        Runs to choose a plan on, and others to check it on. The same run in a
-        clip of fewer than ten frames.
-    """
+    """Runs of frames, from the liveliest to the quieter ones of a clip."""
 
     frames: NDArray[np.intp]
+    """Frames of the clip that are read: every run with the frames around it, which its velocities,
+    smoothing and reused masks look at."""
     chosen_on: tuple[Run, ...]
+    """Runs to choose a plan on."""
     checked_on: tuple[Run, ...]
+    """Runs to check it on; the same run in a clip of fewer than ten frames."""
 
     @property
     def runs(self) -> tuple[Run, ...]:
@@ -70,10 +64,7 @@ class Sample:
     def of(self, mesh: MeshSequence) -> MeshSequence:
         """Sampled frames of a mesh in memory, one run after the other at their own times.
 
-        Raises
-        ------
-        Sd2Error
-            When a vertex is not finite; it is named by its frame in the clip.
+        Raises Sd2Error, with the frame in the clip, if a vertex is not finite.
         """
         cuts = np.flatnonzero(np.diff(self.frames) > 1) + 1
         stretches = []
@@ -93,20 +84,10 @@ class Sample:
 
 
 def take_sample(mesh: MeshSequence, options: SynthesisOptions, runs: int = 6) -> Sample:
-    """Choose frames on which plans are compared.
+    """Choose frames on which plans are compared: ``runs`` of ten frames, half of them to choose on.
 
-    Parameters
-    ----------
-    options : SynthesisOptions
-        Smoothing of the vertices' paths widens the margins of the runs.
-    runs : int
-        Number of runs of ten frames, half of them to choose on. A clip that is
-        too short for them is used whole.
-
-    Returns
-    -------
-    Sample
-        Every second run in order of liveliness is to check on.
+    Every second run in order of liveliness is to check on. A clip that is too short for
+    them is used whole. Smoothing of the vertices' paths widens the margins of the runs.
     """
     frames = mesh.frame_count
     margin = _FEWEST_MARGIN

@@ -19,13 +19,7 @@ _CURVES = ("hands", "elbows", "torso")
 
 
 def draw_comparison(comparison: Comparison) -> Figure:
-    """Draw maps and curves on one time axis.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Bound to no window.
-    """
+    """Draw maps and curves on one time axis."""
     from matplotlib.figure import Figure
 
     count = len(comparison.labels)

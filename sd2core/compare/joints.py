@@ -81,18 +81,10 @@ def rows_of(names: tuple[str, ...]) -> list[int]:
 
 @dataclass(frozen=True, eq=False)
 class JointPatches:
-    """Patches of one surface.
+    """Patches of one surface."""
 
-    Parameters
-    ----------
-    rows : tuple of intp arrays
-        Vertices of each joint's patch, in the order of :data:`JOINTS`.
-    weights : tuple of float64 arrays
-        Adding up to 1 for each joint.
-    """
-
-    rows: tuple[NDArray[np.intp], ...]
-    weights: tuple[Floats, ...]
+    rows: tuple[NDArray[np.intp], ...]  # vertices of each joint's patch, in the order of JOINTS
+    weights: tuple[Floats, ...]  # adding up to 1 for each joint
 
     def positions(self, vertices: NDArray[np.floating]) -> Floats:
         """Joints (..., J, 3) of vertices (..., V, 3)."""
@@ -156,40 +148,26 @@ def _even_weights(points_m: Floats, joint_m: Floats) -> Floats:
 
 
 class CarriedPatches(NamedTuple):
-    """Patches that another surface took over.
-
-    Parameters
-    ----------
-    frame : int
-        In which the two surfaces lie closest, counted on their common times.
-    distance_m : float
-        Mean distance of the patches' vertices from those that replace them, there.
-    """
+    """Patches that another surface took over."""
 
     patches: JointPatches
     frame: int
+    """Common frame in which the two surfaces lie closest."""
     distance_m: float
+    """Mean distance of the patches' vertices from those that replace them, there."""
 
 
 def carry_patches(
     patches: JointPatches, source: NDArray[np.floating], target: NDArray[np.floating]
 ) -> CarriedPatches:
-    """Take patches over to another surface of the same person in the same motion.
+    """Transfer patches to another surface of the same person in the same motion.
 
-    Parameters
-    ----------
-    patches : JointPatches
-        Of the source.
-    source, target : float arrays, shape (T, V, 3) and (T, W, 3)
-        At the same times. Up to two dozen frames, spread evenly, are tried. The
-        middles of the two (of each patch's vertices, of all vertices) may differ:
-        a shift of the whole body is taken out first.
+    Source (T, V, 3) and target (T, W, 3) are at the same times. Up to two dozen frames,
+    spread evenly, are tried. The middles of the two (of each patch's vertices, of all
+    vertices) may differ: a shift of the whole body is taken out first.
 
-    Raises
-    ------
-    Sd2Error
-        When the surfaces are of different persons, poses or scales: they lie more
-        than 10 cm apart even where they are closest.
+    Raises Sd2Error if the surfaces are of different persons, poses or scales: they lie more
+    than 10 cm apart even where they are closest.
     """
     from scipy.spatial import cKDTree
 

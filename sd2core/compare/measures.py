@@ -38,21 +38,10 @@ def line_of_sight_velocity(
     sensor_m: ArrayLike = (0.0, 0.0, 0.0),
     presence: Presence | None = None,
 ) -> Floats:
-    """Velocity towards a sensor.
+    """Velocity (T, N) towards a sensor in m/s, positive when approaching.
 
-    Parameters
-    ----------
-    positions_m : float array, shape (T, N, 3)
-        T of 2 at least.
-    times_s : float64 array, shape (T,)
-    sensor_m : array_like, shape (3,)
-    presence : Presence, optional
-        Nothing is measured from one stretch with a person to another.
-
-    Returns
-    -------
-    float64 array, shape (T, N)
-        m/s, positive when approaching; 0 where nothing can be measured.
+    ``positions_m`` is of shape (T, N, 3), with T of 2 at least. The velocity is 0 where
+    nothing can be measured; nothing is measured from one stretch with a person to another.
     """
     stencil = moments(times_s, np.arange(len(times_s)), 1, presence)
     paths = np.ascontiguousarray(np.swapaxes(positions_m, 1, 2), dtype=np.float64)  # (T, 3, N)
@@ -80,20 +69,11 @@ def correlation(values: NDArray[Any], truth: NDArray[Any]) -> float:
 
 
 def jitter(positions_m: NDArray[Any], times_s: Floats, presence: Presence | None = None) -> Floats:
-    """RMS over time of the third difference of the path, per joint.
+    """RMS over time of the third difference of the path (T, N, 3), per joint: shape (N,).
 
-    Parameters
-    ----------
-    positions_m : float array, shape (T, N, 3)
-    times_s : float64 array, shape (T,)
-    presence : Presence, optional
-        No difference reaches from one stretch with a person to another.
-
-    Returns
-    -------
-    float64 array, shape (N,)
-        Metres per frame cubed, times the cube of the typical frame rate: m/s³ of
-        evenly timed frames. 0 for fewer than four frames.
+    Metres per frame cubed, times the cube of the typical frame rate: m/s³ of evenly timed
+    frames. 0 for fewer than four frames. No difference reaches from one stretch with a
+    person to another.
     """
     third = np.diff(positions_m, 3, axis=0) / np.median(np.diff(times_s)) ** 3
     if presence is not None:
@@ -106,10 +86,7 @@ def jitter(positions_m: NDArray[Any], times_s: Floats, presence: Presence | None
 def common_times(meshes: Sequence[MeshSequence], reference: int = 0) -> NDArray[np.float64]:
     """The reference's frame times within the stretch that all meshes cover.
 
-    Raises
-    ------
-    Sd2Error
-        When fewer than four frames are left.
+    Raises Sd2Error if fewer than four frames are left.
     """
     times = meshes[reference].times_s
     first = max(float(mesh.times_s[0]) for mesh in meshes) - _SAME_S
@@ -126,23 +103,11 @@ def common_times(meshes: Sequence[MeshSequence], reference: int = 0) -> NDArray[
 
 
 def resample_mesh(mesh: MeshSequence, times_s: NDArray[np.float64]) -> tuple[MeshSequence, bool]:
-    """A mesh at other times within its own, in memory.
+    """A mesh at other times within its own, in memory, and whether anything was interpolated.
 
-    Parameters
-    ----------
-    times_s : float64 array, shape (n,)
-
-    Returns
-    -------
-    MeshSequence
-    bool
-        Whether anything was interpolated: by the cubic through two frames with
-        the tangents of their neighbours.
-
-    Notes
-    -----
-    The vertices of frames without a person mean nothing, nor do those interpolated
-    next to them; the mesh that is returned says which these are.
+    Interpolation is by the cubic through two frames with the tangents of their neighbours.
+    The vertices of frames without a person mean nothing, nor do those interpolated next to
+    them; the mesh that is returned says which these are.
     """
     own = mesh.times_s
     nearest = np.abs(own[:, None] - times_s[None, :]).argmin(axis=0)
@@ -210,17 +175,8 @@ def map_l1(
 ) -> float:
     """Sum of absolute differences over the sum of the reference, both smoothed.
 
-    Parameters
-    ----------
-    values, reference : DopplerMap
-        Of one shape.
-    frames : bool array, shape (frames,), optional
-        Only these.
-
-    Returns
-    -------
-    float
-        0 when both are empty, infinite when only the reference is.
+    Both maps are of one shape; ``frames`` restricts the sums. 0 when both are empty,
+    infinite when only the reference is.
     """
     a, b = (one.values.astype(np.float64) for one in (values, reference))
     if frames is not None:

@@ -41,29 +41,18 @@ Alignment = Literal["none", "root"]
 
 @dataclass(frozen=True, eq=False)
 class Difference:
-    """Differences of one mesh from the reference.
-
-    Parameters
-    ----------
-    distance_m : float64 array, shape (J,)
-        Mean distance of each joint over time, after the alignment.
-    velocity_rms_mps : float64 array, shape (J,)
-        Of the difference of the velocities along the line of sight.
-    correlation : float64 array, shape (J,)
-        Of those velocities; NaN where one does not change.
-    jitter_mps3 : float64 array, shape (J,)
-        Of this mesh by itself: RMS third difference, see
-        :func:`sd2core.compare.measures.jitter`.
-    map_l1 : float
-        Relative difference of the smoothed Doppler maps.
-    """
+    """Differences of one mesh from the reference, per joint (J,)."""
 
     label: str
     distance_m: Floats
+    """Mean distance of each joint over time, after the alignment."""
     velocity_rms_mps: Floats
-    correlation: Floats
+    """RMS of the difference of the velocities along the line of sight."""
+    correlation: Floats  # of those velocities; NaN where one does not change
     jitter_mps3: Floats
+    """Of this mesh by itself: RMS third difference, see :func:`sd2core.compare.measures.jitter`."""
     map_l1: float
+    """Relative difference of the smoothed Doppler maps."""
 
     def group(self, values: Floats, name: str) -> float:
         """Mean of one of the arrays over a group of :data:`GROUPS` (RMS of velocities)."""
@@ -73,40 +62,25 @@ class Difference:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """Result of :func:`compare_meshes`.
-
-    Parameters
-    ----------
-    reference : int
-        Number of the mesh that the others are measured against.
-    times_s : float64 array, shape (T,)
-        Common to all.
-    alignment : {"none", "root"}
-        Whether joint distances are those of the places, or of the places from the
-        pelvis. Velocities and maps are never aligned.
-    joints_m : tuple of float64 arrays, shape (T, J, 3)
-        Of every mesh, not aligned.
-    velocity_mps : tuple of float64 arrays, shape (T, J)
-        Along the line of sight, positive when approaching.
-    measured : bool array, shape (T,)
-        Frames that count: those in which every mesh has a person.
-    differences : tuple of Difference
-        Of every mesh, the reference included.
-    notes : tuple of str
-        What was interpolated, carried over or left out.
-    """
+    """Result of :func:`compare_meshes`."""
 
     labels: tuple[str, ...]
     reference: int
-    times_s: Floats
+    """Number of the mesh that the others are measured against."""
+    times_s: Floats  # (T,), common to all
     sensor: VirtualSensor
     alignment: Alignment
-    joints_m: tuple[Floats, ...]
+    """Joint distances are those of the places (``none``), or of the places from the pelvis
+    (``root``). Velocities and maps are never aligned."""
+    joints_m: tuple[Floats, ...]  # of every mesh, (T, J, 3), not aligned
     velocity_mps: tuple[Floats, ...]
+    """Along the line of sight, positive when approaching; (T, J) of every mesh."""
     measured: NDArray[np.bool_]
+    """Frames that count, shape (T,): those in which every mesh has a person."""
     maps: tuple[DopplerMap, ...]
-    differences: tuple[Difference, ...]
+    differences: tuple[Difference, ...]  # of every mesh, the reference included
     notes: tuple[str, ...]
+    """Interpolated, carried over or omitted parts, as sentences."""
 
     def as_dict(self) -> dict[str, Any]:
         """Everything but the curves and maps, for JSON."""

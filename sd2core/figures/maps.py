@@ -37,21 +37,12 @@ _LETTER_IN = 0.062
 
 @dataclass(frozen=True)
 class Levels:
-    """Colour scale: levels relative to the reference of each map.
-
-    Parameters
-    ----------
-    scale : {"dB", "linear"}
-    low_db, high_db : float
-        First and last colour; on a linear scale zero and ``high_db``.
-    colour_map : str
-        Name of a matplotlib map.
-    """
+    """Colour scale: levels relative to the reference of each map."""
 
     scale: Scale = "dB"
-    low_db: float = -30.0
-    high_db: float = 0.0
-    colour_map: str = "viridis"
+    low_db: float = -30.0  # first colour; on a linear scale this is zero
+    high_db: float = 0.0  # last colour
+    colour_map: str = "viridis"  # name of a matplotlib map
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -77,37 +68,22 @@ class Levels:
 
 @dataclass(frozen=True, eq=False)
 class MapRow:
-    """One map of a figure.
-
-    Parameters
-    ----------
-    title : str
-        What it is, with the word simulated where it is.
-    reference : float
-        Value shown as 0 dB.
-    offset_s : float
-        How much later its clock starts than that of the figure.
-    """
+    """One map of a figure."""
 
     doppler: DopplerMap
-    title: str
-    reference: float
-    offset_s: float = 0.0
+    title: str  # with the word simulated where it is
+    reference: float  # value shown as 0 dB
+    offset_s: float = 0.0  # start of its clock on that of the figure
 
 
 def difference_of(
     minuend: MapRow, subtrahend: MapRow, levels: Levels
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Level of one map minus that of another, on the clock of the first.
+    """Level of one map minus that of another, on the clock of the first, and where it is known.
 
     Each is relative to its own reference and held within the levels shown, so that the
-    difference is that of the two pictures.
-
-    Returns
-    -------
-    difference : float64 array, shape (bins, frames)
-    known : bool array, shape (bins, frames)
-        False where one of the two says nothing: no frame, no person, an emptied bin.
+    difference is that of the two pictures. Both arrays are of shape (bins, frames); unknown
+    are cells of which one map says nothing: no frame, no person, an emptied bin.
     """
     one, other = minuend.doppler, subtrahend.doppler
     if one.axis != other.axis:
@@ -147,7 +123,7 @@ def draw_maps(
     rows : sequence of MapRow
         From top to bottom.
     start_s, end_s : float
-        Stretch that is shown.
+        Part that is shown.
     difference : tuple of int, optional
         Numbers of two rows: the level of the first minus that of the second as a last row.
     colours : tuple of str
@@ -155,7 +131,7 @@ def draw_maps(
     labels : Labels, optional
         Drawn below the maps, and their edges on them; none where none is in view.
     heading : str
-        What the maps are of, with the word simulated where it is.
+        Subject of the maps, with the word simulated where it is.
     """
     from matplotlib.figure import Figure
 
@@ -207,14 +183,9 @@ def draw_maps(
 
 
 def save_maps(figure: Figure, path: Path, rows: Sequence[MapRow], about: dict[str, Any]) -> None:
-    """Write the figure as PNG, SVG or PDF by the name's ending, with its provenance.
+    """Write a figure of :func:`draw_maps` as PNG, SVG or PDF by the name's ending.
 
-    Parameters
-    ----------
-    figure : matplotlib.figure.Figure
-        Of :func:`draw_maps`.
-    about : dict
-        What else is to be known, fit for JSON.
+    ``about`` is further provenance, fit for JSON.
     """
     provenance = about | {
         "maps": [

@@ -32,19 +32,10 @@ def plot_strip(
     options: StripOptions | None = None,
     progress: Progress = silent,
 ) -> Figure:
-    """Draw a strip.
+    """Draw a strip of frames, which are numbers on :attr:`StripSource.clock`.
 
-    Parameters
-    ----------
-    frames : sequence of int
-        On :attr:`StripSource.clock`.
-    progress : Progress
-        Called once per frame.
-
-    Raises
-    ------
-    Sd2Error
-        When a row needs what is not there, or a frame does not exist.
+    Progress is called once per frame. Raises Sd2Error if a row needs what is not there, or
+    a frame does not exist.
     """
     from matplotlib.figure import Figure
 

@@ -30,30 +30,14 @@ _EXPECTED = "frame numbers such as 0,15,30 or a range such as 0:90:15 (from, to,
 
 @dataclass(frozen=True)
 class StripOptions:
-    """Options of a strip.
+    """Options of a strip."""
 
-    Parameters
-    ----------
-    rows : tuple of str
-        Of ``video``, ``mesh`` and ``overlay`` (the mesh over the video), in this order.
-    as_dots : bool
-        Vertices instead of the surface.
-    colour : str
-        ``plain``, or by radial ``velocity`` towards the sensor.
-    v_max_mps : float
-        Where the colours of velocity end.
-    whole : bool
-        The whole picture instead of what is around the body.
-    columns : int
-        Pictures side by side; more frames go below.
-    """
-
-    rows: tuple[Row, ...] = ("video", "mesh")
-    as_dots: bool = False
-    colour: Colour = "velocity"
-    v_max_mps: float = 2.0
-    whole: bool = False
-    columns: int = 10
+    rows: tuple[Row, ...] = ("video", "mesh")  # "overlay" is the mesh over the video
+    as_dots: bool = False  # vertices instead of the surface
+    colour: Colour = "velocity"  # velocity is radial, towards the sensor
+    v_max_mps: float = 2.0  # end of the colour scale of velocity
+    whole: bool = False  # the whole picture instead of what is around the body
+    columns: int = 10  # pictures side by side; more frames go below
 
     def __post_init__(self) -> None:
         unknown = [row for row in self.rows if row not in ROWS]
@@ -69,26 +53,14 @@ class StripOptions:
 
 @dataclass(frozen=True, eq=False)
 class StripSource:
-    """Video and mesh that a strip is drawn of.
-
-    Parameters
-    ----------
-    camera : PinholeCamera
-        Sees both.
-    sensor : VirtualSensor
-        Velocities are towards it.
-    simulated : bool
-        Whether no camera was there.
-    name : str
-        Of the recording or file, for provenance.
-    """
+    """Video and mesh that a strip is drawn of, both seen by ``camera``."""
 
     video: VideoReader | None
     mesh: MeshSequence | None
     camera: PinholeCamera
-    sensor: VirtualSensor = field(default_factory=VirtualSensor)
-    simulated: bool = False
-    name: str = ""
+    sensor: VirtualSensor = field(default_factory=VirtualSensor)  # velocities are towards it
+    simulated: bool = False  # there was no camera
+    name: str = ""  # of the recording or file, for provenance
 
     @classmethod
     def of(
@@ -135,24 +107,10 @@ def check_strip(source: StripSource, frames: Sequence[int], options: StripOption
 
 
 def parse_frames(text: str, total: int) -> list[int]:
-    """Read ``0,15,30`` or ``0:90:15``, or several of either.
+    """Read ``0,15,30`` or ``0:90:15``, or several of either, in the order given.
 
-    Parameters
-    ----------
-    text : str
-        Ranges are half-open; what is left out is the start, the end, or 1.
-    total : int
-        Number of frames there are.
-
-    Returns
-    -------
-    list of int
-        In the order given.
-
-    Raises
-    ------
-    Sd2Error
-        When it cannot be read, is empty, or names a frame that is not there.
+    Ranges are half-open; what is left out is the start, the end (``total``), or 1. Raises
+    Sd2Error if the text cannot be read, is empty, or names a frame that is not there.
     """
     frames: list[int] = []
     for part in text.replace(" ", "").split(","):

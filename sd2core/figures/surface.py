@@ -22,23 +22,13 @@ _CELL_PER_DOT = 2.2
 
 @dataclass(frozen=True)
 class Frame:
-    """Part of a camera's picture, enlarged.
+    """Part of a camera's picture, enlarged."""
 
-    Parameters
-    ----------
-    left, top : float
-        Corner in pixels of the camera's picture.
-    width, height : int
-        Of the enlarged part.
-    zoom : float
-        Its pixels per pixel of the picture.
-    """
-
-    left: float
+    left: float  # corner in pixels of the camera's picture
     top: float
-    width: int
+    width: int  # of the enlarged part
     height: int
-    zoom: float = 1.0
+    zoom: float = 1.0  # its pixels per pixel of the picture
 
     @classmethod
     def whole(cls, camera: PinholeCamera) -> Frame:
@@ -61,23 +51,13 @@ def project_vertices(
 
 @dataclass(frozen=True, eq=False)
 class VisibleTriangles:
-    """Triangle that each pixel shows.
-
-    Parameters
-    ----------
-    owner : int32 array, shape (height, width)
-        Number of the triangle, minus one beside the mesh.
-    points : float32 array, shape (V, 2)
-        Pixel coordinates of the vertices.
-    nearness : float32 array, shape (V,)
-        1 / depth; 0 where that is not known.
-    faces : int32 array, shape (F, 3)
-    """
+    """Triangle that each pixel shows."""
 
     owner: NDArray[np.int32]
-    points: NDArray[np.float32]
-    nearness: NDArray[np.float32]
-    faces: NDArray[np.int32]
+    """Number of the triangle, shape (height, width); minus one beside the mesh."""
+    points: NDArray[np.float32]  # (V, 2), pixels
+    nearness: NDArray[np.float32]  # (V,), 1 / depth; 0 where that is not known
+    faces: NDArray[np.int32]  # (F, 3)
 
     @property
     def shown(self) -> NDArray[np.bool_]:
@@ -102,16 +82,10 @@ def find_visible_triangles(
     camera: PinholeCamera,
     frame: Frame | None = None,
 ) -> VisibleTriangles:
-    """Look at a mesh.
+    """Find the triangle of a mesh that each pixel of a picture, or of a part of it, shows.
 
-    Parameters
-    ----------
-    vertices_m : float array, shape (V, 3)
-        Metres in the camera's frame; triangles with an unknown corner are left out.
-    faces : int32 array, shape (F, 3)
-        Counter-clockwise seen from outside.
-    frame : Frame, optional
-        The whole picture by default.
+    Vertices (V, 3) are in metres in the camera's frame; triangles with an unknown corner
+    are left out. Faces (F, 3) are counter-clockwise seen from outside.
     """
     frame = frame or Frame.whole(camera)
     pixels, depth = project_vertices(vertices_m, camera)
@@ -143,21 +117,10 @@ def shade_mesh(
     camera: PinholeCamera,
     frame: Frame | None = None,
 ) -> NDArray[np.float32]:
-    """Shade a mesh by a lamp at the camera.
+    """Shade a mesh by a lamp at the camera: 0 beside it, from a third (edge-on) to 1 (square on).
 
-    Parameters
-    ----------
-    vertices_m : float array, shape (V, 3)
-        Metres in the camera's frame.
-    faces : int32 array, shape (F, 3), or None
-        None: dots.
-    frame : Frame, optional
-        The whole picture by default.
-
-    Returns
-    -------
-    float32 array, shape (height, width)
-        0 beside the mesh; on it from a third (edge-on) to 1 (square on, and dots).
+    Vertices (V, 3) are in metres in the camera's frame; without faces they are drawn as
+    dots, of value 1. The whole picture (height, width) unless a part of it is given.
     """
     if faces is None:
         return draw_dots(vertices_m, camera, frame)
