@@ -27,25 +27,13 @@ Arrays = dict[str, NDArray]
 
 @dataclass(frozen=True, eq=False)
 class Clip:
-    """Run of frames that segments are cut from.
+    """Run of frames that segments are cut from."""
 
-    Parameters
-    ----------
-    start, stop : int
-        Half-open frames of the source.
-    times_s : float64 array, shape (frames,)
-        Of its frames as segments hold them.
-    resampled : bool
-        Whether these are other times than those of the source.
-    starts : int64 array, shape (segments,)
-        First frames of the segments, within the clip.
-    """
-
-    start: int
-    stop: int
-    times_s: NDArray[np.float64]
-    resampled: bool
-    starts: NDArray[np.int64]
+    start: int  # First frame of the source.
+    stop: int  # End of its frames, exclusive.
+    times_s: NDArray[np.float64]  # Of its frames as segments hold them.
+    resampled: bool  # True if these are other times than those of the source.
+    starts: NDArray[np.int64]  # First frames of the segments, within the clip.
 
 
 def clips_of(
@@ -57,12 +45,7 @@ def clips_of(
 ) -> list[Clip]:
     """Find the clips of a source and the first frames of their segments.
 
-    Parameters
-    ----------
-    present : bool array, shape (frames,), optional
-        Frames with a person; None: all.
-    frame_rate_hz : float
-        Of the segments.
+    ``present`` marks frames with a person; None: all. ``frame_rate_hz`` is that of the segments.
     """
     there = np.ones(len(times_s), bool) if present is None else present
     found = []
@@ -106,18 +89,10 @@ def cut_source(
 ) -> Iterator[Arrays]:
     """Yield the rows of a data set in blocks of bounded size.
 
-    Parameters
-    ----------
-    null_bins : sequence of int
-        Set to zero.
-    label_numbers : int16 array, shape (labels,)
-        What each label of the source is in the data set.
-
-    Yields
-    ------
-    dict of str to array
-        Per segment, first axis: the kinds the source has and ``available``, ``label``,
-        ``segment_label``, ``purity``, ``start_s``, ``start_frame``, ``resampled``.
+    ``null_bins`` are set to zero. ``label_numbers`` holds the data set's number of each label of
+    the source. A block has, per segment (first axis), the kinds that the source has and
+    ``available``, ``label``, ``segment_label``, ``purity``, ``start_s``, ``start_frame``,
+    ``resampled``.
     """
     known = source.known
     kinds = [kind for kind in options.kinds if kind in source.maps]
@@ -157,12 +132,8 @@ def label_of_segments(
 ) -> tuple[NDArray[np.int16], NDArray[np.float32]]:
     """Return the label of every segment and the share of its frames that have it.
 
-    Parameters
-    ----------
-    windows : int array, shape (segments, length)
-        Labels of the frames; 0 is background.
-    labels : int
-        How many there are.
+    ``windows`` holds the labels of the frames, (segments, length), below ``labels``; 0 is
+    background.
     """
     counts = np.stack([(windows == number).sum(axis=1) for number in range(labels)], axis=1)
     if options.label_rule == "majority" or labels == 1:

@@ -29,29 +29,18 @@ _WARMING_FRAMES = 4
 
 @dataclass(frozen=True)
 class Forecast:
-    """Size of the data set that would be written.
-
-    Parameters
-    ----------
-    of_subject, of_label : dict of str to int
-        Segments.
-    of_kind : dict of str to int
-        Segments that have it; where a radar missed frames it may be fewer.
-    total_bytes : int
-        Of the arrays before compression.
-    failed : tuple of str
-        Sources that cannot be read, each with its reason.
-    """
+    """Size of the data set that would be written."""
 
     sources: int
     segments: int
-    of_subject: dict[str, int]
-    of_label: dict[str, int]
+    of_subject: dict[str, int]  # Segments.
+    of_label: dict[str, int]  # Segments.
+    # Segments that have it; where a radar missed frames it may be fewer.
     of_kind: dict[MapKind, int]
     split: Split
     frame_rate_hz: float
-    total_bytes: int
-    failed: tuple[str, ...] = ()
+    total_bytes: int  # Of the arrays before compression.
+    failed: tuple[str, ...] = ()  # Sources that cannot be read, each with its reason.
 
     def of_split(self) -> dict[str, int]:
         """Segments of each split."""
@@ -65,15 +54,9 @@ class Forecast:
 
 @dataclass
 class Counting:
-    """Outlines of sources, read once and counted with several options.
+    """Outlines of sources, read once and counted with several options."""
 
-    Parameters
-    ----------
-    outlines : list of (str, Outline)
-        With the subject of each.
-    """
-
-    outlines: list[tuple[str, Outline]] = field(default_factory=list)
+    outlines: list[tuple[str, Outline]] = field(default_factory=list)  # With the subject of each.
     failed: list[str] = field(default_factory=list)
 
     @classmethod
@@ -93,13 +76,7 @@ class Counting:
         return found
 
     def forecast(self, options: DatasetOptions, bins: int) -> Forecast:
-        """Count the segments that these options give.
-
-        Parameters
-        ----------
-        bins : int
-            Of the velocity axis.
-        """
+        """Count the segments that these options give on a velocity axis of ``bins``."""
         if not self.outlines:
             raise Sd2Error(
                 self.failed[0] if self.failed else "There are no sources", "one at least"
@@ -139,13 +116,8 @@ class Counting:
 def simulation_s(recordings: Sequence[Path], making: Making) -> float:
     """Estimate the seconds that simulating all recordings from all places takes.
 
-    Timed on some frames of the first recording that can be simulated; the others are assumed
-    to cost the same per frame.
-
-    Parameters
-    ----------
-    recordings : sequence of Path
-        Those that cannot be read are left out.
+    Timed on some frames of the first recording that can be simulated; the others are assumed to
+    cost the same per frame. Recordings that cannot be read are left out.
     """
     if making.simulation is None or "simulated" not in making.kinds:
         return 0.0

@@ -51,12 +51,7 @@ def write_packed(
 ) -> None:
     """Write a data set as one file, in one step.
 
-    Parameters
-    ----------
-    arrays : dict of str to array
-        As Zarr or h5py has them: read in parts.
-    progress : Progress
-        Counts segments.
+    The arrays, of Zarr or h5py, are read in parts. ``progress`` counts segments.
     """
     if form == "npz":
         _write_npz(out, header, arrays, sources)

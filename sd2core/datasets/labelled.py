@@ -25,13 +25,7 @@ _EXPECTED = "a campaign or other pairs, a data set, a labelled recording, or a l
 
 
 class LabelledSource(NamedTuple):
-    """Labelled data and its subject.
-
-    Parameters
-    ----------
-    subject : str
-        Empty where nothing was said.
-    """
+    """Labelled data and its subject, empty where none was given."""
 
     path: Path
     subject: str = ""
@@ -47,35 +41,20 @@ class Grid(NamedTuple):
 
 @dataclass(frozen=True)
 class LabelledFacts:
-    """Content of one source of labelled data.
-
-    Parameters
-    ----------
-    subjects : tuple of str
-        As the source itself calls them.
-    maps : tuple of str
-        Of ``synthetic``, ``denoised`` and ``radar`` those that there are, or can be made.
-    duration_s : float or None
-        Of the movements, each counted once; None where only reading the maps would tell.
-    simulated : bool
-        Whether its radar is.
-    spans : int
-        Labelled ones; 0 where labels stand by frames.
-    grid : Grid or None
-        None where it depends on what it is learnt from with.
-    splits : dict of str to tuple of str
-        Who trains, validates and tests, where the source says so.
-    """
+    """Content of one source of labelled data."""
 
     path: Path
     kind: LabelledKind
-    subjects: tuple[str, ...]
+    subjects: tuple[str, ...]  # Names in the source itself.
+    # Of ``synthetic``, ``denoised`` and ``radar`` those that there are, or can be made.
     maps: tuple[str, ...]
+    # Of the movements, each counted once; None where only reading the maps would tell.
     duration_s: float | None = None
-    simulated: bool = False
+    simulated: bool = False  # True if its radar is simulated.
     placements: int = 1
-    spans: int = 0
-    grid: Grid | None = None
+    spans: int = 0  # Labelled ones; 0 where labels stand by frames.
+    grid: Grid | None = None  # None where it depends on what it is learnt from with.
+    # Subjects that train, validate and test, where the source says so.
     splits: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
 

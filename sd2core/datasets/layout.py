@@ -49,46 +49,28 @@ CHUNK_ROWS = 8192
 class Header:
     """Header of a data set: properties of all its segments.
 
-    Parameters
-    ----------
-    length, overlap : int
-        Frames of a segment, and how many neighbours share.
-    null_bins : tuple of int
-        Bins set to zero in all kinds.
-    label_rule, min_share
-        As :class:`~sd2core.datasets.options.DatasetOptions` has them.
-    kinds_wanted, kinds : tuple of str
-        Those that were asked for, and those that some segment has.
-    labels : tuple of str
-        Numbers in ``label`` and ``segment_label`` are places in it; the first is background.
-    classes : dict of str to str
-        What a classifier calls a label.
-    subjects : tuple of str
-        Numbers in ``subject`` are places in it.
-    splits : dict of str to tuple of str
-        Subjects of each split.
-    units : dict of str to tuple of str
-        What 1 means in each kind; several where sources differ.
-    made_by : str
-        Program and version.
+    ``label_rule`` and ``min_share`` are those of :class:`~sd2core.datasets.options.DatasetOptions`.
     """
 
-    length: int
-    overlap: int
+    length: int  # Frames of a segment.
+    overlap: int  # Frames that neighbouring segments share.
     axis: VelocityAxis
-    null_bins: tuple[int, ...]
+    null_bins: tuple[int, ...]  # Bins set to zero in all kinds.
     frame_rate_hz: float
     label_rule: LabelRule
     min_share: float
-    kinds_wanted: tuple[MapKind, ...] = KINDS
-    kinds: tuple[MapKind, ...] = ()
+    kinds_wanted: tuple[MapKind, ...] = KINDS  # Those that were asked for.
+    kinds: tuple[MapKind, ...] = ()  # Those that some segment has.
+    # Numbers in ``label`` and ``segment_label`` are places in it; the first is background.
     labels: tuple[str, ...] = ("background",)
+    # Class that a classifier learns for a label.
     classes: dict[str, str] = field(default_factory=dict)
-    subjects: tuple[str, ...] = ()
-    splits: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    subjects: tuple[str, ...] = ()  # Numbers in ``subject`` are places in it.
+    splits: dict[str, tuple[str, ...]] = field(default_factory=dict)  # Subjects of each split.
+    # Meaning of the value 1 in each kind; several where sources differ.
     units: dict[str, tuple[str, ...]] = field(default_factory=dict)
     title: str = ""
-    made_by: str = ""
+    made_by: str = ""  # Program and version.
     provenance: dict[str, Any] = field(default_factory=dict)
 
     @property

@@ -45,24 +45,14 @@ _TITLES: dict[MapKind, str] = {
 
 @dataclass(frozen=True, eq=False)
 class Example:
-    """Column of the sheet: one segment.
+    """Column of the sheet: one segment."""
 
-    Parameters
-    ----------
-    label : int
-        Place in the header's labels.
-    levels : dict of kind to float64 array, shape (bins, frames)
-        In dB below the strongest cell of the segment in that kind; empty where it is zero.
-    marked : bool array, shape (frames,)
-        Frames that have the label.
-    words : tuple of str
-        Who, and from where.
-    """
-
-    label: int
+    label: int  # Place in the header's labels.
+    # In dB below the strongest cell of the segment in that kind, (bins, frames); empty where it is
+    # zero.
     levels: dict[MapKind, NDArray[np.float64]]
-    marked: NDArray[np.bool_]
-    words: tuple[str, str]
+    marked: NDArray[np.bool_]  # True in frames that have the label.
+    words: tuple[str, str]  # Subject and placement.
 
 
 def write_preview(path: Path) -> Path:

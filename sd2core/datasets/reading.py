@@ -20,13 +20,6 @@ class Dataset:
 
     Get one from :func:`open_dataset`. ``dataset["synthetic"][10:20]`` is an array of shape
     (10, length, bins); ``docs/formats.md`` lists all names.
-
-    Parameters
-    ----------
-    sources : list of dict, optional
-        As an NPZ holds them.
-    file : object, optional
-        To close.
     """
 
     def __init__(
@@ -84,10 +77,7 @@ class Dataset:
     def of_split(self, split: str) -> NDArray[np.int64]:
         """Return the indices of the segments of a split, ascending.
 
-        Raises
-        ------
-        Sd2Error
-            For a name that is none.
+        Raises Sd2Error for a name that is none.
         """
         if split not in SPLITS:
             raise Sd2Error(f"The split is {split!r}", f"one of {', '.join(SPLITS)}")

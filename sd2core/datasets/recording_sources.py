@@ -91,10 +91,7 @@ def recording_sources(
 ) -> list[LazySource]:
     """Return one source per recording and placement; nothing is computed yet.
 
-    Parameters
-    ----------
-    subjects : sequence of str
-        Who each recording is of.
+    ``subjects`` names the subject of each recording.
     """
     shared = _Shared(making)
     found = []
@@ -128,10 +125,7 @@ def labels_and_classes(labels: Labels) -> tuple[tuple[str, ...], dict[str, str]]
 def radar_map(recording: Recording, axis: VelocityAxis) -> DopplerMap:
     """Return the map of a recording's radar file, on the recording's clock.
 
-    Parameters
-    ----------
-    axis : VelocityAxis
-        Of a capture's map; a file that holds a map keeps its own.
+    ``axis`` is that of a capture's map; a file that holds a map keeps its own.
     """
     if recording.holds_radar_map:
         radar = recording.load_radar_map().doppler
@@ -376,13 +370,7 @@ class Denoising:
         self._model: TrainedDenoiser | None = None
 
     def denoised(self, synthetic: DopplerMap, path: Path) -> DopplerMap:
-        """Denoise a synthetic map.
-
-        Parameters
-        ----------
-        path : Path
-            Model file.
-        """
+        """Denoise a synthetic map with a model file."""
         if self._model is None or path != self._path:
             from sd2core.denoise.files import load_model
 

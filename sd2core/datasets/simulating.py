@@ -37,14 +37,10 @@ class Simulation:
 
     A rough surface, what nothing hides, and the gain and noise of a
     :class:`~sd2core.fmcw.link.LinkBudget`: what is farther away is weaker.
-
-    Parameters
-    ----------
-    seed : int
-        Of phases and noise; every mesh and place has its own from it, see :func:`seed_of`.
     """
 
     radar: RadarConfig = PAPER_RADAR
+    # Of phases and noise; every mesh and place has its own from it, see :func:`seed_of`.
     seed: int = 0
 
     def as_json(self) -> dict[str, Any]:
@@ -74,12 +70,8 @@ def simulated_map(
     ``sd2 simulate radar --link-budget --incoherent`` makes with this sensor and seed. The raw
     samples are of some hundred frames at a time and not kept.
 
-    Parameters
-    ----------
-    mesh : MeshSequence
-        With faces.
-    frames : (int, int), optional
-        Only these frames of the mesh, the last excluded: columns of the whole map.
+    The mesh has faces. ``frames``, the last excluded, limits the result to columns of the whole
+    map.
     """
     start_s = mesh.timebase.start_s
     # As a capture says it, whose clock begins with its first frame.

@@ -46,25 +46,13 @@ class SourceKey(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Outline:
-    """Outline of a source before its maps are made, enough to count segments.
+    """Outline of a source before its maps are made, enough to count segments."""
 
-    Parameters
-    ----------
-    kinds : tuple of str
-        Of its maps.
-    present : bool array, shape (frames,), optional
-        Frames with a person; None: all.
-    label : int array, shape (frames,)
-        Index into ``labels``.
-    labels : tuple of str
-        The first is :data:`BACKGROUND`.
-    """
-
-    kinds: tuple[MapKind, ...]
+    kinds: tuple[MapKind, ...]  # Of its maps.
     times_s: NDArray[np.float64]
-    present: NDArray[np.bool_] | None
-    label: NDArray[np.integer]
-    labels: tuple[str, ...]
+    present: NDArray[np.bool_] | None  # Frames with a person; None: all.
+    label: NDArray[np.integer]  # Index into ``labels``, per frame.
+    labels: tuple[str, ...]  # The first is :data:`BACKGROUND`.
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +61,8 @@ class Source:
 
     Parameters
     ----------
-    subject, recording : str
-        Whose, and which; ``recording`` is unique within the subject.
+    recording : str
+        Unique within the subject.
     placement : int
         0 for the recording's own sensor; 1 and up are the same movement seen from elsewhere.
     maps : mapping of kind to DopplerMap
@@ -82,15 +70,13 @@ class Source:
         nothing: in a synthetic or denoised map those without a person, in a radar's map
         those that the radar did not record.
     label : int array, shape (frames,)
-        Index into ``labels``.
-    labels : tuple of str
-        The first is :data:`BACKGROUND`.
+        Index into ``labels``, the first of which is :data:`BACKGROUND`.
     classes : mapping of str to str
-        What a classifier calls a label; labels that are not learnt from are absent.
+        Class that a classifier learns for a label; labels that are not learnt from are absent.
     target_m : tuple of 3 floats, optional
         Mean place of the body, from which range and angles of the sensor follow.
     provenance : dict
-        How it was made, as JSON can hold it, besides what the maps say of themselves.
+        Origin of the maps, as JSON can hold it, besides what the maps say of themselves.
 
     Raises
     ------
@@ -200,16 +186,11 @@ class Source:
 class LazySource:
     """Source that is made only when it is needed.
 
-    Parameters
-    ----------
-    load : callable
-        Makes the source; may raise ``Sd2Error``, which leaves out this source alone.
-    fingerprint : callable
-        Gives the hash of what it is made of and how, which may take reading files; may raise
-        ``Sd2Error``. A data set that holds a source of this key and of another fingerprint
-        is not gone on with. Empty: not compared.
-    outline : callable, optional
-        What it will hold, cheaply; needed for a dry run.
+    ``load`` makes the source; it may raise ``Sd2Error``, which leaves out this source alone.
+    ``fingerprint`` gives a hash of everything that the source is made of and of the settings, and
+    may read files and raise ``Sd2Error``; a data set that holds a source of this key and of another
+    fingerprint is not continued. Empty: not compared. ``outline`` foretells the content cheaply;
+    needed for a dry run.
     """
 
     key: SourceKey
@@ -228,12 +209,8 @@ def label_per_frame(
 ) -> NDArray[np.int16]:
     """Return the label of every frame: that of the span at its time, 0 where there is none.
 
-    Parameters
-    ----------
-    spans : sequence of Span
-        Later ones lie over earlier ones; suggestions are left out.
-    labels : tuple of str
-        The first is :data:`BACKGROUND`.
+    Later spans lie over earlier ones; suggestions are left out. The first of the labels is
+    :data:`BACKGROUND`.
     """
     label = np.zeros(len(times_s), np.int16)
     for span in spans:

@@ -52,8 +52,6 @@ def gather(
     ----------
     paths : sequence of Path
         Recordings, folders of recordings, pairs, Doppler maps.
-    making : Making
-        Options for the maps of recordings.
     subjects : sequence of str, optional
         Subject of each recording and each map, in their order; by default each shows another
         person, named like the file. Pairs name their subjects themselves.
@@ -119,15 +117,9 @@ def _expanded(path: Path) -> list[Path]:
 def map_source(path: Path, subject: str, label_file: Path | None = None) -> LazySource:
     """Return the source of one Doppler map.
 
-    Parameters
-    ----------
-    path : Path
-        Map (``.npz``), or radar file that holds one with labels of its own.
-    subject : str
-        Person in the map.
-    label_file : Path, optional
-        On the map's clock, in any format that `sd2 labels convert` reads. None: the labels
-        of the radar's file, otherwise nothing is labelled.
+    ``path`` is a map (``.npz``), or a radar file that holds one with labels of its own.
+    ``label_file`` is on the map's clock, in any format that `sd2 labels convert` reads; None: the
+    labels of the radar's file, otherwise nothing is labelled.
     """
     key = SourceKey(subject, path.stem, 0)
 
@@ -185,19 +177,11 @@ def _sensor(meta: dict[str, Any]) -> VirtualSensor:
 def pair_sources(
     paths: Sequence[Path], kinds: tuple[MapKind, ...] = KINDS, model: str | None = None
 ) -> list[LazySource]:
-    """Return one source per take.
+    """Return one source per take of the stores of pairs.
 
     Subjects of the same name in different stores are different people: they are then called
-    ``STORE:NAME``.
-
-    Parameters
-    ----------
-    paths : sequence of Path
-        Stores of pairs.
-    kinds : tuple of str
-        Wanted kinds. Denoised maps are made from the synthetic ones.
-    model : str, optional
-        Denoiser, by file or name; None: the bundled one.
+    ``STORE:NAME``. Denoised maps are made from the synthetic ones, with a ``model`` given by file
+    or name; None: the bundled one.
     """
     stores = [_PairStore(path, kinds, model) for path in paths]
     people = Counter(name for one in stores for name in {take["subject"] for take in one.takes})

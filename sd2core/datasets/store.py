@@ -43,10 +43,7 @@ _TORN = "*.partial"
 class SegmentStore:
     """Rows of a data set on disk, appended source by source.
 
-    Parameters
-    ----------
-    path : Path
-        Folder; it holds a store already, see :meth:`begin`.
+    The folder holds a store already, see :meth:`begin`.
     """
 
     def __init__(self, path: Path) -> None:
@@ -104,24 +101,14 @@ class SegmentStore:
         return bool(self._group.attrs["complete"])
 
     def append(self, blocks: Iterable[Arrays], entry: dict[str, Any]) -> int:
-        """Add the segments of one source.
+        """Add the segments of one source and return their number.
 
         Some are kept in memory and written together, which takes a fraction of the time.
         They count once their source's line is written, see :meth:`flush`.
 
-        Parameters
-        ----------
-        blocks : iterable of dict of str to array
-            Of :func:`~sd2core.datasets.cutting.cut_source`. What they raise leaves the store
-            as it was.
-        entry : dict
-            What its line says, with a value for each of its columns in ``columns``; it
-            learns ``start`` and ``stop``, its rows.
-
-        Returns
-        -------
-        int
-            How many segments it has.
+        ``blocks`` come from :func:`~sd2core.datasets.cutting.cut_source`; errors that they raise
+        leave the store unchanged. ``entry`` is the line of the source, with a value for each of its
+        columns in ``columns``; its rows are added to it as ``start`` and ``stop``.
         """
         if self.complete:
             self._group.attrs["complete"] = False

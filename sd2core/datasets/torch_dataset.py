@@ -48,7 +48,7 @@ class SegmentDataset(TorchDataset[Item]):
     Parameters
     ----------
     path : Path or str
-        Of a data set, in any format.
+        Data set in any format.
     inputs : str
         Kind of map: an item's first tensor, float32 of shape (length, bins).
     target : str
@@ -67,7 +67,7 @@ class SegmentDataset(TorchDataset[Item]):
     Attributes
     ----------
     names : tuple of str
-        What the numbers of a label or class target mean.
+        Names that the numbers of a label or class target stand for.
 
     Raises
     ------

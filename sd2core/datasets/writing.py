@@ -47,20 +47,12 @@ class Failed:
 
 @dataclass(frozen=True)
 class Written:
-    """Result of writing a data set.
-
-    Parameters
-    ----------
-    segments, sources : int
-        In the data set now.
-    added : int
-        Sources that were not there before.
-    """
+    """Result of writing a data set."""
 
     path: Path
-    segments: int
-    sources: int
-    added: int
+    segments: int  # In the data set now.
+    sources: int  # In the data set now.
+    added: int  # Sources that were not there before.
     failed: tuple[Failed, ...] = ()
 
 
