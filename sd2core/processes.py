@@ -19,14 +19,7 @@ _START_TOLERANCE_S = 2.0
 
 @dataclass(frozen=True)
 class ProcessId:
-    """Number and start time of a process: a number alone is given to another process later.
-
-    Parameters
-    ----------
-    pid : int
-    started_unix_s : float
-        When the system started it.
-    """
+    """Number and start time of a process: a number alone is given to another process later."""
 
     pid: int
     started_unix_s: float
@@ -84,10 +77,8 @@ class ProcessId:
 def lower_priority(nice: int | None = None) -> None:
     """Let other programs go first; where the system refuses, the priority stays.
 
-    Parameters
-    ----------
-    nice : int, optional
-        0 to 19; by default 10 more than now. Windows knows one step below the normal priority.
+    ``nice`` is 0 to 19; by default 10 more than now. Windows knows one step below the
+    normal priority.
     """
     import psutil
 

@@ -20,17 +20,11 @@ DEFAULT_FIELD_OF_VIEW_DEG = 2.0 * math.degrees(math.atan(320.0 / 600.0))
 
 @dataclass(frozen=True)
 class PinholeCamera:
-    """A camera in the camera frame's origin, looking along +z.
+    """A camera in the camera frame's origin, looking along +z; all sizes are in pixels.
 
     A point (x, y, z) is seen at pixel coordinates
-    (width / 2 + f x / z, height / 2 + f y / z); the centre of pixel (row, column) is
-    at (column + 0.5, row + 0.5).
-
-    Parameters
-    ----------
-    width, height : int
-        Pixels.
-    focal_px : float
+    (width / 2 + f x / z, height / 2 + f y / z); the centre of pixel (row, column) is at
+    (column + 0.5, row + 0.5).
     """
 
     width: int = 640
@@ -81,25 +75,12 @@ def camera_of(
 ) -> tuple[PinholeCamera, Source]:
     """Camera of a video, and the source of its focal length.
 
-    Parameters
-    ----------
-    video : VideoReader
-    focal_px : float, optional
-        Focal length in pixels of the upright picture, from the user.
-    field_of_view_deg : float, optional
-        Instead of it, the angle across the longer side of the picture.
+    ``focal_px`` (of the upright picture) or ``field_of_view_deg`` (the angle across the
+    longer side) is from the user. Source ``metadata``: focal length equivalent on 35 mm
+    film, by the diagonal of the picture, as phones write it; ``default``: 56° across the
+    longer side.
 
-    Returns
-    -------
-    PinholeCamera
-    {"user", "metadata", "default"}
-        Metadata: focal length equivalent on 35 mm film, by the diagonal of the picture, as phones
-        write it. Default: 56° across the longer side.
-
-    Raises
-    ------
-    Sd2Error
-        If both are given, or are impossible.
+    Raises Sd2Error if both are given, or are impossible.
     """
     size = video.width, video.height
     if focal_px is not None and field_of_view_deg is not None:

@@ -61,8 +61,6 @@ def fit_body(
 
     Parameters
     ----------
-    track : Landmarks
-    camera : PinholeCamera
     stature_m : float, optional
         The person's height, which fixes the scale; :data:`DEFAULT_STATURE_M` without.
     lift : callable, optional

@@ -75,10 +75,7 @@ def _is_ours(partial: Path) -> bool:
 def claim_folder(partial: Path, restart: bool) -> Iterator[None]:
     """Make or take over the folder of a fit and lock it against other processes.
 
-    Raises
-    ------
-    Sd2Error
-        When another process uses it.
+    Raises Sd2Error if another process uses it.
     """
     partial.mkdir(exist_ok=True)
     lock = FileLock(partial / _LOCK)

@@ -74,21 +74,14 @@ class FitChoices:
 
 @dataclass(frozen=True)
 class FitReport:
-    """Callbacks of a running fit; each may raise ``Cancelled``.
-
-    Parameters
-    ----------
-    progress_of : callable
-        Gives the progress callback of a stage that begins.
-    started : callable
-        Called with the open video, and True if a stopped run is continued.
-    on_frame : callable
-        Called with a stage and a frame's number, landmarks in pixels (33, 2) and visibility (33,).
-    """
+    """Callbacks of a running fit; each may raise ``Cancelled``."""
 
     progress_of: Callable[[Stage], Progress]
+    """Gives the progress callback of a stage that begins."""
     started: Callable[[VideoReader, bool], None]
+    """Called with the open video, and True if a stopped run is continued."""
     on_frame: Callable[[Stage, int, NDArray[np.float32], NDArray[np.float32]], None]
+    """Called with a stage, a frame's number, landmarks in pixels (33, 2) and visibility (33,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,8 +111,8 @@ def fit_video(
 ) -> FittedVideo:
     """Fit a body to the person in a video and write it as a mesh.
 
-    Results are kept in ``OUT.partial`` until the mesh is complete; the same call goes on from
-    there, even after a kill.
+    Results are kept in ``OUT.partial`` until the mesh is complete; the same call goes on
+    from there, even after a kill.
 
     Parameters
     ----------
@@ -127,8 +120,6 @@ def fit_video(
         The video.
     out : Path
         The mesh to be written (.zarr or .npz); an earlier mesh is replaced.
-    choices : FitChoices
-    report : FitReport
     models : Path, optional
         Folder of the landmark models.
     landmarks_out : Path, optional

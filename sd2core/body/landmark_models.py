@@ -76,19 +76,10 @@ def landmark_models(
 ) -> LandmarkModels:
     """Find the models, and fetch them into the user's cache where they are missing.
 
-    Parameters
-    ----------
-    folder : Path, optional
-        The only place to look; by default the folder named by ``SD2_MODELS``, or the user's cache.
-    progress : callable
-        Called with bytes while they are fetched; may raise ``Cancelled``.
-    download : bool
-        False: do not fetch them.
-
-    Raises
-    ------
-    Sd2Error
-        If they are missing, not the known ones, or cannot be fetched.
+    A given folder is the only place to look; by default that is the folder named by
+    ``SD2_MODELS``, or the user's cache. Progress counts bytes while they are fetched and
+    may raise ``Cancelled``. Raises Sd2Error if they are missing, not the known ones, or
+    cannot be fetched.
     """
     named = folder or (Path(os.environ[ENVIRONMENT]) if os.environ.get(ENVIRONMENT) else None)
     if named is not None:
@@ -105,22 +96,12 @@ def landmark_models(
 def fetch_models(
     progress: Progress = silent, *, source: Path | None = None, into: Path | None = None
 ) -> LandmarkModels:
-    """Fetch the models into the user's cache, or replace them there.
+    """Fetch the models into the user's cache (or the folder ``into``), or replace them there.
 
-    Parameters
-    ----------
-    progress : callable
-        Called with bytes; may raise ``Cancelled``.
-    source : Path, optional
-        A wheel of mediapipe, or a folder with one or with the two files; by default they are
-        downloaded from the package index of pip.
-    into : Path, optional
-        Another folder.
-
-    Raises
-    ------
-    Sd2Error
-        If they cannot be fetched or are not the known ones.
+    ``source`` is a wheel of mediapipe, or a folder with one or with the two files; by
+    default they are downloaded from the package index of pip. Progress counts bytes and may
+    raise ``Cancelled``. Raises Sd2Error if they cannot be fetched or are not the known
+    ones.
     """
     into = default_folder() if into is None else Path(into)
     into.mkdir(parents=True, exist_ok=True)

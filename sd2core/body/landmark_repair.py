@@ -328,16 +328,9 @@ def repair_landmarks(
 ) -> tuple[str, ...]:
     """Repair a whole clip part by part; return sentences about it.
 
-    Parameters
-    ----------
-    read : callable
-    times_s : float64 array, shape (T,)
-    seen : bool array, shape (T,)
-        Frames in which the person was found.
-    max_gap_s : float
-        Longest gap that is bridged, from the last frame before to the first after.
-    write : callable
-        Called with the repaired parts, in order.
+    ``seen`` (T,) marks the frames in which the person was found. Gaps up to ``max_gap_s``,
+    from the last frame before to the first after, are bridged. ``write`` is called with the
+    repaired parts, in order.
     """
     swapped = find_side_swaps(read, seen)
     tally = _Tally(swapped={part: int(frames.sum()) for part, frames in swapped.items()})

@@ -52,15 +52,14 @@ def find_landmarks(
 ) -> TrackInParts:
     """Find the landmarks of one person in every frame.
 
-    The person is followed from a first frame both ways; the path of the square around them is
-    smoothed without lag, and every frame is looked at again in it. Swapped sides and outliers are
-    repaired, short gaps bridged.
+    The person is followed from a first frame both ways; the path of the square around them
+    is smoothed without lag, and every frame is looked at again in it. Swapped sides and
+    outliers are repaired, short gaps bridged.
 
     Parameters
     ----------
     video : VideoReader
         Two frames or more.
-    models : LandmarkModels
     person : Rectangle, optional
         Around the person in one frame; otherwise the most prominent one.
     max_gap_s : float
@@ -74,15 +73,10 @@ def find_landmarks(
     on_stage : callable, optional
         Called with ``"find"`` and ``"refine"`` when that stage begins.
     on_frame : callable, optional
-        Called with what each stage found in a frame.
+        Called with the findings of each stage in a frame.
     workspace : Path, optional
-        Folder for what a stopped search can go on from. Results of another video or other options
-        in it are not used.
-
-    Returns
-    -------
-    TrackInParts
-        In the workspace; without one in memory.
+        Folder from which a stopped search can go on. Results of another video or other options
+        in it are not used. Without it the track is in memory.
 
     Raises
     ------

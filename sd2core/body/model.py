@@ -65,13 +65,9 @@ class Skeleton:
     def transforms(self, rotations: Floats, translation_m: Floats | None = None) -> Floats:
         """Transforms ``[R | t]`` of every bone, (T, B, 3, 4): a point x at rest goes to R x + t.
 
-        Parameters
-        ----------
-        rotations : array, shape (T, B, 3, 3)
-            Rotation of every bone about its head relative to its parent, in the axes of the rest
-            pose; the identity is the rest pose.
-        translation_m : array, shape (T, 3), optional
-            Added to everything.
+        ``rotations`` (T, B, 3, 3) turn every bone about its head relative to its parent, in
+        the axes of the rest pose; the identity is the rest pose. The translation (T, 3) is
+        added to everything.
         """
         frames = len(rotations)
         transforms = np.empty((frames, len(self), 3, 4))

@@ -74,21 +74,21 @@ _CHEST = "spine01"
 
 
 class Rig:
-    """The joints of one body, and the keypoints that follow them.
+    """Joints of one body, and the keypoints that follow them.
 
     Attributes
     ----------
-    skeleton : Skeleton
+    skeleton
         Only the bones that the joints turn or the keypoints follow.
-    keypoints : Keypoints
+    keypoints
         On these bones.
-    marks : Keypoints
+    marks
         The same, then a point of the chest and one a metre behind it.
-    axes : list of float64 arrays, shape (3, 1) or (3, 3)
-        Axes of each joint, in the rest pose.
-    columns : list of slice
+    axes
+        Axes of each joint, in the rest pose; of shape (3, 1) or (3, 3).
+    columns
         Degrees of freedom of each joint; the translation is last.
-    freedoms : int
+    freedoms
         Number of all of them, translation included.
     """
 

@@ -20,14 +20,10 @@ DISK_FULL = frozenset({errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno
 def atomic_write(path: Path) -> Iterator[IO[bytes]]:
     """Open a binary file that replaces ``path`` when the block succeeds.
 
-    The bytes go to a temporary file in the same folder, which is flushed to
-    disk and renamed; when the block raises, ``path`` is untouched. Where
-    ``path`` is a link, the file that it leads to is replaced.
-
-    Raises
-    ------
-    OSError
-        When ``path`` cannot be written; it is the error's ``filename``.
+    The bytes go to a temporary file in the same folder, which is flushed to disk and
+    renamed; when the block raises, ``path`` is untouched. Where ``path`` is a link, the
+    file that it leads to is replaced. Raises OSError, whose ``filename`` is ``path``, if it
+    cannot be written.
     """
     path = Path(path)
     target = _target(path)

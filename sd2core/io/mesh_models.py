@@ -75,22 +75,15 @@ def weak_perspective_shift(
 ) -> NDArray[np.float64]:
     """Shift (T, 3) in metres of a root-centred body by which a real camera sees it in its box.
 
-    VIBE's camera (s, t_x, t_y) maps a point X of the body to s·(X + t_x) in its
-    box, which spans -1 to 1; the box is h pixels wide and centred on c_x. In
-    pixels: u = c_x + (s·h/2)·(X + t_x). A pinhole camera with focal length f,
-    centred on the image of width W, sees a body at depth Z and offset T_x at
-    u = W/2 + f·(X + T_x)/Z. Equal scale gives Z = 2·f/(s·h); equal position gives
-    T_x = t_x + (c_x - W/2)·2/(s·h). The same holds for y with the image's height.
+    VIBE's camera (s, t_x, t_y) maps a point X of the body to s·(X + t_x) in its box, which
+    spans -1 to 1; the box is h pixels wide and centred on c_x. In pixels: u = c_x +
+    (s·h/2)·(X + t_x). A pinhole camera with focal length f, centred on the image of width
+    W, sees a body at depth Z and offset T_x at u = W/2 + f·(X + T_x)/Z. Equal scale gives Z
+    = 2·f/(s·h); equal position gives T_x = t_x + (c_x - W/2)·2/(s·h). The same holds for y
+    with the image's height.
 
-    Parameters
-    ----------
-    camera : array, shape (T, 3)
-        s, t_x, t_y.
-    boxes : array, shape (T, 4)
-        c_x, c_y, width, height in pixels; VIBE's are square.
-    image_size : (width, height)
-        Pixels.
-    focal_px : float
+    ``camera`` (T, 3) is s, t_x, t_y; ``boxes`` (T, 4) are c_x, c_y, width, height in pixels
+    (VIBE's are square); the image's size is width, height in pixels.
     """
     metres_per_pixel = 2.0 / (camera[:, 0] * boxes[:, 2])
     width, height = image_size

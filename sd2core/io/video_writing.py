@@ -29,7 +29,6 @@ def write_video(
 
     Parameters
     ----------
-    path : Path
     frames : iterable of uint8 arrays, shape (height, width, 3)
     frames_per_s : int
         Frame k is shown at ``k / frames_per_s`` unless times are given.
@@ -38,9 +37,9 @@ def write_video(
     times_s : float64 array, shape (frames,), optional
         When each frame is shown; the first at 0 s.
     crf : int
-        What x264 calls constant rate factor: less is better, 18 is hard to tell from the source.
+        The constant rate factor of x264: less is better, 18 is hard to tell from the source.
     preset : str
-        How long x264 may look for a shorter file.
+        Speed preset of x264: slower ones make smaller files.
 
     Raises
     ------

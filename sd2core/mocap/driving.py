@@ -36,17 +36,10 @@ _AT = {name: row for row, name in enumerate(LANDMARKS)}
 
 @dataclass(frozen=True, eq=False)
 class Puppet:
-    """One person's body, and where a skeleton's joints are on it.
-
-    Parameters
-    ----------
-    shape : BodyShape
-    keypoints : Keypoints
-        Where the joints are at rest, as landmarks.
-    """
+    """One person's body, and where a skeleton's joints are on it."""
 
     shape: BodyShape
-    keypoints: Keypoints
+    keypoints: Keypoints  # the joints at rest, as landmarks
     markers: tuple[Marker, ...]
 
     def pose(self, clip: SkeletonClip, tick: Callable[[], None] = lambda: None) -> DrivenClip:
@@ -65,32 +58,21 @@ class Puppet:
 
 @dataclass(frozen=True, eq=False)
 class DrivenClip:
-    """A body's motion.
-
-    Parameters
-    ----------
-    landmarks_m : float64 array, shape (T, 33, 3)
-        Where the joints are on the moving body.
-    residual_m : float64 array, shape (T, 33)
-        How far from the skeleton's; NaN without one.
-    """
+    """A body's motion."""
 
     puppet: Puppet
     clip: SkeletonClip
     pose: Pose
     landmarks_m: Floats
+    """Joints on the moving body, shape (T, 33, 3)."""
     residual_m: Floats
+    """Distance from those of the skeleton, shape (T, 33); NaN without one."""
 
     def mesh(self, times_s: Floats, resolution: Resolution = "medium") -> MeshSequence:
-        """The moving surface at any times; vertices are posed where they are read.
+        """The moving surface at any ascending times; vertices are posed where they are read.
 
-        Between the clip's frames the pose follows splines without a kink in velocity.
-
-        Parameters
-        ----------
-        times_s : float64 array, shape (n,)
-            Ascending; before and after the clip its first and last pose are held.
-        resolution : {"high", "medium", "low"}
+        Between the clip's frames the pose follows splines without a kink in velocity;
+        before and after the clip its first and last pose are held.
         """
         space = ShapeSpace()
         body = space.load(resolution, self.puppet.shape)
@@ -101,17 +83,9 @@ class DrivenClip:
 
 
 def puppet_of(clips: Sequence[SkeletonClip], markers: tuple[Marker, ...]) -> Puppet:
-    """The body of the person whose joints these are.
+    """The body of the person whose joints these are; all clips are of one person.
 
-    Parameters
-    ----------
-    clips : sequence of SkeletonClip
-        All of the same person.
-
-    Raises
-    ------
-    Sd2Error
-        When the joints are not those of a person.
+    Raises Sd2Error if the joints are not those of a person.
     """
     stills = _sample(clips, markers)
     space = ShapeSpace()

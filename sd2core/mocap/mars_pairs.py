@@ -42,45 +42,26 @@ _SYNTHESIS = replace(PRESETS["paper"], visibility="facing", null_bins=())
 
 @dataclass(frozen=True)
 class MarsChoices:
-    """Options of making pairs from MARS recordings.
-
-    Parameters
-    ----------
-    synthesis : SynthesisOptions
-        Of the input; axis and nulled bins are the target's, too. By default no bin is
-        nulled: half of the radar's points are within one step of zero velocity.
-    target : {"share", "intensity"}
-        Whether each frame of the target is divided by the sum of its intensities (the
-        share of each velocity), or holds intensities as they are.
-    resolution : {"high", "medium", "low"}
-        Of the body: 13,348, 5,000 or 1,229 vertices.
-    moments : int
-        The body is posed so many times per radar frame; velocities are differences over
-        two of these steps.
-    """
+    """Options of making pairs from MARS recordings."""
 
     synthesis: SynthesisOptions = _SYNTHESIS
+    """Of the input; axis and nulled bins are the target's, too. By default no bin is nulled: half
+    of the radar's points are within one step of zero velocity."""
     target: Target = "share"
-    resolution: Resolution = "low"
+    """``share`` divides each frame of the target by the sum of its intensities, ``intensity``
+    keeps them as they are."""
+    resolution: Resolution = "low"  # 1,229 vertices; medium 5,000, high 13,348
     moments: int = 1
+    """Poses of the body per radar frame; velocities are differences over two of these steps."""
 
 
 @dataclass(frozen=True)
 class MadePairs:
-    """Result of :func:`make_mars_pairs`.
+    """Result of :func:`make_mars_pairs`."""
 
-    Parameters
-    ----------
-    subjects : dict of str to tuple of int
-        Takes and frames of every subject.
-    stature_m, residual_m : dict of str to float
-        Of every subject made in this run: the body's height, and how far its joints
-        are from the skeleton's in the mean.
-    """
-
-    subjects: dict[str, tuple[int, int]]
-    stature_m: dict[str, float]
-    residual_m: dict[str, float]
+    subjects: dict[str, tuple[int, int]]  # takes and frames
+    stature_m: dict[str, float]  # height of the body of every subject of this run
+    residual_m: dict[str, float]  # mean distance of its joints from the skeleton's
 
 
 def radar_doppler(
@@ -141,24 +122,13 @@ def make_mars_pairs(
     choices: MarsChoices | None = None,
     progress: Progress = silent,
 ) -> MadePairs:
-    """Write the pairs of some folders; goes on where a stopped run ended.
+    """Write the pairs of some folders, each with one person's parts; resume a stopped run.
 
-    The subject of a take is person and part (``1-test``), so that both can be kept
-    apart; every stretch is a take.
+    The subject of a take is person and part (``1-test``), so that both can be kept apart;
+    every stretch is a take. ``out`` is the store; progress counts frames.
 
-    Parameters
-    ----------
-    folders : sequence of Path
-        Each with one person's parts.
-    out : Path
-        The store to write.
-    progress : Progress
-        Counts frames.
-
-    Raises
-    ------
-    Sd2Error
-        When a folder cannot be used, two hold the same, or the store holds other pairs.
+    Raises Sd2Error if a folder cannot be used, two hold the same, or the store holds other
+    pairs.
     """
     choices = choices or MarsChoices()
     parts = [read_mars(folder, name) for folder in folders for name in mars_parts(folder)]

@@ -33,18 +33,11 @@ _STEPS = 1000
 
 @dataclass(frozen=True)
 class PairsMade:
-    """Result of :func:`make_recording_pairs`.
+    """Result of :func:`make_recording_pairs`."""
 
-    Parameters
-    ----------
-    subjects : dict of str to (int, int)
-        Takes and frames per subject.
-    left_out_s : float
-        Time without a radar frame, without a person, or in rests shorter than a second.
-    """
-
-    subjects: dict[str, tuple[int, int]]
+    subjects: dict[str, tuple[int, int]]  # takes and frames
     left_out_s: float
+    """Time without a radar frame, without a person, or in rests shorter than a second."""
 
 
 def make_recording_pairs(
@@ -55,24 +48,15 @@ def make_recording_pairs(
     subjects: Sequence[str] | None = None,
     progress: Progress = silent,
 ) -> PairsMade:
-    """Put recordings into a store of pairs; goes on with a store that was begun.
+    """Put recordings into a store of pairs; resume a store that was begun.
 
     Every recording is seen by its own sensor. The radar's frame that is nearest to a frame
-    of the mesh, by the recording's offset, is its target. Nulled bins are those of the
-    synthesis, in input and target alike.
+    of the mesh, by the recording's offset, is its target. Axis and nulled bins are those of
+    the synthesis, in input and target alike. ``subjects`` are the people in the recordings;
+    by default a different one in each, named like it.
 
-    Parameters
-    ----------
-    synthesis : SynthesisOptions
-        Of the input; its axis is the target's, too.
-    subjects : sequence of str, optional
-        Person in each recording; by default a different one in each, named like it.
-
-    Raises
-    ------
-    Sd2Error
-        When a recording lacks mesh or radar, two are called alike, or frame rates or kinds
-        of radar differ.
+    Raises Sd2Error if a recording lacks mesh or radar, two are called alike, or frame rates
+    or kinds of radar differ.
     """
     opened = [open_recording(path) for path in recordings]
     names = _names(opened, subjects)
@@ -215,16 +199,8 @@ def _takes(
 def on_clock(radar: DopplerMap, timebase: Timebase) -> DopplerMap:
     """A radar's map at the frames of another clock: those nearest to them.
 
-    Parameters
-    ----------
-    radar : DopplerMap
-        At its times on that clock.
-
-    Returns
-    -------
-    DopplerMap
-        ``present`` is False where the radar recorded no frame near enough, or says itself
-        that its frame shows no person.
+    ``radar`` has its times on that clock. ``present`` is False where it recorded no frame
+    near enough, or says itself that its frame shows no person.
     """
     nearest, seen = _nearest(timebase.times_s, radar.times_s)
     if radar.present is not None:

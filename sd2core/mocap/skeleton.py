@@ -16,24 +16,13 @@ from sd2core.io.radar.mars import JOINTS
 
 @dataclass(frozen=True)
 class Marker:
-    """One joint of a skeleton as a landmark of the body.
+    """One joint of a skeleton as a landmark of the body."""
 
-    Parameters
-    ----------
-    landmark : str
-        One of :data:`sd2core.body.track.LANDMARKS`.
-    joint : int
-        Number of the skeleton's joint.
-    sd_m : float
-        How well the joint is known in a frame.
-    beside_sd_m : float
-        How far from the landmark it may always lie, fixed to the same bone.
-    """
-
-    landmark: str
-    joint: int
-    sd_m: float
+    landmark: str  # of sd2core.body.track.LANDMARKS
+    joint: int  # number in the skeleton
+    sd_m: float  # of the joint's position in a frame
     beside_sd_m: float
+    """Of its lasting distance from the landmark, fixed to the same bone."""
 
 
 # Hands are noisy. What a Kinect calls hips, shoulders and feet lies elsewhere than in our
@@ -67,21 +56,12 @@ face turns, a Kinect does not tell."""
 
 @dataclass(frozen=True, eq=False)
 class SkeletonClip:
-    """Joints of one stretch of time.
+    """Joints of one stretch of time."""
 
-    Parameters
-    ----------
-    times_s : float64 array, shape (T,)
-        Ascending.
-    joints_m : float64 array, shape (T, J, 3)
-        In the camera frame, in front of the camera.
-    known : bool array, shape (T,), optional
-        False in frames whose joints are only bridged. None: all are known.
-    """
-
-    times_s: Floats
-    joints_m: Floats
+    times_s: Floats  # (T,), ascending
+    joints_m: Floats  # (T, J, 3) in the camera frame, in front of the camera
     known: NDArray[np.bool_] | None = None
+    """False in frames whose joints are only bridged; None: all are known."""
 
     def __post_init__(self) -> None:
         if len(self.times_s) != len(self.joints_m) or not len(self.times_s):
@@ -103,16 +83,10 @@ class SkeletonClip:
         return cls(grid / frames_per_s, bridged.reshape(len(grid), -1, 3), np.isin(grid, frames))
 
     def landmarks(self, markers: tuple[Marker, ...]) -> tuple[Floats, Floats, Floats]:
-        """The joints as landmarks.
+        """The joints as landmarks: points (T, 33, 3), SD in metres (T, 33), and trust (T, 33).
 
-        Returns
-        -------
-        points_m : float64 array, shape (T, 33, 3)
-            What has no marker is at the middle of the trunk.
-        sd_m : float64 array, shape (T, 33)
-            Infinite without marker, and in frames that are not known.
-        trust : float64 array, shape (T, 33)
-            1 with a marker, otherwise 0.
+        Points without a marker are at the middle of the trunk. The SD is infinite without
+        marker, and in frames that are not known. Trust is 1 with a marker, otherwise 0.
         """
         rows = [LANDMARKS.index(marker.landmark) for marker in markers]
         frames = len(self.times_s)
@@ -130,14 +104,9 @@ class SkeletonClip:
 
 
 def evidence_of_points(times_s: Floats, points_m: Floats, sd_m: Floats) -> Evidence:
-    """Landmarks that are known in space, for the solver of the fit.
+    """Landmarks (T, 33, 3) that are known in space, for the solver of the fit.
 
-    Parameters
-    ----------
-    times_s : float64 array, shape (T,)
-    points_m : float64 array, shape (T, 33, 3)
-    sd_m : float64 array, shape (T, 33)
-        In every direction alike; infinite where nothing is known.
+    ``sd_m`` (T, 33) holds in every direction alike; infinite where nothing is known.
     """
     depth = points_m[..., 2]
     trunk_m = depth[:, TORSO_CORNERS].mean(axis=1)
