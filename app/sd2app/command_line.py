@@ -101,7 +101,7 @@ def _show(paths: Sequence[Path], screenshot: Path | None) -> int:
 
 
 def has_display(platform: str, environment: Mapping[str, str]) -> bool:
-    """True if Qt will find a screen or was told to run without one."""
+    """True if Qt finds a screen, or its platform is set explicitly."""
     if not platform.startswith("linux"):
         return True
     names = ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM")

@@ -57,7 +57,7 @@ class Settings:
         self.set_paths("recent", paths[:_RECENT])
 
     def flag(self, name: str, default: bool) -> bool:
-        """A yes or no; it may have been stored as text."""
+        """Boolean, which may have been stored as text."""
         value = self._store.value(name)
         return default if value is None else str(value).lower() == "true"
 
@@ -161,16 +161,16 @@ class StoredChoices:
                 self._values[name] = self.defaults[name]
 
     def __getitem__(self, name: str) -> Any:
-        """One of them; raises KeyError when there is no such choice."""
+        """Value of a choice; raises KeyError if there is none of that name."""
         return self._values[name]
 
     @property
     def others(self) -> dict[str, Any]:
-        """Those that are not as they are by default."""
+        """Choices that differ from their defaults."""
         return {name: value for name, value in self._values.items() if value != self.defaults[name]}
 
     def set(self, name: str, value: Any) -> bool:
-        """Choose; whether that is another value. Raises KeyError as :meth:`__getitem__`."""
+        """Set a choice; True if its value changed. Raises KeyError as :meth:`__getitem__`."""
         kind: Callable[[Any], Any] = type(self.defaults[name])
         if kind(value) == self._values[name]:
             return False

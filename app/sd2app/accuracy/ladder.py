@@ -1,4 +1,4 @@
-"""The ladder as the window asks for it; the library is loaded when it is first asked."""
+"""The accuracy functions of the library, which is loaded at the first call."""
 
 from __future__ import annotations
 
@@ -83,4 +83,4 @@ def _synthesizer_for(
 
 
 CORE = Ladder(_survey, _choose, _measure, _remembered, _remember, _synthesizer_for)
-"""The library's own."""
+"""Functions of the library itself."""

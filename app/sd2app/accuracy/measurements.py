@@ -52,7 +52,7 @@ class MeasuredModel(QObject):
 
     @property
     def family(self) -> Family:
-        """Whose plans are shown."""
+        """Family of plans that is shown."""
         return self._family
 
     @property
@@ -88,7 +88,7 @@ class MeasuredModel(QObject):
         self.changed.emit()
 
     def rest_at(self, sensor: VirtualSensor) -> None:
-        """Look for what was measured with the sensor here, once per place."""
+        """Read the stored measurement for this sensor, once per place."""
         if self._scene is None or sensor == self._place:
             return
         self._place = sensor

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from sd2core.accuracy.results import Choice, PlanResult
 
 PRESETS = (0.005, 0.01, 0.02, 0.05, 0.1)
-"""Tolerances that are offered."""
+"""Offered tolerances."""
 
 
 class _Wish(NamedTuple):
@@ -170,7 +170,7 @@ class AccuracyModel(QObject):
         self.changed.emit()
 
     def rest_at(self, sensor: VirtualSensor) -> None:
-        """The sensor rests here."""
+        """Take over the position of the resting sensor."""
         self.measured.rest_at(sensor)
 
     def choose(self, sensor: VirtualSensor, budget_ms: float) -> None:
@@ -203,7 +203,7 @@ class AccuracyModel(QObject):
             self.choose_by_tolerance()
 
     def choose_by_tolerance(self) -> None:
-        """Let the tolerance rule again."""
+        """Choose by the tolerance again."""
         if self._clicked is not None:
             self._clicked = None
             self.plan_changed.emit()
@@ -275,7 +275,7 @@ class AccuracyModel(QObject):
         self.decided.emit()
 
     def _give_up(self) -> None:
-        """The user does not want to wait for it; what was in use stays."""
+        """Cancel on the user's request; the plan in use stays."""
         self._runner.cancel()
         self._decide()
         self.decided.emit()

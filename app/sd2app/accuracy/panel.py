@@ -1,4 +1,4 @@
-"""The Accuracy panel: how much error is accepted, what that costs here, and why."""
+"""The Accuracy panel: accepted error, its cost on this scene, and the reasons."""
 
 from __future__ import annotations
 
@@ -226,7 +226,7 @@ def _part(parent: QWidget) -> tuple[QWidget, QVBoxLayout]:
 
 
 def _unbroken(plan: str) -> str:
-    """No line starts with a separator, or ends between a sign and its number."""
+    """Text without line breaks before separators or between a sign and its number."""
     space = "\N{NO-BREAK SPACE}"
     return plan.replace(" ·", f"{space}·").replace("× ", f"×{space}").replace(" %", f"{space}%")
 

@@ -29,7 +29,7 @@ _STEPS = {
 
 
 class AccuracyPlot(PointPlot):
-    """Every plan as a point: the cheaper the further left, the nearer the lower.
+    """Plot of error over cost with a point per plan.
 
     Hovering says what a point is, a click uses it. With the keyboard Left and
     Right go along the front, Up and Down over all points by their error, Return
@@ -183,7 +183,7 @@ class AccuracyPlot(PointPlot):
     def _paint_front(
         self, painter: QPainter, plot: QRectF, front: tuple[PlanResult, ...], colour: QColor
     ) -> None:
-        """Stepped: between two points one gets the error of the cheaper."""
+        """Paint the front in steps: between two points holds the error of the cheaper."""
         line: list[QPointF] = []
         for result in front:
             place = self.point_of(result)
@@ -236,7 +236,7 @@ class AccuracyPlot(PointPlot):
             self._trade.use(result)
 
     def leaveEvent(self, event: QEvent) -> None:
-        """Point at nothing."""
+        """Remove the mark of the pointed point."""
         self.point_at(None)
 
     def _near(self, place: QPointF) -> PlanResult | None:

@@ -35,7 +35,7 @@ class InUse:
 
 
 def deviation(error: float) -> str:
-    """By how much a map is off."""
+    """Relative error of a map."""
     return percent(error) if 0 < error < 1e-4 else f"±{percent(error)}"
 
 

@@ -107,7 +107,7 @@ class LatestRunner(QObject):
         try:
             self._posted.emit(revision, what, value)
         except RuntimeError:
-            # The window is gone; there is nobody left to tell.
+            # The window is gone and takes no results.
             self._closed = True
 
     def _deliver(self, revision: int, what: str, value: object) -> None:

@@ -1,4 +1,4 @@
-"""A program in a process of its own that says line by line how far it is."""
+"""A program in a separate process that reports its progress line by line."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from PySide6.QtCore import QObject, QProcess, QProcessEnvironment, QTimer, Signa
 
 _PATIENCE_MS = 3000
 _KEPT_BYTES = 64 * 1024
-"""Of what is written to standard error, the end."""
+"""Length of the end of standard error that is kept."""
 
 
 @dataclass(frozen=True)

@@ -93,7 +93,7 @@ class CommandFolder(RunFolder):
 
     @property
     def progress(self) -> Path:
-        """The same file: lines of JSON stand between the sentences."""
+        """File with lines of JSON: the same as the output, which also has plain lines."""
         return self.output
 
     @property
@@ -112,7 +112,7 @@ class CommandFolder(RunFolder):
 
     @property
     def taken(self) -> bool:
-        """True while a process works in the folder, or was started and has not got there."""
+        """True while a process works in the folder or is about to."""
         if self.live:
             return True
         launched = self._read_launch("process")
@@ -120,7 +120,7 @@ class CommandFolder(RunFolder):
 
     @property
     def is_followed(self) -> bool:
-        """True while the window is there that started the command, or took it up."""
+        """True while the window that started or took up the command is open."""
         window = self._read_launch("window")
         return window is not None and window.is_alive
 

@@ -31,7 +31,7 @@ UNDER_WAY: tuple[Phase, ...] = (
 
 POLL_MS = 250
 SLOW_POLL_MS = 1000
-"""While a run rests or has ended; it may be resumed or deleted elsewhere."""
+"""Interval for paused or ended runs, which may be resumed or deleted elsewhere."""
 _ASK_AGAIN_S = 15.0
 _GIVE_UP_S = 30.0
 """After that a process that does not react to its cancellation is killed."""
@@ -79,7 +79,7 @@ class Poller(QObject):
         self.poll()
 
     def set_interval(self, every_ms: int) -> None:
-        """Call more or less often."""
+        """Change the interval."""
         self._timer.setInterval(every_ms)
 
     def poll(self) -> None:
@@ -88,7 +88,7 @@ class Poller(QObject):
             self._runner.submit(lambda emit: self._look())
 
     def close(self) -> None:
-        """Call no more."""
+        """Stop calling."""
         self._timer.stop()
         self._runner.close()
 
@@ -192,7 +192,7 @@ class RunMonitor(QObject, Generic[F]):
 
     @property
     def loaded(self) -> bool:
-        """True once the folder has been looked at."""
+        """True once the folder has been read."""
         return self._loaded
 
     @property
@@ -258,7 +258,7 @@ class RunMonitor(QObject, Generic[F]):
         self._poller.poll()
 
     def close(self) -> None:
-        """Follow it no more; its process goes on."""
+        """Stop following the run; its process goes on."""
         self._poller.close()
 
     # --- looking ----------------------------------------------------------------------------
@@ -353,7 +353,7 @@ class RunMonitor(QObject, Generic[F]):
                 process.terminate(at_once=waited_s > _GIVE_UP_S)
 
     def _settle(self) -> None:
-        """Follow another phase."""
+        """Take over another phase."""
         under_way = self._phase in UNDER_WAY
         rests = not under_way or self._phase == "paused"
         self._poller.set_interval(SLOW_POLL_MS if rests else self._poll_ms)

@@ -18,7 +18,7 @@ CLASSIFIER = "classifier"
 _BINS = 32
 _WARM_UP, _TIMED = 1, 4
 _VALIDATION = 1.1
-"""Who chooses the best is looked at besides, forward only."""
+"""Factor for the validation, which runs the network forward only."""
 
 
 def main() -> int:
@@ -36,7 +36,7 @@ def main() -> int:
 
 
 def _of_denoiser(model: str, batch_size: int) -> Sequence[float]:
-    """Times of the steps that count."""
+    """Times of the steps after the warm-up."""
     import torch
 
     from sd2core.denoise.registry import build
@@ -63,7 +63,7 @@ def _of_denoiser(model: str, batch_size: int) -> Sequence[float]:
 
 
 def _of_classifier(model: str, features: str, width: int) -> Sequence[float]:
-    """The same; of the training itself, on a batch of clips as long as its windows."""
+    """Step times of the training itself, on a batch of clips as long as its windows."""
     import numpy as np
 
     from sd2core.classify.data import Clip, ClipSet

@@ -85,7 +85,7 @@ class StepTimes(QObject):
         return self._refused.get(key, "")
 
     def learn(self, key: StepKey, seconds: float) -> None:
-        """A run takes so long for a step."""
+        """Store the time of a step that a run has measured."""
         known = self.of(key)
         if (
             known is None
@@ -107,7 +107,7 @@ class StepTimes(QObject):
         self.changed.emit()
 
     def stop(self) -> None:
-        """Time no more."""
+        """Stop timing."""
         if self._process is not None:
             self._process.close()
             self._process.deleteLater()
@@ -163,17 +163,17 @@ class PatientTiming(QObject):
         self._timer.timeout.connect(self.look)
 
     def wait(self) -> None:
-        """Something else was chosen."""
+        """Restart the delay: something else was chosen."""
         self._timer.start()
 
     def look(self) -> None:
-        """Have it timed at once, where it is wanted."""
+        """Start the timing at once, if one is wanted."""
         key = self._wanted()
         if key is not None:
             self._times.measure(key)
 
     def stop(self) -> None:
-        """Time nothing more."""
+        """Stop timing."""
         self._timer.stop()
         self._times.stop()
 

@@ -1,4 +1,4 @@
-"""The window of a batch, and what it asks: files, folders, placements."""
+"""The window of a batch, and its dialogs for files, folders and placements."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ _OWN, _PLANNED, _FILE = range(3)
 
 
 class BatchDialogs:
-    """Asks, then calls the models; ``installed`` names the denoisers that are there."""
+    """Dialogs, followed by calls of the models; ``installed`` names the denoisers."""
 
     def __init__(
         self,
@@ -74,7 +74,7 @@ class BatchDialogs:
         self._window.activateWindow()
 
     def show_with_placements(self) -> None:
-        """The same, with the places that are planned in the recording that is open."""
+        """Set up a batch with the places that are planned in the open recording."""
         placements = self._placements.plan
         if placements is not None and self._batch.batch is None:
             self._batch.setup.set_placements(placements, _PLAN_HERE)
@@ -98,13 +98,13 @@ class BatchDialogs:
         self._batch.setup.add([_meant(Path(name)) for name in names])
 
     def add_folder(self) -> None:
-        """Let the user choose a folder of some."""
+        """Let the user choose a folder of recordings, videos or meshes."""
         name = QFileDialog.getExistingDirectory(self._over, "A recording, or a folder of some")
         if name:
             self._batch.setup.add([Path(name)])
 
     def placement_choices(self) -> Sequence[str]:
-        """Where sensors may be put, in words."""
+        """Choices of sensor placements in words."""
         placements, setup = self._placements.plan, self._batch.setup
         here = "As planned in the open recording"
         if placements is not None:
@@ -116,7 +116,7 @@ class BatchDialogs:
         return ("Where each recording has its own", here, file)
 
     def placement_index(self) -> int:
-        """Which of them holds."""
+        """Index of the current choice."""
         if self._batch.setup.placements is None:
             return _OWN
         return _PLANNED if self._batch.setup.placed == _PLAN_HERE else _FILE
@@ -144,7 +144,7 @@ class BatchDialogs:
                 self._batch.setup.set_placements(found[0], Path(name).name)
 
     def _follow_plan(self) -> None:
-        """What is planned in the open recording is what was chosen, as long as it is open."""
+        """Follow the plan of the open recording, if that was chosen."""
         setup, placements = self._batch.setup, self._placements.plan
         if setup.placements is None or setup.placed != _PLAN_HERE:
             return
@@ -175,7 +175,7 @@ class BatchDialogs:
             self._attempt(lambda: write_plan(path, self._batch.setup.plan()))
 
     def start(self) -> None:
-        """Begin as it is set up."""
+        """Start what is set up."""
         self._attempt(self._batch.start)
 
     # --- a batch that is there ------------------------------------------------------------
@@ -219,7 +219,7 @@ class BatchDialogs:
 
     @property
     def _over(self) -> QWidget:
-        """What choosers are put over."""
+        """Parent of the file choosers."""
         return self._window or self._shell.dialog_parent
 
     def _attempt(self, work: Callable[[], object]) -> None:
@@ -230,7 +230,7 @@ class BatchDialogs:
             self._say(str(error))
 
     def _say(self, text: str) -> None:
-        """Where the user looks."""
+        """Show a sentence in the batch window if it is open, else in the main window."""
         if self._window is not None and self._window.isVisible():
             self._window.warn(text)
         elif text:
@@ -266,7 +266,7 @@ class BatchWindow(QDialog):
         layout.addLayout(head)
         layout.addWidget(self._warning)
         layout.addWidget(self._pages, 1)
-        # Not while somebody still turns a number.
+        # Not while the user still changes a number.
         self._patience = QTimer(self)
         self._patience.setSingleShot(True)
         self._patience.setInterval(_ESTIMATE_MS)
@@ -282,14 +282,14 @@ class BatchWindow(QDialog):
         self._warning.setVisible(bool(text))
 
     def showEvent(self, event: QShowEvent) -> None:
-        """Somebody looks: say what it would take."""
+        """Follow the batch and estimate the set-up."""
         super().showEvent(event)
         self._batch.set_watched(True)
         self._setup.refresh()
         self._patience.start()
 
     def hideEvent(self, event: QHideEvent) -> None:
-        """Nobody looks."""
+        """Stop following while hidden."""
         super().hideEvent(event)
         self._batch.set_watched(False)
 

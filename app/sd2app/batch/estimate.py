@@ -51,7 +51,7 @@ class BatchEstimateModel(QObject):
         return self._asked == (plan, workers)
 
     def ask(self, plan: BatchPlan, workers: int) -> None:
-        """Work it out, unless that was done."""
+        """Compute the estimate for this plan, unless it is known."""
         if self.of(plan, workers):
             return
         self.forget()
@@ -67,7 +67,7 @@ class BatchEstimateModel(QObject):
         self.changed.emit()
 
     def forget(self) -> None:
-        """Stop, and know nothing."""
+        """Stop, and drop the estimate."""
         if self._process is not None:
             self._process.close()
         self._clear_up()

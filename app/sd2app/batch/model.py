@@ -67,7 +67,7 @@ class BatchModel(QObject):
         return estimate.problem
 
     def set_watched(self, watched: bool) -> None:
-        """Note that it is visible, or hidden."""
+        """Note that the batch is visible or hidden."""
         self._watched = watched
 
     # --- one batch after another ----------------------------------------------------------
@@ -93,7 +93,7 @@ class BatchModel(QObject):
         self.select(path)
 
     def ask_estimate(self) -> None:
-        """Work out what the set-up would do, unless that is known."""
+        """Compute the estimate for the set-up, unless it is known."""
         if not self.setup.problem:
             self.estimate.ask(self.setup.plan(), self.setup.workers)
 
@@ -124,7 +124,7 @@ class BatchModel(QObject):
                 self.failed.emit(str(error))
 
     def close(self) -> None:
-        """Look no more; what is at work goes on."""
+        """Stop polling; a running batch goes on."""
         self.estimate.close()
         self.setup.close()
         self.results.close()

@@ -25,7 +25,7 @@ from sd2core.sensor import Vector, VirtualSensor, spherical_from_position
 Index = QModelIndex | QPersistentModelIndex
 _NOWHERE = QModelIndex()
 _MOST_ROWS = 50_000
-"""A person looks at no more; the file has all."""
+"""Limit of shown rows; the file has all."""
 _COLUMNS = ("Recording", "Subject", "Place", "Seen from the body", "Maps")
 
 
@@ -68,7 +68,7 @@ class BatchResults(QAbstractTableModel):
         return self._card
 
     def read(self, folder: BatchFolder) -> None:
-        """Read those of a batch."""
+        """Read the results of a batch."""
         self._runner.submit(lambda emit: (_rows(folder.results), _card(folder)))
 
     def forget(self) -> None:
@@ -89,11 +89,11 @@ class BatchResults(QAbstractTableModel):
     # --- Qt's questions ---------------------------------------------------------------------
 
     def rowCount(self, parent: Index = _NOWHERE) -> int:
-        """One per map."""
+        """Number of maps."""
         return 0 if parent.isValid() else len(self._rows)
 
     def columnCount(self, parent: Index = _NOWHERE) -> int:
-        """Number of facts that are said of each result."""
+        """Number of facts per result."""
         return 0 if parent.isValid() else len(_COLUMNS)
 
     def headerData(
@@ -105,7 +105,7 @@ class BatchResults(QAbstractTableModel):
         return None
 
     def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
-        """Words."""
+        """Text of a cell."""
         if role != Qt.ItemDataRole.DisplayRole or not index.isValid():
             return None
         row = self._rows[index.row()]

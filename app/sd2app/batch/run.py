@@ -18,7 +18,7 @@ from sd2core.runs.folder import State
 from sd2core.runs.progress import Event
 
 _KEPT_FAILURES = 500
-"""There may be thousands, and the report has all."""
+"""Limit of kept failures; the report has all."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class BatchMonitor(RunMonitor[BatchFolder]):
         return _Facts(about, last_output(folder.log), folder.plan.exists())
 
     def on_facts(self, facts: _Facts) -> None:
-        """Keep them."""
+        """Store the facts."""
         self._facts = facts
 
     @property

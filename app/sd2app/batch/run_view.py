@@ -1,4 +1,4 @@
-"""A batch that is at work or has ended: how far, what failed, and what it made."""
+"""View of a running or ended batch: progress, failures and results."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _NO_DATASET = "No data set has been exported here yet."
 
 
 class Asks(Protocol):
-    """Actions of the view that dialogs carry through."""
+    """Actions of the view that need dialogs."""
 
     def resume(self) -> None:
         """Go on with the batch in view."""
@@ -184,7 +184,7 @@ class BatchRunView(QWidget):
 
 
 def _result_table(open_row: Callable[[], None]) -> QTableView:
-    """Return or a double click opens a row."""
+    """Table of results, where Return or a double click opens a row."""
     table = QTableView()
     table.setAccessibleName("Results")
     table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
@@ -215,6 +215,6 @@ def _text(name: str) -> QPlainTextEdit:
 
 
 def _show(widget: QPlainTextEdit, text: str) -> None:
-    """Show other words, without losing the place in the same."""
+    """Set a text that differs from the present one, which keeps its scroll position."""
     if text != widget.toPlainText():
         widget.setPlainText(text)

@@ -145,7 +145,7 @@ class BatchSetupModel(QObject):
             self._look()
 
     def remove(self, paths: Sequence[Path]) -> None:
-        """Do not work on these."""
+        """Remove recordings, videos, meshes or folders."""
         self._entries = tuple(entry for entry in self._entries if entry.path not in paths)
         self._keep()
 
@@ -210,12 +210,12 @@ class BatchSetupModel(QObject):
 
 
 def most_workers() -> int:
-    """More processes than this only get into one another's way."""
+    """Largest useful number of processes."""
     return 2 * worker_count()
 
 
 def _looked_at(path: Path) -> Entry:
-    """In the background: what is there of a file or folder."""
+    """Read a file or folder, in the background."""
     try:
         if path.is_dir() and (found := _in_folder(path)):
             patterns, count = found

@@ -1,4 +1,4 @@
-"""A batch that is to be: what, from where, which steps, and what that would take."""
+"""Set-up of a batch: recordings, placements, steps, and the estimated time."""
 
 from __future__ import annotations
 
@@ -59,13 +59,13 @@ _MOST_FACTS = 8
 
 
 class Asks(Protocol):
-    """Actions of the view that dialogs carry through."""
+    """Actions of the view that need dialogs."""
 
     def add_files(self) -> None:
         """Let the user choose recordings, videos or meshes."""
 
     def add_folder(self) -> None:
-        """Let the user choose a folder of some."""
+        """Let the user choose a folder of recordings, videos or meshes."""
 
     def choose_placements(self, index: int) -> None:
         """Put sensors where one of :meth:`placement_choices` says; it may ask for a file."""
@@ -86,7 +86,7 @@ class Asks(Protocol):
         """Let the user choose a file for the plan."""
 
     def start(self) -> None:
-        """Begin as it is set up."""
+        """Start what is set up."""
 
 
 class BatchSetupView(QWidget):
@@ -202,7 +202,7 @@ class BatchSetupView(QWidget):
     # --- showing --------------------------------------------------------------------------
 
     def refresh(self) -> None:
-        """Follow the models, and what of the open recording may be chosen."""
+        """Follow the models, and the choices that the open recording offers."""
         if self._batch.batch is not None:
             return
         setup = self._setup
@@ -274,7 +274,7 @@ class _Paths(QListWidget):
         return [self._shown[self.row(item)][0] for item in self.selectedItems()]
 
     def show_entries(self, entries: list[tuple[Path, str, bool]]) -> None:
-        """Paths, what is said of each, and whether that is a problem."""
+        """Show paths, each with a remark and a flag if that is a problem."""
         if entries == self._shown:
             return
         self._shown = entries
@@ -285,15 +285,15 @@ class _Paths(QListWidget):
             self.addItem(item)
 
     def sizeHint(self) -> QSize:
-        """A few lines."""
+        """Size of a few lines."""
         return QSize(400, 96)
 
     def minimumSizeHint(self) -> QSize:
-        """Two lines."""
+        """Size of two lines."""
         return QSize(200, 52)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Delete."""
+        """Remove the selected entries with Delete."""
         if event.key() in (Qt.Key.Key_Delete, Qt.Key.Key_Backspace):
             self._drop()
         else:

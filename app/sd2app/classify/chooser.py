@@ -13,7 +13,7 @@ from sd2app.widgets.model_menu import Entry, Face
 
 
 class ClassifierChooser:
-    """Classifiers."""
+    """Classifiers to choose from."""
 
     title = "Classify with"
     role = "Classifier"
@@ -24,7 +24,7 @@ class ClassifierChooser:
 
     @property
     def changed(self) -> SignalInstance:
-        """After which the words may be others."""
+        """Signal that texts or models may have changed."""
         return self._classify.changed
 
     @property

@@ -35,7 +35,7 @@ class ClassCurve(SteppedPlot):
         return run.history if run is not None else ClassHistory()
 
     def points(self) -> list[CheckPoint]:
-        """The looks at the validation so far."""
+        """The validation checks so far."""
         return self._history.checks
 
     def first_point(self) -> CheckPoint | None:
@@ -96,7 +96,7 @@ class ClassCurve(SteppedPlot):
     # --- pointing -------------------------------------------------------------------------
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        """Say what the look nearest to the pointer came to."""
+        """Point at the check nearest to the pointer."""
         x, points = event.position().x(), self.points()
         nearest = min(
             points, key=lambda one: abs(self.place_of(one.step, 0.0).x() - x), default=None

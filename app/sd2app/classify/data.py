@@ -1,4 +1,4 @@
-"""Labelled data that was chosen for a classifier: what it holds, and who does what in training."""
+"""Labelled data chosen for a classifier: content and division of people."""
 
 from __future__ import annotations
 
@@ -61,12 +61,12 @@ class DataSource:
         return " · ".join(parts)
 
     def has(self, name: str) -> bool:
-        """True if all of it has maps of a kind, or can be given them."""
+        """True if all of it has maps of a kind, or they can be computed."""
         return all(name in one.maps for one in self.facts)
 
 
 def looked_into(path: Path, person: str) -> DataSource:
-    """Content of a source of data; may wait for the disk."""
+    """Read the content of a source of data; may wait for the disk."""
     try:
         sources = unfolded([LabelledSource(path, person)])
         facts = tuple(labelled_facts(one) for one in sources)
@@ -121,7 +121,7 @@ def why_not_together(data: Sequence[DataSource], maps: Sequence[str] = ()) -> st
 
 
 def _what(facts: Sequence[LabelledFacts]) -> str:
-    """Such as ``simulated pairs``, or ``3 recordings``."""
+    """Short text such as ``simulated pairs`` or ``3 recordings``."""
     kinds = {one.kind for one in facts}
     if len(facts) > 1:
         words = {"recording": "recordings", "radar file": "radar files", "data set": "data sets"}

@@ -1,4 +1,4 @@
-"""What classifiers ask: files, data to learn from, whether to delete; and what they show."""
+"""Dialogs of classifiers: files, training data, deletion, model card and results."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class ClassifyDialogs:
         self._attempt(lambda: self._classify.use(path))
 
     def show_card(self) -> None:
-        """What the classifier in use says about itself."""
+        """Show the card of the classifier in use."""
         card = self._classify.card
         if card is not None:
             ModelCardDialog(classifier_page(card), self._parent).exec()
@@ -86,16 +86,16 @@ class ClassifyDialogs:
             self._training.setup.add(recording.folder)
 
     def has_this(self) -> bool:
-        """Whether it can be learnt from: it is on disk."""
+        """True if the open recording can be learnt from: it is on disk."""
         content = self._session.document.content
         return content is not None and content.recording.folder != UNTITLED
 
     def train(self) -> None:
-        """Begin to train."""
+        """Start the training."""
         self._attempt(self._training.train)
 
     def compare(self) -> None:
-        """Begin to compare."""
+        """Start the comparison."""
         self._attempt(self._training.compare)
 
     def again(self) -> None:
@@ -111,7 +111,7 @@ class ClassifyDialogs:
         self._attempt(self._training.use_model)
 
     def show_result(self) -> None:
-        """Show what came of the comparison in view."""
+        """Show the result of the comparison in view."""
         run = self._training.run
         if run is not None and run.result is not None:
             self._show(run.result)

@@ -14,7 +14,7 @@ from sd2core.classify.spans import SpanOptions, predicted_spans
 
 
 class GestureFinder:
-    """Finder of what the classifier takes for gestures."""
+    """Finder of the spans that the classifier recognises as gestures."""
 
     title = "classifier"
     threshold = Threshold(
@@ -49,7 +49,7 @@ class GestureFinder:
 
     @property
     def signals(self) -> tuple[SignalInstance, ...]:
-        """After which it may be possible to look."""
+        """Signals after which a search may become possible."""
         return (self._classify.track.changed, self._classify.changed)
 
     @property
@@ -58,7 +58,7 @@ class GestureFinder:
         return self._classify.track.complete
 
     def look(self, threshold: float) -> Callable[[], Found]:
-        """Search to be called in the background."""
+        """Make the search, to be run in the background."""
         source, card = self.source, self._classify.track.card
         assert source is not None
         assert source.map is not None

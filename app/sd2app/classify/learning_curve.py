@@ -15,7 +15,7 @@ from sd2app.widgets.time_axis import ticks
 
 _PAD = 1.15
 _ASIDE_PX = 8
-"""Between curves, so that their bars do not cover each other."""
+"""Shift between curves, so that their bars do not cover each other."""
 _NEAR_PX = 14.0
 
 
@@ -41,15 +41,15 @@ class LearningCurve(SteppedPlot):
         self._high = max(min(math.ceil(10 * high) / 10, 1.0), self._low + 0.1)
 
     def points(self) -> list[CurvePoint]:
-        """All of all curves."""
+        """Points of all curves."""
         return [point for curve in self._curves for point in curve]
 
     def first_point(self) -> CurvePoint:
-        """With the least real data and nothing added."""
+        """Point with the least real data and nothing added."""
         return self.points()[0]
 
     def tip_place(self, point: CurvePoint) -> QPointF:
-        """At the point."""
+        """Pixel of the point."""
         return self._beside(point, point.recall.mean)
 
     def _beside(self, point: CurvePoint, recall: float) -> QPointF:

@@ -1,4 +1,4 @@
-"""Classifiers as the window asks for them; a test puts its own here."""
+"""Interface to the library's classifiers, which tests replace."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class LiveClasses(Protocol):
         """Probabilities that follow from the next frames: (frames, bins) → (answers, classes)."""
 
     def finish(self) -> NDArray[np.float32]:
-        """Answers that are owed, if nothing moves from now on; it goes on all the same."""
+        """Outstanding answers, as if nothing moved from now on; the session stays usable."""
 
 
 class Classifier(Protocol):
@@ -35,7 +35,7 @@ class Classifier(Protocol):
         """Class probabilities of every frame of a map, (frames, classes)."""
 
     def live(self) -> LiveClasses:
-        """For frames of one stretch, all with a person, as they come."""
+        """Session for live frames of one stretch, all with a person."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ def user_classifiers_folder() -> Path:
 
 
 def core_classifiers(process: ModelProcess) -> ClassifierLibrary:
-    """The library's own: cards are read here, classifiers work where the denoisers do."""
+    """Functions of the library; classifiers run in the model process, cards are read here."""
     from sd2core.classify.files import describe_classifier
 
     def available() -> Sequence[ClassifierCard]:

@@ -1,4 +1,4 @@
-"""The classifier in use, the map that it looks at, and what it makes of it."""
+"""The classifier in use, the map that it classifies, and the probabilities."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from sd2core.classify.card import ClassifierCard
 
 _PATIENCE_MS = 1500
-"""The classifier of the last time is loaded so long after there is a map: others go first."""
+"""Delay after the first map before the last session's classifier is loaded."""
 
 _MODEL, _SHOWN = "classify/model", "classify/shown"
 
@@ -187,7 +187,7 @@ class ClassifyModel(QObject):
             self.changed.emit()
 
     def close(self) -> None:
-        """Stop."""
+        """Stop classifying."""
         self._patience.stop()
         self._runner.close()
         self.track.close()

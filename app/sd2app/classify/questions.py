@@ -1,4 +1,4 @@
-"""Actions of the panel of classifiers that dialogs carry through."""
+"""Actions of the panel of classifiers that need dialogs."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ class ClassAsks(Protocol):
         """True if the open recording can be learnt from: it is on disk."""
 
     def train(self) -> None:
-        """Begin to train."""
+        """Start the training."""
 
     def compare(self) -> None:
-        """Begin to compare."""
+        """Start the comparison."""
 
     def again(self) -> None:
         """Go on with the comparison in view."""
@@ -36,7 +36,7 @@ class ClassAsks(Protocol):
         """Use the model of the run in view."""
 
     def show_result(self) -> None:
-        """Show what came of the comparison in view."""
+        """Show the result of the comparison in view."""
 
     def open_result(self) -> None:
         """Let the user choose a result, and show it."""

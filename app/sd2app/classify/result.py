@@ -27,7 +27,7 @@ class Spread:
     sd: float
 
     def text(self, signed: bool = False) -> str:
-        """In per cent, or in points where it is a difference."""
+        """Text in per cent, or in percentage points for a difference."""
         if not math.isfinite(self.mean):
             return "–"
         sign = "+" if signed else ""

@@ -28,7 +28,7 @@ _GAP_PX = 6
 
 
 class ConfusionView(QWidget):
-    """True classes from top to bottom, what they were taken for from left to right."""
+    """Confusion matrix: true classes from top to bottom, answers from left to right."""
 
     def __init__(self, display: DisplayModel, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -44,7 +44,7 @@ class ConfusionView(QWidget):
         return self._matrix
 
     def show_matrix(self, matrix: Matrix, classes: tuple[str, ...]) -> None:
-        """Show another one."""
+        """Show another matrix."""
         self._matrix, self._classes = matrix, classes
         self.setAccessibleName(f"Confusion matrix: {matrix.title}")
         self.setAccessibleDescription(
@@ -64,7 +64,7 @@ class ConfusionView(QWidget):
         return QSize(left + count * _CELL_PX[0], top + count * _CELL_PX[1] + 2)
 
     def minimumSizeHint(self) -> QSize:
-        """No cell is cut."""
+        """Size at which no cell is cut off."""
         return self.sizeHint()
 
     def _margins(self) -> tuple[int, int]:
@@ -73,7 +73,7 @@ class ConfusionView(QWidget):
         return widest + 2 * _GAP_PX, 2 * metrics.height() + _GAP_PX
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Names, cells, numbers."""
+        """Paint names, cells and numbers."""
         if self._matrix is None:
             return
         palette, (left, top) = self._display.palette, self._margins()
@@ -119,7 +119,7 @@ class ConfusionView(QWidget):
 
 
 class ClassResultDialog(QDialog):
-    """To the left what everything is compared with, to the right what is chosen."""
+    """Reference matrix on the left, a chosen matrix on the right, learning curves below."""
 
     def __init__(
         self, result: ClassResult, display: DisplayModel, parent: QWidget | None = None
@@ -156,7 +156,7 @@ class ClassResultDialog(QDialog):
         self.resize(_WIDTH_PX, self.sizeHint().height())
 
     def _what_else(self, matrices: tuple[Matrix, ...]) -> QWidget:
-        """A choice of what is shown to the right, or what that is where there is no other."""
+        """Choice of the matrix on the right, or its title if there is only one."""
         if len(matrices) == 1:
             return QLabel(matrices[0].title, self)
         choice = Choice("What is compared with it", self)
@@ -170,7 +170,7 @@ class ClassResultDialog(QDialog):
 
 
 class _MatrixColumn(QWidget):
-    """A heading, the matrix, and how good it is in all."""
+    """A heading, the matrix, and its mean recall."""
 
     def __init__(self, display: DisplayModel, parent: QWidget) -> None:
         super().__init__(parent)
@@ -195,6 +195,6 @@ class _MatrixColumn(QWidget):
 
 
 def _usual(matrices: tuple[Matrix, ...]) -> int:
-    """The denoised synthetic ones of the radar's own place, where there are such."""
+    """Default choice: denoised synthetic maps of the radar's own place, if present."""
     titles = [matrix.title for matrix in matrices]
     return titles.index("+ denoised synthetic") if "+ denoised synthetic" in titles else 0

@@ -16,7 +16,7 @@ from sd2core.processes import ProcessId
 MODEL_NAME = "classifier.safetensors"
 TABLE_NAME = "table"
 _MOST_POINTS = 1000
-"""Beyond that, every second loss is dropped: no screen shows more."""
+"""Limit of kept losses; beyond it, every second one is dropped."""
 
 
 class LossPoint(NamedTuple):
@@ -27,7 +27,7 @@ class LossPoint(NamedTuple):
 
 
 class CheckPoint(NamedTuple):
-    """Mean recall of frames over classes, of the people who choose the best model."""
+    """Mean recall over classes, on the people held out to select the best model."""
 
     step: int
     recall: float
@@ -160,12 +160,12 @@ class ClassRun(RunMonitor[CommandFolder]):
         return self.history.saving
 
     def inspect(self) -> bool:
-        """Look if there is a model, or a whole table."""
+        """Check for a model, or a complete table."""
         result = self.path / self._result_name
         return (result / "table.json" if self.compares else result).is_file()
 
     def on_facts(self, facts: bool) -> None:
-        """Keep it."""
+        """Store the facts."""
         self._has_result = facts
 
     @property

@@ -28,7 +28,7 @@ def headline(run: ClassRun) -> str:
 
 
 def time_text(run: ClassRun) -> str:
-    """Time that has passed, and what is left."""
+    """Elapsed time and time left."""
     history, parts = run.history, []
     if run.phase == "running" and history.left_s is not None:
         parts.append(f"{about(history.left_s)} left")

@@ -1,4 +1,4 @@
-"""One training or comparison of classifiers: how far it is, and what can be done with it."""
+"""Progress, results and actions of one training or comparison of classifiers."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ _DEFAULTS: dict[str, Any] = {
     "seed": 0,
     "quick": "yes",
 }
-"""Those of ``sd2 classify train``; ``quick`` is of a comparison."""
+"""Defaults of ``sd2 classify train``; ``quick`` is for a comparison."""
 _DATA, _PEOPLE = "classify/train/data", "classify/train/people"
 _CHOICES = {"model": MODELS, "features": FEATURES, "quick": ("yes", "no")}
 
@@ -94,7 +94,7 @@ class ClassSetup(QObject):
         self.refresh()
 
     def name_person(self, path: Path, name: str) -> None:
-        """Say who the recordings or radar files of a source are of; empty: as they say it."""
+        """Name the person of a source's recordings or radar files; empty: the stored name."""
         # The command takes a person as PERSON=PATH.
         name = name.translate(str.maketrans("=/", "--")).strip()
         known = {one.path: one.person for one in self._data}
@@ -160,7 +160,7 @@ class ClassSetup(QObject):
         return StepKey.of_classifier(values["model"], values["features"], values["width"])
 
     def train_arguments(self, out: Path) -> list[str]:
-        """``sd2 classify train`` with what is not as it is by default."""
+        """Arguments of ``sd2 classify train`` for all that differs from the defaults."""
         values = self._values
         # Network and steps are named even where they are the default: one looks for them.
         words = ["classify", "train", *self._sources]
@@ -169,7 +169,7 @@ class ClassSetup(QObject):
         return [*words, "--out", str(out)]
 
     def table_arguments(self, out: Path) -> list[str]:
-        """``sd2 classify table`` with the network that is chosen."""
+        """Arguments of ``sd2 classify table`` for the chosen network."""
         values = self._values
         words = ["classify", "table", *self._sources, "--steps", f"{values['steps']}"]
         words += self._others("model", "features", "width", "delay_s")
@@ -178,7 +178,7 @@ class ClassSetup(QObject):
         return [*words, "--out", str(out)]
 
     def _others(self, *names: str) -> list[str]:
-        """Options for what is not as it is by default."""
+        """Options for all that differs from the defaults."""
         others = self._values.others
         return [
             word

@@ -1,4 +1,4 @@
-"""Under the maps: how probable each gesture is over time, and which one is on screen."""
+"""Strip under the maps: class probabilities over time, and the class on screen."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _PLOT_PX = 30
 _BAR_PX = (28, 8)
 _GAP_PX = 10
 _FAINT = 90
-"""Of what is not of the map as it is now."""
+"""Opacity of probabilities that are not of the current map."""
 _UNKNOWN_CLASS = "#8a8f98"
 
 
@@ -158,11 +158,11 @@ class ClassReadout(QWidget):
         self._follow()
 
     def sizeHint(self) -> QSize:
-        """Room for all."""
+        """Size with room for all bars."""
         return QSize(self._bars_px + self._words_px, self.fontMetrics().height() + 4)
 
     def minimumSizeHint(self) -> QSize:
-        """Room for the words."""
+        """Size with room for the text."""
         return QSize(self._words_px, self.fontMetrics().height() + 4)
 
     def _follow(self) -> None:
@@ -171,7 +171,7 @@ class ClassReadout(QWidget):
         self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Bars with their names, then the words."""
+        """Paint bars with their names, then the text."""
         reading, palette = self._shown, self._display.palette
         if reading is None:
             return
@@ -249,7 +249,7 @@ class ClassPlot(QWidget):
         return QRectF(GUTTER_PX, 1, max(self.width() - GUTTER_PX - MARGIN_PX, 1), self.height() - 4)
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """The strip, and the cursor."""
+        """Paint the strip and the cursor."""
         with QPainter(self) as painter:
             self._still.paint(painter, self._paint)
             paint_cursor(painter, self._plot_rect(), self.scale.x_of(self._playback.time_s))
@@ -303,7 +303,7 @@ class ClassPlot(QWidget):
             self._playback.seek(self.scale.time_of(event.position().x()))
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        """Scrub."""
+        """Seek while the button is down."""
         if event.buttons() & Qt.MouseButton.LeftButton:
             self._playback.seek(self.scale.time_of(event.position().x()))
 

@@ -72,5 +72,5 @@ def ago_text(seconds: float) -> str:
 
 
 def delay_text(card: ClassifierCard) -> str:
-    """When it answers."""
+    """Delay of the classifier's answers."""
     return f"{card.delay_s:.2g} s late" if card.delay_frames else "at once"

@@ -22,12 +22,12 @@ if TYPE_CHECKING:
     from sd2core.classify.card import ClassifierCard
 
 _LATE_S = 0.2
-"""While a map grows frame by frame, what is known is that much behind the clock at most."""
+"""Largest accepted lag behind the clock while a map grows frame by frame."""
 _LATER_S = 0.5
-"""The same besides the delay of a classifier that answers late: there the time is named."""
+"""Largest accepted lag in addition to the classifier's own delay; its age is shown."""
 
 _BETWEEN_MS = 120
-"""While a long map is painted piece by piece, it is looked at so often at most."""
+"""Shortest interval between updates while a long map is painted piece by piece."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class ClassReading:
 
 
 class _Going(NamedTuple):
-    """A stretch that was gone through up to a frame, and what is remembered of it."""
+    """Session of a stretch that is classified up to a frame."""
 
     session: LiveClasses
     start: int
@@ -177,7 +177,7 @@ class ClassTrack(QObject):
     # --- requests -------------------------------------------------------------------------
 
     def use(self, classifier: Classifier | None, card: ClassifierCard | None) -> None:
-        """Classify with another one, or not at all."""
+        """Use another classifier, or none."""
         self._classifier, self._card = classifier, card if classifier is not None else None
         self._begin_anew()
 
@@ -234,7 +234,7 @@ class ClassTrack(QObject):
             self._calm.start()
 
     def _take(self, doppler: DopplerMap, known: NDArray[np.bool_]) -> None:
-        """Copied: the values go on changing while they are looked at."""
+        """Copy values, which may change while they are classified."""
         assert self._card is not None
         before = self._given
         if before is None or not np.array_equal(before.times_s, doppler.times_s):
@@ -341,7 +341,7 @@ def _in_order(
     going: _Going | None,
     emit: Emit,
 ) -> None:
-    """One stretch piece by piece, from where it was left; ``grows`` where it has no end yet."""
+    """Classify one stretch piece by piece from where it was left; ``grows``: no end yet."""
     start, stop = stretch
     if going is None or going.start != start or going.next > stop:
         going = _Going(classifier.live(), start, start, start)

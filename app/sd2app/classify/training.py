@@ -132,7 +132,7 @@ class ClassTraining(QObject):
     # --- one run after another ------------------------------------------------------------
 
     def set_watched(self, watched: bool) -> None:
-        """Somebody looks at the panel, or no longer."""
+        """Note that the panel is visible or hidden."""
         self._watched = watched
         if watched:
             self.setup.refresh()
@@ -152,7 +152,7 @@ class ClassTraining(QObject):
             self.noted.emit(f"{live.path.name} is under way. The Train panel shows it.")
 
     def refresh(self) -> None:
-        """Look again what lies on disk."""
+        """Read the folder of runs again."""
         found = commands_in(self._folder / "runs")
         self._runs = tuple(KnownRun(one.path, _title(one), one.live) for one in found)
         self.changed.emit()
@@ -221,7 +221,7 @@ class ClassTraining(QObject):
             self.refresh()
 
     def close(self) -> None:
-        """Look no more; what is under way goes on."""
+        """Stop polling; a running process goes on."""
         self._timing.stop()
         self.setup.close()
         if self._run is not None:
@@ -272,7 +272,7 @@ class ClassTraining(QObject):
             self.step_times.learn(StepKey(tuple(map(str, words))), step_s)
 
     def _new_folder(self, what: str) -> Path:
-        """A name that is free: what it is, of which data, and when."""
+        """Free folder name made of the task, the data and the time."""
         data = "+".join(one.path.stem for one in self.setup.data)[:40]
         name = f"{what} {data} {time.strftime('%Y-%m-%d %H.%M')}"
         path, number = self._folder / "runs" / name, 2

@@ -1,4 +1,4 @@
-"""Export a data set: what of, which maps, from where, cut how; what it would be, and writing it."""
+"""Dialog to export a data set: recordings, maps, placements, segments, forecast."""
 
 from __future__ import annotations
 
@@ -230,7 +230,7 @@ class ExportDialog(QDialog):
         self._sheet.setVisible(written)
 
     def _show_sheet(self, file: Path) -> None:
-        """The sheet as wide as the dialog, which grows to hold it."""
+        """Show the preview sheet in the width of the dialog, which grows to hold it."""
         picture = QPixmap(str(file))
         if picture.isNull() or not self._picture.pixmap().isNull():
             return

@@ -1,4 +1,4 @@
-"""A data set to be exported: what of, what it would hold, and the process that writes it."""
+"""Data set to be exported: its choices, its forecast, and the process that writes it."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ MAPS: dict[str, tuple[MapKind, ...]] = {
     "denoised": ("denoised",),
     "radar": ("simulated", "real"),
 }
-"""What is chosen together: a radar's map is simulated or real as its recording is."""
+"""Kinds of maps that are chosen together; a radar's map is simulated or real."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class ExportChoice:
         return self.place, self.maps, self.planned, self.subjects
 
     def to_json(self) -> dict[str, Any]:
-        """By name."""
+        """Choices by name."""
         return {
             "place": str(self.place),
             "maps": sorted(self.maps),
@@ -170,7 +170,7 @@ class ExportModel(QObject):
 
     @property
     def stopping(self) -> bool:
-        """True once the export was told to stop."""
+        """True once the export has been asked to stop."""
         return self._run is not None and self._run.phase == "stopping"
 
     def begin(self, place: Path | None) -> None:
@@ -244,7 +244,7 @@ class ExportModel(QObject):
             )
 
     def close(self) -> None:
-        """Look no more; what is being written goes on."""
+        """Stop polling; a running export goes on."""
         self._runner.close()
         if self._run is not None:
             self._run.close()
@@ -295,7 +295,7 @@ class ExportModel(QObject):
         self.changed.emit()
 
     def _new_folder(self, out: Path) -> Path:
-        """A name that is free."""
+        """Free folder name."""
         path, number = self._folder / out.name, 2
         while path.exists() or path in self._over:
             path, number = path.with_name(f"{out.name} {number}"), number + 1
@@ -348,7 +348,7 @@ class ExportModel(QObject):
 
 
 def _places(place: Path | None) -> int:
-    """The most places that a recording there plans; damaged ones plan none."""
+    """Largest number of places that a recording plans; damaged ones plan none."""
     if place is None:
         return 0
     most = 0

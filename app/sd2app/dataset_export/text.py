@@ -37,7 +37,7 @@ def split_words(forecast: Forecast) -> str:
 
 
 def bytes_words(count: int) -> str:
-    """Such as ``1.2 MB``."""
+    """Size of a file, such as ``1.2 MB``."""
     return f"{count / 1e9:,.1f} GB" if count >= 1e9 else f"{count / 1e6:,.1f} MB"
 
 

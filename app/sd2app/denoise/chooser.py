@@ -13,7 +13,7 @@ from sd2app.widgets.model_menu import Entry, Face
 
 
 class DenoiserChooser:
-    """Denoisers."""
+    """Denoisers to choose from."""
 
     title = "Denoise with"
     role = "Denoiser"
@@ -24,7 +24,7 @@ class DenoiserChooser:
 
     @property
     def changed(self) -> SignalInstance:
-        """After which the words may be others."""
+        """Signal that texts or models may have changed."""
         return self._denoise.changed
 
     @property

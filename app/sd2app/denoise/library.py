@@ -1,4 +1,4 @@
-"""Denoisers as the window asks for them; a test puts its own here."""
+"""Interface to the library's denoisers, which tests replace."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class LiveSession(Protocol):
-    """Frame in, frame out."""
+    """Session that denoises live frames."""
 
     equals_batch: bool
 
@@ -41,7 +41,7 @@ class Denoiser(Protocol):
         """Denoise a synthetic map."""
 
     def live(self) -> LiveSession:
-        """For frames as they come."""
+        """Session for live frames."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class DenoiserLibrary:
 
 
 def core_library(process: ModelProcess) -> DenoiserLibrary:
-    """The library's own: cards are read here, models work in another process."""
+    """Functions of the library; models run in the model process, cards are read here."""
 
     def available() -> Sequence[ModelCard]:
         from sd2core.denoise.files import available_models

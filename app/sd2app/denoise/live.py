@@ -19,7 +19,7 @@ from sd2core.denoise.resample_to_model import is_regular
 
 _WANTED = "denoise_live"
 _JUMP_S = 1.0
-"""Frames that are skipped when the clock is late still arrive; a jump starts again."""
+"""Longest step of the clock whose skipped frames are denoised; a jump starts again."""
 
 
 class _Stepped(NamedTuple):

@@ -26,13 +26,13 @@ from sd2core.pairs.segments import LENGTH, OVERLAP
 from sd2core.timebase import Timebase
 
 _TOO_SLOW_S = 0.15
-"""A model that takes longer than a drag allows waits until the drag pauses."""
+"""Time limit per sweep; a slower model waits until the drag pauses."""
 
 _TRIED = 3
-"""Sweeps in which that is found out."""
+"""Number of sweeps that decide if a model is too slow."""
 
 _BETWEEN_MS = 80
-"""While the synthetic map sharpens, a short clip is denoised so often at most."""
+"""Shortest interval between denoisings of a short clip while its map is refined."""
 
 _WAITS = "too slow to be dragged, follows when the sensor rests"
 
@@ -114,7 +114,7 @@ class DenoisedMap(QObject):
         self._restart()
 
     def _restart(self) -> None:
-        """Nothing is denoised."""
+        """Mark all frames as not denoised."""
         frames = self._known.size
         self._shown = np.zeros(frames, bool)
         self._changed_at = np.full(frames, self._revision)
@@ -167,7 +167,7 @@ class DenoisedMap(QObject):
             self._go_on()
 
     def clear(self) -> None:
-        """There is no synthetic map."""
+        """Remove the map."""
         self._stop()
         self._forget()
         self.track.set_map(None)
@@ -192,7 +192,7 @@ class DenoisedMap(QObject):
             self._go_on()
 
     def finish(self) -> None:
-        """The synthetic map stands: what is a preview can be replaced."""
+        """Replace previews, now that the synthetic map is complete."""
         if not self._stands:
             self._stands = True
             self._go_on()
@@ -223,7 +223,7 @@ class DenoisedMap(QObject):
         start: int,
         swept: Swept | None,
     ) -> None:
-        """The sensor was dragged; ``swept`` is what the companion made of the preview."""
+        """Show the preview that the companion has denoised during a drag."""
         self._runner.cancel()
         self._again.stop()
         self._follow(source, known, sensor)
@@ -390,7 +390,7 @@ class DenoisedMap(QObject):
         self.track.set_map(self._made, None if whole else self._shown.copy())
 
     def _report(self, left: int) -> None:
-        """A long clip is a job that can be cancelled."""
+        """Report a long clip as a task that can be cancelled."""
         total = self._known.size
         if left > AT_ONCE and self._job is None:
             self._job = self._jobs.start("Denoising the map", self._give_up)
@@ -400,7 +400,7 @@ class DenoisedMap(QObject):
                 self._end_job()
 
     def _give_up(self) -> None:
-        """The user does not want to wait; what is denoised stays."""
+        """Cancel on the user's request; denoised frames stay."""
         self._stop()
         self._stands = False
         self._done_at[:] = self._changed_at
@@ -457,7 +457,7 @@ def with_context(known: NDArray[np.bool_], piece: View) -> View:
 
 
 def touched(piece: View, frames: int) -> slice:
-    """Frames whose preview changes with a stretch."""
+    """Range of frames whose preview depends on a stretch."""
     return slice(max(piece[0] - CONTEXT, 0), min(piece[1] + CONTEXT, frames))
 
 

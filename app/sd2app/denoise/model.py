@@ -28,12 +28,12 @@ if TYPE_CHECKING:
     from sd2core.denoise.card import ModelCard
 
 _PATIENCE_MS = 2000
-"""The first model is loaded when the synthetic map stands, or after so long."""
+"""Longest delay of the first model, which waits for the synthetic map."""
 
 
 @dataclass(frozen=True, eq=False)
 class Loaded:
-    """A model at work."""
+    """A loaded model with its card."""
 
     card: ModelCard
     denoiser: Denoiser
@@ -148,7 +148,7 @@ class DenoiseModel(QObject):
         return [*cards, *(one for one in (self.before, self.card) if one and one.path not in known)]
 
     def installed(self) -> list[str]:
-        """Names by which models are found everywhere."""
+        """Names of the installed models."""
         return [card.name for card in self._library.available()]
 
     def describe(self, path: Path) -> ModelCard:
@@ -261,7 +261,7 @@ class DenoiseModel(QObject):
             self._patience.start()
 
     def _wake(self) -> None:
-        """There is a map to denoise, and what is more urgent is done."""
+        """Load the waiting model: the synthetic map is complete, or the delay is over."""
         self._patience.stop()
         if self._awake or self._synthetic.map is None:
             return
@@ -313,7 +313,7 @@ class DenoiseModel(QObject):
     # --- following the synthetic map ------------------------------------------------------
 
     def _companion(self) -> Companion | None:
-        """Asked before a sweep: both maps in one go."""
+        """Companion of a sweep, which makes both maps in one task."""
         parts = [one.companion() for one in (self.map, self.before_map)]
         if not any(parts):
             return None

@@ -45,7 +45,7 @@ def origin_words(card: ModelCard) -> str:
 
 
 def track_words(card: ModelCard) -> str:
-    """Beside the title of the denoised map."""
+    """Text beside the title of the denoised map."""
     simulated = " (simulated data only)" if card.trained_on == "simulated" else ""
     return f"{model_title(card)}{simulated}"
 

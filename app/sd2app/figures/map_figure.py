@@ -1,4 +1,4 @@
-"""The maps as a figure, with what was labelled: choices, a preview, the file."""
+"""Figure of the maps and labels: choices, preview, export."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ class FigureModel(DrawnFigure):
         return self._pair is not None
 
     def choose(self, **changes: object) -> None:
-        """Show something else."""
+        """Change the content of the figure."""
         choice = replace(self._choice, **changes)  # type: ignore[arg-type]
         if choice != self._choice:
             self._choice = choice

@@ -1,4 +1,4 @@
-"""A figure as it will be, as large as there is room."""
+"""Preview of a figure, as large as there is room."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ class FigurePreview(QWidget):
         model.changed.connect(self.update)
 
     def sizeHint(self) -> QSize:
-        """Wide: figures are."""
+        """Wide size, as figures have."""
         return QSize(960, 320)
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """The picture on its own paper, or a word."""
+        """Paint the figure on its own background, or a message."""
         with QPainter(self) as painter:
             painter.fillRect(self.rect(), QColor(self._colours.well))
             picture = self._model.picture

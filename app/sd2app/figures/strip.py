@@ -1,4 +1,4 @@
-"""A strip of frames in the making: choices, a preview, the file."""
+"""Strip of frames: choices, preview, export."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ class StripModel(DrawnFigure):
             self._draw()
 
     def set_options(self, **changes: object) -> None:
-        """Draw them otherwise."""
+        """Change the layout."""
         try:
             options = replace(self._options, **changes)  # type: ignore[arg-type]
         except Sd2Error:

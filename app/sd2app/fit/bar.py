@@ -15,7 +15,7 @@ from sd2app.widgets.panel import ElidedLabel
 
 _STEPS = 1000
 _HEIGHT = 40
-"""The same for all states: what is below should not move."""
+"""Height in all states, so that the view below does not move."""
 
 
 class FitBar(QFrame):

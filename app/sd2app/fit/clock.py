@@ -11,7 +11,7 @@ from sd2core.files.paths import plain_path
 
 
 class FitPlayback(QObject):
-    """Shows the frame that the fit is at, where the window is on its video."""
+    """Follows the frame under way while the window shows the video of the fit."""
 
     changed = Signal()
 
@@ -48,7 +48,7 @@ class FitPlayback(QObject):
         return plain_path(recording.video) == request.video
 
     def set_following(self, following: bool) -> None:
-        """Go along, or stay."""
+        """Follow the fit, or stop following."""
         if following != self._following:
             self._following = following
             self.changed.emit()

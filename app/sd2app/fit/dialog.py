@@ -1,4 +1,4 @@
-"""New from video: who is meant, how tall, which camera, where to save."""
+"""Dialog New from video: person, height, camera and folder."""
 
 from __future__ import annotations
 

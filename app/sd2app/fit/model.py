@@ -139,7 +139,7 @@ class FitModel(QObject):
             self.dismiss()
 
     def dismiss(self) -> None:
-        """Put it away; what a stopped fit left stays on disk."""
+        """Hide the ended fit; a stopped one can still be continued from disk."""
         if not self.busy:
             request = self._request
             if self._state == "failed" and request is not None and not request.partial.exists():

@@ -14,7 +14,7 @@ _DIMMED = 110
 
 
 class PersonPicker(QWidget):
-    """Drag draws the rectangle; a click beside it removes it."""
+    """Picture on which a drag draws a rectangle and a click removes it."""
 
     def __init__(
         self, setup: FitSetupModel, palette: Palette, parent: QWidget | None = None
@@ -32,7 +32,7 @@ class PersonPicker(QWidget):
         setup.picture_changed.connect(self.update)
 
     def sizeHint(self) -> QSize:
-        """VGA, a little smaller."""
+        """Size a little below VGA."""
         return QSize(560, 420)
 
     @property
@@ -47,13 +47,13 @@ class PersonPicker(QWidget):
         return box
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        """A corner of the rectangle."""
+        """Set a corner of the rectangle."""
         if event.button() == Qt.MouseButton.LeftButton and self._setup.picture is not None:
             self._from = self._to = event.position()
             self.update()
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        """The opposite corner."""
+        """Move the opposite corner."""
         if self._from is not None:
             self._to = event.position()
             self.update()
@@ -79,7 +79,7 @@ class PersonPicker(QWidget):
         self._setup.set_person(x0, y0, x1, y1)
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """The picture, what is outside the rectangle dimmed."""
+        """Paint the picture, dimmed outside the rectangle."""
         with QPainter(self) as painter:
             self._paint(painter)
 
@@ -128,7 +128,7 @@ class PersonPicker(QWidget):
         )
 
     def _rectangle(self) -> QRectF | None:
-        """The one being drawn, or the one that holds, on the widget."""
+        """Rectangle on the widget: the one being drawn, else the chosen one."""
         if self._from is not None:
             return QRectF(self._from, self._to).normalized().intersected(self.box)
         person, size = self._setup.person, self._setup.size

@@ -141,7 +141,7 @@ _WEIGHTS = {"models": 0.0, "find": 1.0, "refine": 4.0, "lift": 0.1, "fit": 3.0, 
 """Time of a frame in each stage, relative to the others."""
 _UNKNOWN_WEIGHT = 0.5
 _SETTLING_S = 2.0
-"""An estimate from less time says nothing."""
+"""Shortest time from which the rest is estimated."""
 
 
 class FitProgress:

@@ -159,6 +159,6 @@ def settled(request: FitRequest) -> FitRequest:
     kept = read_request(folder)
     if kept is not None and kept.video == video:
         return replace(request, video=video, folder=folder, mesh_name=kept.mesh_name)
-    # A mesh that lies there is somebody's.
+    # An existing mesh belongs to the user.
     name = free_path(folder, MESH_NAME, "fitted", reserved=FILE_NAME).name
     return replace(request, video=video, folder=folder, mesh_name=name)

@@ -22,7 +22,7 @@ CameraWay = Literal["file", "angle", "focal"]
 STATURES_M = (0.8, 2.3)
 ANGLES_DEG = (10.0, 150.0)
 _SMALLEST_PERSON = 0.02
-"""Sides of a rectangle below this share of the picture are a slip of the hand."""
+"""Smallest side of a rectangle as share of the picture; less is a click."""
 
 
 class FitSetupModel(QObject):
@@ -93,7 +93,7 @@ class FitSetupModel(QObject):
         return self._picture
 
     def choose_video(self, path: Path, open_now: Recording | None = None) -> None:
-        """Take another video; where it is the one of a saved recording, that is completed."""
+        """Choose another video; the open recording of it, if saved, gets the mesh."""
         self._let_go()
         self._video, self._problem, self._person, self._frame = path, "", None, 0
         self._folder = folder_for(path, open_now)
@@ -171,7 +171,7 @@ class FitSetupModel(QObject):
         return self._reader is not None and self._folder is not None and not self._problem
 
     def set_folder(self, folder: Path) -> None:
-        """Save elsewhere."""
+        """Choose another folder."""
         self._change("_folder", folder)
 
     def set_stature(self, stature_m: float | None) -> None:
@@ -205,7 +205,7 @@ class FitSetupModel(QObject):
         self._change("_person", Person(self._frame, x0, y0, x1 - x0, y1 - y0))
 
     def clear_person(self) -> None:
-        """Have the person chosen."""
+        """Let the fit choose the person."""
         self._change("_person", None)
 
     def request(self) -> FitRequest:

@@ -12,10 +12,10 @@ from sd2core.labels.formats.rows import apart
 from sd2core.labels.spans import Labels, Span
 
 WIDE_PX = 4.0
-"""From here on a span is drawn as a box of its own."""
+"""Smallest width of a span with a box of its own."""
 _SEEN = 1e-3
 UNKNOWN_COLOUR = "#8a8f98"
-"""Of labels that the label set does not have."""
+"""Colour of labels outside the label set."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ from sd2core.timebase import Timebase
 
 Change = Callable[[Labels, Timebase], Edit]
 Typed = Callable[[str, Sequence[Span]], Change]
-"""What was typed into a cell, and the spans that it is about, the one of the cell first."""
+"""Makes the edit of a typed text, given the spans concerned, that of the cell first."""
 When = Callable[[str, Span, Timebase], float]
 
 

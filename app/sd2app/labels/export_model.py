@@ -85,7 +85,7 @@ class LabelExportModel(QObject):
         labels, base, chosen, media = self._labels, self._timebase, self._format, self._media
         target = path if path.suffix else path.with_suffix(chosen.suffixes[0])
         if target != path and target.exists():
-            # Nobody was asked about that one.
+            # The user was not asked about that one.
             self._refuse(
                 Sd2Error(
                     f"{target} exists", "another name", "Type the ending as well to replace it"

@@ -169,7 +169,7 @@ class LabelImportModel(QObject):
     def _refuse(self, error: Exception) -> None:
         self._problem = str(error)
         if self._observations and self._observation is None:
-            # Not a fault: nobody has chosen yet.
+            # Not a fault: the user has not chosen yet.
             self._problem = ""
             self.set_observation(self._observations[0])
             return

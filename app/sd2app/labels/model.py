@@ -13,7 +13,7 @@ from sd2app.labels.arrays import UNKNOWN_COLOUR, SpanArrays, SpanColumns
 from sd2core.labels.spans import Labels, Span
 
 _COLUMNS_KEPT = 4
-"""Maps, timeline and overview ask for few scales, but at every frame that is played."""
+"""Number of cached scales; maps, timeline and overview use few, at every frame."""
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from sd2core.labels.spans import Span
 
 _TINT, _SELECTED_TINT = 64, 136
 _NARROW_TINTS = 90, 255
-"""Of columns that narrow spans hold hardly and wholly."""
+"""Opacities of columns that narrow spans cover hardly and wholly."""
 _REGION_TINT, _SELECTED_REGION_TINT = 18, 54
 """Faint: a map's colours are read as levels."""
 _EDGES_FROM_PX = 12.0

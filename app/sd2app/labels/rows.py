@@ -10,7 +10,7 @@ from sd2app.labels.model import Mark
 from sd2core.labels.spans import LabelTrack
 
 ROW_PX = 24.0
-"""Of a track whose spans do not overlap."""
+"""Height of a track whose spans do not overlap."""
 _LANE_PX, _HIGHEST_PX = 17.0, 72.0
 _GAP_PX = 1.0
 

@@ -76,7 +76,7 @@ _ATTRACT_PX = 8.0
 _MOVED_PX = 3.0
 _CHOSEN_PX = 3.0
 _SMALL = 0.82
-"""Of names that would not be whole otherwise."""
+"""Share of the font size for names that would not fit otherwise."""
 _SCROLL_MS, _SCROLL_SHARE = 30, 0.03
 
 

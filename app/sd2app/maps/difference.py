@@ -1,4 +1,4 @@
-"""Denoised minus real: the difference of what is shown of the two."""
+"""Difference of the denoised and the measured map, as shown on screen."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ class DifferenceModel(QObject):
 
     @property
     def blank_bins(self) -> tuple[int, ...]:
-        """Bins in which one of the two says nothing."""
+        """Bins in which one of the two has no information."""
         bins: set[int] = set()
         for track in (self.denoised, self.real):
             if track.map is not None:
@@ -85,7 +85,7 @@ class DifferenceModel(QObject):
         return tuple(sorted(bins))
 
     def set_wanted(self, wanted: bool) -> None:
-        """Show it or not, and remember it."""
+        """Show or hide it, and store the choice."""
         if wanted != self._wanted:
             self._wanted = wanted
             self._settings.set_value(_SHOWN, wanted)

@@ -49,7 +49,7 @@ class DifferenceView(HeatmapView):
         return f"Denoised − {self._difference.against}"
 
     def make_image(self, start_s: float, end_s: float, columns: int) -> QImage:
-        """Signed colours; the background where one of the two has no frame."""
+        """Image in signed colours, clear where one of the two has no frame."""
         background = QColor(self._display.palette.well).rgb()
         levels = self._display.levels
         return difference_image(
@@ -57,21 +57,21 @@ class DifferenceView(HeatmapView):
         )
 
     def null_colour(self) -> QColor:
-        """No difference."""
+        """Colour of no difference."""
         return QColor.fromRgb(int(self._table()[127]))
 
     def hatch_colour(self) -> QColor:
-        """Legible on the colour of no difference, which follows the theme."""
+        """Colour that is legible on that of no difference, which follows the theme."""
         colour = QColor(self._display.palette.hatch)
         colour.setAlpha(150)
         return colour
 
     def marked_bins(self) -> tuple[tuple[tuple[int, ...], Qt.BrushStyle], ...]:
-        """Bins in which one of the two says nothing."""
+        """Bins in which one of the two has no information."""
         return ((self._difference.blank_bins, Qt.BrushStyle.BDiagPattern),)
 
     def read(self, time_s: float, velocity_mps: float) -> Reading | None:
-        """Both levels, and their difference."""
+        """Text of both levels and their difference."""
         return self._difference.read(time_s, velocity_mps)
 
     def _table(self) -> np.ndarray:

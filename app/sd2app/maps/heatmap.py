@@ -82,7 +82,7 @@ class HeatmapView(MapWidget):
             signal.connect(self.update)
 
     def sizeHint(self) -> QSize:
-        """Room for 32 bins of 5 pixels."""
+        """Size with room for 32 bins of 5 pixels."""
         return QSize(640, _HEADER_PX + 160)
 
     def invalidate(self) -> None:
@@ -111,7 +111,7 @@ class HeatmapView(MapWidget):
         return self._track.title
 
     def null_colour(self) -> QColor:
-        """Colour of nothing."""
+        """Colour of zero."""
         return QColor.fromRgb(int(lookup_table(self._display.levels.colour_map)[0]))
 
     def hatch_colour(self) -> QColor:
@@ -119,7 +119,7 @@ class HeatmapView(MapWidget):
         return QColor(255, 255, 255, 80)
 
     def marked_bins(self) -> tuple[tuple[tuple[int, ...], Qt.BrushStyle], ...]:
-        """Bins that say nothing, and how they are hatched."""
+        """Bins without information, and their hatching."""
         doppler_map = self._track.map
         assert doppler_map is not None
         return (
@@ -300,7 +300,7 @@ class HeatmapView(MapWidget):
     # --- mouse ----------------------------------------------------------------------------
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        """Take hold of the cursor, the time axis or the alignment."""
+        """Start to drag the cursor, the time axis or the alignment."""
         position = event.position()
         if event.button() == Qt.MouseButton.MiddleButton:
             self._grab = ("pan", position.x())
@@ -332,7 +332,7 @@ class HeatmapView(MapWidget):
             self.offset_dragged.emit((position.x() - start_x) * self.scale.seconds_per_px)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        """Let go."""
+        """End the drag."""
         if self._grab is not None and self._grab[0] == "offset":
             self.offset_released.emit()
         self._grab = None
@@ -343,7 +343,7 @@ class HeatmapView(MapWidget):
             self._span.fit()
 
     def leaveEvent(self, event: object) -> None:
-        """Nothing is under the pointer any more."""
+        """Clear the reading under the pointer."""
         self._pointer.leave()
 
     def wheelEvent(self, event: QWheelEvent) -> None:

@@ -51,7 +51,7 @@ class MapWidget(TimePlot):
         return heatmap_image(self._track, self._display.levels, start_s, end_s, columns, background)
 
     def paint_gaps(self, painter: QPainter, plot: QRectF, scale: TimeScale) -> None:
-        """Hatch the frames without a person, in which nothing was measured."""
+        """Hatch the frames without a person."""
         colours = self._display.palette
         painter.save()
         painter.setClipRect(plot)

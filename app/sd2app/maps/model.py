@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from sd2core.accuracy.plans import AccuracyPlan
 
 _REST_MS = 300
-"""A drag that pauses for so long counts as rest."""
+"""Pause of a drag that counts as rest."""
 
 
 class SynthesisModel(QObject):

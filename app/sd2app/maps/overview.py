@@ -1,4 +1,4 @@
-"""The whole recording as one narrow map."""
+"""Narrow map of the whole recording."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ class Overview(MapWidget):
         return "pan" if left < x < right else "centre"
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        """Take hold of the frame or one of its edges; elsewhere jump there."""
+        """Start to drag the frame or an edge; elsewhere seek."""
         x = event.position().x()
         handle = self._handle_at(x)
         if handle == "centre":
@@ -126,7 +126,7 @@ class Overview(MapWidget):
         self._grab = (handle, x)
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        """Drag what is held."""
+        """Drag the frame or the edge."""
         x = event.position().x()
         if self._grab is None:
             edge = self._handle_at(x) in ("left", "right")

@@ -18,7 +18,7 @@ from sd2core.mesh.sequence import MeshSequence
 from sd2core.sensor import VirtualSensor
 
 ROUGH, PREVIEW, FINAL = 1, 2, 3
-"""How good a frame is: rough, the preview while the sensor is dragged (or what was
+"""Quality of a frame: rough, the preview while the sensor is dragged (or what was
 final for another plan), what the plan in use gives. 0 is not computed."""
 
 View = tuple[int, int]
@@ -34,7 +34,7 @@ class PartialMap:
 
     @classmethod
     def blank(cls, bins: int, frames: int) -> PartialMap:
-        """Nothing known."""
+        """Map without computed frames."""
         return cls(
             np.zeros((bins, frames), np.float32),
             np.zeros(frames, np.uint8),
@@ -91,21 +91,21 @@ def pieces(
 
 
 class ShownMap:
-    """Takes stretches over, and says on the track what they are worth."""
+    """Map on screen that is painted part by part, with its quality on the track."""
 
     def __init__(self, track: MapModel) -> None:
         self._track = track
         self.forget()
 
     def forget(self) -> None:
-        """There is no mesh."""
+        """Remove the map."""
         self.partial = PartialMap.blank(2, 0)
         self._scene: tuple[SynthesisOptions, MeshSequence] | None = None
         self._words: dict[int, str] = {}
         self._needs_reference = True
 
     def begin(self, options: SynthesisOptions, mesh: MeshSequence) -> None:
-        """Nothing of this mesh is known yet."""
+        """Begin an empty map of another mesh."""
         self.forget()
         self._scene = options, mesh
         self.partial = PartialMap.blank(options.axis.bins, mesh.frame_count)
@@ -116,7 +116,7 @@ class ShownMap:
         self._words[PREVIEW] = self._words.get(FINAL, self._words.get(PREVIEW, ""))
 
     def take(self, part: Part) -> None:
-        """Paint a stretch; the first whole map says what 0 dB is."""
+        """Paint a stretch; the first whole map sets the 0 dB reference."""
         assert self._scene is not None
         options, mesh = self._scene
         self.partial.paint(part.sensor, part.start, part.stretch, part.quality)

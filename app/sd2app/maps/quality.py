@@ -34,7 +34,7 @@ the same background task."""
 
 
 def budget_ms(frames: int) -> float:
-    """Per frame, in steps, so that a little zooming asks for no other plan."""
+    """Time budget per frame, in steps, so that a little zooming needs no other plan."""
     steps = math.ceil(2 * math.log2(max(frames, 1)))
     return float(_MAP_BUDGET_MS / 2 ** (steps / 2))
 

@@ -35,7 +35,7 @@ class FrameReader:
         self.forget()
 
     def forget(self) -> None:
-        """Another recording is open."""
+        """Drop what was read of an earlier recording."""
         self._frame: tuple[Any, FrameScattering] | None = None
         self._torso: tuple[int, Vector] | None = None
 

@@ -18,7 +18,7 @@ _LOWEST_PX = {1: 96, 2: 96, 3: 72, 4: 54}
 
 
 class MapStack(QWidget):
-    """Maps that there are, each in a view of its own; a map with nothing to show is hidden."""
+    """One view per map; views without content are hidden."""
 
     def __init__(
         self,
@@ -67,7 +67,7 @@ class MapStack(QWidget):
         self.refresh()
 
     def refresh(self) -> None:
-        """Show the views that have something to show."""
+        """Show the views that have content."""
         document, maps = self._session.document, self._session.maps
         has_any = maps.synthetic.map is not None or maps.real.map is not None
         shown = {

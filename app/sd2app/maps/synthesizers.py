@@ -1,4 +1,4 @@
-"""Synthesizers that carry plans out for the mesh that is open."""
+"""Synthesizers of accuracy plans for the open mesh."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from sd2core.accuracy.plans import AccuracyPlan
 
 _KEPT = 3
-"""The plan at rest, the one for dragging, and the one before."""
+"""Number of kept synthesizers: for the rest, for dragging, and the one before."""
 
 
 class SynthesizerCache:

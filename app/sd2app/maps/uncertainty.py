@@ -99,7 +99,7 @@ class UncertaintyModel(QObject):
         self._runner.close()
 
     def _follow(self) -> None:
-        """Begin where a finished map waits for it; stop where that map is gone."""
+        """Compute for a finished map; stop if that map is gone."""
         made = self._track.map
         if self._job is not None and made is not self._of:
             self._stop()
@@ -133,7 +133,7 @@ class UncertaintyModel(QObject):
             self.failed.emit(str(error))
 
     def _cancel(self) -> None:
-        """The user does not want to wait."""
+        """Cancel on the user's request."""
         self._stop()
         self.set_shown(False)
 

@@ -1,4 +1,4 @@
-"""Getting ready for the next drag while the sensor rests."""
+"""Preparation of the next drag while the sensor rests."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ class CompilerModel(QObject):
             self._poll.start()
 
     def stop(self) -> None:
-        """Wait no longer."""
+        """Stop waiting."""
         self._poll.stop()
 
     def _watch(self) -> None:

@@ -17,11 +17,11 @@ from sd2core.mesh.presence import runs
 
 _TITLE_PX = 24
 _LEAST_MPS = 0.2
-"""Less than that fills the axis for nothing."""
+"""Smallest range of the velocity axis."""
 
 
 class JointCurves(QWidget):
-    """Two lines; click or drag seeks."""
+    """Plot of both velocities; click or drag seeks."""
 
     def __init__(
         self,
@@ -61,7 +61,7 @@ class JointCurves(QWidget):
             self._playback.seek(self.scale.time_of(event.position().x()))
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        """Scrub."""
+        """Seek."""
         if event.buttons() & Qt.MouseButton.LeftButton:
             self._playback.seek(self.scale.time_of(event.position().x()))
 

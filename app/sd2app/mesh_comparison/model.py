@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from sd2core.compare.meshes import Comparison
 
 JOINT = "hand.R"
-"""Whose curves are shown at first."""
+"""Joint whose curves are shown at first."""
 
 
 @dataclass(frozen=True)
@@ -167,7 +167,7 @@ class ComparisonModel(QObject):
             self.work_out()
 
     def work_out(self) -> None:
-        """Compare again, with the sensor where it is."""
+        """Compare again with the present sensor."""
         recording = self._document.recording
         own = self._document.mesh
         if recording is None or own is None:
@@ -204,7 +204,7 @@ class ComparisonModel(QObject):
             save_figure(draw_comparison(self.comparison), path)
 
     def close(self) -> None:
-        """Stop working."""
+        """Stop comparing."""
         if self._closed:
             return
         self._closed = True

@@ -18,9 +18,9 @@ from sd2app.widgets.mesh_painting import draw_mesh
 
 _TITLE_PX = 24
 _GREY = 56
-"""Of the ground where there is no video."""
+"""Grey value of the ground without a video."""
 _LEAST_OPACITY = 0.2
-"""What is compared has to be seen."""
+"""Lowest opacity, so that the compared meshes stay visible."""
 
 
 def colour_of(display: DisplayModel, number: int) -> QColor:

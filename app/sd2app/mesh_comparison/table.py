@@ -1,4 +1,4 @@
-"""Joint by joint: how far apart, how differently they move, how they tremble."""
+"""Table of differences per joint: position, velocity and jitter."""
 
 from __future__ import annotations
 

@@ -156,7 +156,7 @@ class ComparisonWindow(QWidget):
             self._attempt(lambda: self._model.save_figure(Path(name)))
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        """Stop working; nothing of it is kept."""
+        """Stop comparing, and discard the results."""
         self._model.close()
         event.accept()
         self.closed.emit()

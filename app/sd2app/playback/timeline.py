@@ -72,7 +72,7 @@ class TimeRuler(QWidget):
         painter.drawPolygon([QPointF(x - 5, 0), QPointF(x + 5, 0), QPointF(x, 7)])
 
     def _paint_stretch(self, painter: QPainter, scale: TimeScale) -> None:
-        """A bracket around what is played again and again."""
+        """Paint a bracket around the repeated time range."""
         if self._playback.stretch_s is None:
             return
         left, right = (
@@ -98,5 +98,5 @@ class TimeRuler(QWidget):
         self._playback.seek(self.scale.time_of(event.position().x()))
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        """Scrub."""
+        """Seek."""
         self._playback.seek(self.scale.time_of(event.position().x()))

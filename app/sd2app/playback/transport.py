@@ -28,7 +28,7 @@ class Looped(Protocol):
         """The span, or None."""
 
     def end(self) -> None:
-        """Play on beyond it."""
+        """Leave the loop and play on."""
 
 
 class TransportBar(QWidget):

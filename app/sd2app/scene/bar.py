@@ -22,7 +22,7 @@ _VIEWS = ("view_three_quarter", "view_camera", "view_sensor", "view_side", "view
 
 
 class SceneBar(QWidget):
-    """Colour, dots, and where one looks from."""
+    """Bar with the mesh's colour, dots and ready-made views."""
 
     def __init__(
         self,

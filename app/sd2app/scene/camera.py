@@ -57,11 +57,11 @@ class EyePose:
 
     @cached_property
     def position(self) -> Vector:
-        """The eye, metres."""
+        """Position of the eye, metres."""
         return np.asarray(self.focus) - self.distance_m * self.axes[2]
 
     def orbited(self, dx_px: float, dy_px: float) -> EyePose:
-        """Turned around the focus by a drag; the vertical stays vertical."""
+        """Pose turned around the focus by a drag; the vertical stays vertical."""
         elevation = self.elevation_deg - _ORBIT_DEG_PER_PX * dy_px
         return replace(
             self,
@@ -70,14 +70,14 @@ class EyePose:
         )
 
     def panned(self, dx_px: float, dy_px: float, height_px: float) -> EyePose:
-        """Shifted so that what lies at the focus follows the drag."""
+        """Pose shifted so that the focus follows the drag."""
         right, down, _ = self.axes
         scale = self.distance_m / self.pixels_per_tangent(height_px)
         focus = np.asarray(self.focus) - scale * (dx_px * right + dy_px * down)
         return replace(self, focus=_triple(focus))
 
     def zoomed(self, factor: float, x_px: float, y_px: float, size_px: ArrayLike) -> EyePose:
-        """Distance times ``factor``, keeping in place what the pointer is on (at the focus)."""
+        """Pose at ``factor`` times the distance; the point under the pointer stays in place."""
         width, height = (float(value) for value in np.asarray(size_px))
         distance = min(max(self.distance_m * factor, _NEAREST_M), _FARTHEST_M)
         right, down, _ = self.axes
@@ -121,7 +121,7 @@ class EyePose:
         return depth / self.pixels_per_tangent(height_px) if depth > 1e-6 else math.inf
 
     def framed(self, points: ArrayLike, size_px: ArrayLike, margins: Margins) -> EyePose:
-        """The same direction from as near as all points fit inside the margins."""
+        """Pose of the same direction, as near as all points fit inside the margins."""
         points = np.atleast_2d(np.asarray(points, np.float64))
         width, height = (float(value) for value in np.asarray(size_px))
         scale = self.pixels_per_tangent(height)

@@ -22,7 +22,7 @@ def fractions(colour: str) -> tuple[float, float, float]:
 
 
 def mixed(colour: str, other: str, share: float) -> str:
-    """``colour`` with ``share`` of ``other`` in it."""
+    """Mix of ``colour`` with ``share`` of ``other``."""
     blend = (1.0 - share) * rgb(colour) + share * rgb(other)
     return "#" + np.rint(blend).astype(np.uint8).tobytes().hex()
 
@@ -46,7 +46,7 @@ class SceneColours:
 
     @classmethod
     def of(cls, palette: Palette, dark: bool) -> SceneColours:
-        """The scene in a theme of the window."""
+        """Colours of the scene for a theme of the window."""
         background = "#1b1d21" if dark else "#f6f7f9"
         return cls(
             background=background,

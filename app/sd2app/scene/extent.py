@@ -24,14 +24,14 @@ class Extent:
 
     @classmethod
     def of_points(cls, points: NDArray[np.floating], floor_m: float | None = None) -> Extent:
-        """Around points; the floor is at the lowest unless given."""
+        """Extent of points; the floor is at the lowest unless given."""
         points = np.asarray(points, np.float64).reshape(-1, 3)
         low, high = points.min(axis=0), points.max(axis=0)
         return cls(points, low, high, float(high[1]) if floor_m is None else floor_m)
 
     @classmethod
     def of_mesh(cls, mesh: MeshSequence) -> Extent:
-        """From a few frames spread over the clip, so that a long one stays on disk."""
+        """Extent from a few frames over the clip, so that a long one stays on disk."""
         count = min(mesh.frame_count, _SAMPLED_FRAMES)
         frames = np.linspace(0, mesh.frame_count - 1, count).astype(int)
         stride = max(mesh.vertex_count // _SAMPLED_VERTICES, 1)

@@ -14,7 +14,7 @@ from sd2core.sensor import VirtualSensor
 _LENGTH_M = 0.10
 _LEAST_PX = 7.0
 _SIZE_STEP = 1.15
-"""Points are not rebuilt for a smaller change of size."""
+"""Relative change of size from which points are rebuilt."""
 
 
 class Markers:

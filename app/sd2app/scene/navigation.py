@@ -22,7 +22,7 @@ Constraint = Literal["view", "vertical", "sight"]
 LEAST_GRAB_PX = 14.0
 _MARKER_PX = 9.0
 _CLICK_PX = 4.0
-"""A mouse that moves less has clicked."""
+"""Movement below which a press counts as a click."""
 _ZOOM_PER_NOTCH = 0.88
 
 
@@ -109,7 +109,7 @@ class Navigator:
         return nearest if away[nearest] <= _MARKER_PX else None
 
     def press(self, x_px: float, y_px: float, button: Button, shift: bool, ctrl: bool) -> None:
-        """A button went down; a second one changes nothing."""
+        """Handle a pressed button; a second one changes nothing."""
         if self._button is not None:
             return
         self._button = button
@@ -128,7 +128,7 @@ class Navigator:
             self._moving = "pan"
 
     def move(self, x_px: float, y_px: float, shift: bool, ctrl: bool) -> None:
-        """The pointer moved, with a button or without."""
+        """Handle a move of the pointer, with a button or without."""
         if self._clicking is not None:
             _, x, y = self._clicking
             if math.hypot(x_px - x, y_px - y) < _CLICK_PX:
@@ -148,7 +148,7 @@ class Navigator:
             self._look(x_px, y_px)
 
     def release(self, x_px: float, y_px: float, button: Button) -> None:
-        """A button went up."""
+        """Handle a released button."""
         if button == self._button:
             clicked = self._clicking
             self.let_go()
@@ -165,12 +165,12 @@ class Navigator:
             self._show_hot()
 
     def look_again(self) -> None:
-        """Something moved under a resting pointer."""
+        """Test again what is under a resting pointer."""
         if (self._hovering or self._marker is not None) and self._held is None:
             self._look(*self._last_px)
 
     def leave(self) -> None:
-        """The pointer left the view."""
+        """Handle the pointer's leaving the view."""
         self._hover(False)
         self._hover_marker(None)
 

@@ -63,7 +63,7 @@ class ImageBackend(QWidget):
 
     @property
     def widget(self) -> QWidget:
-        """Itself."""
+        """The widget itself."""
         return self
 
     @property
@@ -98,7 +98,7 @@ class ImageBackend(QWidget):
             self._window = None
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """The picture no longer fits."""
+        """Render again in the new size."""
         self.request_render()
 
     def paintEvent(self, event: QPaintEvent) -> None:
@@ -147,7 +147,7 @@ class ImageBackend(QWidget):
 
 
 def _off_screen_window() -> vtkRenderWindow:
-    """A render window that needs no screen.
+    """Make a render window that needs no screen.
 
     Raises NoOpenGL if no driver answers: rendering would end the program.
     """

@@ -1,4 +1,4 @@
-"""Words and scales over the 3D picture: crisp text that costs no rendering."""
+"""Texts and scales over the 3D picture: sharp, and without rendering again."""
 
 from __future__ import annotations
 
@@ -315,7 +315,7 @@ class Overlay(QWidget):
     def _paint_beside(
         self, painter: QPainter, text: str, point_m: tuple[float, float, float]
     ) -> None:
-        """Words right above a point."""
+        """Paint a text right above a point."""
         px, py, _ = self._scene.pose.project(point_m, self._size())[0]
         metrics = QFontMetricsF(painter.font())
         box = QRectF(0.0, 0.0, metrics.horizontalAdvance(text) + 16.0, metrics.height() + 8.0)

@@ -92,7 +92,7 @@ class Shape:
         self.data.Modified()
 
     def set_point_colours(self, colours: NDArray[np.uint8]) -> None:
-        """One colour per point, (n, 3) or with opacity (n, 4)."""
+        """Set one colour per point, (n, 3) or with opacity (n, 4)."""
         if self._colours is None or self._colours.shape != colours.shape:
             self._colours = np.ascontiguousarray(colours).copy()
             self._colour_array = numpy_to_vtk(self._colours)
@@ -108,16 +108,16 @@ class Shape:
         return self._colours
 
     def set_colour(self, colour: str, opacity: float = 1.0) -> None:
-        """One colour for all of it."""
+        """Set one colour for all of it."""
         self.actor.GetProperty().SetColor(*fractions(colour))
         self.actor.GetProperty().SetOpacity(opacity)
 
     def place(self, linear: NDArray[np.float64], offset: NDArray[np.float64]) -> None:
-        """Put it elsewhere: p -> linear p + offset."""
+        """Set its transform: p -> linear p + offset."""
         self.actor.SetUserMatrix(_matrix(linear, offset))
 
     def show(self, visible: bool) -> None:
-        """Draw it, or not."""
+        """Show or hide it."""
         self.actor.SetVisibility(visible)
 
     def set_line_width(self, pixels: float) -> None:
@@ -200,7 +200,7 @@ class Body(Shape):
         self.shadow.SetUserMatrix(_matrix(flat, np.array([0.0, floor_m - 0.002, 0.0])))
 
     def show(self, visible: bool) -> None:
-        """Draw it, or not."""
+        """Show or hide it."""
         super().show(visible)
         self._update_shadow()
 
@@ -280,13 +280,13 @@ class SensorGlyph:
         self.foot.set_colour(quiet)
 
     def show(self, visible: bool) -> None:
-        """Draw it, or not (the eye is inside it)."""
+        """Show or hide it (the eye may be inside it)."""
         self.sphere.SetVisibility(visible)
         for shape in (self.cone, self.edges, self.axis, self.plumb, self.foot):
             shape.show(visible)
 
     def set_pixel_scale(self, scale: float) -> None:
-        """Widths of lines."""
+        """Scale the widths of lines."""
         self.axis.set_line_width(1.8 * scale)
         for shape in (self.edges, self.plumb, self.foot):
             shape.set_line_width(1.0 * scale)
@@ -306,11 +306,11 @@ class CameraGlyph:
         self.wire.set_colour(colours.camera)
 
     def show(self, visible: bool) -> None:
-        """Draw it, or not (the eye is inside it)."""
+        """Show or hide it (the eye may be inside it)."""
         self.wire.show(visible)
 
     def set_pixel_scale(self, scale: float) -> None:
-        """Widths of lines."""
+        """Scale the widths of lines."""
         self.wire.set_line_width(1.3 * scale)
 
 
@@ -340,11 +340,11 @@ class GroundGrid:
             shape.set_point_colours(np.rint(blend).astype(np.uint8))
 
     def show(self, visible: bool) -> None:
-        """Draw it, or not."""
+        """Show or hide it."""
         for shape in self._shapes:
             shape.show(visible)
 
     def set_pixel_scale(self, scale: float) -> None:
-        """Widths of lines."""
+        """Scale the widths of lines."""
         for shape in self._shapes:
             shape.set_line_width(1.0 * scale)

@@ -41,7 +41,7 @@ _MOUSE = (
     QEvent.Type.MouseButtonDblClick,
 )
 _NOTCH = 120.0
-"""Qt's measure of one notch of a wheel."""
+"""Angle of one notch of the wheel in Qt's units."""
 
 
 class SceneView(QWidget):

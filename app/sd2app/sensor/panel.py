@@ -1,4 +1,4 @@
-"""The sensor in numbers: where it is, what it sees, what it cannot see."""
+"""The sensor in numbers: position, visible share and limits."""
 
 from __future__ import annotations
 
@@ -286,7 +286,7 @@ def _value(parent: QWidget, tip: str) -> QLabel:
 
 
 class SensorPages(QWidget):
-    """The sensor, or the placements."""
+    """Pages of the sensor and of the placements."""
 
     def __init__(self, sensor: QWidget, placements: QWidget, parent: QWidget | None = None) -> None:
         super().__init__(parent)

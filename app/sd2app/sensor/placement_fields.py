@@ -21,7 +21,7 @@ _FIRST: dict[Kind, Placements | None] = {
     "grid": PlacementGrid((1.0, 2.0, 3.0, 4.0), (-60.0, -30.0, 0.0, 30.0, 60.0)),
     "cloud": PlacementCloud(100, (1.0, 4.0), (-60.0, 60.0), (-10.0, 40.0)),
 }
-"""What a plan begins with."""
+"""First plan of each kind."""
 
 
 class PlacementFields(QObject):
@@ -84,7 +84,7 @@ class PlacementFields(QObject):
         self.changed.emit()
 
     def end(self) -> None:
-        """Typing has ended."""
+        """End typing: one step in the history."""
         self._placements.edits.end_typing_placements()
 
     def _follow(self) -> None:

@@ -32,7 +32,7 @@ def limit_facts(model: PlacementsModel) -> list[tuple[str, str]]:
 
 
 def limits_text(model: PlacementsModel) -> str:
-    """Whose limits these are, and what is done about it."""
+    """Limits of the radar, and if the placements keep within them."""
     coverage, radar = model.planned.coverage, model.radar
     if coverage is None:
         return "Looking at what they see…" if model.planned.places else ""
@@ -51,7 +51,7 @@ def current_text(model: PlacementsModel) -> str:
 
 
 def cost_text(cost: PlacementCost) -> str:
-    """One line."""
+    """Cost in one line."""
     time = seconds(cost.total_s) if cost.total_s < _SHORT_S else duration_text(cost.total_s)
     return f"{counted(cost.maps, 'map')} in about {time}, {bytes_text(cost.total_bytes)}"
 

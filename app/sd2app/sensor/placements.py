@@ -34,13 +34,13 @@ class PlanEdits(Protocol):
         """Plan other places, or none."""
 
     def type_placements(self, placements: Placements | None) -> None:
-        """The same while it is typed."""
+        """Plan other places while they are typed."""
 
     def end_typing_placements(self) -> None:
-        """It has been typed."""
+        """End typing: all of it is one step in the history."""
 
     def place_sensor(self, sensor: VirtualSensor, text: str) -> None:
-        """Put the sensor somewhere."""
+        """Place the sensor."""
 
 
 class _Wish(NamedTuple):
@@ -106,7 +106,7 @@ class PlacementsModel(QObject):
 
     @property
     def radar(self) -> RadarConfig:
-        """Whose limits hold: that of the recording's capture, or the paper's."""
+        """Radar whose limits hold: that of the recording's capture, or the paper's."""
         capture = self._document.capture
         return PAPER_RADAR if capture is None else capture.config
 
@@ -158,7 +158,7 @@ class PlacementsModel(QObject):
             self.use(0 if current is None else (current + by) % count)
 
     def close(self) -> None:
-        """Stop working places out."""
+        """Stop computing placements."""
         self._runner.close()
 
     # --- following ------------------------------------------------------------------------
@@ -191,7 +191,7 @@ class PlacementsModel(QObject):
 def _worked_out(
     wish: _Wish, known: tuple[MeshSequence, BodyExtent] | None, emit: Emit
 ) -> tuple[tuple[MeshSequence, BodyExtent], Planned]:
-    """In the background; the places come before what they see."""
+    """Compute in the background: the places first, then what they see."""
     body = known if known is not None and known[0] is wish.mesh else None
     if body is None:
         body = (wish.mesh, BodyExtent.of(wish.mesh))

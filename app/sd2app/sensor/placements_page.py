@@ -198,7 +198,7 @@ class RangeScale(QWidget):
         self.setAccessibleName("Colours of the placements: range")
 
     def show_ranges(self, ranges_m: list[float]) -> None:
-        """From the nearest to the farthest; nothing where all are as far."""
+        """Show the range from nearest to farthest, or nothing where all are equal."""
         ends = ("", "")
         if ranges_m and max(ranges_m) > min(ranges_m):
             ends = (f"{min(ranges_m):.3g} m", f"{max(ranges_m):.3g} m")
@@ -208,15 +208,15 @@ class RangeScale(QWidget):
             self.update()
 
     def sizeHint(self) -> QSize:
-        """One line."""
+        """Size of one line."""
         return QSize(120, self.fontMetrics().height() + 2)
 
     def minimumSizeHint(self) -> QSize:
-        """One line."""
+        """Size of one line."""
         return QSize(60, self.fontMetrics().height() + 2)
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """A bar between two words."""
+        """Paint a colour bar between two texts."""
         painter = QPainter(self)
         painter.setPen(QColor(self.palette().text().color()))
         near, far = self._ends

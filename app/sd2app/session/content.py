@@ -34,7 +34,7 @@ _TOLD: dict[str, tuple[str, str]] = {
     "dataset": ("is a data set", "Look at its card and its preview sheet, or use `sd2 info`"),
     "model": ("is a model", "Open a recording, then choose the model under Model"),
 }
-"""Kinds that no recording is made of: what to say, and where they belong."""
+"""Message and remedy for known kinds of files that are no part of a recording."""
 
 CLUTTER_CHOICES: tuple[Clutter, ...] = ("mean", "moving", "none")
 

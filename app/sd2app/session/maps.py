@@ -14,13 +14,13 @@ from sd2core.maps import CellUncertainty, DopplerMap
 from sd2core.mesh.presence import runs
 
 UNCERTAIN_SHARE = 0.5
-"""A cell is uncertain where the truth may be farther from its value than this share of it."""
+"""Relative deviation from which a cell counts as uncertain."""
 
 _FAINT_SHARE = 0.05
-"""Of the highest level: what is fainter does not show on a linear scale."""
+"""Share of the highest level below which nothing shows on a linear scale."""
 
 _SHOWS_SHARE = 0.1
-"""Of the highest level: what may be there although nothing shows."""
+"""Deviation, as share of the highest level, that matters where nothing shows."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ class MapModel(QObject):
 
     @property
     def status(self) -> str:
-        """A few words on what the map is worth, e.g. ``exact``."""
+        """Quality of the map in a few words, e.g. ``exact``."""
         return self._status
 
     @property
@@ -142,7 +142,7 @@ class MapModel(QObject):
         self.changed.emit()
 
     def set_uncertainty(self, uncertainty: CellUncertainty | None) -> None:
-        """Say how well the cells of this map are known."""
+        """Set the uncertainty of the map's cells."""
         if uncertainty is not self._uncertainty:
             self._uncertainty = uncertainty
             self.changed.emit()
@@ -154,7 +154,7 @@ class MapModel(QObject):
             self.changed.emit()
 
     def set_status(self, status: str) -> None:
-        """Say what the map is worth."""
+        """Set the text about the map's quality."""
         if status != self._status:
             self._status = status
             self.status_changed.emit()
@@ -266,12 +266,12 @@ class PointerModel(QObject):
         return self._reading
 
     def point_at(self, time_s: float, velocity_mps: float, reading: Reading | None) -> None:
-        """The pointer is over a track."""
+        """Set the track, time and velocity under the pointer."""
         self._time_s, self._velocity_mps, self._reading = time_s, velocity_mps, reading
         self.changed.emit()
 
     def leave(self) -> None:
-        """The pointer is elsewhere."""
+        """Clear the reading."""
         if self._time_s is not None:
             self._time_s = self._velocity_mps = self._reading = None
             self.changed.emit()

@@ -1,4 +1,4 @@
-"""Long work that is under way: what it is, how far it got, how to stop it."""
+"""Long tasks under way, with title, progress and cancellation."""
 
 from __future__ import annotations
 
@@ -41,13 +41,13 @@ class TaskList(QObject):
         return job
 
     def report(self, job: Job, done: int, total: int) -> None:
-        """Say how far a job got."""
+        """Report the progress of a job."""
         if (done, total) != (job.done, job.total):
             job.done, job.total = done, total
             self.changed.emit()
 
     def finish(self, job: Job) -> None:
-        """A job is over, one way or the other."""
+        """Remove an ended job."""
         if job in self._jobs:
             self._jobs.remove(job)
             self.changed.emit()

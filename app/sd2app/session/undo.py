@@ -49,7 +49,7 @@ class Edits:
     # --- sensor ---------------------------------------------------------------------------
 
     def place_sensor(self, sensor: VirtualSensor, text: str = "Move sensor") -> None:
-        """Put the sensor somewhere."""
+        """Place the sensor."""
         before = self._sensor.sensor
         self._assign_sensor(sensor)
         self._push(text, self._assign_sensor, before, sensor)
@@ -90,7 +90,7 @@ class Edits:
         self.end_typing_placements()
 
     def type_placements(self, placements: Placements | None) -> None:
-        """The same while it is typed: all until the end is one step."""
+        """Plan other places while they are typed: all until the end is one step."""
         recording = self._document.recording
         if recording is None:
             return
@@ -99,7 +99,7 @@ class Edits:
         self._document.set_placements(placements)
 
     def end_typing_placements(self) -> None:
-        """It has been typed."""
+        """End typing: all of it is one step in the history."""
         recording, before = self._document.recording, self._planned_before
         self._planned_before = None
         # Another recording may have been opened while the user typed.

@@ -12,11 +12,11 @@ from sd2core.train.config import DataConfig, TrainConfig, TrainingConfig
 from sd2core.train.folder import TrainingFolder
 
 _OPTIONS = {"early_stopping_epochs": "--early-stopping"}
-"""Options that are not called as their setting is."""
+"""Options whose names differ from their settings."""
 
 
 def new_run_folder(folder: Path, config: TrainConfig) -> Path:
-    """A name that is free: kind of model, pairs, and when."""
+    """Free folder name made of the kind of model, the pairs and the time."""
     pairs = "+".join(path.stem for path in config.data.pairs)
     when = time.strftime("%Y-%m-%d %H.%M")
     name = f"{config.model.name} {pairs[:40]} {when}"
@@ -27,7 +27,7 @@ def new_run_folder(folder: Path, config: TrainConfig) -> Path:
 
 
 def train_arguments(config: TrainConfig, run: Path) -> list[str]:
-    """``sd2 train`` with all that is not as it is by default."""
+    """Arguments of ``sd2 train`` for all that differs from the defaults."""
     # The model is named even where it is the default: it is what one looks for.
     words = ["train", *map(str, config.data.pairs), "--model", config.model.name, "--background"]
     for section, plain in (("data", DataConfig(config.data.pairs)), ("training", TrainingConfig())):
@@ -40,7 +40,7 @@ def train_arguments(config: TrainConfig, run: Path) -> list[str]:
 
 
 def resume_arguments(run: Path) -> list[str]:
-    """``sd2 train`` that goes on with a run."""
+    """Arguments of ``sd2 train`` that resume a run."""
     return ["train", "--resume", str(run)]
 
 

@@ -61,7 +61,7 @@ class TrainingCurves(SteppedPlot):
         return self._history.best
 
     def tip_place(self, point: EpochPoint) -> QPointF:
-        """Half way up the line at an epoch."""
+        """Pixel half way up the line at an epoch."""
         return QPointF(self._scale().x_of(point.epoch), self.plot_rect().center().y())
 
     def words_of(self, point: EpochPoint) -> str:
@@ -70,7 +70,7 @@ class TrainingCurves(SteppedPlot):
 
     @property
     def pointed(self) -> EpochPoint | None:
-        """The epoch that is pointed at, as the history tells it now."""
+        """Current errors of the pointed epoch."""
         if self._pointed is None:
             return None
         return next((one for one in self.points() if one.epoch == self._pointed.epoch), None)
@@ -182,7 +182,7 @@ class TrainingCurves(SteppedPlot):
     # --- mouse ----------------------------------------------------------------------------
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        """Say what the epoch under the pointer came to."""
+        """Point at the epoch under the pointer."""
         plot, points = self.plot_rect(), self.points()
         x, scale = event.position().x(), self._scale()
         inside = plot.left() - 4 <= x <= plot.right() + 4
@@ -191,7 +191,7 @@ class TrainingCurves(SteppedPlot):
         self.explain()
 
     def leaveEvent(self, event: QEvent) -> None:
-        """Point at nothing."""
+        """Remove the mark of the pointed point."""
         super().leaveEvent(event)
         if not self.hasFocus():
             self.point_at(None)

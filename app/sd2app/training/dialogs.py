@@ -1,4 +1,4 @@
-"""What the Train panel asks: a folder of pairs, whether to delete, what becomes of a run."""
+"""Dialogs of the Train panel: pairs, deletion, and the run when the window closes."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class TrainingDialogs:
             self._attempt(lambda: self._training.pair_maker.make(Path(name)))
 
     def start(self) -> None:
-        """Begin as it is set up."""
+        """Start what is set up."""
         self._attempt(self._training.start)
 
     def resume(self) -> None:
@@ -75,7 +75,7 @@ class TrainingDialogs:
             self._training.delete()
 
     def may_leave(self) -> bool:
-        """Whether the window may close; says what becomes of a run under way."""
+        """True if the window may close; decides on a run under way."""
         training = self._training
         run = training.to_be_left()
         if run is None or run.phase in ("stopping", "cancelling"):

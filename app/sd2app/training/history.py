@@ -13,7 +13,7 @@ from sd2core.errors import Sd2Error
 Outcome = Literal["finished", "stopped", "cancelled", "failed"]
 
 _MOST_STEPS = 2000
-"""Beyond that, every second step is forgotten: no screen shows more."""
+"""Limit of kept steps; beyond it, every second one is dropped."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class EpochPoint:
 
 
 class TrainingHistory:
-    """Takes lines one after another; what it cannot read it leaves out."""
+    """Steps and epochs of a run, read from its lines; damaged lines are left out."""
 
     def __init__(self) -> None:
         self.model = ""
@@ -95,7 +95,7 @@ class TrainingHistory:
     # --- taking lines ---------------------------------------------------------------------
 
     def take(self, events: Iterable[dict[str, Any]]) -> bool:
-        """Take lines; whether any of them was of use."""
+        """Take lines; True if any of them was of use."""
         return take_lines(self, _READERS, events)
 
     def _start(self, event: dict[str, Any]) -> None:
@@ -173,7 +173,7 @@ class TrainingHistory:
 
 
 def _count(value: Any, least: int = 0) -> int:
-    """Whole number; zero for what was not told."""
+    """Whole number; zero if not reported."""
     count = 0 if value is None else int(value)
     if count < least:
         raise ValueError(f"{value!r}")
@@ -181,7 +181,7 @@ def _count(value: Any, least: int = 0) -> int:
 
 
 def _number(value: Any) -> float:
-    """NaN for what was not told."""
+    """Number; NaN if not reported."""
     return math.nan if value is None else float(value)
 
 

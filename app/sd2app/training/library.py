@@ -29,7 +29,7 @@ class KnownRun:
 
     @property
     def title(self) -> str:
-        """To call it in a list."""
+        """Title in a list."""
         status = self.status
         when = clock_text(status.started_unix_s)
         return f"{when} · {model_name(status.model)} · {state_text(status.state)}"
@@ -74,12 +74,12 @@ class TrainingLibrary(QObject):
         return next((run for run in self._runs if run.live), None)
 
     def refresh(self) -> None:
-        """Look again."""
+        """Read the folder again."""
         folder = self._folder
         self._runner.submit(lambda emit: self._list(folder))
 
     def close(self) -> None:
-        """Look no more."""
+        """Stop reading."""
         self._runner.close()
 
     def _list(self, folder: Path) -> tuple[KnownRun, ...]:

@@ -29,7 +29,7 @@ from sd2core.train.folder import TrainingFolder
 Closing = Literal["ask", "keep", "stop"]
 
 CLOSING: tuple[Closing, ...] = ("ask", "keep", "stop")
-"""What happens to a run when the window is closed."""
+"""Choices for a run under way when the window is closed."""
 _LIBRARY_MS = 3000
 
 
@@ -94,7 +94,7 @@ class TrainingModel(QObject):
     def to_be_left(self) -> TrainingMonitor | None:
         """The run that would go on when the window is closed, brought into view.
 
-        What was started from a terminal is nobody's business here unless it is in view.
+        Runs that were started from a terminal do not count here unless they are in view.
         """
         if not self.under_way:
             live = self.library.live
@@ -202,7 +202,7 @@ class TrainingModel(QObject):
     # --- steering -------------------------------------------------------------------------
 
     def pause(self) -> None:
-        """Rest, and give the processor back; the memory is kept."""
+        """Pause, which frees the processor but not the memory."""
         self._attempt(lambda run: run.tell("pause"))
 
     def go_on(self) -> None:
@@ -226,7 +226,7 @@ class TrainingModel(QObject):
             self.library.refresh()
 
     def close(self) -> None:
-        """Look no more; what is being trained goes on."""
+        """Stop polling; a running training goes on."""
         self._timer.stop()
         self._timing.stop()
         self.pair_maker.close()
@@ -297,7 +297,7 @@ class TrainingModel(QObject):
             self.step_times.learn(key, step_s)
 
     def _take_up(self) -> None:
-        """After the first look at all runs."""
+        """Select the run under way, or the last in view, after the first search for runs."""
         if not self._looking_for_runs:
             return
         self._looking_for_runs = False

@@ -8,7 +8,7 @@ from sd2app.widgets.pages import InnerPage, InnerPages
 
 
 class TrainPage(QWidget):
-    """The training of denoisers, or that of classifiers."""
+    """Page for the training of denoisers, or that of classifiers."""
 
     def __init__(
         self, denoisers: QWidget, classifiers: QWidget, parent: QWidget | None = None

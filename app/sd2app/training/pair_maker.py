@@ -46,7 +46,7 @@ class PairMaker(QObject):
 
     @property
     def cancelling(self) -> bool:
-        """True once it was told to end."""
+        """True once it has been asked to end."""
         return self._out is not None and self._cancelled
 
     def make(self, place: Path) -> None:
@@ -70,7 +70,7 @@ class PairMaker(QObject):
         self.changed.emit()
 
     def cancel(self) -> None:
-        """Make none; what was made is removed."""
+        """Cancel, and remove the unfinished pairs."""
         if self._process is not None and not self._cancelled:
             self._cancelled = True
             self._process.stop()

@@ -18,7 +18,7 @@ from sd2app.widgets.run_list import RunPanel
 
 
 class Asks(Protocol):
-    """Actions of the panel that dialogs carry through."""
+    """Actions of the panel that need dialogs."""
 
     def ask_store(self) -> None:
         """Let the user choose a store of pairs."""
@@ -27,7 +27,7 @@ class Asks(Protocol):
         """Let the user choose recordings to make pairs of."""
 
     def start(self) -> None:
-        """Begin as it is set up."""
+        """Start what is set up."""
 
     def copy_command(self) -> None:
         """Put the command on the clipboard."""

@@ -1,4 +1,4 @@
-"""A trained model put to use, and what it gains over what was there before."""
+"""Use of a trained model, and its gain over the model before."""
 
 from __future__ import annotations
 
@@ -138,7 +138,7 @@ class ModelAdoption(QObject):
         self._compare()
 
     def go_back(self) -> None:
-        """Denoise with what was in use before."""
+        """Denoise with the model that was in use before."""
         try:
             self._denoise.use(self._previous)
             self._denoise.set_comparing(False)
@@ -151,11 +151,11 @@ class ModelAdoption(QObject):
         self._denoise.set_comparing(comparing)
 
     def close(self) -> None:
-        """Compare no more."""
+        """Stop comparing."""
         self._calm.stop()
 
     def _keep(self, name: str, best: Path) -> Path:
-        """Copy it to where it is found by name, whatever becomes of the run."""
+        """Copy the model to the user's models, so that it outlives the run."""
         folder = self._models()
         folder.mkdir(parents=True, exist_ok=True)
         kept = folder / f"{name}{best.suffix}"

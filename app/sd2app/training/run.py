@@ -24,7 +24,7 @@ class _Facts(NamedTuple):
 
 
 class TrainingMonitor(RunMonitor[TrainingFolder]):
-    """A training run with its settings and what it told of its epochs."""
+    """A training run with its settings and its history of epochs."""
 
     def __init__(
         self, path: Path, parent: QObject | None = None, *, process: ProcessId | None = None
@@ -46,7 +46,7 @@ class TrainingMonitor(RunMonitor[TrainingFolder]):
         return _Facts(config, folder.best.exists(), folder.last.exists())
 
     def on_facts(self, facts: _Facts) -> None:
-        """Keep them."""
+        """Store the facts."""
         self._facts = facts
 
     @property
@@ -61,7 +61,7 @@ class TrainingMonitor(RunMonitor[TrainingFolder]):
 
     @property
     def error(self) -> str:
-        """Reason of a failure, of its last line."""
+        """Reason of a failure, from its last line."""
         return self.history.error
 
     @property

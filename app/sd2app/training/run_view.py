@@ -1,4 +1,4 @@
-"""One run: how far it is, its curves, and what can be done with it."""
+"""Progress, curves and actions of one training run."""
 
 from __future__ import annotations
 

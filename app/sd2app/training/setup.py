@@ -34,7 +34,7 @@ _DEFAULTS: dict[str, str | int | float] = {
     "range_factor": 1.0,
     "seed": TrainingConfig().seed,
 }
-"""The paper's, where it has them; nought epochs of patience is no early stopping."""
+"""Defaults, from the paper where it has them; 0 epochs of patience: no early stopping."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ class TrainingSetupModel(QObject):
             self.changed.emit()
 
     def reset(self) -> None:
-        """All settings but the kind of model as they were at first."""
+        """Restore the defaults of all settings but the kind of model."""
         for name, default in _DEFAULTS.items():
             if name != "model":
                 self.set_value(name, default)
@@ -136,7 +136,7 @@ class TrainingSetupModel(QObject):
         self.changed.emit()
 
     def refresh(self) -> None:
-        """Look into the stores again: a campaign grows while it is being made."""
+        """Read the stores again: a campaign grows while it is being made."""
         self._read()
 
     def close(self) -> None:
@@ -212,7 +212,7 @@ class TrainingSetupModel(QObject):
         return split_subjects([name for name, _, _ in people]) if people else None
 
     def _people(self) -> list[tuple[str, PairFacts, str]]:
-        """Everybody, as the library calls them, with their store and their name in it."""
+        """All people as the library names them, with store and name in it."""
         found = [store.facts for store in self._stores if store.facts is not None]
         names = [subject for facts in found for subject in facts.subjects]
         return [
@@ -226,7 +226,7 @@ class TrainingSetupModel(QObject):
         ]
 
     def _segments(self) -> int:
-        """To learn from."""
+        """Number of training segments."""
         division = self.division
         if division is None:
             return 0

@@ -108,7 +108,7 @@ def _listed(names: tuple[str, ...]) -> str:
 
 
 def steps_text(steps: int) -> str:
-    """Such as ``160 steps``."""
+    """Number of steps, such as ``160 steps``."""
     return f"{steps:,} {'step' if steps == 1 else 'steps'}"
 
 
@@ -128,7 +128,7 @@ def headline(run: TrainingMonitor) -> str:
 
 
 def time_text(run: TrainingMonitor) -> str:
-    """Time that has passed, and what is left."""
+    """Elapsed time and time left."""
     history, parts = run.history, []
     if run.phase in ("running", "pausing", "paused", "resuming") and history.left_s is not None:
         parts.append(f"{about(history.left_s)} left")
@@ -196,7 +196,7 @@ def gain_summary(gain: Improvement | None, has_radar: bool) -> str:
 
 
 def gain_rows(gain: Improvement) -> list[tuple[str, str]]:
-    """Before and after."""
+    """Errors before and after."""
 
     def row(name: str, value_mps: float) -> tuple[str, str]:
         text = f"{value_mps:.3f} m/s"

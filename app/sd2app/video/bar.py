@@ -16,7 +16,7 @@ _STEPS = 20
 
 
 class VideoBar(QWidget):
-    """Mesh on or off, as dots or surface, and how much of the person it hides."""
+    """Bar with the mesh's visibility, dots or surface, and opacity."""
 
     def __init__(
         self, overlay: OverlayModel, action: Callable[[str], QAction], parent: QWidget | None = None

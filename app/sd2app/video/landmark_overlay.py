@@ -30,7 +30,7 @@ _FAINTEST = 0.2
 
 
 def bones() -> list[tuple[int, int, str]]:
-    """Pairs of landmarks to be joined, each with its colour."""
+    """Pairs of landmarks that are joined, each with its colour."""
     lines = [
         (LANDMARKS.index(f"{a}.{side}"), LANDMARKS.index(f"{b}.{side}"), colour)
         for a, b in _LIMBS

@@ -24,7 +24,7 @@ class Landmarks(Protocol):
 
     @property
     def landmarks_changed(self) -> tuple[SignalInstance, ...]:
-        """Signals after which there are others."""
+        """Signals after which landmarks may have changed."""
 
     def landmarks_at(self, frame: int) -> NDArray[np.float32] | None:
         """Landmarks of a frame, or None where none are to be shown."""
@@ -59,11 +59,11 @@ class VideoView(QWidget):
         document.changed.connect(self.update)
 
     def sizeHint(self) -> QSize:
-        """Two thirds of VGA."""
+        """Size of two thirds of VGA."""
         return QSize(427, 320)
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """The picture, or a word on why there is none."""
+        """Paint the picture, or why there is none."""
         with QPainter(self) as painter:
             self._paint(painter)
 

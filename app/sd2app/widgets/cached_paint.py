@@ -9,18 +9,18 @@ from PySide6.QtWidgets import QWidget
 
 
 class CachedPaint:
-    """Painted once, until it is forgotten or the view has another size."""
+    """Picture that is painted once, until it is dropped or the view has another size."""
 
     def __init__(self, view: QWidget) -> None:
         self._view = view
         self._picture: QPixmap | None = None
 
     def forget(self) -> None:
-        """Something in it has changed."""
+        """Drop the picture: its content has changed."""
         self._picture = None
 
     def paint(self, painter: QPainter, draw: Callable[[QPainter], None]) -> None:
-        """Put it on the view; ``draw`` makes it where it is not there."""
+        """Paint it on the view; ``draw`` makes a missing one."""
         ratio = self._view.devicePixelRatioF()
         size = self._view.size() * ratio
         if self._picture is None or self._picture.size() != size:

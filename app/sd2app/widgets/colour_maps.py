@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 _TINT = np.array([1.0, 0.72, 0.42])
-"""Of equal luminances relative to each other; brought to that of each colour."""
+"""Amber, relative per channel; scaled to the luminance of each colour."""
 
 
 @cache
 def uncertain_table(name: str) -> NDArray[np.uint32]:
-    """The same lightness without the colour: grey, or amber where the map itself is grey."""
+    """Table of the same lightness in grey, or in amber where the map itself is grey."""
     table = lookup_table(name)
     rgb = np.stack([table >> 16 & 255, table >> 8 & 255, table & 255], axis=1).astype(float)
     light = rgb @ _LUMINANCE

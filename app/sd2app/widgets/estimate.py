@@ -10,7 +10,7 @@ from sd2app.widgets.text import about
 
 
 class EstimateLines(QWidget):
-    """The time in large letters, the steps that it is made of below."""
+    """Estimated time in large letters, with its steps below."""
 
     def __init__(self, times: StepTimes, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -29,7 +29,7 @@ class EstimateLines(QWidget):
     def show_estimate(
         self, seconds: float | None, count: str, step: StepTime | None, key: StepKey
     ) -> None:
-        """Show another one; ``count`` is of what there are how many steps."""
+        """Show an estimate; ``count`` names the data and the number of steps."""
         self._time.setText(estimate_text(seconds))
         self._source.setText(estimate_source_text(count, step, key, self._times))
 

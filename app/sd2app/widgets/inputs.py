@@ -68,11 +68,11 @@ class NumberBox(QDoubleSpinBox):
                 self.setValue(value)
 
     def event(self, event: QEvent) -> bool:
-        """Keys that step or end the editing do that here."""
+        """Claim the keys that step or end the editing."""
         return claims(event, _STEP_KEYS) or super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Return and Escape end the editing."""
+        """End the editing with Return or Escape."""
         if event.key() == Qt.Key.Key_Escape:
             self._end_typing()
             self.lineEdit().setText(
@@ -132,7 +132,7 @@ def action_button(action: QAction, text: str) -> QToolButton:
 
 
 def claims(event: QEvent, keys: Collection[Qt.Key] | None = None) -> bool:
-    """Take a plain key, any or one of these, before it is taken for that of an action.
+    """Claim a plain key, any or one of these, before the window's actions get it.
 
     To be asked first in ``event()``; True when the event is settled.
     """
@@ -148,7 +148,7 @@ def claims(event: QEvent, keys: Collection[Qt.Key] | None = None) -> bool:
 
 
 class SearchLine(QLineEdit):
-    """Escape empties it, then gives the keyboard back to the window."""
+    """Search field; Escape empties it, then gives the keyboard back to the window."""
 
     def __init__(self, hint: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -157,11 +157,11 @@ class SearchLine(QLineEdit):
         self.setClearButtonEnabled(True)
 
     def event(self, event: QEvent) -> bool:
-        """Escape and Return are its own."""
+        """Claim Escape and Return."""
         return claims(event, _ENDING_KEYS) or super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Escape."""
+        """Empty it, or leave it, with Escape."""
         if event.key() != Qt.Key.Key_Escape:
             super().keyPressEvent(event)
         elif self.text():
@@ -192,11 +192,11 @@ class TypedLine(QLineEdit):
             self.setText(text)
 
     def event(self, event: QEvent) -> bool:
-        """Escape and Return are its own."""
+        """Claim Escape and Return."""
         return claims(event, _ENDING_KEYS) or super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Return and Escape end the typing."""
+        """End the typing with Return or Escape."""
         if event.key() == Qt.Key.Key_Escape:
             if self.text() != self._before:
                 self.setText(self._before)
@@ -208,11 +208,11 @@ class TypedLine(QLineEdit):
             super().keyPressEvent(event)
 
     def focusInEvent(self, event: QFocusEvent) -> None:
-        """Typing may begin."""
+        """Remember the text before typing."""
         self._before = self.text()
         super().focusInEvent(event)
 
     def focusOutEvent(self, event: QFocusEvent) -> None:
-        """Typing has ended."""
+        """Report the end of typing."""
         super().focusOutEvent(event)
         self.ended.emit()

@@ -1,4 +1,4 @@
-"""One sentence over the window: what went wrong and what to do, or what to know."""
+"""Bar over the window with an error and its remedy, or a remark."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QToolButton, QWidget
 
 
 class MessageBar(QFrame):
-    """Hidden until there is something to say."""
+    """Bar of one message, hidden while there is none."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -32,12 +32,12 @@ class MessageBar(QFrame):
         return "" if self.isHidden() else self._text.text()
 
     def warn(self, text: str) -> None:
-        """Say what failed; several failures stand below each other, each once."""
+        """Show a failure; several stand below each other, each once."""
         said = self.text.splitlines() if self._text.objectName() == "warning" else []
         self._say("\n".join(dict.fromkeys([*said, *text.splitlines()])), "warning")
 
     def note(self, text: str) -> None:
-        """Say what is good to know; a failure on show stays."""
+        """Show a remark, unless a failure is shown."""
         if not (self.text and self._text.objectName() == "warning"):
             self._say(text, "muted")
 

@@ -18,7 +18,7 @@ from sd2app.widgets.model_page import ModelPage
 
 
 class ModelCardDialog(QDialog):
-    """Read from the header of the model file; the model need not be loaded for it."""
+    """Dialog of facts from the header of a model file, which is not loaded for it."""
 
     def __init__(self, page: ModelPage, parent: QWidget | None = None) -> None:
         super().__init__(parent)

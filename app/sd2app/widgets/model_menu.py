@@ -39,7 +39,7 @@ class Chooser(Protocol):
 
     @property
     def changed(self) -> SignalInstance:
-        """After which the words may be others."""
+        """Signal that texts or models may have changed."""
 
     @property
     def path(self) -> Path | None:
@@ -53,7 +53,7 @@ class Chooser(Protocol):
 
 
 class ModelMenu(QMenu):
-    """None, every model that is known, and below them what else can be done with one."""
+    """Menu of all known models, and of actions on them."""
 
     def __init__(
         self, chooser: Chooser, use: Use, below: list[QAction], parent: QWidget | None = None
@@ -91,7 +91,7 @@ class ModelMenu(QMenu):
 
 
 class ModelButton(QToolButton):
-    """Says which model is in use; a click lists the others."""
+    """Button that names the model in use and opens the menu of models."""
 
     def __init__(self, chooser: Chooser, menu: ModelMenu, parent: QWidget | None = None) -> None:
         super().__init__(parent)

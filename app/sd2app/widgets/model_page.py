@@ -56,7 +56,7 @@ def _heading(name: str) -> str:
 
 
 def _lines(value: Any, prefix: str = "") -> Iterator[tuple[str, str]]:
-    """A value that came from JSON, as rows."""
+    """Rows of a value from JSON."""
     if isinstance(value, Mapping):
         for name, inner in value.items():
             label, unit = _unit_of(str(name))
@@ -78,7 +78,7 @@ def _lines(value: Any, prefix: str = "") -> Iterator[tuple[str, str]]:
 
 
 def _unit_of(name: str) -> tuple[str, str]:
-    """``peak_mae_mps`` is ``peak mae`` in m/s."""
+    """Name and unit of a measure: ``peak_mae_mps`` is ``peak mae`` in m/s."""
     head, _, tail = name.rpartition("_")
     if head and tail in _UNITS:
         return head.replace("_", " "), _UNITS[tail]

@@ -67,7 +67,7 @@ def data_row(
     parent: QWidget,
     below: QWidget | None = None,
 ) -> QWidget:
-    """Something to learn from: its name, what is known of it, and a button that removes it."""
+    """Row of training data: its name, its facts, and a button to remove it."""
     row = QWidget(parent)
     heading = ElidedLabel(row)
     heading.setText(name)
@@ -126,7 +126,7 @@ class FactRows(QWidget):
             self._cells.append((name, value))
 
     def show_facts(self, facts: Sequence[tuple[str, str]]) -> None:
-        """Show them, and nothing where there are none."""
+        """Show facts, and nothing where there are none."""
         self.setVisible(bool(facts))
         for row, (name, value) in enumerate(self._cells):
             texts = facts[row] if row < len(facts) else ("", "")
@@ -150,11 +150,11 @@ class ElidedLabel(QLabel):
             self.setAccessibleName(text)
 
     def minimumSizeHint(self) -> QSize:
-        """Some words at least."""
+        """Size of a few words."""
         return QSize(40, super().minimumSizeHint().height())
 
     def sizeHint(self) -> QSize:
-        """All of it."""
+        """Size of the whole text."""
         metrics = self.fontMetrics()
         return QSize(metrics.horizontalAdvance(self.text()) + 4, metrics.height())
 
@@ -195,7 +195,7 @@ def splitter(
 
 
 def fill(frame: QFrame, content: QWidget | QLayout) -> None:
-    """Put something into an empty panel."""
+    """Fill an empty panel."""
     if isinstance(content, QWidget):
         layout: QLayout = QVBoxLayout()
         layout.addWidget(content)

@@ -16,7 +16,7 @@ from sd2app.palette import Palette
 _STEPS = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}
 
 Tick = tuple[float, str]
-"""A pixel along an axis, and what is written there."""
+"""A pixel along an axis, and its text."""
 
 
 class Themed(Protocol):
@@ -28,7 +28,7 @@ class Themed(Protocol):
 
     @property
     def theme_changed(self) -> SignalInstance:
-        """Emitted when there are others."""
+        """Emitted when they change."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class LogAxis:
 
 
 def tick_text(value: float) -> str:
-    """Short, without exponents."""
+    """Short text of a tick, without exponents."""
     return f"{value:.10f}".rstrip("0").rstrip(".")
 
 
@@ -90,11 +90,11 @@ class PointPlot(QWidget):
     """
 
     MARGINS_PX: ClassVar[tuple[int, int, int, int]]
-    """Left, top, right and bottom of what is drawn on."""
+    """Left, top, right and bottom margins of the plot."""
     HEIGHTS_PX: ClassVar[tuple[int, int, int]]
-    """Least, preferred and greatest."""
+    """Least, preferred and greatest height."""
     KEYS: ClassVar[frozenset[Qt.Key]]
-    """Those that belong to the plot while it has the keyboard."""
+    """Keys that belong to the plot while it has the keyboard."""
 
     def __init__(self, display: Themed, name: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -109,13 +109,13 @@ class PointPlot(QWidget):
         display.theme_changed.connect(self.update)
 
     def sizeHint(self) -> QSize:
-        """A little wider than high."""
+        """Size a little wider than high."""
         return QSize(260, self.HEIGHTS_PX[1])
 
     # --- what a plot says of itself -------------------------------------------------------
 
     def points(self) -> Sequence[Any]:
-        """All that can be pointed at."""
+        """Points that can be pointed at."""
         raise NotImplementedError
 
     def first_point(self) -> Any:
@@ -131,7 +131,7 @@ class PointPlot(QWidget):
         raise NotImplementedError
 
     def tip_of(self, point: Any) -> str:
-        """The same on screen, perhaps with what can be done."""
+        """Description of a point on screen, perhaps with possible actions."""
         return self.words_of(point)
 
     def paint_plot(self, painter: QPainter) -> None:
@@ -198,7 +198,7 @@ class PointPlot(QWidget):
         return self._pointed
 
     def point_at(self, point: Any) -> None:
-        """Point at one, or at nothing."""
+        """Point at a point, or at nothing."""
         if point is not self._pointed:
             self._pointed = point
             self.setAccessibleDescription(self.words_of(point) if point is not None else "")
@@ -217,7 +217,7 @@ class PointPlot(QWidget):
     # --- keyboard -------------------------------------------------------------------------
 
     def event(self, event: QEvent) -> bool:
-        """Keys of the plot are not those of the window while it has the keyboard."""
+        """Claim the plot's keys while it has the keyboard."""
         if (
             event.type() == QEvent.Type.ShortcutOverride
             and isinstance(event, QKeyEvent)
@@ -232,14 +232,14 @@ class PointPlot(QWidget):
         return super().event(event)
 
     def focusInEvent(self, event: QFocusEvent) -> None:
-        """Show where the keyboard is."""
+        """Show the keyboard focus."""
         super().focusInEvent(event)
         if event.reason() != Qt.FocusReason.MouseFocusReason:
             self.point_at(self.first_point())
         self.update()
 
     def focusOutEvent(self, event: QFocusEvent) -> None:
-        """Point at nothing."""
+        """Remove the mark of the pointed point."""
         super().focusOutEvent(event)
         self.point_at(None)
         QToolTip.hideText()
@@ -271,7 +271,7 @@ class SteppedPlot(PointPlot):
             self.explain()
 
     def paint_legend(self, painter: QPainter, unit: str, names: list[tuple[str, str]]) -> None:
-        """Over the plot: the unit on the left, a line and a name for each colour on the right."""
+        """Paint over the plot the unit on the left, each colour's line and name on the right."""
         colours, metrics = self._display.palette, painter.fontMetrics()
         centred = Qt.AlignmentFlag.AlignVCenter
         painter.setPen(QColor(colours.muted))

@@ -25,7 +25,7 @@ class Runs(Protocol):
         """Show a run; None is a new one, to be set up."""
 
     def set_watched(self, watched: bool) -> None:
-        """Note that the panel is on screen, or no longer."""
+        """Note that the panel is visible or hidden."""
 
 
 class RunPanel(QWidget):
@@ -60,7 +60,7 @@ class RunPanel(QWidget):
         self._column.addLayout(row)
 
     def fill(self, setup: QWidget, run: QWidget) -> None:
-        """Put in what a new run is to be, and the run in view."""
+        """Put in the set-up of a new run, and the run in view."""
         self._setup, self._run = setup, run
         for part in (setup, run):
             self._column.addWidget(part)
@@ -77,7 +77,7 @@ class RunPanel(QWidget):
         self._list.show_runs(self._known(), here)
 
     def showEvent(self, event: QShowEvent) -> None:
-        """Look again at what lies on disk, and time a step where that is not known."""
+        """Read the runs again, and time a step where that is unknown."""
         super().showEvent(event)
         self._model.set_watched(True)
 

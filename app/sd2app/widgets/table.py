@@ -31,7 +31,7 @@ _OWN_KEYS = (
     Qt.Key.Key_Enter,
     Qt.Key.Key_F2,
 )
-"""Those that move in a table, whatever they mean elsewhere. Left and Right stay with the frames."""
+"""Keys that move in a table; Left and Right keep stepping through frames."""
 _Move = QAbstractItemView.CursorAction
 
 
@@ -54,7 +54,7 @@ class ListedEditor(QComboBox):
             self.addItem(one.icon or QIcon(), one.text, one.value)
 
     def event(self, event: QEvent) -> bool:
-        """Letters choose here."""
+        """Claim letters, which choose an entry."""
         return claims(event) or super().event(event)
 
 
@@ -62,7 +62,7 @@ class FramedCells(QStyledItemDelegate):
     """Frames the cell that has the keyboard, and knows lists besides lines of text."""
 
     def listed(self, choices: Sequence[Choosable], name: str, parent: QWidget) -> ListedEditor:
-        """A list; what is chosen is taken at once."""
+        """Make a list whose choice is taken at once."""
         editor = ListedEditor(choices, name, parent)
         editor.activated.connect(lambda _: self.take(editor))
         return editor
@@ -73,7 +73,7 @@ class FramedCells(QStyledItemDelegate):
         self.closeEditor.emit(editor)
 
     def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: QModelIndex) -> None:
-        """The cell, framed where the keyboard is."""
+        """Paint the cell, framed where the keyboard is."""
         super().paint(painter, option, index)
         if option.state & QStyle.StateFlag.State_HasFocus:
             selected = bool(option.state & QStyle.StateFlag.State_Selected)
@@ -86,7 +86,7 @@ class FramedCells(QStyledItemDelegate):
     def updateEditorGeometry(
         self, editor: QWidget, option: QStyleOptionViewItem, index: QModelIndex
     ) -> None:
-        """The whole cell, and more where a list needs it."""
+        """Give the editor the whole cell, and more where a list needs it."""
         place = QRect(option.rect)
         place.setWidth(max(place.width(), editor.minimumSizeHint().width()))
         editor.setGeometry(place)
@@ -132,11 +132,11 @@ class CellTable(QTableView):
         self.horizontalHeader().setStretchLastSection(True)
 
     def event(self, event: QEvent) -> bool:
-        """Keys that move in a table do that here."""
+        """Claim the keys that move in a table."""
         return claims(event, self._own_keys) or super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Return edits, Escape leaves."""
+        """Edit with Return, leave with Escape."""
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
             # The one that ended editing comes by here too.
             if self.state() != QAbstractItemView.State.EditingState:
@@ -147,10 +147,10 @@ class CellTable(QTableView):
             super().keyPressEvent(event)
 
     def keyboardSearch(self, search: str) -> None:
-        """Letters are keys of labels and actions, and go nowhere where they are none."""
+        """Ignore letters, which are keys of labels and actions."""
 
     def moveCursor(self, action: _Move, modifiers: Qt.KeyboardModifier) -> QModelIndex:
-        """Tab goes from one cell that can be edited to the next, row after row."""
+        """Move with Tab from one editable cell to the next, row after row."""
         current, model = self.currentIndex(), self.model()
         steps = {_Move.MoveNext: 1, _Move.MovePrevious: -1}
         if action not in steps or not current.isValid():

@@ -6,7 +6,7 @@ import time
 
 
 def duration_text(seconds: float) -> str:
-    """Rounded as an estimate deserves."""
+    """Duration, rounded as an estimate."""
     if seconds < 10:
         return "a few seconds"
     if seconds < 57.5:
@@ -28,7 +28,7 @@ def about(seconds: float) -> str:
 
 
 def exact_text(seconds: float) -> str:
-    """Time that has passed."""
+    """Elapsed time."""
     minutes, rest = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
@@ -53,7 +53,7 @@ def number(value: float) -> str:
 
 
 def percent(share: float) -> str:
-    """A share with its unit; what is hardly there is said to be so."""
+    """A share in per cent; tiny ones as less than a bound."""
     if 0 < share < 1e-4:
         return "<0.01 %"
     return f"{number(100 * share)} %"
@@ -75,7 +75,7 @@ def counted(number: int, what: str) -> str:
 
 
 def bytes_text(count: int) -> str:
-    """In the unit one would say it in."""
+    """Size in bytes with a suitable unit."""
     for unit, size in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
         if count >= size:
             value = count / size

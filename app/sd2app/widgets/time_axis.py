@@ -10,7 +10,7 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPen, QWheelEvent
 
 GUTTER_PX = 56
-"""Left of every track: room for the velocity axis, so that all tracks line up."""
+"""Space left of every track for the velocity axis, so that all tracks line up."""
 MARGIN_PX = 8
 
 
@@ -90,10 +90,10 @@ class _Window(Protocol):
 
     @property
     def duration_s(self) -> float:
-        """Length of it."""
+        """Length of the part."""
 
     def pan(self, seconds: float) -> None:
-        """Move it."""
+        """Move the part."""
 
     def zoom(self, factor: float, anchor_s: float) -> None:
         """Scale its length about a time."""

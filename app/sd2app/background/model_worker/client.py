@@ -1,4 +1,4 @@
-"""Models that work in a process of their own, where torch is; the window never loads it."""
+"""Models that run in a separate process with torch, which the window never loads."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def _let_go(process: subprocess.Popen[bytes]) -> None:
     process.wait()
     for stream in (process.stdin, process.stdout):
         if stream is not None:
-            # What was not written has nobody to read it.
+            # No process is left to read the rest.
             with contextlib.suppress(OSError):
                 stream.close()
 
@@ -137,7 +137,7 @@ class _Remote:
         self._take(content)
 
     def _take(self, content: dict[str, Any]) -> None:
-        """Take further facts from an answer."""
+        """Store further facts from an answer."""
 
     def _ready(self) -> int:
         """Its number, loaded again where the process that had it is gone."""
@@ -146,7 +146,7 @@ class _Remote:
         return self._number
 
     def _begin(self) -> int:
-        """A clip whose frames come one after another; its number."""
+        """Begin a clip whose frames come one after another; return its number."""
         content, _ = self._process.ask({"do": "live", "model": self._ready()})
         return int(content["live"])
 
@@ -165,7 +165,7 @@ class RemoteDenoiser(_Remote):
         return replace(unpacked_map(answer, numbers), timebase=doppler.timebase)
 
     def live(self) -> RemoteLive:
-        """For frames as they come; the one before is forgotten."""
+        """Session for live frames; it replaces the session before."""
         return RemoteLive(self._process, self._begin(), self.equals_batch)
 
     def _take(self, content: dict[str, Any]) -> None:
@@ -187,7 +187,7 @@ class RemoteClassifier(_Remote):
         return np.frombuffer(answer, np.float32).reshape(len(doppler.timebase), -1).copy()
 
     def live(self) -> RemoteClasses:
-        """For frames of one stretch, all with a person, as they come."""
+        """Session for live frames of one stretch, all with a person."""
         return RemoteClasses(self._process, self._begin())
 
 
@@ -225,12 +225,12 @@ class RemoteClasses(_RemoteSession):
         return self._advance(energies, np.ones(len(energies), np.bool_))
 
     def finish(self) -> NDArray[np.float32]:
-        """Answers that are owed, if nothing moves from now on; it goes on all the same."""
+        """Outstanding answers, as if nothing moved from now on; the session stays usable."""
         return self._ask("finish")
 
 
 class RemoteLive(_RemoteSession):
-    """Frames in; for each of them what the model makes of it."""
+    """Session that takes frames and answers each of them."""
 
     def __init__(self, process: ModelProcess, number: int, equals_batch: bool) -> None:
         super().__init__(process, number)

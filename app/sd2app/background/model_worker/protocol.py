@@ -40,7 +40,7 @@ def read_message(stream: IO[bytes]) -> Message | None:
 
 
 def packed_map(doppler: DopplerMap) -> Message:
-    """A map with all that a denoiser looks at."""
+    """Pack a map with all that a denoiser uses."""
     frames = len(doppler.timebase)
     present = np.ones(frames, bool) if doppler.present is None else doppler.present
     content = {

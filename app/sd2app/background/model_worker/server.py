@@ -38,7 +38,7 @@ class Worker:
         self._next = 0
 
     def answer(self, content: dict[str, Any], numbers: bytes) -> Message:
-        """One answer; what a user can cause is raised as :class:`Sd2Error`."""
+        """Answer a request; errors that a user can cause are raised as :class:`Sd2Error`."""
         reply: Message = getattr(self, f"_do_{content['do']}")(content, numbers)
         return reply
 
@@ -108,7 +108,7 @@ class Worker:
 
 
 class _Classifying:
-    """A classifier, asked as denoisers are."""
+    """Classifier with the interface of a denoiser."""
 
     def __init__(self, trained: Any) -> None:
         self.trained = trained
@@ -161,7 +161,7 @@ def serve(source: BinaryIO, sink: BinaryIO) -> None:
 
 
 def main() -> int:
-    """Keep answers apart from whatever a library may print."""
+    """Serve, with the output of libraries redirected away from the answers."""
     sink = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     with contextlib.suppress(BrokenPipeError, KeyboardInterrupt):
