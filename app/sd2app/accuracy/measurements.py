@@ -78,7 +78,7 @@ class MeasuredModel(QObject):
     # --- requests -------------------------------------------------------------------------
 
     def take_over(self, mesh: MeshSequence | None, options: SynthesisOptions) -> None:
-        """Start on another scene, or none."""
+        """Take over another scene, or none."""
         self._meter.cancel()
         self._memory.cancel()
         self._end_job()

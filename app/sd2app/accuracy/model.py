@@ -161,7 +161,7 @@ class AccuracyModel(QObject):
     # --- requests -------------------------------------------------------------------------
 
     def take_over(self, mesh: MeshSequence | None, options: SynthesisOptions) -> None:
-        """Start on another scene, or none."""
+        """Take over another scene, or none."""
         self.hold()
         self._scene = None if mesh is None else (mesh, options)
         self._forget()
@@ -192,7 +192,7 @@ class AccuracyModel(QObject):
         self.changed.emit()
 
     def hold(self) -> None:
-        """Stop choosing: the sensor moves, and the machine is needed for that."""
+        """Stop choosing, which frees the processor for the moving sensor."""
         self._runner.cancel()
         self._end_job()
 
@@ -297,7 +297,7 @@ class AccuracyModel(QObject):
             self.changed.emit()
 
     def _follow_measured(self) -> None:
-        """A clicked point keeps its plan, with figures from here once there are some."""
+        """Keep the plan of a clicked point, with figures for this sensor once measured."""
         before, counting = self.in_use, self.measured.counting
         if self._clicked is not None:
             here = None if counting is None or counting.stale else counting.of(self._clicked.plan)

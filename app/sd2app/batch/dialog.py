@@ -181,13 +181,13 @@ class BatchDialogs:
     # --- a batch that is there ------------------------------------------------------------
 
     def open_batch(self) -> None:
-        """Let the user choose a batch that lies elsewhere, as of a command in a terminal."""
+        """Let the user choose a batch in another folder, such as one started in a terminal."""
         name = QFileDialog.getExistingDirectory(self._over, "Folder of a batch")
         if name:
             self._attempt(lambda: self._batch.open_batch(Path(name)))
 
     def resume(self) -> None:
-        """Go on with the batch in view."""
+        """Resume the batch in view."""
         self._attempt(self._batch.resume)
 
     def open_folder(self) -> None:

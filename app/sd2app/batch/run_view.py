@@ -34,7 +34,7 @@ class Asks(Protocol):
     """Actions of the view that need dialogs."""
 
     def resume(self) -> None:
-        """Go on with the batch in view."""
+        """Resume the batch in view."""
 
     def open_folder(self) -> None:
         """Show the folder of the results."""

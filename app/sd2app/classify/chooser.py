@@ -1,4 +1,4 @@
-"""The menu of classifiers."""
+"""Menu of classifiers."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ _RESULTS = "Results (*.json)"
 
 
 class ClassifyDialogs:
-    """Asks, then calls the models; a failure is handed to ``report`` as a sentence."""
+    """Dialogs, followed by calls of the models; ``report`` shows the sentence of a failure."""
 
     def __init__(
         self,
@@ -99,7 +99,7 @@ class ClassifyDialogs:
         self._attempt(self._training.compare)
 
     def again(self) -> None:
-        """Go on with the comparison in view."""
+        """Resume the comparison in view."""
         self._attempt(self._training.again)
 
     def copy_command(self) -> None:

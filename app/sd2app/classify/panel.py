@@ -13,7 +13,7 @@ from sd2app.widgets.run_list import RunPanel
 
 
 class ClassPanel(RunPanel):
-    """Trainings and comparisons."""
+    """Panel of trainings and comparisons of classifiers."""
 
     def __init__(
         self,

@@ -27,7 +27,7 @@ class ClassAsks(Protocol):
         """Start the comparison."""
 
     def again(self) -> None:
-        """Go on with the comparison in view."""
+        """Resume the comparison in view."""
 
     def copy_command(self) -> None:
         """Put the command on the clipboard."""

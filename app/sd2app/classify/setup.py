@@ -34,7 +34,7 @@ _CHOICES = {"model": MODELS, "features": FEATURES, "quick": ("yes", "no")}
 
 
 class ClassSetup(QObject):
-    """The choices, kept from one start to the next."""
+    """Choices for a classifier's training, kept from one start to the next."""
 
     changed = Signal()
 
@@ -75,12 +75,12 @@ class ClassSetup(QObject):
             self.changed.emit()
 
     def set_map(self, name: str, wanted: bool) -> None:
-        """Learn from one kind of maps, or do not."""
+        """Add or remove a kind of maps to learn from."""
         chosen = {*self.maps, name} if wanted else set(self.maps) - {name}
         self.set_value("maps", ",".join(one for one in MAPS if one in chosen))
 
     def add(self, path: Path) -> None:
-        """Learn from this as well."""
+        """Add a source of data."""
         path = plain_path(path)
         if path.name in ("zarr.json", "recording.json"):
             path = path.parent
@@ -89,7 +89,7 @@ class ClassSetup(QObject):
             self.refresh()
 
     def remove(self, path: Path) -> None:
-        """Do not learn from this."""
+        """Remove a source of data."""
         self._keep(tuple(one for one in self._data if one.path != path))
         self.refresh()
 
@@ -104,7 +104,7 @@ class ClassSetup(QObject):
             self.refresh()
 
     def refresh(self) -> None:
-        """Look into the data again."""
+        """Read the data again."""
         chosen = [(one.path, one.person) for one in self._data]
         if chosen:
             self._runner.submit(lambda emit: tuple(looked_into(*one) for one in chosen))

@@ -11,7 +11,7 @@ from sd2app.session.document import DocumentModel
 
 
 class FitOffer(QObject):
-    """Stands until it is taken, declined, or a mesh is there."""
+    """Offer that stands until it is accepted, declined, or a mesh exists."""
 
     changed = Signal()
 

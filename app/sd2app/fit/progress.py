@@ -66,7 +66,7 @@ class Done:
 
 @dataclass(frozen=True)
 class Refused:
-    """A sentence on what is wrong; the process ends."""
+    """Reason of a failure in a sentence; the process ends."""
 
     text: str
 

@@ -21,7 +21,7 @@ from sd2core.labels.import_labels import take_in
 
 
 class LabelFileDialogs:
-    """Asks, then calls models and edits; results are reported over the window."""
+    """Dialogs, followed by calls of models and edits; results are shown over the window."""
 
     def __init__(
         self,

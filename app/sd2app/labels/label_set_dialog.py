@@ -19,7 +19,7 @@ _FILES = "Label set (*.json);;All files (*)"
 
 
 class LabelSetDialogs:
-    """Asks, then makes the edit; ``report`` gets the sentence of a failure."""
+    """Dialogs, followed by the edit; ``report`` shows the sentence of a failure."""
 
     def __init__(
         self,

@@ -54,7 +54,7 @@ class TrackDialog(QDialog):
 
 
 class TrackDialogs:
-    """Asks, then calls the edits."""
+    """Dialogs, followed by calls of the edits."""
 
     def __init__(
         self, shell: Shell, labels: LabelsModel, tracks: LabelTracks, reaction: ReactionModel

@@ -58,7 +58,7 @@ class MaskPrefetcher(QObject):
         self._prefetched_for = None
 
     def cancel(self) -> None:
-        """Stop: the machine is needed for something else."""
+        """Stop, and free the processor."""
         self._runner.cancel()
 
     def close(self) -> None:

@@ -16,7 +16,7 @@ _WRITTEN = "Placements (*.json)"
 
 
 class PlacementDialogs:
-    """Asks, then calls the model; a failure is handed to ``report`` as a sentence."""
+    """Dialogs, followed by calls of the model; ``report`` shows the sentence of a failure."""
 
     def __init__(
         self,

@@ -71,11 +71,11 @@ class TimeWindow(QObject):
         self.set_span(*self._extent)
 
     def reveal(self, time_s: float) -> None:
-        """Turn the page when ``time_s`` has left the stretch."""
+        """Scroll by a page when ``time_s`` has left the window."""
         if time_s < self.start_s or time_s >= self.end_s:
             self.set_span(time_s, time_s + self.duration_s)
 
     def reveal_any(self, start_s: float, end_s: float) -> None:
-        """Turn the page where nothing between two times is shown."""
+        """Scroll by a page when nothing between two times is in the window."""
         if end_s <= self.start_s or start_s >= self.end_s:
             self.reveal(start_s)

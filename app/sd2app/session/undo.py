@@ -29,11 +29,11 @@ class Assign(QUndoCommand):
         self._assign, self._before, self._after = assign, before, after
 
     def undo(self) -> None:
-        """Assign what was there before."""
+        """Assign the earlier value."""
         self._assign(self._before)
 
     def redo(self) -> None:
-        """Assign what was there after."""
+        """Assign the later value."""
         self._assign(self._after)
 
 

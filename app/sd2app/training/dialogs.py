@@ -14,7 +14,7 @@ from sd2core.errors import Sd2Error
 
 
 class TrainingDialogs:
-    """Asks, then calls the models; a failure is handed to ``report`` as a sentence."""
+    """Dialogs, followed by calls of the models; ``report`` shows the sentence of a failure."""
 
     def __init__(
         self,
@@ -45,11 +45,11 @@ class TrainingDialogs:
         self._attempt(self._training.start)
 
     def resume(self) -> None:
-        """Go on with the run in view."""
+        """Resume the run in view."""
         self._attempt(self._training.resume)
 
     def open_run(self) -> None:
-        """Let the user choose a run that lies elsewhere, as of a command in a terminal."""
+        """Let the user choose a run in another folder, such as one started in a terminal."""
         name = QFileDialog.getExistingDirectory(self._parent, "Folder of a run")
         if name:
             self._attempt(lambda: self._training.open_run(Path(name)))

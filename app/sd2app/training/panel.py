@@ -36,10 +36,10 @@ class Asks(Protocol):
         """Use the model of the run in view."""
 
     def open_run(self) -> None:
-        """Let the user choose a run that lies elsewhere."""
+        """Let the user choose a run in another folder."""
 
     def resume(self) -> None:
-        """Go on with the run in view."""
+        """Resume the run in view."""
 
     def delete(self) -> None:
         """Ask, then delete the run in view."""
@@ -81,7 +81,7 @@ class TrainingGainView(QWidget):
 
 
 class TrainingPanel(RunPanel):
-    """Trainings of denoisers; the model that is in use says what it gains."""
+    """Panel of the trainings of denoisers, with the gain of the model in use."""
 
     def __init__(
         self,

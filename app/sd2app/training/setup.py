@@ -57,7 +57,7 @@ class Estimate:
 
 
 class TrainingSetupModel(QObject):
-    """The choices, kept from one start to the next."""
+    """Choices for a training, kept from one start to the next."""
 
     changed = Signal()
 
@@ -115,7 +115,7 @@ class TrainingSetupModel(QObject):
                 self.set_value(name, default)
 
     def add_store(self, path: Path) -> None:
-        """Learn from these pairs as well."""
+        """Add a store of pairs."""
         path = plain_path(path)
         if path.name == "zarr.json":
             path = path.parent
@@ -126,7 +126,7 @@ class TrainingSetupModel(QObject):
             self._keep_stores()
 
     def remove_store(self, path: Path) -> None:
-        """Do not learn from these."""
+        """Remove a store of pairs."""
         self._stores = tuple(store for store in self._stores if store.path != path)
         self._keep_stores()
 

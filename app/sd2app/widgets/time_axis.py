@@ -1,4 +1,4 @@
-"""Pixels to seconds, and round numbers to write on an axis."""
+"""Scale of pixels and seconds, and round numbers for an axis."""
 
 from __future__ import annotations
 

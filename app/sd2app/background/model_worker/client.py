@@ -121,7 +121,7 @@ def _let_go(process: subprocess.Popen[bytes]) -> None:
 
 
 class _Remote:
-    """A model in that process."""
+    """Stand-in for a model in the model process."""
 
     _LOAD: ClassVar[str]
 
@@ -140,7 +140,7 @@ class _Remote:
         """Store further facts from an answer."""
 
     def _ready(self) -> int:
-        """Its number, loaded again where the process that had it is gone."""
+        """Number of the model, loaded again if its process has died."""
         if not self._process.running or self._process.generation != self._generation:
             self._load()
         return self._number
