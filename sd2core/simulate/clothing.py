@@ -34,61 +34,38 @@ Pattern = Literal["plain", "stripes", "checks"]
 
 @dataclass(frozen=True)
 class Outfit:
-    """Colours (sRGB, 0 to 1) and lengths of clothes, on the bundled body.
-
-    Parameters
-    ----------
-    pattern : {"plain", "stripes", "checks"}
-        Of the shirt.
-    second : colour
-        The pattern's other one.
-    period_m : float
-        After which the pattern repeats.
-    sleeve_m : float
-        From the shoulder along the arm: 0.03 leaves the arm bare, 0.19 is a T-shirt,
-        0.5 reaches the wrist.
-    trousers_from_m : float
-        Height of their lower end: 0 is long, 0.5 ends above the knee.
-    """
+    """Colours (sRGB, 0 to 1) and lengths of clothes, on the bundled body."""
 
     skin: Colour = SKIN
     hair: Colour = HAIR
     shirt: Colour = SHIRT
     trousers: Colour = TROUSERS
     shoes: Colour = SHOES
-    pattern: Pattern = "plain"
-    second: Colour = WHITES
-    period_m: float = 0.08
+    pattern: Pattern = "plain"  # Of the shirt.
+    second: Colour = WHITES  # The pattern's other colour.
+    period_m: float = 0.08  # Distance after which the pattern repeats.
+    # From the shoulder along the arm: 0.03 leaves the arm bare, 0.19 is a T-shirt, 0.5 reaches the
+    # wrist.
     sleeve_m: float = 0.19
-    trousers_from_m: float = 0.0
+    trousers_from_m: float = 0.0  # Height of their lower end: 0 is long, 0.5 ends above the knee.
 
 
 @dataclass(frozen=True, eq=False)
 class Clothes:
-    """Fields of one surface.
+    """Fields of one surface."""
 
-    Parameters
-    ----------
-    fields : float32 array, shape (V, 8)
-        Positive inside: trousers, shirt, shoes, hair, brows, whites of the eyes,
-        irises, lips; metres for the first four.
-    places_m : float32 array, shape (V, 3)
-        Of the vertices at rest: what a pattern is printed on.
-    """
-
+    # Positive inside, (V, 8): trousers, shirt, shoes, hair, brows, whites of the eyes, irises,
+    # lips; metres for the first four.
     fields: Singles
-    places_m: Singles
+    places_m: Singles  # Of the vertices at rest, (V, 3): what a pattern is printed on.
     outfit: Outfit = field(default_factory=Outfit)
 
     @classmethod
     def of(cls, body: Body, outfit: Outfit | None = None) -> Clothes:
         """Dress the bundled body.
 
-        Parameters
-        ----------
-        body : Body
-            With the bundled shape: borders are sewn for it. A shaped body of the same
-            surface wears the same clothes, vertex by vertex.
+        The body has the bundled shape: borders are sewn for it. A shaped body of the same surface
+        wears the same clothes, vertex by vertex.
         """
         outfit = outfit or Outfit()
         # All lengths are metres on this body's rest shape, fitted by looking at pictures.

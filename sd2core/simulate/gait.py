@@ -44,18 +44,10 @@ _ACROSS = np.array([1.0, 0.0, 0.0])
 
 
 class Path(NamedTuple):
-    """Path of the body's middle over the floor, at any times.
+    """Path of the body's middle over the floor, at any times; both map (T,) to (T,)."""
 
-    Parameters
-    ----------
-    forward_m : callable, (T,) -> (T,)
-        Towards the camera.
-    yaw_deg : callable, (T,) -> (T,)
-        From facing the camera, about the axis that points down.
-    """
-
-    forward_m: Callable[[Floats], Floats]
-    yaw_deg: Callable[[Floats], Floats]
+    forward_m: Callable[[Floats], Floats]  # Towards the camera.
+    yaw_deg: Callable[[Floats], Floats]  # From facing the camera, about the axis that points down.
 
 
 class Step(NamedTuple):
@@ -117,16 +109,8 @@ def plan_steps(path: Path, duration_s: float, half_base_m: float) -> list[Step]:
 def gait(skeleton: Skeleton, times_s: Floats, path: Path, arm_scale: float = 1.0) -> Motion:
     """Motion of the whole body along a path.
 
-    Parameters
-    ----------
-    times_s : float64 array, shape (T,)
-    arm_scale : float
-        See :func:`sd2core.simulate.gestures.reach`.
-
-    Returns
-    -------
-    Motion
-        The translation moves the body from the origin; its floor is at y = 0.
+    The translation moves the body from the origin; its floor is at y = 0. ``arm_scale`` is as for
+    :func:`sd2core.simulate.gestures.reach`.
     """
     duration_s = float(times_s[-1]) + 1.0
     fine = np.arange(0.0, duration_s, 1.0 / _GRID_HZ)

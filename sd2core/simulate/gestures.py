@@ -44,33 +44,19 @@ class Motion(NamedTuple):
 class ArmPose:
     """Pose of one arm: place of the wrist seen from the shoulder, elbow, hand, torso.
 
-    Parameters
-    ----------
-    azimuth_deg : float
-        From straight ahead, positive across the body.
-    elevation_deg : float
-        Positive upwards.
-    reach_m : float
-        From shoulder to wrist.
-    elbow_out, elbow_down, elbow_back : float
-        Direction in which the elbow bends out of the line from shoulder to wrist.
-    pronation_deg : float
-        Turn of the hand about the forearm, thumb inwards.
-    flexion_deg : float
-        Bend of the hand towards its palm.
-    torso_deg : float
-        Turn of the upper body, positive across (the arm's side comes forward).
+    ``elbow_out``, ``elbow_down`` and ``elbow_back`` are the direction in which the elbow bends out
+    of the line from shoulder to wrist.
     """
 
-    azimuth_deg: float
-    elevation_deg: float
-    reach_m: float
+    azimuth_deg: float  # From straight ahead, positive across the body.
+    elevation_deg: float  # Positive upwards.
+    reach_m: float  # From shoulder to wrist.
     elbow_out: float
     elbow_down: float
     elbow_back: float
-    pronation_deg: float
-    flexion_deg: float
-    torso_deg: float
+    pronation_deg: float  # Turn of the hand about the forearm, thumb inwards.
+    flexion_deg: float  # Bend of the hand towards its palm.
+    torso_deg: float  # Turn of the upper body, positive across (the arm's side comes forward).
 
 
 class Move(NamedTuple):
@@ -123,10 +109,6 @@ def swipes(skeleton: Skeleton, times_s: ArrayLike) -> Motion:
     """Motion of the whole body at any times, smooth in time.
 
     Before 0.3 s and after 14.95 s the arm hangs.
-
-    Parameters
-    ----------
-    times_s : array_like, shape (T,)
     """
     times = np.asarray(times_s, dtype=np.float64)
     arm = arm_poses(_MOVES, times)  # (T, parameters)
@@ -143,16 +125,7 @@ def swipes(skeleton: Skeleton, times_s: ArrayLike) -> Motion:
 def arm_poses(moves: Sequence[Move], times: Floats) -> Floats:
     """Parameters of the arm through time: hanging, plus every move so far.
 
-    Parameters
-    ----------
-    moves : sequence of Move
-        One after another.
-    times : float64 array, shape (T,)
-
-    Returns
-    -------
-    float64 array, shape (T, parameters)
-        Columns are the fields of :class:`ArmPose`.
+    The moves follow one another. Columns of the result are the fields of :class:`ArmPose`.
     """
     before = np.array(astuple(HANGING))
     poses = np.tile(before, (len(times), 1))
@@ -203,15 +176,9 @@ def reach(
 ) -> None:
     """Bring one wrist to its place: shoulder, elbow and wrist rotations in closed form.
 
-    Parameters
-    ----------
-    rotations : float64 array, shape (T, B, 3, 3)
-        Of the whole body; those of the arm are replaced. The body faces the camera.
-    side : {"L", "R"}
-    arm : float64 array, shape (T, parameters)
-        See :func:`arm_poses`.
-    scale : float
-        Length of this arm to that for which the poses were written.
+    ``rotations``, (T, B, 3, 3), are those of the whole body, which faces the camera; those of the
+    arm are replaced. ``arm`` comes from :func:`arm_poses`; ``scale`` is the length of this arm to
+    that for which the poses were written.
     """
     index, heads = skeleton.index, skeleton.heads_m
     upper, lower = index[f"upperarm01.{side}"], index[f"lowerarm01.{side}"]
@@ -258,18 +225,9 @@ def bend(
 ) -> tuple[Floats, Floats]:
     """Turn the two bones of a limb so that it reaches from one place to another.
 
-    Parameters
-    ----------
-    start, end : array, shape (T, 3)
-    upper_rest, lower_rest : array, shape (3,)
-        The two bones at rest, which is not straight.
-    pole : array, shape (T, 3)
-        See :func:`elbow_position`.
-
-    Returns
-    -------
-    float64 arrays, shape (T, 3, 3)
-        Whole rotations of the two bones from rest.
+    ``start`` and ``end`` are (T, 3); ``upper_rest`` and ``lower_rest``, (3,), are the two bones at
+    rest, which is not straight; ``pole`` is as for :func:`elbow_position`. Returns whole rotations
+    of the two bones from rest, (T, 3, 3).
     """
     elbow = elbow_position(
         start, end, float(np.linalg.norm(upper_rest)), float(np.linalg.norm(lower_rest)), pole
@@ -286,18 +244,10 @@ def bend(
 def elbow_position(
     shoulder: Floats, wrist: Floats, upper_m: float, lower_m: float, pole: Floats
 ) -> Floats:
-    """Elbow of an arm with two bones of known lengths, bent towards a pole.
+    """Elbow of an arm with two bones of known lengths, bent towards a pole, (T, 3).
 
-    Parameters
-    ----------
-    shoulder, wrist : array, shape (T, 3)
-        Further apart than ``|upper_m - lower_m|``, nearer than their sum.
-    pole : array, shape (T, 3)
-        Not along the line from shoulder to wrist.
-
-    Returns
-    -------
-    float64 array, shape (T, 3)
+    Shoulder and wrist are further apart than ``|upper_m - lower_m|`` and nearer than their sum; the
+    pole, (T, 3), is not along the line between them.
     """
     line = wrist - shoulder
     distance = np.linalg.norm(line, axis=1, keepdims=True)

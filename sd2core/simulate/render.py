@@ -27,64 +27,37 @@ _LIGHT_PIXELS = 640
 
 @dataclass(frozen=True)
 class Camera(PinholeCamera):
-    """A pinhole camera some way above the floor.
+    """A pinhole camera some way above the floor."""
 
-    Parameters
-    ----------
-    width, height : int
-        Pixels.
-    above_floor_m : float
-        Height of the optical axis.
-    """
-
-    above_floor_m: float = 1.1
+    above_floor_m: float = 1.1  # Height of the optical axis.
 
 
 @dataclass(frozen=True)
 class Studio:
-    """The room and its light; colours are sRGB from 0 to 1.
+    """The room and its light; colours are sRGB from 0 to 1."""
 
-    Parameters
-    ----------
-    wall_m : float
-        Depth of the wall behind the person.
-    key_power, fill_power, ambient, sky : float
-        How bright: from one side, from the other, from everywhere, from above.
-    key_colour : (float, float, float)
-        Linear.
-    shadow_m, shadow_depth_m : float
-        Width of the stretch in which the key light throws shadows, and its depth.
-    noise : float
-        Standard deviation of the camera's noise at mid-grey, as a share of white.
-    """
-
-    wall_m: float = 3.5
+    wall_m: float = 3.5  # Depth of the wall behind the person.
     wall: tuple[float, float, float] = (0.84, 0.845, 0.84)
     floor: tuple[float, float, float] = (0.60, 0.55, 0.50)
     skirting: tuple[float, float, float] = (0.90, 0.90, 0.89)
     key: tuple[float, float, float] = (-0.70, -0.72, -0.95)
     fill: tuple[float, float, float] = (0.9, -0.2, -0.7)
     rim: tuple[float, float, float] = (0.75, -0.55, 0.75)
-    key_power: float = 1.7
-    fill_power: float = 0.30
-    ambient: float = 0.20
-    sky: float = 0.28
-    key_colour: tuple[float, float, float] = (1.0, 0.965, 0.91)
-    shadow_m: float = 3.2
-    shadow_depth_m: float = 2.2
-    noise: float = 0.0
+    key_power: float = 1.7  # Brightness of the light from one side.
+    fill_power: float = 0.30  # From the other side.
+    ambient: float = 0.20  # From everywhere.
+    sky: float = 0.28  # From above.
+    key_colour: tuple[float, float, float] = (1.0, 0.965, 0.91)  # Linear.
+    shadow_m: float = 3.2  # Width of the region in which the key light throws shadows.
+    shadow_depth_m: float = 2.2  # Depth of that region.
+    noise: float = 0.0  # Standard deviation of the camera's noise at mid-grey, as a share of white.
 
 
 class Renderer:
-    """Draws one body in one room; the same picture for the same vertices.
+    """Renderer of one body in one room; the same picture for the same vertices.
 
-    Parameters
-    ----------
-    body : Body
-        Gives the faces.
-    clothes : Clothes, optional
-        Of this surface; by default a T-shirt and trousers sewn for the body's rest
-        shape, which must be the bundled one.
+    The body gives the faces. The clothes are those of this surface; by default a T-shirt and
+    trousers sewn for the body's rest shape, which must be the bundled one.
     """
 
     def __init__(
@@ -101,19 +74,10 @@ class Renderer:
         self._offsets = _disc(12, 2.6)
 
     def frame(self, vertices_m: NDArray[np.float64], seed: int = 0) -> NDArray[np.uint8]:
-        """Picture of one frame.
+        """Picture of one frame, (height, width, 3), sRGB.
 
-        Parameters
-        ----------
-        vertices_m : float64 array, shape (V, 3)
-            Camera frame, all in front of the camera.
-        seed : int
-            Of the camera's noise, if the studio has any.
-
-        Returns
-        -------
-        uint8 array, shape (height, width, 3)
-            sRGB.
+        Vertices, (V, 3), are in the camera frame, all in front of the camera. The seed is that of
+        the camera's noise, if the studio has any.
         """
         shadow = self._light_buffer(vertices_m)
         picture = self._background(shadow)  # (H, W, 3) linear

@@ -57,28 +57,12 @@ _CHUNK_FRAMES = 150
 
 
 def make_sample(out: Path, progress: Progress = silent, *, duration_s: float = DURATION_S) -> Path:
-    """Make the sample recording; the same bytes every time, except for the video.
+    """Make the sample recording and return its folder; the same bytes, except for the video.
 
-    Parameters
-    ----------
-    out : Path
-        The recording's folder; ``.sd2`` is appended to a name without it. It
-        appears when it is complete.
-    progress : Progress
-        Counts frames over five stages: posed, drawn, posed for the recording,
-        looked at for what is hidden, and seen by the radar.
-    duration_s : float
-        The motion's beginning only; gestures that do not fit are left out.
-
-    Returns
-    -------
-    Path
-        The folder.
-
-    Raises
-    ------
-    Sd2Error
-        When the folder exists and is not empty.
+    ``.sd2`` is appended to a name without it; the folder appears when it is complete. ``progress``
+    counts frames over five stages: posed, drawn, posed for the recording, examined for hidden
+    parts, and seen by the radar. ``duration_s`` keeps the motion's beginning only; gestures that do
+    not fit are left out. Raises Sd2Error when the folder exists and is not empty.
     """
     out = Path(out)
     if out.suffix != SUFFIX:

@@ -43,25 +43,15 @@ _WAVES = 96
 class GroupErrors:
     """Errors of one group of a posture; n of them, depending on m features.
 
-    Parameters
-    ----------
-    gain : float64 array, shape (n, 1 + m)
-    bias : float64 array, shape (n, n)
-        Covariance of what is constant within a clip.
-    spread : float64 array, shape (n, n)
-        Covariance of the Gaussian process.
-    length : float
-        Of its kernel, in the unit of the features.
-    mixing : float
-        Exponent of its kernel, (1 + h² / (2 · mixing · length²)) ** -mixing: the
-        smaller, the more lengths it mixes.
+    The kernel of the Gaussian process is (1 + h² / (2 · mixing · length²)) ** -mixing: the smaller
+    the mixing, the more lengths it mixes.
     """
 
-    gain: Floats
-    bias: Floats
-    spread: Floats
-    length: float
-    mixing: float
+    gain: Floats  # (n, 1 + m).
+    bias: Floats  # Covariance of what is constant within a clip, (n, n).
+    spread: Floats  # Covariance of the Gaussian process, (n, n).
+    length: float  # Of its kernel, in the unit of the features.
+    mixing: float  # Exponent of its kernel.
 
     def draw(self, rng: np.random.Generator) -> ErrorFunction:
         """Errors of one clip."""
@@ -96,33 +86,18 @@ class ErrorFunction:
 
 @dataclass(frozen=True, eq=False)
 class FitErrors:
-    """Statistics of the errors of fits, from which those of one clip are drawn.
+    """Statistics of the errors of fits, from which those of one clip are drawn."""
 
-    Parameters
-    ----------
-    groups : dict of str to GroupErrors
-        ``place``, ``trunk``, ``arm``, ``leg``.
-    shape_mean : float64 array, shape (K,)
-        Of the errors of the shape's coefficients.
-    shape_covariance : float64 array, shape (K, K)
-        Their mean square about that.
-    provenance : dict
-        What was measured, and how.
-    """
-
-    groups: Mapping[Group, GroupErrors]
-    shape_mean: Floats
-    shape_covariance: Floats
-    provenance: dict[str, Any] = field(default_factory=dict)
+    groups: Mapping[Group, GroupErrors]  # ``place``, ``trunk``, ``arm``, ``leg``.
+    shape_mean: Floats  # Of the errors of the shape's coefficients, (K,).
+    shape_covariance: Floats  # Their mean square about that, (K, K).
+    provenance: dict[str, Any] = field(default_factory=dict)  # Measured fits and the method.
 
     @classmethod
     def load(cls, path: Path | None = None) -> FitErrors:
         """Read what :meth:`save` wrote; the bundled ones by default.
 
-        Raises
-        ------
-        Sd2Error
-            When the file is missing, damaged or of a later version.
+        Raises Sd2Error when the file is missing, damaged or of a later version.
         """
         path = resource_path(RESOURCE) if path is None else Path(path)
         try:
@@ -196,12 +171,8 @@ class Disturbance:
     def transforms(self, true: Skeleton, transforms: Floats, fitted: Skeleton) -> Floats:
         """Transforms of the bones that are found.
 
-        Parameters
-        ----------
-        true, fitted : Skeleton
-            Of the true shape and of the one that is found.
-        transforms : float64 array, shape (T, B, 3, 4)
-            Of the true body in the camera frame.
+        ``true`` and ``fitted`` have the true shape and the one that is found; ``transforms``, (T,
+        B, 3, 4), are those of the true body in the camera frame.
         """
         held = posture(true, transforms)
         change = {key: function(held.features(*key)) for key, function in self.functions.items()}

@@ -41,34 +41,17 @@ def make_campaign(
     errors: Path | None = None,
     progress: Progress = silent,
 ) -> int:
-    """Make the takes of a campaign that are not there yet.
+    """Make the takes of a campaign that are not there yet, and return their number.
 
     Takes are written in order, one of each subject in turn, so that a campaign that is
     stopped has equally much of every subject; started again it goes on, as if it
     had not been stopped. A longer one begins with a shorter one's takes.
 
-    Parameters
-    ----------
-    out : Path
-        Folder of the pairs.
-    minutes : float
-        Of all subjects together; placements count once.
-    processes : int
-        1 works in this one.
-    errors : Path, optional
-        Errors of fits to use instead of the bundled ones.
-    progress : Progress
-        Counts takes.
+    ``out`` is the folder of the pairs; ``minutes`` is the length of all subjects together, where
+    placements count once, as in the number of takes. With one process the takes are made in this
+    one. ``errors`` replaces the bundled errors of fits. ``progress`` counts takes.
 
-    Returns
-    -------
-    int
-        How many were made, a take of several placements counting once.
-
-    Raises
-    ------
-    Sd2Error
-        When the folder holds something else, or a campaign of other settings.
+    Raises Sd2Error when the folder holds something else, or a campaign of other settings.
     """
     if subjects < 1:
         raise Sd2Error(f"{subjects} subjects", "at least one")

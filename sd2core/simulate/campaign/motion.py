@@ -82,23 +82,13 @@ class Performance(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Move:
-    """One arm's way to a pose.
-
-    Parameters
-    ----------
-    to : float64 array, shape (9,)
-        Fields of :class:`~sd2core.simulate.gestures.ArmPose`.
-    bow : float64 array, shape (9,)
-        How far the way is from the straight one in its middle.
-    skew : float
-        1: fastest in the middle of the time; below 1 earlier.
-    """
+    """One arm's way to a pose."""
 
     start_s: float
     end_s: float
-    to: Floats
-    bow: Floats
-    skew: float
+    to: Floats  # Fields of :class:`~sd2core.simulate.gestures.ArmPose`, (9,).
+    bow: Floats  # Distance of the way from the straight one in its middle, (9,).
+    skew: float  # 1: fastest in the middle of the time; below 1 earlier.
     label: int = 0
 
 
@@ -112,14 +102,8 @@ def perform(
 ) -> Performance:
     """Motion of one person in one take, on the floor's origin, facing -z.
 
-    Parameters
-    ----------
-    skeleton, base : Skeleton
-        The person's, and that of the bundled body.
-    times_s : float64 array, shape (T,)
-        Multiples of 1/240 s.
-    kind : {"gestures", "moving", "pacing"}, optional
-        Drawn where it is not given.
+    ``skeleton`` is the person's, ``base`` that of the bundled body. The times are multiples of
+    1/240 s. The kind is drawn where it is not given.
     """
     drawn: Kind = rng.choice(list(KINDS), p=list(KINDS.values()))
     kind = kind or drawn

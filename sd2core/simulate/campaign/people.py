@@ -14,39 +14,18 @@ _SUBJECT = 1  # takes have 0 in this place of the seed
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """One person.
-
-    Parameters
-    ----------
-    shape : BodyShape
-    hand : {"L", "R"}
-        That makes most gestures.
-    other_hand : float
-        Share of the gestures that the other one makes.
-    tempo : float
-        Time for a stroke, 1 on average.
-    size : float
-        Width of a stroke, 1 on average.
-    held_deg : (float, float)
-        Azimuth and elevation that are added to every pose of the arms.
-    follow : float
-        How much the torso goes with the arm, 1 on average.
-    sway_deg : float
-        Standard deviation of the lean about the ankles.
-    rests : float
-        How long pauses are, 1 on average.
-    """
+    """One person."""
 
     name: str
     shape: BodyShape
-    hand: Literal["L", "R"]
-    other_hand: float
-    tempo: float
-    size: float
-    held_deg: tuple[float, float]
-    follow: float
-    sway_deg: float
-    rests: float
+    hand: Literal["L", "R"]  # Hand that makes most gestures.
+    other_hand: float  # Share of the gestures that the other one makes.
+    tempo: float  # Time for a stroke, 1 on average.
+    size: float  # Width of a stroke, 1 on average.
+    held_deg: tuple[float, float]  # Azimuth and elevation that are added to every pose of the arms.
+    follow: float  # Motion of the torso with the arm, 1 on average.
+    sway_deg: float  # Standard deviation of the lean about the ankles.
+    rests: float  # Length of pauses, 1 on average.
 
 
 def subject_name(number: int) -> str:

@@ -44,24 +44,14 @@ _TURNED_LEAST = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Posture:
-    """Posture of one body in every frame.
+    """Posture of one body in every frame."""
 
-    Parameters
-    ----------
-    axes : float64 array, shape (T, 3, 3)
-        Rows: to the right, down and along the line of sight, in the camera frame.
-    place_m : float64 array, shape (T, 3)
-        Of the pelvis, in those axes (so along the last but for rounding).
-    trunk : float64 array, shape (T, 3, 3, 3)
-        Turns of :data:`TRUNK` against rest, in the camera frame.
-    limbs : dict of (group, side) to float64 array, shape (T, n, 3)
-        Unit directions in the axes of the line of sight. Those of the left side are
-        mirrored, so that both sides can be told together.
-    """
-
+    # Rows, (T, 3, 3): to the right, down and along the line of sight, in the camera frame.
     axes: Floats
-    place_m: Floats
-    trunk: Floats
+    place_m: Floats  # Of the pelvis, (T, 3), in those axes (so along the last but for rounding).
+    trunk: Floats  # Turns of :data:`TRUNK` against rest, (T, 3, 3, 3), in the camera frame.
+    # Unit directions in the axes of the line of sight, (T, n, 3). Those of the left side are
+    # mirrored, so that both sides can be told together.
     limbs: Mapping[tuple[Group, str], Floats]
 
     def features(self, group: Group, side: str = "") -> Floats:
@@ -83,12 +73,8 @@ class Posture:
 def posture(skeleton: Skeleton, transforms: Floats, axes: Floats | None = None) -> Posture:
     """Read a body's posture.
 
-    Parameters
-    ----------
-    transforms : float64 array, shape (T, B, 3, 4)
-        Of :meth:`~sd2core.body.model.Skeleton.transforms`, in the camera frame.
-    axes : float64 array, shape (T, 3, 3), optional
-        To use instead of the line of sight to this body's own pelvis.
+    ``transforms``, (T, B, 3, 4), come from :meth:`~sd2core.body.model.Skeleton.transforms`, in the
+    camera frame; ``axes``, (T, 3, 3), replace the line of sight to this body's own pelvis.
     """
     heads = applied(transforms[..., :3], skeleton.heads_m) + transforms[..., 3]  # (T, B, 3)
     index = skeleton.index
@@ -137,21 +123,11 @@ def change_posture(
     true: Posture,
     change: Mapping[tuple[Group, str], Floats],
 ) -> Floats:
-    """Transforms of a body in another posture.
+    """Transforms of a body in another posture, (T, B, 3, 4).
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Of the body that is to be held so; it may be of another shape than the one that
-        the posture was read from.
-    transforms : float64 array, shape (T, B, 3, 4)
-        Of the body in the true posture.
-    change : dict of (group, side) to float64 array, shape (T, n)
-        As :func:`errors` gives them; ``place`` and ``trunk`` have the side "".
-
-    Returns
-    -------
-    float64 array, shape (T, B, 3, 4)
+    The skeleton is that of the result and may be of another shape than the one that the posture was
+    read from; ``transforms`` are those of the body in the true posture. ``change`` holds, (T, n),
+    the output of :func:`errors`; ``place`` and ``trunk`` have the side "".
     """
     frames = len(transforms)
     back = transposed(true.axes)  # from the axes of the line of sight to the camera's

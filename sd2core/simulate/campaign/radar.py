@@ -45,20 +45,12 @@ _EMPTY_FRAMES, _EMPTY_ROOM = 128, 2026
 
 @dataclass(frozen=True)
 class TargetOptions:
-    """Options of the simulated radar.
+    """Options of the simulated radar."""
 
-    Parameters
-    ----------
-    looks : int
-        Sets of random phases whose powers are averaged.
-    link : LinkBudget or None
-        None for a receiver without noise and rounding.
-    above_noise : float
-        How many standard deviations of the noise's power a cell must rise above its mean.
-    """
-
-    looks: int = 12
+    looks: int = 12  # Sets of random phases whose powers are averaged.
+    # None for a receiver without noise and rounding.
     link: LinkBudget | None = field(default_factory=LinkBudget)
+    # Least level of a cell over the noise's mean, in standard deviations of its power.
     above_noise: float = 5.0
 
 
@@ -74,25 +66,11 @@ def radar_target(
     options: TargetOptions | None = None,
     on_frame: Callable[[], None] = lambda: None,
 ) -> NDArray[np.float32]:
-    """Doppler map of a moving mesh by a radar.
+    """Doppler map of a moving mesh by a radar: power, (T, bins), see :data:`REFERENCE_RANGE_M`.
 
-    Parameters
-    ----------
-    mesh : MeshSequence
-        With faces; the radar's frames are at the mesh's times.
-    null_bins : sequence of int
-        Emptied, as in the synthetic map.
-    reflectors : tuple of Reflector
-        Static clutter.
-    seed : sequence of int
-        Of phases and noise.
-    on_frame : callable
-        Called before every frame; may raise to stop.
-
-    Returns
-    -------
-    float32 array, shape (T, bins)
-        Power; see :data:`REFERENCE_RANGE_M`.
+    The mesh has faces, and the radar's frames are at its times. ``null_bins`` are emptied, as in
+    the synthetic map; ``reflectors`` are static clutter; the seed is that of phases and noise.
+    ``on_frame`` is called before every frame and may raise to stop.
     """
     options = options or TargetOptions()
     rng = np.random.default_rng(seed)

@@ -26,21 +26,11 @@ _CROSS_SECTION_M2 = (0.05, 5.0)
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """Scene of one take.
+    """Scene of one take."""
 
-    Parameters
-    ----------
-    place_m : float64 array, shape (3,)
-        Of the floor under the person, in the camera frame.
-    heading_deg : float
-        From facing along the camera's axis.
-    sensors : tuple of VirtualSensor
-        The take's own beside the camera, then others.
-    """
-
-    place_m: Floats
-    heading_deg: float
-    sensors: tuple[VirtualSensor, ...]
+    place_m: Floats  # Of the floor under the person, in the camera frame.
+    heading_deg: float  # From facing along the camera's axis.
+    sensors: tuple[VirtualSensor, ...]  # The take's own beside the camera, then others.
     reflectors: tuple[Reflector, ...]
 
     def place(self, transforms: Floats) -> Floats:

@@ -38,17 +38,11 @@ _MOTION, _SETTING, _FIT, _RADAR = range(4)
 
 @dataclass(frozen=True)
 class Campaign:
-    """Settings that all takes of a campaign share.
-
-    Parameters
-    ----------
-    placements : int
-        Sensors that see every take.
-    """
+    """Settings that all takes of a campaign share."""
 
     seed: int = 0
     take_seconds: float = 15.0
-    placements: int = 1
+    placements: int = 1  # Sensors that see every take.
     radar: RadarConfig = PAPER_RADAR
     target: TargetOptions = field(default_factory=TargetOptions)
 
@@ -80,12 +74,9 @@ class Campaign:
 
 
 class TakeMaker:
-    """Makes takes of one campaign; each depends on its numbers alone.
+    """Maker of the takes of one campaign; each depends on its numbers alone.
 
-    Parameters
-    ----------
-    errors : FitErrors, optional
-        How fits of its videos err; by default not at all.
+    ``errors`` are those of fits to its videos; by default there are none.
     """
 
     def __init__(self, campaign: Campaign, errors: FitErrors | None = None) -> None:
@@ -107,13 +98,8 @@ class TakeMaker:
     ) -> list[Take]:
         """One take as every placement sees it.
 
-        Parameters
-        ----------
-        on_frame : callable
-            Called before every radar frame; may raise to stop.
-        look : int
-            Others have the same motion, and a radar with other noise and another rough
-            surface.
+        ``on_frame`` is called before every radar frame and may raise to stop. Other values of
+        ``look`` have the same motion, and a radar with other noise and another rough surface.
         """
         campaign = self._campaign
         rngs = [

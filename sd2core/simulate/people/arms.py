@@ -37,27 +37,17 @@ _FASTEST = 7.0
 class ArmStyle:
     """Style of an arm's motion.
 
-    Parameters
-    ----------
-    shortest_s, longest_s : float
-        Time of one move, drawn evenly in its logarithm.
-    hold : float
-        Chance that the arm rests between two moves.
-    zones : tuple of (str, float)
-        Names of :data:`ZONES`, and how likely each is the next target.
-    wave : float
-        Chance of one oscillation per second.
-    returns : bool
-        Whether every second target is the one before: strokes out and back.
+    The time of one move is drawn evenly in its logarithm, from ``shortest_s`` to ``longest_s``.
     """
 
     shortest_s: float = 0.3
     longest_s: float = 1.4
-    hold: float = 0.5
+    hold: float = 0.5  # Chance that the arm rests between two moves.
     longest_hold_s: float = 0.8
+    # Names of :data:`ZONES`, and how likely each is the next target.
     zones: tuple[tuple[str, float], ...] = (("any", 0.35), ("front", 0.55), ("hang", 0.1))
-    wave: float = 0.15
-    returns: bool = False
+    wave: float = 0.15  # Chance of one oscillation per second.
+    returns: bool = False  # True if every second target is the one before: strokes out and back.
 
 
 # Azimuth from straight ahead (positive away from the body's middle), elevation, and reach

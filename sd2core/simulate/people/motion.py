@@ -30,30 +30,15 @@ _ARMS = TRAINING_STYLES | GESTURE_STYLES | HELD_OUT_STYLES
 
 @dataclass(frozen=True)
 class Deed:
-    """Action of a person in one take.
+    """Action of a person in one take."""
 
-    Parameters
-    ----------
-    legs : str
-        One of :data:`~sd2core.simulate.people.walking.MODES`.
-    arms : tuple of str
-        Styles of left and right arm.
-    still : bool
-        Nothing but breath and sway.
-    natural : bool
-        Elbows and trunk as people have them, not any way they can.
-    elbows_rest : bool
-        Forearms often turn about elbows that stay.
-    calm : bool
-        The trunk does little of its own.
-    """
-
-    legs: str
-    arms: tuple[str, str]
-    still: bool
+    legs: str  # One of :data:`~sd2core.simulate.people.walking.MODES`.
+    arms: tuple[str, str]  # Styles of left and right arm.
+    still: bool  # True for nothing but breath and sway.
+    # True for elbows and trunk as people have them, not in any possible position.
     natural: bool = False
-    elbows_rest: bool = False
-    calm: bool = False
+    elbows_rest: bool = False  # True if forearms often turn about elbows that stay.
+    calm: bool = False  # True if the trunk does little of its own.
 
 
 def random_motion(

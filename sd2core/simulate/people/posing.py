@@ -26,23 +26,11 @@ def place_limb(
 ) -> Floats:
     """Bring the end of a limb of two bones to a place.
 
-    Parameters
-    ----------
-    rotations : array, shape (T, B, 3, 3)
-        The first two bones' are written.
-    bones : tuple of str
-        Thigh, shank, foot; or upper arm, forearm, wrist.
-    root : array, shape (T, 3, 4)
-        Transform of what the limb hangs on.
-    target_m : array, shape (T, 3)
-        Brought nearer where it is out of reach.
-    pole : array, shape (T, 3)
-        Where the joint bends to.
-
-    Returns
-    -------
-    float64 array, shape (T, 3, 3)
-        Turn of the second bone against rest, in the axes of ``target_m``.
+    ``bones`` are thigh, shank, foot; or upper arm, forearm, wrist. The first two are written in
+    ``rotations``, (T, B, 3, 3). ``root``, (T, 3, 4), is the transform of the parent of the limb;
+    ``target_m``, (T, 3), is brought nearer where it is out of reach; ``pole``, (T, 3), is where the
+    joint bends to. Returns the turn of the second bone against rest, (T, 3, 3), in the axes of
+    ``target_m``.
     """
     first, second, end = (skeleton.index[bone] for bone in bones)
     heads = skeleton.heads_m
@@ -65,15 +53,8 @@ def turn_hand(
 ) -> None:
     """Turn, bend and close one hand.
 
-    Parameters
-    ----------
-    rotations : array, shape (T, B, 3, 3)
-        Of forearm, wrist and fingers, written.
-    side : {"L", "R"}
-    angles_deg : array, shape (T, 3)
-        Pronation, flexion, deviation.
-    curl : array, shape (T, 2)
-        Of fingers and thumb, 0 open to 1 closed.
+    The rotations of forearm, wrist and fingers are written. ``angles_deg``, (T, 3): pronation,
+    flexion, deviation. ``curl``, (T, 2): of fingers and thumb, 0 open to 1 closed.
     """
     index, heads = skeleton.index, skeleton.heads_m
     across = 1.0 if side == "R" else -1.0

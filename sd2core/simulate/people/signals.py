@@ -12,18 +12,11 @@ _WAVES = 9
 
 
 class Moves(NamedTuple):
-    """Moves from each pose to the next.
-
-    Parameters
-    ----------
-    start_s, length_s : float64 array, shape (n,)
-    skew : float64 array, shape (n,)
-        Where in the move the hand is fastest: 1 in its middle, below 1 earlier.
-    """
+    """Moves from each pose to the next."""
 
     start_s: Floats
     length_s: Floats
-    skew: Floats
+    skew: Floats  # Place in the move where the hand is fastest: 1 in its middle, below 1 earlier.
 
 
 def smooth_share(phase: Floats, skew: Floats) -> Floats:
@@ -35,16 +28,7 @@ def smooth_share(phase: Floats, skew: Floats) -> Floats:
 def follow(times_s: Floats, moves: Moves, poses: Floats) -> Floats:
     """Parameters through time: the first pose plus every move so far; moves may overlap.
 
-    Parameters
-    ----------
-    times_s : array, shape (T,)
-    moves : Moves
-        n of them.
-    poses : array, shape (n + 1, K)
-
-    Returns
-    -------
-    float64 array, shape (T, K)
+    n moves and the poses, (n + 1, K), give an array of shape (T, K).
     """
     phase = (times_s[:, None] - moves.start_s) / moves.length_s
     return np.asarray(poses[0] + smooth_share(phase, moves.skew) @ np.diff(poses, axis=0))

@@ -18,29 +18,14 @@ _STEP = 0.36
 
 @dataclass(frozen=True, eq=False)
 class Footwork:
-    """Pelvis and feet on the floor, in statures.
+    """Pelvis and feet on the floor, in statures."""
 
-    Parameters
-    ----------
-    place : float64 array, shape (T, 2)
-        Of the pelvis: x, z on the floor.
-    heading_deg : float64 array, shape (T,)
-        Turn about the vertical; 0 faces towards -z.
-    sink : float64 array, shape (T,)
-        How much lower than standing the pelvis is.
-    feet : float64 array, shape (T, 2, 3)
-        x, z and height above the floor of left and right ankle, above its rest.
-    feet_heading_deg : float64 array, shape (T, 2)
-    stride : float64 array, shape (T,)
-        -1 to 1: how far ahead the left foot is, for the arms to swing by.
-    """
-
-    place: Floats
-    heading_deg: Floats
-    sink: Floats
-    feet: Floats
-    feet_heading_deg: Floats
-    stride: Floats
+    place: Floats  # Of the pelvis, (T, 2): x, z on the floor.
+    heading_deg: Floats  # Turn about the vertical; 0 faces towards -z.
+    sink: Floats  # Distance of the pelvis below its height when standing.
+    feet: Floats  # x, z and height above its rest of left and right ankle, (T, 2, 3).
+    feet_heading_deg: Floats  # (T, 2).
+    stride: Floats  # -1 to 1: how far ahead the left foot is, for the arms to swing by.
 
 
 def footwork(
