@@ -43,24 +43,11 @@ def digitise(
 ) -> dict[str, float]:
     """Apply gain and thermal noise and round to converter counts around mid-scale.
 
-    Parameters
-    ----------
-    signal : float array, shape (frames, receivers, chirps, samples)
-    peak : float
-        Largest magnitude in it.
-    power : float
-        Mean square of the moving scene's part, over the frames with a person.
-    samples : uint16 array
-        Result, of the same shape.
-    go_on : callable
-        Called once per frame; may raise to stop.
-    first : int
-        Number of the first of these frames in the recording, which selects its noise.
-
-    Returns
-    -------
-    dict
-        Improvement and noise of the converter, for provenance.
+    ``samples``, of the shape of the signal, (frames, receivers, chirps, samples), gets the result.
+    ``peak`` is the signal's largest magnitude, ``power`` the mean square of the moving scene's part
+    over the frames with a person. ``first`` is the number of the first of these frames in the
+    recording, which selects its noise. ``go_on`` is called once per frame and may raise to stop.
+    Returns improvement and noise of the converter, for provenance.
     """
     middle = 2 ** (config.adc_bits - 1)
     gain = options.peak_share * middle / peak if peak > 0 else 1.0

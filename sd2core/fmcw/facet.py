@@ -89,25 +89,14 @@ def facet_mean(
     bend_bc: float,
     bend_ca: float,
 ) -> Any:
-    """Mean over a triangle of weight times exp(j phase), and how it changes.
+    """Mean over a triangle of weight times exp(j phase), and its derivative.
 
-    Parameters
-    ----------
-    a, b, c : float
-        Phase at the corners in radians.
-    weight_a, weight_b, weight_c : float
-        Weight at the corners; linear between them.
-    turn_a, turn_b, turn_c : float
-        Rate of change of the phase at the corners.
-    bend_ab, bend_bc, bend_ca : float
-        Deviation of the phase from linearity: along an edge it sags by a quarter of this.
+    ``a``, ``b``, ``c`` are phases at the corners in radians; weights are linear between the
+    corners; ``turn`` is the rate of change of the phase at a corner; ``bend`` is the deviation of
+    the phase from linearity: along an edge it sags by a quarter of this.
 
-    Returns
-    -------
-    complex
-        To 1e-7 of the weight for a linear phase; of the bend to first order about its mean.
-    complex
-        Its derivative, of the bend to no order.
+    The mean is exact to 1e-7 of the weight for a linear phase, and to first order in the bend about
+    its mean; the derivative neglects the bend.
     """
     # Sorted, so that every division but those along the edges is by the whole span.
     if a > b:

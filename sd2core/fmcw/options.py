@@ -24,21 +24,11 @@ CONCRETE = -0.39
 
 @dataclass(frozen=True)
 class Mirror:
-    """Reflecting plane, a floor or wall, modelled by an image of the sensor.
+    """Reflecting plane, a floor or wall, modelled by an image of the sensor."""
 
-    Parameters
-    ----------
-    point_m : tuple of 3 floats
-        Any point of the plane, camera frame.
-    normal : tuple of 3 floats
-        Normal of the plane; length and side do not matter.
-    reflection : float
-        Amplitude coefficient, from -1 to 1; the same for every angle.
-    """
-
-    point_m: Vector
-    normal: Vector
-    reflection: float = CONCRETE
+    point_m: Vector  # Any point of the plane, camera frame.
+    normal: Vector  # Normal of the plane; length and side do not matter.
+    reflection: float = CONCRETE  # Amplitude coefficient, from -1 to 1; the same for every angle.
 
     def __post_init__(self) -> None:
         values = (*self.point_m, *self.normal)
@@ -136,18 +126,10 @@ class WaveOptions:
 
 @dataclass(frozen=True)
 class Reflector:
-    """Static point reflector.
+    """Static point reflector."""
 
-    Parameters
-    ----------
-    position_m : tuple of 3 floats
-        Camera frame.
-    area_m2 : float
-        Effective area: it echoes like a facet of this area seen square on.
-    """
-
-    position_m: Vector
-    area_m2: float
+    position_m: Vector  # Camera frame.
+    area_m2: float  # Effective area: it echoes like a facet of this area seen square on.
 
 
 @dataclass(frozen=True)
@@ -211,10 +193,7 @@ def paths(
 ) -> list[list[tuple[Antenna, Antenna]]]:
     """Pairs (transmitter, receiver) between which waves travel, for every receiver.
 
-    Raises
-    ------
-    Sd2Error
-        When receivers are placed, but not as many as the radar has.
+    Raises Sd2Error when receivers are placed, but not as many as the radar has.
     """
     offsets = np.array(options.receiver_offsets_m, dtype=np.float64).reshape(-1, 3)
     if not options.receiver_offsets_m:

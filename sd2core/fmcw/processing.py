@@ -36,18 +36,10 @@ UNIT = "power (1 = full-scale sine)"
 
 @dataclass(frozen=True, eq=False)
 class RangeDoppler:
-    """Power of one frame over range and velocity, summed over receivers.
+    """Power of one frame over range and velocity, summed over receivers."""
 
-    Parameters
-    ----------
-    values : float32 array, shape (gates, bins)
-        Velocity ascending, positive when approaching.
-    range_m : float64 array, shape (gates,)
-        Centre of every gate.
-    """
-
-    values: NDArray[np.float32]
-    range_m: NDArray[np.float64]
+    values: NDArray[np.float32]  # (gates, bins); velocity ascending, positive when approaching.
+    range_m: NDArray[np.float64]  # Centre of every gate, (gates,).
     axis: VelocityAxis
     time_s: float
 
@@ -190,9 +182,7 @@ def rebinning(config: RadarConfig, axis: VelocityAxis, doppler_bins: int) -> NDA
     own spectrum does. Columns add up to 1 where the axis covers ±v_max, so power
     is conserved.
 
-    Returns
-    -------
-    float64 array, shape (axis.bins, doppler_bins)
+    The weights have the shape (axis.bins, doppler_bins).
     """
     v_max = config.v_max_mps
     width = 2.0 * v_max / doppler_bins

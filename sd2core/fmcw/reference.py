@@ -1,4 +1,4 @@
-"""What the signal of a frame converges to when its facets are cut ever finer."""
+"""Limit of a frame's signal when its facets are cut ever finer."""
 
 from __future__ import annotations
 
@@ -21,28 +21,17 @@ _FACETS_PER_STEP = 20_000
 
 @dataclass(frozen=True, eq=False)
 class Converged:
-    """A frame's signal on facets cut until nothing changes.
+    """A frame's signal on facets cut until nothing changes."""
 
-    Parameters
-    ----------
-    signal : float64 array, shape (receivers, chirps, samples)
-        Of the finest cut.
-    pieces : tuple of int
-        Triangles per facet that were tried: 1, 4, 16 …
-    changes : tuple of float
-        L1 of the change of :func:`doppler_marginal` from one to the next of these.
-    tolerance : float
-        What the last change was to be below.
-    """
-
-    signal: NDArray[np.float64]
-    pieces: tuple[int, ...]
+    signal: NDArray[np.float64]  # Of the finest cut, (receivers, chirps, samples).
+    pieces: tuple[int, ...]  # Triangles per facet that were tried: 1, 4, 16 …
+    # L1 of the change of :func:`doppler_marginal` from one to the next of these.
     changes: tuple[float, ...]
-    tolerance: float
+    tolerance: float  # Limit that the last change was to stay below.
 
     @property
     def converged(self) -> bool:
-        """Whether the last change was below the tolerance."""
+        """True if the last change was below the tolerance."""
         return not self.changes or self.changes[-1] <= self.tolerance
 
 
@@ -61,17 +50,9 @@ def converged_frame(
     ``motion`` makes it, so that this is the limit of the same physics. A rough surface has
     one random phase per facet and is summed as it is.
 
-    Parameters
-    ----------
-    scene : WaveScene
-    time_s : float
-        Middle of the frame.
-    tolerance : float
-        L1 between the last two marginals.
-    most_cuts : int
-        Halvings after which it stops, converged or not.
-    go_on : callable or None
-        Called every few ten milliseconds; may raise to stop.
+    ``time_s`` is the middle of the frame; ``tolerance`` the L1 between the last two marginals. It
+    stops after ``most_cuts`` halvings, converged or not. ``go_on`` is called every few ten
+    milliseconds and may raise to stop.
     """
     signal = _cut(scene, time_s, 0, go_on)
     pieces, changes = [1], list[float]()
@@ -86,18 +67,10 @@ def converged_frame(
 
 
 def doppler_marginal(signal: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Share of a frame's power per Doppler bin, over all ranges and receivers.
+    """Share of a frame's power per Doppler bin, (chirps,), over all ranges and receivers.
 
-    Hann windows in both directions, no clutter filter.
-
-    Parameters
-    ----------
-    signal : float64 array, shape (receivers, chirps, samples)
-
-    Returns
-    -------
-    float64 array, shape (chirps,)
-        In FFT order; adds up to 1, or is 0 without any power.
+    Hann windows in both directions, no clutter filter. The signal is (receivers, chirps, samples);
+    the result is in FFT order and adds up to 1, or is 0 without any power.
     """
     _, chirps, samples = signal.shape
     peak = np.abs(signal).max()

@@ -26,20 +26,12 @@ _BLOCK_FRAMES = 64
 
 @dataclass(frozen=True, eq=False)
 class Scatterers:
-    """Reflecting centres at one instant.
+    """Reflecting centres at one instant."""
 
-    Parameters
-    ----------
-    position_m : float64 array, shape (n, 3)
-        Camera frame.
-    velocity_mps : float64 array, shape (n, 3)
-    amplitude : complex128 array, shape (n,)
-        Echo at the sensor: projected area in m^2 over R^2, times the mean
-        phasor of the facet about its centre.
-    """
-
-    position_m: NDArray[np.float64]
-    velocity_mps: NDArray[np.float64]
+    position_m: NDArray[np.float64]  # Camera frame, (n, 3).
+    velocity_mps: NDArray[np.float64]  # (n, 3).
+    # Echo at the sensor, (n,): projected area in m^2 over R^2, times the mean phasor of the facet
+    # about its centre.
     amplitude: NDArray[np.complex128]
 
 
@@ -51,10 +43,7 @@ def point_scatterers(
 ) -> Scatterers:
     """Scatterers of a given effective area that reflect alike in all directions.
 
-    Parameters
-    ----------
-    position_m, velocity_mps : array_like, shape (n, 3)
-    area_m2 : array_like, shape (n,) or a number
+    Positions and velocities are (n, 3), areas (n,) or one number.
     """
     position = np.atleast_2d(np.asarray(position_m, dtype=np.float64))
     velocity = np.broadcast_to(np.asarray(velocity_mps, dtype=np.float64), position.shape)
@@ -77,13 +66,8 @@ def facet_scatterers(
     (:func:`~sd2core.fmcw.triangle.mean_phasor`). Points one per facet would have
     to lie well under a wavelength apart to add up to the same.
 
-    Parameters
-    ----------
-    vertices_m, velocity_mps : float64 array, shape (V, 3)
-    faces : int32 array, shape (F, 3)
-        Counter-clockwise seen from outside.
-    visible : bool array, shape (F,), or None
-        Facets that nothing hides; those that face away never count.
+    Faces are counter-clockwise seen from outside. ``visible``, (F,), marks the facets that nothing
+    hides; those that face away never count.
     """
     corners = vertices_m[faces] - np.asarray(sensor.position_m)  # (F, 3 corners, 3)
     normal = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -122,15 +106,11 @@ def radar_times_s(timebase: Timebase, config: RadarConfig) -> NDArray[np.float64
 
 
 class MeshScene:
-    """Moving mesh as seen by one radar.
+    """Moving mesh, which has faces, as seen by one radar.
 
-    Parameters
-    ----------
-    mesh : MeshSequence
-        Must have faces.
-    visibility : bool array, shape (T, F), "facing" or "exact"
-        Per mesh frame, the facets that nothing hides from the sensor; ``exact`` looks for
-        them frame by frame as they are asked for.
+    ``visibility``, (T, F), marks per mesh frame the facets that nothing hides from the sensor;
+    ``"exact"`` finds them frame by frame as they are asked for, ``"facing"`` takes all whose normal
+    points towards it.
     """
 
     def __init__(

@@ -127,14 +127,10 @@ def capture_scene(
 
 
 def echo(scatterers: Scatterers, config: RadarConfig, sensor: VirtualSensor) -> NDArray[np.float64]:
-    """Beat signal of one frame without noise.
+    """Beat signal of one frame without noise, (receivers, chirps, samples).
 
     The transmitter is at the sensor; receivers stand half a wavelength apart to
     its left and right.
-
-    Returns
-    -------
-    float64 array, shape (receivers, chirps, samples)
     """
     signal = np.zeros((config.receivers, config.chirps_per_frame, config.samples_per_chirp))
     # float64 throughout: rounding then stays far below one converter count, and

@@ -42,21 +42,12 @@ _TERMS_PER_STEP = 1_000_000
 
 @dataclass(frozen=True, eq=False)
 class Echoes:
-    """Echoes at one receiver.
+    """Echoes at one receiver."""
 
-    Parameters
-    ----------
-    range_m : float64 array, shape (n,)
-        Half the path at the frame's middle.
-    rate_mps : float64 array, shape (n,)
-        How fast that grows.
-    amplitude : complex128 array, shape (n,) or (terms, n)
-        Constant, or a polynomial in the time from the frame's middle over half
-        the radar's frame: constant, linear, quadratic.
-    """
-
-    range_m: NDArray[np.float64]
-    rate_mps: NDArray[np.float64]
+    range_m: NDArray[np.float64]  # Half the path at the frame's middle, (n,).
+    rate_mps: NDArray[np.float64]  # Rate of growth of the range, (n,).
+    # (n,) or (terms, n): constant, or a polynomial in the time from the frame's middle over half
+    # the radar's frame: constant, linear, quadratic.
     amplitude: NDArray[np.complex128]
 
     @property
@@ -88,12 +79,8 @@ def direct(
 ) -> NDArray[np.complex128]:
     """Sum every echo at every sample directly, (chirps, samples); the reference.
 
-    Parameters
-    ----------
-    chirps : int or None
-        How many around the middle; the radar's own.
-    go_on : callable or None
-        Called every few ten milliseconds; may raise to stop.
+    ``chirps`` is the number around the middle; None: the radar's own. ``go_on`` is called every few
+    ten milliseconds and may raise to stop.
     """
     turns = turns_of(echoes, config)
     shape = (chirps or config.chirps_per_frame, config.samples_per_chirp)
@@ -155,16 +142,9 @@ def nufft(
 ) -> NDArray[np.complex128]:
     """Compute the same sum by type-1 non-uniform FFTs on one thread, (chirps, samples).
 
-    Parameters
-    ----------
-    blocks : int
-        Stretches of chirps with a beat frequency of their own; no more than
-        there are chirps. What one block leaves out of the phase at its ends is
-        2 pi (2 / c) S r t_m t_n.
-    chirps : int or None
-        How many around the middle; the radar's own.
-    tolerance : float
-        Relative error of the sums.
+    Each of the ``blocks``, no more than there are chirps, has beat frequencies of its own. One
+    block leaves 2 pi (2 / c) S r t_m t_n out of the phase at its ends. ``chirps`` is the number
+    around the middle; None: the radar's own. ``tolerance`` is the relative error of the sums.
     """
     turns = turns_of(echoes, config)
     chirps = chirps or config.chirps_per_frame

@@ -11,7 +11,7 @@ _SERIES_TERMS = 16
 
 
 def mean_phasor(phase_rad: NDArray[np.float64]) -> NDArray[np.complex128]:
-    """Mean of exp(j phase) over triangles on which the phase is linear.
+    """Mean of exp(j phase) over triangles on which the phase is linear; (n, 3) to (n,).
 
     The mean is twice the second divided difference of exp at the three corner
     phases (Hermite-Genocchi). Differences of close numbers are avoided on two
@@ -19,14 +19,7 @@ def mean_phasor(phase_rad: NDArray[np.float64]) -> NDArray[np.complex128]:
     phases span less than one radian use the Taylor series about the mean phase,
     whose moments are complete symmetric polynomials of the corner phases.
 
-    Parameters
-    ----------
-    phase_rad : float64 array, shape (n, 3)
-
-    Returns
-    -------
-    complex128 array, shape (n,)
-        Exact to about 1e-15, whether or not phases coincide.
+    Exact to about 1e-15, whether or not phases coincide.
     """
     ordered = np.sort(phase_rad, axis=1)
     middle = ordered.mean(axis=1)

@@ -23,18 +23,11 @@ _NO_PLANE = np.array([0.0, 0.0, 0.0, 1.0])
 
 
 class WaveScene:
-    """Moving mesh and radar with the wave propagation between them.
+    """Moving mesh, which has faces, and radar with the wave propagation between them.
 
-    Parameters
-    ----------
-    mesh : MeshSequence
-        Must have faces.
-    sensor : VirtualSensor
-        Transmitter and boresight.
-    visibility : bool array, shape (T, F), "facing" or "exact"
-        See :class:`~sd2core.fmcw.scene.MeshScene`.
-    seed : int
-        Seed of the random phases of a rough surface.
+    The sensor is the transmitter, with its boresight. ``visibility`` is as for
+    :class:`~sd2core.fmcw.scene.MeshScene`; ``seed`` is that of the random phases of a rough
+    surface.
     """
 
     def __init__(
@@ -63,7 +56,7 @@ class WaveScene:
     def frame(self, time_s: float, go_on: GoOn | None = None) -> NDArray[np.float64]:
         """Beat signal of the frame around a time, (receivers, chirps, samples).
 
-        Nothing where there is nobody.
+        Zero where there is no person.
         """
         if not self.scene.there(time_s):
             return self.silence()
