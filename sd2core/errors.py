@@ -1,4 +1,4 @@
-"""The one error a user may see: a sentence, never a traceback."""
+"""Error shown to users: a sentence, never a traceback."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The only place that converts between time and frame."""
+"""Conversion between time and frame; no other module does it."""
 
 from __future__ import annotations
 

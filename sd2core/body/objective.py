@@ -265,7 +265,7 @@ class Objective:
         return Pose(turns, pose.translation_m + change[:, -3:])
 
     def _velocity(self) -> tuple[Floats, Floats]:
-        """Between frames: mean of both, and its standard deviation, (T - 1, 33)."""
+        """Mean velocity between frames, and its standard deviation, (T - 1, 33)."""
         seen = self.evidence
         return (
             0.5 * (seen.velocity_mps[1:] + seen.velocity_mps[:-1]),

@@ -1,4 +1,4 @@
-"""Landmarks of one person through a video: what is found, before a body is fitted."""
+"""Landmarks of one person through a video, before a body is fitted."""
 
 from __future__ import annotations
 

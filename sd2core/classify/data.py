@@ -69,7 +69,7 @@ class Clip:
         return f"{self.subject}/{self.movement}"
 
     def until(self, frames: int) -> Clip:
-        """Return its first frames."""
+        """Return the first frames of the clip."""
         return replace(self, energies=self.energies[:frames], label=self.label[:frames])
 
 

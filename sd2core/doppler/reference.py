@@ -1,4 +1,4 @@
-"""Plain histogram in double precision: the truth that faster methods are measured by.
+"""Plain histogram in double precision: the reference for the errors of faster methods.
 
 Positions are the mesh's own, velocities and weights are computed with NumPy, and every
 vertex is tested for occlusion. Nothing is shared with the compiled counting but the exact

@@ -1,4 +1,4 @@
-"""A mesh as a camera sees it: which triangle each pixel shows, and how bright it is."""
+"""Projection of a mesh into a picture: the visible triangle and the brightness of each pixel."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Frame:
 
     @classmethod
     def whole(cls, camera: PinholeCamera) -> Frame:
-        """All of the picture as it is."""
+        """The whole picture at its own size."""
         return cls(0.0, 0.0, camera.width, camera.height)
 
     def place(self, pixels: NDArray[np.floating]) -> NDArray[np.float64]:

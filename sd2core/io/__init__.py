@@ -1,1 +1,1 @@
-"""Files of others read into, and written from, the core's own types."""
+"""Reading and writing of foreign file formats."""

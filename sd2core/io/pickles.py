@@ -91,7 +91,7 @@ class _ZlibFile(io.RawIOBase):
         self._machine = zlib.decompressobj()
 
     def readable(self) -> bool:
-        """True."""
+        """True: it is a file to read."""
         return True
 
     def readinto(self, buffer: Any) -> int:

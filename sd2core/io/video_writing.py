@@ -1,4 +1,4 @@
-"""Pictures to a video file."""
+"""Writing of pictures to a video file."""
 
 from __future__ import annotations
 

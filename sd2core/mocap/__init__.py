@@ -1,1 +1,1 @@
-"""Bodies that move as a recorded skeleton did."""
+"""Body motion driven by recorded skeletons."""

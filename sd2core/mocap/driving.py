@@ -1,4 +1,4 @@
-"""A body of the skeleton's size, put into its poses.
+"""Body of the size of a recorded skeleton, in its poses.
 
 The solver of the fit does it: joints take the place of landmarks seen in a picture,
 with their depth known. The joints of another tool are not quite ours, so where each
@@ -36,7 +36,7 @@ _AT = {name: row for row, name in enumerate(LANDMARKS)}
 
 @dataclass(frozen=True, eq=False)
 class Puppet:
-    """One person's body, and where a skeleton's joints are on it."""
+    """One person's body, with the places of a skeleton's joints on it."""
 
     shape: BodyShape
     keypoints: Keypoints  # the joints at rest, as landmarks
@@ -102,7 +102,7 @@ def puppet_of(clips: Sequence[SkeletonClip], markers: tuple[Marker, ...]) -> Pup
 def _sample(
     clips: Sequence[SkeletonClip], markers: tuple[Marker, ...]
 ) -> tuple[Floats, Floats, Floats]:
-    """Landmarks, how well they are known, and trust in some of the known frames."""
+    """Landmarks, their standard deviations, and trust in some of the known frames."""
     parts = []
     for clip in clips:
         known = slice(None) if clip.known is None else clip.known
@@ -129,7 +129,7 @@ def _shape(
 
 
 def _upright_m(points_m: Floats) -> Floats:
-    """From the middle of the ears by shoulders, hips and knees to the ankles, (...)."""
+    """Distance from the middle of the ears by shoulders, hips and knees to the ankles, (...)."""
 
     def middle(name: str) -> Floats:
         return np.asarray(

@@ -221,5 +221,5 @@ def _nearest(
 
 
 def _part(progress: Progress, number: int, of: int) -> Progress:
-    """Progress of one recording as that of all."""
+    """Progress of one recording, converted to that of all."""
     return lambda done, total: progress(number * _STEPS + round(_STEPS * done / total), of * _STEPS)

@@ -1,4 +1,4 @@
-"""A recorded skeleton, and which of its joints are which landmarks of the body."""
+"""Recorded skeletons, and the assignment of their joints to landmarks of the body."""
 
 from __future__ import annotations
 

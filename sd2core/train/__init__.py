@@ -1,1 +1,1 @@
-"""Training of denoisers: runs in folders of their own, and what came of them."""
+"""Training of denoisers in run folders, and their evaluation."""

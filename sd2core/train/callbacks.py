@@ -95,7 +95,7 @@ class TrainingCallbacks:
         return position.epoch >= training.epochs
 
     def begin(self, learner: Learner) -> None:
-        """Bring what is needed to the device, and take signals."""
+        """Move data to the device, install signal handlers and start the clock."""
         self._control.take_signals()
         self._learner = learner
         self._exam = self._exam.on(learner.device)
@@ -186,7 +186,7 @@ class TrainingCallbacks:
         )
 
     def _end_epoch(self) -> bool:
-        """Validate and keep the best; whether the run is over."""
+        """Validate and keep the best model; True when the run is over."""
         position = self.position
         position.squares = self._finite_squares()
         found = validate(
@@ -255,10 +255,10 @@ class TrainingCallbacks:
             write_checkpoint(self._folder.last, self._folder.last_record, checkpoint)
 
     def _keep_what_there_is(self) -> None:
-        """A model of a run that is stopped in its first epoch.
+        """Keep the model of a run that is stopped in its first epoch.
 
-        It is no epoch's, so the position does not know of it: the run, resumed, goes the
-        way it would have gone.
+        It is no epoch's, so the position does not know of it: a resumed run ends as it
+        would have ended without the stop.
         """
         found = validate(self._learner.network, self._exam, self.scaling, self._axis, self.counted)
         if found is not None and math.isfinite(found.rmse):
@@ -291,7 +291,7 @@ class TrainingCallbacks:
         return bool(self._learner.trainer.is_global_zero)
 
     def _agreed(self, word: Word, number: float) -> tuple[Word, float]:
-        """The same in all processes, as the first has it: or they would wait for each other."""
+        """Answer of the first process in all processes; else they would wait for each other."""
         trainer = self._learner.trainer
         if trainer.world_size == 1:
             return word, number

@@ -116,6 +116,6 @@ def moments_of(optimiser: torch.optim.Optimizer) -> dict[int, dict[str, torch.Te
 def set_moments(
     optimiser: torch.optim.Optimizer, moments: dict[int, dict[str, torch.Tensor]]
 ) -> None:
-    """Put a state back."""
+    """Restore the state of an optimiser."""
     groups = optimiser.state_dict()["param_groups"]
     optimiser.load_state_dict({"state": moments, "param_groups": groups})

@@ -1,4 +1,4 @@
-"""Time of training: goes on after a resume, stands still in pauses."""
+"""Clock of training time: continues after a resume, stops in pauses."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Clock:
 
     @property
     def elapsed_s(self) -> float:
-        """Since the run began, without pauses."""
+        """Seconds since the run began, without pauses."""
         return self._before_s + time.monotonic() - self._begun_s
 
     def leave_out(self, seconds: float) -> None:

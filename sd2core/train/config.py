@@ -173,7 +173,7 @@ class TrainConfig:
     machine: MachineConfig = field(default_factory=MachineConfig)
 
     def with_values(self, values: Mapping[str, Mapping[str, Any]]) -> TrainConfig:
-        """Another one, with settings replaced: ``{section: {name: value}}``."""
+        """Copy with settings replaced: ``{section: {name: value}}``."""
         changed = {
             section: replace(getattr(self, section), **dict(content))
             for section, content in values.items()
@@ -191,7 +191,7 @@ _SECTIONS: dict[str, type] = {
 
 
 def settings() -> list[ConfigKey]:
-    """Every setting with its default, what it may be, and what it means."""
+    """Every setting with its default, its allowed values and its meaning."""
     return [
         ConfigKey(
             section,

@@ -1,4 +1,4 @@
-"""Pairs to segments: what is learnt from, what chooses, what stays unseen."""
+"""Segments of pairs for training, for the choice of the best epoch, and for the test."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class TrainingData:
 
     @property
     def digest(self) -> str:
-        """The same for the same segments, whatever their files are called."""
+        """Hash of the segments, independent of the names of their files."""
         sums = hashlib.blake2b(digest_size=16)
         learnt, chosen_by = self.training, self.validation
         places = (learnt.earliest, learnt.latest)
@@ -301,7 +301,7 @@ def _relabelled(
 
 
 def _by_take(takes: tuple[Take, ...]) -> tuple[tuple[Take, ...], tuple[Take, ...]]:
-    """The last fifth of everybody's motions, with all their placements, apart from the others."""
+    """The last fifth of everyone's motions, with all their placements, apart from the others."""
     kept: set[tuple[str, str]] = set()
     for subject in dict.fromkeys(take.subject for take in takes):
         motions = list(dict.fromkeys(take.name for take in takes if take.subject == subject))

@@ -40,7 +40,7 @@ def evaluate(
     first_only: bool = True,
     progress: Progress = silent,
 ) -> Evaluation:
-    """Measure models, and beside them what needs no training.
+    """Measure models, and for comparison filters that need no training.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ def _filters(
 
 
 def _grouped(reports: Sequence[Report]) -> list[Group]:
-    """By architecture, in the order of the first of each."""
+    """Models by architecture, in the order of the first of each."""
     groups: dict[str, list[Report]] = {}
     for report in reports:
         groups.setdefault(_architecture(report.card), []).append(report)

@@ -24,7 +24,7 @@ class Score:
     map: MapError  # of all cells of all frames
 
     def to_json(self) -> dict[str, Any]:
-        """By name."""
+        """Errors by name."""
         parts = {name: getattr(self, name).to_json() for name in _PARTS}
         return {"frames": self.frames, **parts}
 

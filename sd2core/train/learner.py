@@ -1,4 +1,4 @@
-"""The part of a run that Lightning drives: one step, and what comes after it.
+"""Training step and its callbacks, driven by Lightning.
 
 Lightning has the loop, the devices and the precision. Epochs are ours: to Lightning the
 whole run is one, so that a run can begin in the middle of an epoch, and so that nothing
@@ -105,11 +105,11 @@ class Learner(LightningModule):
             setattr(self, name, getattr(self, name).to(self.device))
 
     def on_train_start(self) -> None:
-        """Begin, with signals handled as we want it: Lightning has put its own in place."""
+        """Begin the run here, because Lightning has put its own signal handlers in place before."""
         self._course.begin(self)
 
     def on_train_batch_start(self, batch: Step, batch_idx: int) -> None:
-        """Set the rate, and the state of chance, which so is a function of the position."""
+        """Set the learning rate, and seed the random numbers by the position in the run."""
         course = self._course
         course.rate = set_rate(self._optimiser, course.agreed_rate_factor())
         seed = np.random.SeedSequence(
@@ -151,7 +151,7 @@ class Learner(LightningModule):
             torch.nn.utils.clip_grad_norm_(self.network.parameters(), norm)
 
     def on_train_batch_end(self, outputs: Any, batch: Step, batch_idx: int) -> None:
-        """Let the course decide what comes next."""
+        """Count the step; stop training when the run is over."""
         if not self._course.after_step():
             self.trainer.should_stop = True
 

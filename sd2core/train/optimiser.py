@@ -39,7 +39,7 @@ def optimiser_of(model: Denoiser, config: TrainingConfig) -> torch.optim.AdamW:
 
 
 def set_rate(optimiser: torch.optim.Optimizer, factor: float) -> float:
-    """Set every group to a share of its highest rate; the rate of the first."""
+    """Set every group to a share of its highest rate; return the rate of the first."""
     for group in optimiser.param_groups:
         group["lr"] = factor * group["peak_lr"]
     return float(optimiser.param_groups[0]["lr"])

@@ -48,7 +48,7 @@ def choice(*values: str) -> Allowed:
 
 
 def flag() -> Allowed:
-    """Yes or no."""
+    """A flag: true or false."""
 
     def rule(key: str, value: Any) -> bool:
         if not isinstance(value, bool):
@@ -59,7 +59,7 @@ def flag() -> Allowed:
 
 
 def text() -> Allowed:
-    """Any text but none."""
+    """Any text that is not empty."""
 
     def rule(key: str, value: Any) -> str:
         if not isinstance(value, str) or not value:

@@ -1,4 +1,4 @@
-"""A run from settings to a model, or from a checkpoint on."""
+"""Training of a model from settings, or from a checkpoint on."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def carry_out(
     resume: bool,
     command: str,
 ) -> tuple[Outcome, Position]:
-    """Train in a folder that is made, and locked by this process.
+    """Train a model in a folder that is made, and locked by this process.
 
     ``resume`` goes on from the last checkpoint; ``command`` goes onto the model's card.
     Raises Sd2Error for what the user can mend.

@@ -1,4 +1,4 @@
-"""Begin a run, or go on with one; loads torch when all is in place.
+"""Start or resume of a run; torch is loaded after all checks.
 
 ::
 
@@ -177,7 +177,7 @@ def _trained(
 
 
 def _beside(folder: TrainingFolder, config: TrainConfig, command: str, resume: bool) -> Ending:
-    """Another of several processes: it computes, and the first one writes."""
+    """Compute as another of several processes; the first one writes."""
     from sd2core.train.run import carry_out
 
     with ProgressWriter(Path(os.devnull)) as writer:
@@ -201,7 +201,7 @@ def _end_line(folder: TrainingFolder, outcome: str, position: Position) -> dict[
 
 
 def _note_failure(folder: TrainingFolder, writer: ProgressWriter, error: BaseException) -> None:
-    """Say it in words in the lines, and in full in the log."""
+    """Record a failure: in words in the progress lines, in full in the log."""
     with folder.log.open("a", encoding="utf-8") as log:
         log.write(time.strftime("%Y-%m-%d %H:%M:%S\n"))
         log.write("".join(traceback.format_exception(error)) + "\n")

@@ -41,7 +41,7 @@ class Exam:
     """Of the targets, (segments · length,); NaN in frames in which nothing moves."""
 
     def on(self, device: torch.device) -> Exam:
-        """The same on a device."""
+        """Copy on a device."""
         return Exam(self.inputs.to(device), self.targets.to(device), self.peaks_mps)
 
     @classmethod
