@@ -29,8 +29,8 @@ class DatasetOptions:
     length, overlap : int
         Frames of a segment, and how many it shares with the next one.
     frame_rate_hz : float, optional
-        Of all segments; None: that of the first source. Sources at another rate, or whose
-        frames come unevenly, are brought to it.
+        Frame rate of all segments; None: that of the first source. Sources at another rate, or
+        whose frames come unevenly, are brought to it.
     null_bins : tuple of int, optional
         Bins that are zero in all kinds; None: those of the first source.
     label_rule : {"foreground", "majority"}
@@ -44,7 +44,7 @@ class DatasetOptions:
         Subjects that validate and test; None: chosen by their names, see
         :mod:`sd2core.datasets.splitting`.
     provenance : dict
-        How the data set was made; kept as JSON.
+        Origin of the data set; kept as JSON.
 
     Raises
     ------

@@ -62,7 +62,7 @@ class SegmentDataset(TorchDataset[Item]):
         Powers of an item, input and target map alike, are multiplied by a factor drawn
         between minus and plus this: as a body nearer or farther would be seen.
     seed : int
-        Of the gains; see :meth:`set_epoch`.
+        Seed of the gains; see :meth:`set_epoch`.
 
     Attributes
     ----------

@@ -73,7 +73,7 @@ def write_dataset(
     Parameters
     ----------
     out : Path
-        Its ending says the format: ``.zarr``, ``.h5``, ``.hdf5`` or ``.npz``.
+        Its ending gives the format: ``.zarr``, ``.h5``, ``.hdf5`` or ``.npz``.
     progress : Progress
         Of all sources where their number is known; it may raise ``Cancelled``.
 

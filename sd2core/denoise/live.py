@@ -107,17 +107,10 @@ class TrainedDenoiser:
     def denoise_values(
         self, energies: NDArray[np.float32], progress: Progress = silent
     ) -> NDArray[np.float32]:
-        """Denoise one clip at the model's frame rate.
+        """Denoise one clip at the model's frame rate; energies are (frames, bins), not negative.
 
-        Parameters
-        ----------
-        energies : float32 array, shape (frames, bins)
-            Not negative, in the unit of the synthetic training maps.
-
-        Returns
-        -------
-        float32 array, shape (frames, bins)
-            Not negative, in the unit of the radar maps of the training.
+        They come in the unit of the synthetic maps of the training, and the result is in that of
+        its radar maps.
         """
         values = np.array(energies, dtype=np.float32)
         if values.ndim != 2 or values.shape[1] != self.card.axis.bins:

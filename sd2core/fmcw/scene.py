@@ -153,7 +153,7 @@ class MeshScene:
     def at(self, time_s: float) -> Scatterers:
         """Facets at an instant, moving with the central difference over two mesh frames.
 
-        None where there is nobody.
+        None where there is no person.
         """
         if not self.there(time_s):
             nothing = np.zeros((0, 3))

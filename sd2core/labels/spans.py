@@ -108,7 +108,6 @@ class Labels:
     spans : tuple of Span
         Kept in the order of start, end and id. Each is on one of the tracks, ids differ,
         and on an exclusive track no two overlap.
-    label_set : LabelSet
 
     Raises
     ------

@@ -126,11 +126,10 @@ def suggest_spans(
     doppler : DopplerMap
         Synthetic, denoised, simulated or real. At least a quarter of its frames with a
         person must be quiet: what moves all the time is not told from what never does.
-    options : SuggestOptions, optional
     label, track : str
-        Of all spans.
+        The same for all spans.
     first_id : int
-        Of the first span; the others count on.
+        Id of the first span; the others count on.
 
     Returns
     -------

@@ -37,23 +37,23 @@ class MeshSequence:
     ----------
     vertices : array, shape (T, V, 3)
         Metres in the camera frame (x right, y down, z forward). May stay on
-        disk; read stretches with :meth:`read`.
+        disk; read time ranges with :meth:`read`.
     faces : int32 array, shape (F, 3), or None
         Counter-clockwise seen from outside. None makes it a point cloud, which
         has no surface and takes visibility ``none`` only.
     timebase : Timebase
         One time per frame.
     source : str
-        Where it came from, for provenance.
+        Origin of the mesh, for provenance.
     notes : tuple of str
-        What the reader found and repaired or wants the user to know.
+        Remarks of the reader: repairs, and all else that the user should know.
     vertex_counts : int64 array, shape (V,), optional
-        How many vertices each stands for, after decimation; None: for itself.
+        Number of vertices that each stands for, after decimation; None: for itself.
     present : bool array, shape (T,), optional
         False where there is no person. Vertices hold the last known pose there, which
         nothing may be concluded from. None: there is one in every frame.
     uncertainty : VelocityUncertainty, optional
-        How well velocities are known; None: nothing is said of it.
+        Standard deviations of the velocities; None: not stated.
 
     Examples
     --------
