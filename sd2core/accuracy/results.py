@@ -51,58 +51,41 @@ class Spread:
 
 @dataclass(frozen=True)
 class Errors:
-    """Errors of a plan's map against the reference map of the same frames.
-
-    Parameters
-    ----------
-    l1 : float
-        Relative L1 of all frames together, after smoothing: sum of absolute
-        differences over the sum of the reference. A tolerance limits this error.
-    l1_raw : float
-        The same before smoothing, which hides errors.
-    l1_frames, l1_raw_frames : Spread
-        Relative L1 of single frames.
-    peak_mps, mean_mps : Spread
-        Absolute error of the strongest bin's velocity, and of the mean velocity
-        weighted by the map.
-    wrong_bins : Spread
-        Share of a frame's energy that lies in wrong bins (total variation of the
-        frame's distribution over velocity).
-    frames : int
-        Number of frames, counted for each side from which a kept mask was tried. Those
-        in which hardly anything moves are left out of the figures of single frames.
-    """
+    """Errors of a plan's map against the reference map of the same frames."""
 
     l1: float
-    l1_raw: float
-    l1_frames: Spread
+    """Relative L1 of all frames together, after smoothing: sum of absolute differences over the
+    sum of the reference. A tolerance limits this error."""
+    l1_raw: float  # the same before smoothing, which hides errors
+    l1_frames: Spread  # of single frames
     l1_raw_frames: Spread
     peak_mps: Spread
+    """Absolute error of the strongest bin's velocity."""
     mean_mps: Spread
+    """Absolute error of the mean velocity weighted by the map."""
     wrong_bins: Spread
+    """Share of a frame's energy that lies in wrong bins (total variation of the frame's
+    distribution over velocity)."""
     frames: int
+    """Number of frames, counted for each side from which a kept mask was tried. Those in which
+    hardly anything moves are left out of the figures of single frames."""
 
 
 @dataclass(frozen=True)
 class Cost:
     """Time and memory of a plan per frame, once the clip is prepared, for a new sensor place.
 
-    Parameters
-    ----------
-    one_thread_ms, all_cores_ms : Spread
-        Median and 95th percentile of repeated runs, taken in turns with those
-        of the other plans. Milliseconds per frame; the first is the thread's
-        own processor time, which other programs do not disturb.
-    peak_bytes : int
-        Most memory allocated at once while the sampled frames were computed.
-    setup_s : float
-        Once per clip: decimating and preparing the sampled frames.
+    Times are the median and the 95th percentile of repeated runs, taken in turns with those
+    of the other plans, in milliseconds per frame.
     """
 
     one_thread_ms: Spread
+    """The thread's own processor time, which other programs do not disturb."""
     all_cores_ms: Spread
     peak_bytes: int
+    """Most memory allocated at once while the sampled frames were computed."""
     setup_s: float
+    """Once per clip: decimating and preparing the sampled frames."""
 
 
 @dataclass(frozen=True)
@@ -132,37 +115,20 @@ class Machine:
 
 @dataclass(frozen=True)
 class Measurement:
-    """Cost and error of many plans on one scene and machine.
-
-    Parameters
-    ----------
-    family : {"histogram", "fmcw"}
-    reference : AccuracyPlan
-        Plan whose map the errors are relative to.
-    results : tuple of PlanResult
-        Cheapest first.
-    scene : str
-        Fingerprint of mesh, sensor and options.
-    frames : tuple of int
-        Frames of the clip that were sampled.
-    source : str
-        Name of the mesh.
-    convergence : tuple of (int, float)
-        FMCW: pieces per facet of the reference sum, and by how much the map
-        changed from the level before.
-    stale : bool
-        True if scene or machine have changed since.
-    """
+    """Cost and error of many plans on one scene and machine."""
 
     family: Family
-    reference: AccuracyPlan
-    results: tuple[PlanResult, ...]
-    scene: str
+    reference: AccuracyPlan  # errors are relative to its map
+    results: tuple[PlanResult, ...]  # cheapest first
+    scene: str  # fingerprint of mesh, sensor and options
     machine: Machine
-    frames: tuple[int, ...]
-    source: str = ""
+    frames: tuple[int, ...]  # of the clip that were sampled
+    source: str = ""  # name of the mesh
     convergence: tuple[tuple[int, float], ...] = ()
+    """FMCW: pieces per facet of the reference sum, and by how much the map changed from the level
+    before."""
     stale: bool = field(default=False, compare=False)
+    """True if scene or machine have changed since."""
 
     @property
     def front(self) -> tuple[PlanResult, ...]:
@@ -186,60 +152,37 @@ class Measurement:
 
 @dataclass(frozen=True)
 class Reason:
-    """Reason for one setting of a plan, in words with numbers.
-
-    Parameters
-    ----------
-    setting : str
-        "occlusion", "static", "range_law", "aliasing", "motion", "mask_age",
-        "mask_reuse", "geometry" or "weight".
-    modelled : bool
-        True if the scene requires it, so that the plan contains it.
-    value : float
-        The number that decided: a relative change of the map, or a share.
-    text : str
-        One sentence without a full stop.
-    """
+    """Reason for one setting of a plan, in words with numbers."""
 
     setting: str
-    modelled: bool
+    """One of occlusion, static, range_law, aliasing, motion, mask_age, mask_reuse, geometry and
+    weight."""
+    modelled: bool  # True if the scene requires it, so that the plan contains it
     value: float
-    text: str
+    """The number that decided: a relative change of the map, or a share."""
+    text: str  # one sentence without a full stop
 
 
 @dataclass(frozen=True)
 class Choice:
-    """Cheapest plan that holds a tolerance, or most accurate plan within a budget.
-
-    Parameters
-    ----------
-    holds : bool
-        True if tolerance or budget is held; otherwise the plan is the best available.
-    errors : Errors
-        On the frames to check on.
-    cost_ms : float
-        Milliseconds per frame when all cores share the work: a forecast from the
-        processor time of its parts, measured while choosing.
-    tolerance : float or None
-        Relative L1 after smoothing that was asked for.
-    budget_ms : float or None
-        Milliseconds per frame that were allowed.
-    spent_s : float
-        How long the choosing took.
-    unseen : bool
-        True if the errors are of frames that were not used to choose; a clip of fewer
-        than ten frames has none to spare.
-    """
+    """Cheapest plan that holds a tolerance, or most accurate plan within a budget."""
 
     plan: AccuracyPlan
     holds: bool
-    errors: Errors
+    """True if tolerance or budget is held; otherwise the plan is the best available."""
+    errors: Errors  # on the frames to check on
     cost_ms: float
+    """Milliseconds per frame when all cores share the work: a forecast from the processor time of
+    its parts, measured while choosing."""
     reasons: tuple[Reason, ...]
     tolerance: float | None
+    """Requested relative L1 after smoothing."""
     budget_ms: float | None
-    spent_s: float
+    """Requested milliseconds per frame."""
+    spent_s: float  # duration of the choice
     unseen: bool = True
+    """True if the errors are of frames that were not used to choose; a clip of fewer than ten
+    frames has none to spare."""
 
     @property
     def summary(self) -> str:

@@ -48,28 +48,16 @@ STAGES: tuple[Stage, ...] = ("find", "refine", "fit", "write")
 
 @dataclass(frozen=True)
 class FitChoices:
-    """Options of a fit.
-
-    Parameters
-    ----------
-    person : Rectangle, optional
-        Around the person in one frame; the most prominent one by default.
-    focal_px, field_of_view_deg : float, optional
-        Of the camera; see :func:`~sd2core.body.camera.camera_of`.
-    stature_m : float, optional
-        The person's height.
-    max_gap_s : float
-        Longest gap without the person that is bridged.
-    resolution : {"low", "medium", "high"}
-        Of the mesh: 1,229, 5,000 or 13,348 vertices.
-    """
+    """Options of a fit."""
 
     person: Rectangle | None = None
+    """Around the person in one frame; the most prominent one by default."""
     focal_px: float | None = None
+    """Of the camera, like the field of view; see :func:`~sd2core.body.camera.camera_of`."""
     field_of_view_deg: float | None = None
-    stature_m: float | None = None
-    max_gap_s: float = DEFAULT_MAX_GAP_S
-    resolution: Resolution = "medium"
+    stature_m: float | None = None  # height of the person
+    max_gap_s: float = DEFAULT_MAX_GAP_S  # longest gap without the person that is bridged
+    resolution: Resolution = "medium"  # mesh of 1,229, 5,000 or 13,348 vertices
 
 
 @dataclass(frozen=True)

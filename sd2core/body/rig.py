@@ -80,10 +80,8 @@ class Rig:
     ----------
     skeleton
         Only the bones that the joints turn or the keypoints follow.
-    keypoints
-        On these bones.
     marks
-        The same, then a point of the chest and one a metre behind it.
+        Keypoints, then a point of the chest and one a metre behind it.
     axes
         Axes of each joint, in the rest pose; of shape (3, 1) or (3, 3).
     columns

@@ -138,51 +138,33 @@ class Landmarks(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class LandmarkTrack:
-    """33 landmarks of one person in every frame of a video.
-
-    Parameters
-    ----------
-    timebase : Timebase
-        One time per frame, T of them.
-    width, height : int
-        Of the upright picture, in pixels.
-    image_px : float32 array, shape (T, 33, 2)
-        Landmarks in the picture (also outside it); NaN in empty frames.
-    depth_px : float32 array, shape (T, 33)
-        The landmark model's own depth behind the hips at the scale of the picture, in pixels;
-        weak. NaN in empty frames.
-    world_m : float32 array, shape (T, 33, 3)
-        The landmark model's own place from the middle of the hips, x right, y down, z away; its
-        depth is weak. NaN in empty frames.
-    visibility : float32 array, shape (T, 33)
-        From 0 (hidden or outside the picture) to 1; 0 in empty frames.
-    confidence : float32 array, shape (T,)
-        Of the model that there is a person; 0 where it found none.
-    present : bool array, shape (T,)
-        False in empty frames: no person, and the gap too long to be bridged.
-    bridged : bool array, shape (T,)
-        Frames without a person, interpolated from their neighbours.
-    silhouette_frames : intp array, shape (K,)
-        Frames whose mask is kept.
-    silhouettes : uint8 array, shape (K, h, w)
-        Confidence that a pixel shows the person, 0 to 255, of the whole picture made smaller.
-    notes : tuple of str
-        Sentences about repairs: swapped sides, outliers, gaps.
-    """
+    """33 landmarks of one person in T frames of a video."""
 
     timebase: Timebase
-    width: int
+    width: int  # of the upright picture, in pixels
     height: int
     image_px: NDArray[np.float32]
+    """Landmarks in the picture (also outside it), (T, 33, 2); NaN in empty frames."""
     depth_px: NDArray[np.float32]
+    """The landmark model's own depth behind the hips at the scale of the picture, (T, 33), in
+    pixels; weak. NaN in empty frames."""
     world_m: NDArray[np.float32]
+    """The landmark model's own place from the middle of the hips, x right, y down, z away, (T, 33,
+    3); its depth is weak. NaN in empty frames."""
     visibility: NDArray[np.float32]
+    """From 0 (hidden or outside the picture) to 1, (T, 33); 0 in empty frames."""
     confidence: NDArray[np.float32]
+    """Of the model that there is a person, (T,); 0 where it found none."""
     present: NDArray[np.bool_]
+    """False in empty frames, (T,): no person, and the gap too long to be bridged."""
     bridged: NDArray[np.bool_]
-    silhouette_frames: NDArray[np.intp]
+    """Frames without a person, interpolated from their neighbours, (T,)."""
+    silhouette_frames: NDArray[np.intp]  # (K,), frames whose mask is kept
     silhouettes: NDArray[np.uint8]
+    """Confidence that a pixel shows the person, 0 to 255, of the whole picture made smaller; (K,
+    h, w)."""
     notes: tuple[str, ...] = ()
+    """Sentences about repairs: swapped sides, outliers, gaps."""
 
     def __len__(self) -> int:
         return len(self.timebase)

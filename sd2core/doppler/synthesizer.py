@@ -34,53 +34,32 @@ from sd2core.version import __version__
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """Consecutive frames of a synthetic Doppler map.
+    """Consecutive frames of a synthetic Doppler map."""
 
-    Parameters
-    ----------
-    values : float32 array, shape (bins, n)
-    raw : float64 array, shape (bins, n)
-        Values before any smoothing, with nulled bins emptied.
-    visible_share : float32 array, shape (n,)
-        Share of all vertices that the sensor sees; of a decimated mesh, of the
-        vertices that the kept ones stand for. Vertices that cannot change
-        the map (in nulled bins) are judged by the facing test.
-    beyond_share : float32 array, shape (n,)
-        Share of the visible vertices whose velocity lies beyond the axis.
-    quality : {"none", "facing", "depth", "frozen", "exact"}
-        The weakest visibility that was used: ``frozen`` falls back to facing
-        where no depth or exact visibility is kept.
-    processor_s : float
-        Processor time that visibility and counting took, all threads together.
-    """
-
-    values: NDArray[np.float32]
+    values: NDArray[np.float32]  # (bins, n)
     raw: NDArray[np.float64]
+    """Values before any smoothing, with nulled bins emptied."""
     visible_share: NDArray[np.float32]
+    """Share of all vertices that the sensor sees, (n,); of a decimated mesh, of the vertices that
+    the kept ones stand for. Vertices that cannot change the map (in nulled bins) are judged by
+    the facing test."""
     beyond_share: NDArray[np.float32]
+    """Share of the visible vertices whose velocity lies beyond the axis, (n,)."""
     quality: Quality
+    """The weakest visibility that was used: ``frozen`` falls back to facing where no depth or
+    exact visibility is kept."""
     processor_s: float = 0.0
+    """Processor time that visibility and counting took, all threads together."""
 
 
 @dataclass(frozen=True, eq=False)
 class FrameScattering:
-    """Velocity, range and visibility of the vertices of one frame.
+    """Velocity, range and visibility of the V vertices of one frame."""
 
-    Parameters
-    ----------
-    velocity_mps : float32 array, shape (V,)
-        Radial velocity, positive when approaching.
-    range_m : float32 array, shape (V,)
-        Distance from the sensor.
-    visible : bool array, shape (V,)
-    quality : {"none", "facing", "depth", "frozen", "exact"}
-        Visibility that was used.
-    """
-
-    velocity_mps: NDArray[np.float32]
-    range_m: NDArray[np.float32]
+    velocity_mps: NDArray[np.float32]  # radial, positive when approaching
+    range_m: NDArray[np.float32]  # distance from the sensor
     visible: NDArray[np.bool_]
-    quality: Quality
+    quality: Quality  # visibility that was used
 
 
 def map_notes(prepared: PreparedMesh, sensor: VirtualSensor, start: int, stop: int) -> list[str]:
@@ -365,17 +344,9 @@ class Synthesizer:
     ) -> CellUncertainty:
         """Uncertainty of the cells of :meth:`map` that follows from that of the mesh's velocities.
 
-        Model and limits are those of :mod:`sd2core.doppler.cell_uncertainty`.
-
-        Parameters
-        ----------
-        sensor, visibility, frames, progress
-            As for :meth:`map`.
-
-        Raises
-        ------
-        Sd2Error
-            When the mesh does not say how well its velocities are known.
+        Model and limits are those of :mod:`sd2core.doppler.cell_uncertainty`, arguments
+        those of :meth:`map`. Raises Sd2Error if the mesh does not say how well its
+        velocities are known.
         """
         start, stop = frames or (0, self.mesh.frame_count)
         if not 0 <= start < stop <= self.mesh.frame_count:
@@ -390,12 +361,9 @@ class Synthesizer:
         stop: int | None = None,
         visibility: Occlusion = "exact",
     ) -> NDArray[np.uint8] | None:
-        """Exact or depth visibility of frames ``start`` to ``stop`` from this place, if kept.
+        """Exact or depth visibility (n, V) of frames ``start`` to ``stop``, if kept for this place.
 
-        Returns
-        -------
-        uint8 array, shape (n, V), or None
-            Vertices that cannot change the map hold the facing test.
+        Vertices that cannot change the map hold the facing test.
         """
         stop = self.mesh.frame_count if stop is None else stop
         parts = []

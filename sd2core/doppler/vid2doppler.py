@@ -37,23 +37,11 @@ def velocities(
 ) -> NDArray[np.float64]:
     """Velocity −(Δp·p)/|p|·fps of each vertex, then its zero-padded mean over five frames.
 
-    Parameters
-    ----------
-    positions : float array, shape (n, 3, V)
-        Frames from ``first`` on: at least from ``start - 3`` to ``stop + 2``, as
-        far as the recording goes.
-    start, stop : int
-        Frames wanted.
-    frame_count : int
-        Length of the recording, where the zero padding begins.
-    presence : Presence, optional
-        Of all frames of the recording. Frames without a person cut it into recordings of
-        their own.
-
-    Returns
-    -------
-    float64 array, shape (stop - start, V)
-        m/s, positive when approaching.
+    ``positions`` (n, 3, V) are those of frames from ``first`` on: at least from ``start -
+    3`` to ``stop + 2``, as far as the recording goes; the zero padding begins beyond
+    ``frame_count``. Presence is that of all frames of the recording: frames without a
+    person cut it into recordings of their own. The result (stop - start, V) is in m/s,
+    positive when approaching.
     """
     low, high = max(start - TAPS // 2, 0), min(stop + TAPS // 2, frame_count)
     instant = np.zeros((stop - start + TAPS - 1, positions.shape[2]))

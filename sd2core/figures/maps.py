@@ -116,22 +116,12 @@ def draw_maps(
     labels: Labels | None = None,
     heading: str = "",
 ) -> Figure:
-    """Draw maps on one time axis.
+    """Draw maps on one time axis, from top to bottom, between two times.
 
-    Parameters
-    ----------
-    rows : sequence of MapRow
-        From top to bottom.
-    start_s, end_s : float
-        Part that is shown.
-    difference : tuple of int, optional
-        Numbers of two rows: the level of the first minus that of the second as a last row.
-    colours : tuple of str
-        Of negative and positive differences.
-    labels : Labels, optional
-        Drawn below the maps, and their edges on them; none where none is in view.
-    heading : str
-        Subject of the maps, with the word simulated where it is.
+    ``difference`` names two rows: the level of the first minus that of the second is a last
+    row, in ``colours`` of negative and positive differences. Labels are drawn below the
+    maps, and their edges on them, where any is in view. The heading is the subject of the
+    maps, with the word simulated where it is.
     """
     from matplotlib.figure import Figure
 

@@ -28,26 +28,16 @@ _SLACK_S = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """Knots of a trajectory: the frames, and ``oversampling - 1`` moments between each two.
+    """Knots of a trajectory: the frames, and ``oversampling - 1`` moments between each two."""
 
-    Parameters
-    ----------
-    frame_times_s : float64 array, shape (T,)
-    oversampling : int
-        Any number from 1.
-    smoothing_s : float
-        Sigma of a zero-phase Gaussian; 0 leaves the path alone. A straight line
-        is fitted under the Gaussian, so uniform motion stays as it is, up to
-        both ends of the recording.
-    presence : Presence, optional
-        Of the frames. Frames without a person separate paths of their own; knots
-        without a person are at the frame before.
-    """
-
-    frame_times_s: NDArray[np.float64]
+    frame_times_s: NDArray[np.float64]  # (T,)
     oversampling: int = 1
     smoothing_s: float = 0.0
+    """Sigma of a zero-phase Gaussian; 0 leaves the path alone. A straight line is fitted under the
+    Gaussian, so uniform motion stays as it is, up to both ends of the recording."""
     presence: Presence | None = None
+    """Of the frames. Frames without a person separate paths of their own; knots without a person
+    are at the frame before."""
 
     def __post_init__(self) -> None:
         if self.oversampling < 1:

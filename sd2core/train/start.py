@@ -50,22 +50,11 @@ class Ending:
 def begin(
     config: TrainConfig, out: Path, *, command: str = "", watch: Watch | None = None
 ) -> Ending:
-    """Train a model.
+    """Train a model in a new or empty folder, or in that of a run that failed at once.
 
-    Parameters
-    ----------
-    out : Path
-        Folder of the run; new, empty, or of a run that failed before it had learnt
-        anything.
-    command : str
-        Command line that is kept with the model.
-    watch : callable, optional
-        Called with every event of the progress.
-
-    Raises
-    ------
-    Sd2Error
-        For what the user can mend; the run's folder then says it, too, if it was made.
+    ``command`` is kept with the model; ``watch`` is called with every event of the
+    progress. Raises Sd2Error for what the user can mend; the run's folder then says it,
+    too, if it was made.
     """
     check(config)
     folder = TrainingFolder(out)
