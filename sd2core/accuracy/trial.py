@@ -33,22 +33,12 @@ def synthesizer_for(
     *,
     like: Synthesizer | None = None,
 ) -> Synthesizer:
-    """Create the synthesizer of a counting plan.
+    """Create the synthesizer of a counting plan for a full mesh.
 
-    Parameters
-    ----------
-    mesh : MeshSequence
-        Full mesh.
-    options : SynthesisOptions
-        For what a plan does not choose: axis, nulled bins, range law, smoothing.
-    like : Synthesizer, optional
-        Synthesizer of a plan that keeps as many vertices; its decimated mesh, and
-        its prepared frames where possible, are shared.
-
-    Raises
-    ------
-    Sd2Error
-        For an FMCW plan, or a plan that this mesh cannot have.
+    ``options`` are for what a plan does not choose: axis, nulled bins, range law,
+    smoothing. ``like`` is the synthesizer of a plan that keeps as many vertices; its
+    decimated mesh, and its prepared frames where possible, are shared. Raises Sd2Error for
+    an FMCW plan, or a plan that this mesh cannot have.
     """
     if plan.family != "histogram":
         raise Sd2Error(f"The plan is {plan}", "a plan that counts vertices")

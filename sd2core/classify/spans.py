@@ -55,8 +55,6 @@ def predicted_spans(
     ----------
     probabilities : float array, shape (frames, classes)
         Rows add up to 1.
-    timebase : Timebase
-        Of the frames.
     classes : sequence of str
         Names of the columns; they become labels.
     present : bool array, shape (frames,), optional
@@ -64,8 +62,6 @@ def predicted_spans(
         pause of the recording.
     background : str
         The class that makes no spans.
-    track : str
-        Of all spans.
     first_id : int
         Of the first span; the others count on.
 

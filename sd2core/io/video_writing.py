@@ -25,26 +25,12 @@ def write_video(
     crf: int = 21,
     preset: str = "slow",
 ) -> None:
-    """Encode sRGB pictures as H.264 in MP4.
+    """Encode sRGB pictures (height, width, 3) as H.264 in MP4.
 
-    Parameters
-    ----------
-    frames : iterable of uint8 arrays, shape (height, width, 3)
-    frames_per_s : int
-        Frame k is shown at ``k / frames_per_s`` unless times are given.
-    size : (int, int)
-        Width and height, both even.
-    times_s : float64 array, shape (frames,), optional
-        When each frame is shown; the first at 0 s.
-    crf : int
-        The constant rate factor of x264: less is better, 18 is hard to tell from the source.
-    preset : str
-        Speed preset of x264: slower ones make smaller files.
-
-    Raises
-    ------
-    Sd2Error
-        When this build of PyAV has no H.264 encoder.
+    Width and height are even. Frame k is shown at ``k / frames_per_s``, or at its time in
+    ``times_s``, the first of which is 0. ``crf`` and ``preset`` are those of x264: a lower
+    constant rate factor is better (18 is hard to tell from the source), a slower preset
+    makes a smaller file. Raises Sd2Error if this build of PyAV has no H.264 encoder.
     """
     import av
 

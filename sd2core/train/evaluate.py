@@ -42,22 +42,12 @@ def evaluate(
 ) -> Evaluation:
     """Measure models, and for comparison filters that need no training.
 
-    Parameters
-    ----------
-    models : sequence of TrainedDenoiser
-        The filters are fitted on the subjects that the first model learnt from, as far as
-        they are there; else on all that are not judged.
-    subjects : iterable of str, optional
-        Subjects to judge; by default the test subjects of the first model, or all.
-    first_only : bool
-        Judge only what every take's own sensor saw.
-    progress : callable
-        Called with takes.
+    The filters are fitted on the subjects that the first model learnt from, as far as they
+    are there; else on all that are not judged. By default the test subjects of the first
+    model are judged, or all, with ``first_only`` on what every take's own sensor saw.
+    Progress counts takes.
 
-    Raises
-    ------
-    Sd2Error
-        When a model does not fit the pairs, or a subject has no take.
+    Raises Sd2Error if a model does not fit the pairs, or a subject has no take.
     """
     for model in models:
         _check_fits(model.card, pairs)
