@@ -14,7 +14,7 @@ from sd2core.errors import Sd2Error
 from sd2core.maps import MapKind
 
 _SLACK_FRAMES = 0.01
-"""Of times that were rounded."""
+"""Tolerance for times that were rounded."""
 
 
 def clips_of_dataset(dataset: Dataset, kind: MapKind) -> ClipSet:

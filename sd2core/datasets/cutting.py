@@ -31,7 +31,7 @@ class Clip:
 
     start: int  # First frame of the source.
     stop: int  # End of its frames, exclusive.
-    times_s: NDArray[np.float64]  # Of its frames as segments hold them.
+    times_s: NDArray[np.float64]  # Times of its frames as segments hold them.
     resampled: bool  # True if these are other times than those of the source.
     starts: NDArray[np.int64]  # First frames of the segments, within the clip.
 

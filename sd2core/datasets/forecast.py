@@ -39,7 +39,7 @@ class Forecast:
     of_kind: dict[MapKind, int]
     split: Split
     frame_rate_hz: float
-    total_bytes: int  # Of the arrays before compression.
+    total_bytes: int  # Size of the arrays before compression.
     failed: tuple[str, ...] = ()  # Sources that cannot be read, each with its reason.
 
     def of_split(self) -> dict[str, int]:

@@ -19,7 +19,7 @@ from sd2core.recording.recording import SUFFIX, is_recording, open_recording
 LabelledKind = Literal["pairs", "data set", "recording", "radar file"]
 
 ONE_PERSON = "one person"
-"""Who a radar file is of, where that is not said."""
+"""Subject of a radar file that does not name one."""
 
 _EXPECTED = "a campaign or other pairs, a data set, a labelled recording, or a labelled radar file"
 
@@ -46,9 +46,9 @@ class LabelledFacts:
     path: Path
     kind: LabelledKind
     subjects: tuple[str, ...]  # Names in the source itself.
-    # Of ``synthetic``, ``denoised`` and ``radar`` those that there are, or can be made.
+    # Those of ``synthetic``, ``denoised`` and ``radar`` that exist or can be made.
     maps: tuple[str, ...]
-    # Of the movements, each counted once; None where only reading the maps would tell.
+    # Length of the movements, each counted once; None where only reading the maps would tell.
     duration_s: float | None = None
     simulated: bool = False  # True if its radar is simulated.
     placements: int = 1

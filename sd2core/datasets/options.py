@@ -12,7 +12,7 @@ from sd2core.maps import MapKind
 from sd2core.pairs.segments import LENGTH, OVERLAP, segment_starts
 
 LabelRule = Literal["foreground", "majority"]
-"""How a segment gets its label from those of its frames; see :class:`DatasetOptions`."""
+"""Rule for a segment's label from those of its frames; see :class:`DatasetOptions`."""
 
 LABEL_RULES: tuple[LabelRule, ...] = get_args(LabelRule)
 MIN_SHARE = 0.2

@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 
 _STEPS = 1000
 _COUNTED_SHARE = 0.05
-"""Of the time that a source takes whose radar is simulated."""
+"""Share of the time that a source takes whose radar is simulated."""
 
 
 @dataclass(frozen=True)

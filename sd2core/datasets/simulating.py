@@ -25,7 +25,7 @@ from sd2core.sensor import VelocityAxis, VirtualSensor
 from sd2core.timebase import Timebase
 
 CLUTTER: Clutter = "mean"
-"""How the static room is taken out of a capture's map, computed or recorded."""
+"""Filter that takes the static room out of a capture's map, computed or recorded."""
 
 _BLOCK_FRAMES = 256
 _BLOCK_BYTES = 64 << 20
@@ -40,7 +40,7 @@ class Simulation:
     """
 
     radar: RadarConfig = PAPER_RADAR
-    # Of phases and noise; every mesh and place has its own from it, see :func:`seed_of`.
+    # Seed of phases and noise; each mesh and place has its own from it, see :func:`seed_of`.
     seed: int = 0
 
     def as_json(self) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from sd2core.progress import Progress
 from sd2core.sensor import Vector, VirtualSensor, spherical_from_position
 
 BACKGROUND = "background"
-"""What frames are called in which nothing is labelled; always label 0."""
+"""Label of frames in which nothing is labelled; always label 0."""
 
 KINDS: tuple[MapKind, ...] = ("synthetic", "denoised", "simulated", "real")
 assert {*KINDS} == {*get_args(MapKind)}
@@ -27,7 +27,7 @@ FROM_A_MESH: tuple[MapKind, ...] = ("synthetic", "denoised")
 """Kinds that say nothing where there is no person; the others are of a radar."""
 
 _LONGEST_LIST = 64
-"""Of provenance: what is longer is a number per frame, and is left out."""
+"""Longest list kept in the provenance: a longer one has a number per frame, and is left out."""
 
 
 class SourceKey(NamedTuple):
@@ -48,7 +48,7 @@ class SourceKey(NamedTuple):
 class Outline:
     """Outline of a source before its maps are made, enough to count segments."""
 
-    kinds: tuple[MapKind, ...]  # Of its maps.
+    kinds: tuple[MapKind, ...]  # Kinds of its maps.
     times_s: NDArray[np.float64]
     present: NDArray[np.bool_] | None  # Frames with a person; None: all.
     label: NDArray[np.integer]  # Index into ``labels``, per frame.

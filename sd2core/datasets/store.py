@@ -33,11 +33,11 @@ from sd2core.io.kinds import is_dataset
 SOURCES_NAME = "sources.jsonl"
 LOCK_NAME = ".sd2-lock"
 FLUSH_EVERY_S = 2.0
-"""What a killed writer may lose; a source that takes longer is written at once."""
+"""Time of work that a killed writer may lose; a source that takes longer is written at once."""
 _TOGETHER = 16 * CHUNK_SEGMENTS
 """Segments that are written together."""
 _TORN = "*.partial"
-"""What a killed Zarr leaves of a chunk that it was writing."""
+"""Files that a killed Zarr leaves of a chunk that it was writing."""
 
 
 class SegmentStore:

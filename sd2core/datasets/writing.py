@@ -34,7 +34,7 @@ from sd2core.progress import Progress, silent
 from sd2core.train.data import Split
 
 _STEPS = 1000
-"""Of progress per source."""
+"""Steps of progress per source."""
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ _FACETS_PER_STEP = 20_000
 class Converged:
     """A frame's signal on facets cut until nothing changes."""
 
-    signal: NDArray[np.float64]  # Of the finest cut, (receivers, chirps, samples).
+    signal: NDArray[np.float64]  # Signal of the finest cut, (receivers, chirps, samples).
     pieces: tuple[int, ...]  # Triangles per facet that were tried: 1, 4, 16 …
     # L1 of the change of :func:`doppler_marginal` from one to the next of these.
     changes: tuple[float, ...]

@@ -22,7 +22,7 @@ from sd2core.mesh.presence import runs
 from sd2core.timebase import Timebase
 
 Answer = tuple[str, ...]
-"""What one annotator says of a frame: its labels in alphabetical order, perhaps none."""
+"""One annotator's labels of a frame, in alphabetical order, perhaps none."""
 
 _ROUNDING_S = 1e-6
 

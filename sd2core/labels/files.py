@@ -37,7 +37,7 @@ SET_FORMAT: Literal["sd2-label-set"] = "sd2-label-set"
 VERSION = 1
 
 NO_LABEL = "no label"
-"""What a span of a recording is called that says nothing."""
+"""Label of a span of a recording that names none."""
 
 
 class _LabelsDocument(LabelsEntry):

@@ -29,7 +29,7 @@ SURE_DB = 20.0
 """A span that is found with this threshold as well has the confidence 1."""
 
 _QUIET_SHARE = 0.25
-"""Of the frames; what each bin does not exceed in them is its quiet level."""
+"""Share of the frames in which a bin does not exceed its quiet level."""
 _FLOOR = 1e-3
 """Share of the strongest frame below which nothing is told apart from nothing."""
 _SMOOTHING_S = 0.1

@@ -21,7 +21,7 @@ from sd2core.errors import Sd2Error
 from sd2core.sensor import VelocityAxis
 
 PairKind = Literal["simulated", "real"]
-"""Whether the targets come from a simulated radar or from a real one."""
+"""Radar that the targets come from: simulated or real."""
 
 FORMAT = "sd2-pairs"
 VERSION = 1

@@ -41,7 +41,7 @@ class Outfit:
     shirt: Colour = SHIRT
     trousers: Colour = TROUSERS
     shoes: Colour = SHOES
-    pattern: Pattern = "plain"  # Of the shirt.
+    pattern: Pattern = "plain"  # Pattern of the shirt.
     second: Colour = WHITES  # The pattern's other colour.
     period_m: float = 0.08  # Distance after which the pattern repeats.
     # From the shoulder along the arm: 0.03 leaves the arm bare, 0.19 is a T-shirt, 0.5 reaches the
@@ -57,7 +57,7 @@ class Clothes:
     # Positive inside, (V, 8): trousers, shirt, shoes, hair, brows, whites of the eyes, irises,
     # lips; metres for the first four.
     fields: Singles
-    places_m: Singles  # Of the vertices at rest, (V, 3): what a pattern is printed on.
+    places_m: Singles  # Vertices at rest, (V, 3), on which a pattern is printed.
     outfit: Outfit = field(default_factory=Outfit)
 
     @classmethod

@@ -50,7 +50,7 @@ class GroupErrors:
     gain: Floats  # (n, 1 + m).
     bias: Floats  # Covariance of what is constant within a clip, (n, n).
     spread: Floats  # Covariance of the Gaussian process, (n, n).
-    length: float  # Of its kernel, in the unit of the features.
+    length: float  # Length of the kernel, in the unit of the features.
     mixing: float  # Exponent of its kernel.
 
     def draw(self, rng: np.random.Generator) -> ErrorFunction:
@@ -89,7 +89,7 @@ class FitErrors:
     """Statistics of the errors of fits, from which those of one clip are drawn."""
 
     groups: Mapping[Group, GroupErrors]  # ``place``, ``trunk``, ``arm``, ``leg``.
-    shape_mean: Floats  # Of the errors of the shape's coefficients, (K,).
+    shape_mean: Floats  # Mean errors of the shape's coefficients, (K,).
     shape_covariance: Floats  # Their mean square about that, (K, K).
     provenance: dict[str, Any] = field(default_factory=dict)  # Measured fits and the method.
 

@@ -48,7 +48,7 @@ class Posture:
 
     # Rows, (T, 3, 3): to the right, down and along the line of sight, in the camera frame.
     axes: Floats
-    place_m: Floats  # Of the pelvis, (T, 3), in those axes (so along the last but for rounding).
+    place_m: Floats  # Pelvis, (T, 3), in those axes (so along the last but for rounding).
     trunk: Floats  # Turns of :data:`TRUNK` against rest, (T, 3, 3, 3), in the camera frame.
     # Unit directions in the axes of the line of sight, (T, n, 3). Those of the left side are
     # mirrored, so that both sides can be told together.

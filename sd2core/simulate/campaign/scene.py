@@ -28,7 +28,7 @@ _CROSS_SECTION_M2 = (0.05, 5.0)
 class Setting:
     """Scene of one take."""
 
-    place_m: Floats  # Of the floor under the person, in the camera frame.
+    place_m: Floats  # Point of the floor under the person, in the camera frame.
     heading_deg: float  # From facing along the camera's axis.
     sensors: tuple[VirtualSensor, ...]  # The take's own beside the camera, then others.
     reflectors: tuple[Reflector, ...]

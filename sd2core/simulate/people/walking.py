@@ -20,7 +20,7 @@ _STEP = 0.36
 class Footwork:
     """Pelvis and feet on the floor, in statures."""
 
-    place: Floats  # Of the pelvis, (T, 2): x, z on the floor.
+    place: Floats  # Pelvis, (T, 2): x, z on the floor.
     heading_deg: Floats  # Turn about the vertical; 0 faces towards -z.
     sink: Floats  # Distance of the pelvis below its height when standing.
     feet: Floats  # x, z and height above its rest of left and right ankle, (T, 2, 3).
