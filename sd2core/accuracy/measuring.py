@@ -167,8 +167,7 @@ class WaveTrial:
 
     mesh: MeshSequence  # with faces
     sensor: VirtualSensor
-    options: SynthesisOptions
-    """Only the axis and the smoothing along velocity are used."""
+    options: SynthesisOptions  # only the axis and the smoothing along velocity are used
     frames: tuple[int, ...]
     config: RadarConfig = PAPER_RADAR
     wave: WaveOptions = field(default_factory=WaveOptions)  # for what a plan does not choose

@@ -59,10 +59,8 @@ class Errors:
     l1_raw: float  # the same before smoothing, which hides errors
     l1_frames: Spread  # of single frames
     l1_raw_frames: Spread
-    peak_mps: Spread
-    """Absolute error of the strongest bin's velocity."""
-    mean_mps: Spread
-    """Absolute error of the mean velocity weighted by the map."""
+    peak_mps: Spread  # absolute error of the strongest bin's velocity
+    mean_mps: Spread  # absolute error of the mean velocity weighted by the map
     wrong_bins: Spread
     """Share of a frame's energy that lies in wrong bins (total variation of the frame's
     distribution over velocity)."""
@@ -79,13 +77,10 @@ class Cost:
     of the other plans, in milliseconds per frame.
     """
 
-    one_thread_ms: Spread
-    """The thread's own processor time, which other programs do not disturb."""
+    one_thread_ms: Spread  # the thread's own processor time, which other programs do not disturb
     all_cores_ms: Spread
-    peak_bytes: int
-    """Most memory allocated at once while the sampled frames were computed."""
-    setup_s: float
-    """Once per clip: decimating and preparing the sampled frames."""
+    peak_bytes: int  # most memory allocated at once while the sampled frames were computed
+    setup_s: float  # once per clip: decimating and preparing the sampled frames
 
 
 @dataclass(frozen=True)
@@ -158,8 +153,7 @@ class Reason:
     """One of occlusion, static, range_law, aliasing, motion, mask_age, mask_reuse, geometry and
     weight."""
     modelled: bool  # True if the scene requires it, so that the plan contains it
-    value: float
-    """The number that decided: a relative change of the map, or a share."""
+    value: float  # the number that decided: a relative change of the map, or a share
     text: str  # one sentence without a full stop
 
 
@@ -168,17 +162,14 @@ class Choice:
     """Cheapest plan that holds a tolerance, or most accurate plan within a budget."""
 
     plan: AccuracyPlan
-    holds: bool
-    """True if tolerance or budget is held; otherwise the plan is the best available."""
+    holds: bool  # true if tolerance or budget is held; otherwise the plan is the best available
     errors: Errors  # on the frames to check on
     cost_ms: float
     """Milliseconds per frame when all cores share the work: a forecast from the processor time of
     its parts, measured while choosing."""
     reasons: tuple[Reason, ...]
-    tolerance: float | None
-    """Requested relative L1 after smoothing."""
-    budget_ms: float | None
-    """Requested milliseconds per frame."""
+    tolerance: float | None  # requested relative L1 after smoothing
+    budget_ms: float | None  # requested milliseconds per frame
     spent_s: float  # duration of the choice
     unseen: bool = True
     """True if the errors are of frames that were not used to choose; a clip of fewer than ten

@@ -51,8 +51,7 @@ class Sample:
     frames: NDArray[np.intp]
     """Frames of the clip that are read: every run with the frames around it, which its velocities,
     smoothing and reused masks look at."""
-    chosen_on: tuple[Run, ...]
-    """Runs to choose a plan on."""
+    chosen_on: tuple[Run, ...]  # runs to choose a plan on
     checked_on: tuple[Run, ...]
     """Runs to check it on; the same run in a clip of fewer than ten frames."""
 

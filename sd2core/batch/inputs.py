@@ -32,8 +32,7 @@ class Origin:
     """Recording, video or mesh of a batch."""
 
     path: str
-    name: str
-    """Path from the folder that holds all of them: unique within the batch."""
+    name: str  # path from the folder that holds all of them: unique within the batch
     subject: str
 
 
@@ -69,8 +68,7 @@ class Inspection:
     sensor: VirtualSensor  # the recording's own
     mesh: MeshInput | None = None
     video: VideoInput | None = None
-    about: str = ""
-    """Hash of what else a data set takes from it: labels, and what its radar saw."""
+    about: str = ""  # hash of what else a data set takes from it: labels, and what its radar saw
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Inspection:

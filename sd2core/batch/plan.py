@@ -162,8 +162,7 @@ class Export(_Section):
     """Maps to take, where a recording has them; a radar's own with the recording's sensor."""
     segment_frames: Annotated[int, Field(ge=2, le=10_000)] = LENGTH
     overlap_frames: Annotated[int, Field(ge=0)] = OVERLAP
-    frame_rate_hz: Positive | None = None
-    """Of all segments; otherwise that of the first source."""
+    frame_rate_hz: Positive | None = None  # of all segments; otherwise that of the first source
     validation_subjects: tuple[Text, ...] | None = None
     """Chosen automatically if not given, like the test subjects."""
     test_subjects: tuple[Text, ...] | None = None
@@ -181,8 +180,7 @@ class BatchPlan(_Section):
 
     format: Literal["sd2-batch-plan"] = FORMAT
     version: Literal[1] = VERSION
-    out: Text
-    """Folder of the results, relative to the plan's folder."""
+    out: Text  # folder of the results, relative to the plan's folder
     recordings: Recordings
     placements: Mapping[str, Any] = Field(default_factory=lambda: {"kind": "recording"})
     """Sensor positions: ``kind = "recording"`` (each recording's own sensor, the camera where it

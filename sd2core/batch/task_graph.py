@@ -34,13 +34,11 @@ _MAPS: tuple[Step, ...] = ("synthesise", "denoise", "simulate")
 class PlannedMap:
     """Map of one recording from one place: one file per stretch."""
 
-    placement: int
-    """0 is the recording's own sensor; 1 and up are the places of the plan."""
+    placement: int  # 0 is the recording's own sensor; 1 and up are the places of the plan
     sensor: VirtualSensor
     stretches: tuple[Stretch, ...]
     synthesis: tuple[Task, ...]  # one per stretch
-    denoising: Task | None = None
-    """Covers all stretches, because a model carries its state on."""
+    denoising: Task | None = None  # covers all stretches, because a model carries its state on
     simulation: tuple[Task, ...] = ()  # one per stretch, or none
 
     @property

@@ -33,15 +33,13 @@ class Task:
     """Function of paths and small values whose result is a file."""
 
     step: Step
-    key: str
-    """Name of the result: tasks of one key have the same result."""
+    key: str  # name of the result: tasks of one key have the same result
     origin: Origin
     details: Mapping[str, Any]  # arguments, as JSON can hold them
     placement: int | None = None
     frames: int = 0  # to work on, for rates
     group: str = ""  # best done by one process
-    out: str = ""
-    """File that is written last; empty where that is not a file of its own."""
+    out: str = ""  # file that is written last; empty where that is not a file of its own
 
     def record(self, folder: Path, most_deaths: int = 2) -> dict[str, Any]:
         """Return what is sent to a worker."""
@@ -61,8 +59,7 @@ class Outcome:
     """Result of one task, as the worker sends it back."""
 
     seconds: float = 0.0
-    error: dict[str, str] | None = None
-    """``found``, ``expected`` and ``remedy`` of a failed task."""
+    error: dict[str, str] | None = None  # "found", "expected" and "remedy" of a failed task
     fatal: bool = False  # True if no other task can be done either
     deaths: int = 0  # workers that died during earlier attempts
     worker_died: bool = False  # True if the task is given up because of that

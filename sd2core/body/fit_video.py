@@ -64,8 +64,7 @@ class FitChoices:
 class FitReport:
     """Callbacks of a running fit; each may raise ``Cancelled``."""
 
-    progress_of: Callable[[Stage], Progress]
-    """Gives the progress callback of a stage that begins."""
+    progress_of: Callable[[Stage], Progress]  # gives the progress callback of a stage that begins
     started: Callable[[VideoReader, bool], None]
     """Called with the open video, and True if a stopped run is continued."""
     on_frame: Callable[[Stage, int, NDArray[np.float32], NDArray[np.float32]], None]

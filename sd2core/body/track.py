@@ -163,8 +163,7 @@ class LandmarkTrack:
     silhouettes: NDArray[np.uint8]
     """Confidence that a pixel shows the person, 0 to 255, of the whole picture made smaller; (K,
     h, w)."""
-    notes: tuple[str, ...] = ()
-    """Sentences about repairs: swapped sides, outliers, gaps."""
+    notes: tuple[str, ...] = ()  # sentences about repairs: swapped sides, outliers, gaps
 
     def __len__(self) -> int:
         return len(self.timebase)

@@ -30,17 +30,14 @@ class ClassifierCard:
 
     model: str  # a name of sd2core.classify.defaults.MODELS
     options: Mapping[str, Any]  # of the network
-    features: Features
-    """Its input, and the maps that it is computed from."""
+    features: Features  # its input, and the maps that it is computed from
     classes: tuple[str, ...]  # in the order of its answers; at least two
     trained_on: tuple[str, ...]  # sd2core.maps.MapKind
-    delay_frames: int = 0
-    """Number of frames seen after one before it is answered."""
+    delay_frames: int = 0  # number of frames seen after one before it is answered
     title: str = ""  # shown in lists; the file's name where it is empty
     about: Mapping[str, Any] = field(default_factory=dict)
     """``data``, ``command``, ``metrics`` and what else fits into JSON."""
-    parameters: int = 0
-    """Number of weights; known when the card comes from a file."""
+    parameters: int = 0  # number of weights; known when the card comes from a file
     path: Path | None = None
 
     def __post_init__(self) -> None:

@@ -48,8 +48,7 @@ QUICK_SHARES = (0.1, 1.0)
 class TableOptions:
     """Options of a comparison: its trainings."""
 
-    seeds: int = 5
-    """Each is another split of people, another draw and another network."""
+    seeds: int = 5  # each is another split of people, another draw and another network
     shares: tuple[float, ...] = SHARES  # of the learning curve, ascending, up to 1
     network: Network = field(default_factory=Network)
     """Network of all trainings but those that compare networks."""
@@ -125,8 +124,7 @@ class Table:
     kind: str  # "simulated" or "real": the radar
     options: TableOptions
     runs: tuple[Run, ...]
-    by_movement: bool
-    """True with one subject only: nothing is said about other people."""
+    by_movement: bool  # true with one subject only: nothing is said about other people
 
     def of(self, condition: Condition) -> tuple[Run, ...]:
         """Return the runs of one condition, by seed."""

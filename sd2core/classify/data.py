@@ -38,14 +38,11 @@ class Clip:
     """Uninterrupted part of a map with the class of every frame."""
 
     subject: str
-    movement: str
-    """The same for all maps of one movement: kinds, and places of the sensor."""
+    movement: str  # the same for all maps of one movement: kinds, and places of the sensor
     kind: MapKind
     energies: NDArray[np.float32]  # (frames, bins)
-    label: NDArray[np.int8]
-    """Index into the classes, or :data:`UNKNOWN`; shape (frames,)."""
-    placement: int = 0
-    """0 for the movement's own sensor; 1 and up are others (range synthesis)."""
+    label: NDArray[np.int8]  # index into the classes, or UNKNOWN; shape (frames,)
+    placement: int = 0  # 0 for the movement's own sensor; 1 and up are others (range synthesis)
 
     def __post_init__(self) -> None:
         if self.energies.ndim != 2 or len(self.energies) != len(self.label):

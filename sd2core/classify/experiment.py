@@ -103,8 +103,7 @@ class Chosen:
     added: tuple[Clip, ...]
     validation: tuple[Clip, ...]  # of the radar, each movement's own sensor
     test: tuple[Clip, ...]  # likewise
-    moved: tuple[Clip, ...]
-    """Test movements as the radar saw them from elsewhere."""
+    moved: tuple[Clip, ...]  # test movements as the radar saw them from elsewhere
     by_movement: bool  # see sd2core.classify.splitting.Parts
 
 

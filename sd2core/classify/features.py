@@ -50,8 +50,7 @@ _BLOCK = 4096
 class Heard(NamedTuple):
     """State of the features after some frames."""
 
-    medians: NDArray[np.float64]
-    """Of the last frames (up to 5 s), the newest at the end."""
+    medians: NDArray[np.float64]  # of the last frames (up to 5 s), the newest at the end
     loudest_log: float
     """Logarithm of the loudest cell so far; minus infinity where there was no energy."""
 

@@ -30,8 +30,7 @@ class Memory(NamedTuple):
 
     heard: Heard
     network: State
-    owed: int = 0
-    """Frames of which the answer is not known yet."""
+    owed: int = 0  # frames of which the answer is not known yet
 
 
 class TrainedClassifier:

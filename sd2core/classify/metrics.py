@@ -50,10 +50,8 @@ class Score:
     """Score of a classifier on some clips."""
 
     classes: tuple[str, ...]
-    frames: Confusion
-    """Confusion matrix of frames, shape (classes, classes)."""
-    gestures: Confusion
-    """Of gestures: the class of most frames of a labelled gesture."""
+    frames: Confusion  # confusion matrix of frames, shape (classes, classes)
+    gestures: Confusion  # of gestures: the class of most frames of a labelled gesture
     latencies_s: NDArray[np.float64]
     """From the beginning of each recognised gesture until a frame of it is recognised."""
     missed: int  # gestures without any correct frame

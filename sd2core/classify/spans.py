@@ -26,8 +26,7 @@ class SpanOptions:
     min_duration_s: float = 0.2  # shorter ones are left out
     merge_gap_s: float = 0.1
     """Frames of other classes up to this long do not end a span, nor begin one."""
-    min_confidence: float = 0.0
-    """Spans whose class is less probable on average are left out."""
+    min_confidence: float = 0.0  # spans whose class is less probable on average are left out
 
     def __post_init__(self) -> None:
         for name in ("min_duration_s", "merge_gap_s"):

@@ -49,8 +49,7 @@ class TrainOptions:
     ssm_learning_rate: float = 0.003
     weight_decay: float = 0.01
     check_steps: int = 20  # between two validations
-    patience: int = 10
-    """Validations without a better one after which it ends; the best is kept."""
+    patience: int = 10  # validations without a better one after which it ends; the best is kept
     seed: int = 0
 
     def __post_init__(self) -> None:

@@ -151,8 +151,7 @@ class CarriedPatches(NamedTuple):
     """Patches that another surface took over."""
 
     patches: JointPatches
-    frame: int
-    """Common frame in which the two surfaces lie closest."""
+    frame: int  # common frame in which the two surfaces lie closest
     distance_m: float
     """Mean distance of the patches' vertices from those that replace them, there."""
 

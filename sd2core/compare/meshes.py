@@ -44,15 +44,12 @@ class Difference:
     """Differences of one mesh from the reference, per joint (J,)."""
 
     label: str
-    distance_m: Floats
-    """Mean distance of each joint over time, after the alignment."""
-    velocity_rms_mps: Floats
-    """RMS of the difference of the velocities along the line of sight."""
+    distance_m: Floats  # mean distance of each joint over time, after the alignment
+    velocity_rms_mps: Floats  # RMS of the difference of the velocities along the line of sight
     correlation: Floats  # of those velocities; NaN where one does not change
     jitter_mps3: Floats
     """Of this mesh by itself: RMS third difference, see :func:`sd2core.compare.measures.jitter`."""
-    map_l1: float
-    """Relative difference of the smoothed Doppler maps."""
+    map_l1: float  # relative difference of the smoothed Doppler maps
 
     def group(self, values: Floats, name: str) -> float:
         """Mean of one of the arrays over a group of :data:`GROUPS` (RMS of velocities)."""
@@ -65,8 +62,7 @@ class Comparison:
     """Result of :func:`compare_meshes`."""
 
     labels: tuple[str, ...]
-    reference: int
-    """Number of the mesh that the others are measured against."""
+    reference: int  # number of the mesh that the others are measured against
     times_s: Floats  # (T,), common to all
     sensor: VirtualSensor
     alignment: Alignment
@@ -79,8 +75,7 @@ class Comparison:
     """Frames that count, shape (T,): those in which every mesh has a person."""
     maps: tuple[DopplerMap, ...]
     differences: tuple[Difference, ...]  # of every mesh, the reference included
-    notes: tuple[str, ...]
-    """Interpolated, carried over or omitted parts, as sentences."""
+    notes: tuple[str, ...]  # interpolated, carried over or omitted parts, as sentences
 
     def as_dict(self) -> dict[str, Any]:
         """Everything but the curves and maps, for JSON."""

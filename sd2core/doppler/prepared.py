@@ -84,8 +84,7 @@ class Block:
     start: int
     stop: int
     frames: Frames
-    first_knot: int
-    """Number, in the whole clip, of the first knot in ``frames.positions``."""
+    first_knot: int  # number, in the whole clip, of the first knot in "frames.positions"
 
 
 @dataclass(eq=False)

@@ -37,8 +37,7 @@ class Stretch:
     """Consecutive frames of a synthetic Doppler map."""
 
     values: NDArray[np.float32]  # (bins, n)
-    raw: NDArray[np.float64]
-    """Values before any smoothing, with nulled bins emptied."""
+    raw: NDArray[np.float64]  # values before any smoothing, with nulled bins emptied
     visible_share: NDArray[np.float32]
     """Share of all vertices that the sensor sees, (n,); of a decimated mesh, of the vertices that
     the kept ones stand for. Vertices that cannot change the map (in nulled bins) are judged by

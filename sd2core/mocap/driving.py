@@ -63,10 +63,8 @@ class DrivenClip:
     puppet: Puppet
     clip: SkeletonClip
     pose: Pose
-    landmarks_m: Floats
-    """Joints on the moving body, shape (T, 33, 3)."""
-    residual_m: Floats
-    """Distance from those of the skeleton, shape (T, 33); NaN without one."""
+    landmarks_m: Floats  # joints on the moving body, shape (T, 33, 3)
+    residual_m: Floats  # distance from those of the skeleton, shape (T, 33); NaN without one
 
     def mesh(self, times_s: Floats, resolution: Resolution = "medium") -> MeshSequence:
         """The moving surface at any ascending times; vertices are posed where they are read.

@@ -21,8 +21,7 @@ class Marker:
     landmark: str  # of sd2core.body.track.LANDMARKS
     joint: int  # number in the skeleton
     sd_m: float  # of the joint's position in a frame
-    beside_sd_m: float
-    """Of its lasting distance from the landmark, fixed to the same bone."""
+    beside_sd_m: float  # of its lasting distance from the landmark, fixed to the same bone
 
 
 # Hands are noisy. What a Kinect calls hips, shoulders and feet lies elsewhere than in our

@@ -50,8 +50,7 @@ class BodyExtent:
     however the limbs move."""
     low_m: NDArray[np.float64]  # (n, 3), corners of the box around the body
     high_m: NDArray[np.float64]
-    points_m: NDArray[np.float32]
-    """Up to 200 vertices of each frame, shape (n, k, 3)."""
+    points_m: NDArray[np.float32]  # up to 200 vertices of each frame, shape (n, k, 3)
     velocity_mps: NDArray[np.float32]
     """Their motion to the next frame; zero where that one has no person."""
 

@@ -327,8 +327,7 @@ class PlacementCost:
 
     maps: int
     frames: int  # of each map
-    frame_ms: float
-    """Measured time per frame on all cores of the plan that holds the tolerance."""
+    frame_ms: float  # measured time per frame on all cores of the plan that holds the tolerance
     bins: int = 32  # of a map, along velocity
 
     @property

@@ -27,10 +27,8 @@ class Position:
     epoch: int = 0  # under way, from 0
     step: int = 0  # steps of this epoch that are done
     steps_done: int = 0  # in all
-    elapsed_s: float = 0.0
-    """Time of training, without pauses and without what a kill has lost."""
-    squares: float = 0.0
-    """Sum over the segments of this epoch of their mean square error."""
+    elapsed_s: float = 0.0  # time of training, without pauses and without what a kill has lost
+    squares: float = 0.0  # sum over the segments of this epoch of their mean square error
     segments: int = 0  # number of them
     best: dict[str, Any] | None = None
     """``epoch``, ``validation_rmse``, ``validation_mae_mps`` and ``score`` of the best epoch."""

@@ -255,8 +255,7 @@ class Draw(NamedTuple):
     """Segments in the order in which they are learnt from; all of shape (segments,)."""
 
     indices: NDArray[np.int64]
-    gains: NDArray[np.float32]
-    """Of power."""
+    gains: NDArray[np.float32]  # of power
     shares: NDArray[np.float64]
     """Where between its earliest and latest place each is cut, from 0 to below 1."""
 
@@ -268,8 +267,7 @@ class Order:
     segments: int
     batch_size: int
     seed: int
-    range_factor: float = 1.0
-    """Gains are drawn for ranges up to this factor nearer or farther."""
+    range_factor: float = 1.0  # gains are drawn for ranges up to this factor nearer or farther
 
     @property
     def steps(self) -> int:

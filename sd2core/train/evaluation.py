@@ -36,8 +36,7 @@ _PARTS = ("peak", "peak_all", "mean", "map")
 class Report:
     """Errors of one model."""
 
-    name: str
-    """Distinguishes it within its group: the file, or the filter."""
+    name: str  # distinguishes it within its group: the file, or the filter
     card: ModelCard
     seed: int | None
     all: Score

@@ -50,7 +50,7 @@ class Ending:
 def begin(
     config: TrainConfig, out: Path, *, command: str = "", watch: Watch | None = None
 ) -> Ending:
-    """Train a model in a new or empty folder, or in that of a run that failed at once.
+    """Train a model in a new or empty folder, or where a run failed before it learnt anything.
 
     ``command`` is kept with the model; ``watch`` is called with every event of the
     progress. Raises Sd2Error for what the user can mend; the run's folder then says it,

@@ -23,8 +23,7 @@ _BATCH = 256
 class Validation:
     """Errors on segments."""
 
-    rmse: float
-    """Of compressed values, over bins that are not nulled; equals the loss."""
+    rmse: float  # of compressed values, over bins that are not nulled; equals the loss
     mae_mps: float
     """Of the peak velocity per frame, as :mod:`sd2core.denoise.metrics` defines it, in frames in
     which something moves. A model begins each segment without a state; ``sd2 eval``, which
