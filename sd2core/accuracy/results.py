@@ -162,7 +162,7 @@ class Choice:
     """Cheapest plan that holds a tolerance, or most accurate plan within a budget."""
 
     plan: AccuracyPlan
-    holds: bool  # true if tolerance or budget is held; otherwise the plan is the best available
+    holds: bool  # True if tolerance or budget is held; otherwise the plan is the best available
     errors: Errors  # on the frames to check on
     cost_ms: float
     """Milliseconds per frame when all cores share the work: a forecast from the processor time of

@@ -50,7 +50,7 @@ class Ending:
     outcomes: Sequence[Outcome] | None = None
     """One per task; None where the bundle did not return."""
     worker: str | None = None
-    killed: bool = False  # true where it did not return because workers died too often
+    killed: bool = False  # True where it did not return because workers died too often
 
 
 class Pool(Protocol):

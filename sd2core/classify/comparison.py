@@ -124,7 +124,7 @@ class Table:
     kind: str  # "simulated" or "real": the radar
     options: TableOptions
     runs: tuple[Run, ...]
-    by_movement: bool  # true with one subject only: nothing is said about other people
+    by_movement: bool  # True with one subject only: nothing is said about other people
 
     def of(self, condition: Condition) -> tuple[Run, ...]:
         """Return the runs of one condition, by seed."""

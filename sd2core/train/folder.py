@@ -34,7 +34,7 @@ class RunStatus:
     pid: int | None  # of the process that trains or trained
     started_unix_s: float
     epoch: int | None  # epochs that are done
-    epochs: int | None  # none while unknown, or if the run is limited by time
+    epochs: int | None  # None while unknown, or if the run is limited by time
     minutes: float | None  # limit of its training time, if there is one
     elapsed_s: float | None  # like left_s without pauses
     left_s: float | None
