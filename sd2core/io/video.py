@@ -190,7 +190,7 @@ class VideoReader:
             except (FFmpegError, OSError):
                 entry, begin = 0, None  # a format that cannot seek
         if entry == 0:
-            # Opening anew reaches the start of every file; seeking does not.
+            # Opening again reaches the start of every file; seeking does not.
             container, stream = open_stream(self.path)
             self._container.close()
             self._container, self._stream = container, stream

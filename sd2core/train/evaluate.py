@@ -7,7 +7,7 @@ frame; :mod:`sd2core.denoise.metrics` defines how. Two sets of frames are judged
   noise of its take (:func:`sd2core.denoise.metrics.stands_out`). This is the measure that
   models are ranked by;
 - all frames. Where nothing moves, the strongest bin of a radar's map is that of its noise,
-  which nobody can foretell, so this measure has a floor well above zero.
+  which no model can foretell, so this measure has a floor well above zero.
 """
 
 from __future__ import annotations
