@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -16,6 +17,7 @@ from sd2app.shell.menus import in_order
 from sd2app.shell.parts import Parts
 from sd2app.shell.window import MainWindow
 from sd2app.shell.wiring import Features, build_features
+from sd2core.errors import Sd2Error
 
 
 def models_of(window: MainWindow) -> SimpleNamespace:
@@ -50,6 +52,13 @@ class NoShell:
 
     def warn(self, text: str) -> None:
         raise AssertionError(text)
+
+    def attempt(self, work: Callable[[], object]) -> object:
+        try:
+            return work()
+        except (Sd2Error, OSError) as error:
+            self.warn(str(error))
+            return None
 
     def open_paths(self, paths: list[Path]) -> None:
         raise AssertionError(paths)

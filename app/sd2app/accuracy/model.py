@@ -185,9 +185,7 @@ class AccuracyModel(QObject):
         self._job = self._jobs.start("Choosing what the scene requires", self._give_up)
         mesh, options = self._scene
         self._runner.submit(
-            lambda emit: self._work_out(
-                mesh, options, wish, lambda done, total: emit((done, total))
-            )
+            lambda emit: self._compute(mesh, options, wish, lambda done, total: emit((done, total)))
         )
         self.changed.emit()
 
@@ -239,7 +237,7 @@ class AccuracyModel(QObject):
 
     # --- choosing -------------------------------------------------------------------------
 
-    def _work_out(
+    def _compute(
         self, mesh: MeshSequence, options: SynthesisOptions, wish: _Wish, progress: Progress
     ) -> list[Choice]:
         """In the background: the choices for a wish; a place is surveyed once."""

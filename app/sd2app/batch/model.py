@@ -61,7 +61,7 @@ class BatchModel(QObject):
         if setup.problem:
             return setup.problem
         if not estimate.of(setup.plan(), setup.workers):
-            return "What it would do has not been worked out yet."
+            return "Its tasks have not been counted yet."
         if estimate.busy:
             return "Working out what it would do…"
         return estimate.problem

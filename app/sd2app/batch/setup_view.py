@@ -42,7 +42,7 @@ from sd2app.widgets.panel import (
 from sd2app.widgets.text import percent
 
 _SUBJECT_TEXT = {
-    "recording": "each recording is somebody of its own",
+    "recording": "each recording is a person of its own",
     "folder": "all in a folder are one person",
 }
 _ACCURACY_TEXT: dict[Accuracy, str] = {

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtWidgets import QApplication, QFileDialog, QWidget
+from PySide6.QtWidgets import QApplication, QFileDialog
 
 from sd2app.classify.model import ClassifyModel
 from sd2app.classify.text import classifier_page
 from sd2app.classify.training import ClassTraining
+from sd2app.feature import Shell
 from sd2app.session.content import UNTITLED
 from sd2app.session.session import Session
 from sd2app.widgets.dialogs import may_delete
@@ -25,15 +25,11 @@ class ClassifyDialogs:
     """Dialogs, followed by calls of the models; ``report`` shows the sentence of a failure."""
 
     def __init__(
-        self,
-        parent: QWidget,
-        classify: ClassifyModel,
-        training: ClassTraining,
-        session: Session,
-        report: Callable[[str], None],
+        self, shell: Shell, classify: ClassifyModel, training: ClassTraining, session: Session
     ) -> None:
-        self._parent, self._report = parent, report
-        self._classify, self._training, self._session = classify, training, session
+        self._shell, self._session = shell, session
+        self._parent = shell.dialog_parent
+        self._classify, self._training = classify, training
 
     def open_classifier(self) -> None:
         """Choose a file, and use it."""
@@ -44,7 +40,7 @@ class ClassifyDialogs:
 
     def use(self, path: Path | None) -> None:
         """Classify with a file, or not at all."""
-        self._attempt(lambda: self._classify.use(path))
+        self._shell.attempt(lambda: self._classify.use(path))
 
     def show_card(self) -> None:
         """Show the card of the classifier in use."""
@@ -66,7 +62,8 @@ class ClassifyDialogs:
     def add_folder(self) -> None:
         """Let the user choose a folder with labelled data."""
         name = QFileDialog.getExistingDirectory(
-            self._parent, "A campaign, a data set, a recording, or a folder of recordings"
+            self._parent,
+            "A campaign, a data set, a recording, or a folder of recordings",
         )
         if name:
             self._training.setup.add(Path(name))
@@ -92,15 +89,15 @@ class ClassifyDialogs:
 
     def train(self) -> None:
         """Start the training."""
-        self._attempt(self._training.train)
+        self._shell.attempt(self._training.train)
 
     def compare(self) -> None:
         """Start the comparison."""
-        self._attempt(self._training.compare)
+        self._shell.attempt(self._training.compare)
 
     def again(self) -> None:
         """Resume the comparison in view."""
-        self._attempt(self._training.again)
+        self._shell.attempt(self._training.again)
 
     def copy_command(self) -> None:
         """Put the command on the clipboard."""
@@ -108,7 +105,7 @@ class ClassifyDialogs:
 
     def use_model(self) -> None:
         """Use the model of the run in view."""
-        self._attempt(self._training.use_model)
+        self._shell.attempt(self._training.use_model)
 
     def show_result(self) -> None:
         """Show the result of the comparison in view."""
@@ -140,10 +137,6 @@ class ClassifyDialogs:
         from sd2app.classify.result_dialog import ClassResultDialog
 
         display = self._session.display
-        self._attempt(lambda: ClassResultDialog(read_result(path), display, self._parent).show())
-
-    def _attempt(self, work: Callable[[], object]) -> None:
-        try:
-            work()
-        except (Sd2Error, OSError) as error:
-            self._report(str(error))
+        self._shell.attempt(
+            lambda: ClassResultDialog(read_result(path), display, self._parent).show()
+        )

@@ -54,9 +54,7 @@ class ClassifyFeature(Feature):
         self.training = ClassTraining(
             session.settings, self.model.use, parent, step_times=step_times
         )
-        self.dialogs = ClassifyDialogs(
-            shell.dialog_parent, self.model, self.training, session, shell.warn
-        )
+        self.dialogs = ClassifyDialogs(shell, self.model, self.training, session)
         self._menu: ModelMenu | None = None
 
     @property

@@ -179,7 +179,7 @@ class ClassTrack(QObject):
     def use(self, classifier: Classifier | None, card: ClassifierCard | None) -> None:
         """Use another classifier, or none."""
         self._classifier, self._card = classifier, card if classifier is not None else None
-        self._begin_anew()
+        self._restart()
 
     def look_at(self, source: MapModel | None) -> None:
         """Look at another map, or at none."""
@@ -190,7 +190,7 @@ class ClassTrack(QObject):
         self._source = source
         if source is not None:
             source.changed.connect(self._follow)
-        self._begin_anew()
+        self._restart()
 
     def close(self) -> None:
         """Stop."""
@@ -199,7 +199,7 @@ class ClassTrack(QObject):
 
     # --- following the map ----------------------------------------------------------------
 
-    def _begin_anew(self) -> None:
+    def _restart(self) -> None:
         self._runner.cancel()
         self._calm.stop()
         self._forget()

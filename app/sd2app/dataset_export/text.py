@@ -25,7 +25,7 @@ def split_words(forecast: Forecast) -> str:
     """Number of segments and people of each split."""
     if not (forecast.split.validation or forecast.split.test):
         who = _named(forecast.split.training)
-        return f"Split: all {forecast.segments:,} to train ({who}); nobody is left to judge on"
+        return f"Split: all {forecast.segments:,} to train ({who}); none to validate or test on"
     people = {
         "train": forecast.split.training,
         "validation": forecast.split.validation,
@@ -43,5 +43,5 @@ def bytes_words(count: int) -> str:
 
 def _named(people: tuple[str, ...]) -> str:
     if not people:
-        return "nobody"
+        return "no person"
     return ", ".join(people) if len(people) <= 3 else f"{len(people)} people"

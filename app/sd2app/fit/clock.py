@@ -30,7 +30,7 @@ class FitPlayback(QObject):
         self._moving = False
         self._was_busy = False
         fit.advanced.connect(self._follow)
-        fit.changed.connect(self._begin_anew)
+        fit.changed.connect(self._restart)
         playback.frame_changed.connect(self._notice)
         playback.playing_changed.connect(self._notice)
 
@@ -63,7 +63,7 @@ class FitPlayback(QObject):
         finally:
             self._moving = False
 
-    def _begin_anew(self) -> None:
+    def _restart(self) -> None:
         if self._fit.busy and not self._was_busy:
             self.set_following(True)
         self._was_busy = self._fit.busy

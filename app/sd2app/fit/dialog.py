@@ -181,7 +181,7 @@ class NewFromVideoDialog(QDialog):
         elif setup.continues:
             text = "A fit of this video was stopped here: it will be continued."
         elif setup.kept is not None:
-            text = "A fit with other choices was stopped here: it will begin anew."
+            text = "A fit with other choices was stopped here: it will start again."
         elif setup.completes:
             text = "The mesh will be added to this recording."
         if self._message.objectName() != role:

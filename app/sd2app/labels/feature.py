@@ -170,7 +170,7 @@ class LabelsFeature(Feature):
     def panels(self) -> Mapping[str, QWidget]:
         """The panel at the side, and the timeline below the maps."""
         s, shell = self._session, self._shell
-        asks = LabelSetDialogs(shell.dialog_parent, self.model, self.edits.apply, shell.warn)
+        asks = LabelSetDialogs(shell, self.model, self.edits.apply)
         panel = LabelsPanel(s, self.model, self.edits, shell.keys, shell.action, asks)
         panel.model.noted.connect(shell.note)
         timeline = LabelTimeline(

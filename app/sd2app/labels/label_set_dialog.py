@@ -6,11 +6,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtGui import QColor
-from PySide6.QtWidgets import QColorDialog, QFileDialog, QWidget
+from PySide6.QtWidgets import QColorDialog, QFileDialog
 
+from sd2app.feature import Shell
 from sd2app.labels.columns import Change
 from sd2app.labels.model import LabelsModel
-from sd2core.errors import Sd2Error
 from sd2core.labels.field_edits import set_label_set
 from sd2core.labels.files import read_label_set, write_label_set
 from sd2core.labels.label_set import GESTURES, LabelSet
@@ -21,14 +21,9 @@ _FILES = "Label set (*.json);;All files (*)"
 class LabelSetDialogs:
     """Dialogs, followed by the edit; ``report`` shows the sentence of a failure."""
 
-    def __init__(
-        self,
-        parent: QWidget,
-        labels: LabelsModel,
-        apply: Callable[[Change], bool],
-        report: Callable[[str], None],
-    ) -> None:
-        self._parent, self._labels, self._apply, self._report = parent, labels, apply, report
+    def __init__(self, shell: Shell, labels: LabelsModel, apply: Callable[[Change], bool]) -> None:
+        self._shell, self._labels, self._apply = shell, labels, apply
+        self._parent = shell.dialog_parent
 
     def ask_colour(self, colour: str) -> str:
         """Let the user choose any colour; empty where there is none."""
@@ -39,7 +34,7 @@ class LabelSetDialogs:
         """Use the set of a file."""
         name, _ = QFileDialog.getOpenFileName(self._parent, "Import label set", "", _FILES)
         if name:
-            self._attempt(lambda: self._use(read_label_set(Path(name))))
+            self._shell.attempt(lambda: self._use(read_label_set(Path(name))))
 
     def export_set(self) -> None:
         """Write the set to a file."""
@@ -47,7 +42,7 @@ class LabelSetDialogs:
         start = f"{shown.name or 'labels'}.json".replace("/", "-")
         name, _ = QFileDialog.getSaveFileName(self._parent, "Export label set", start, _FILES)
         if name:
-            self._attempt(lambda: write_label_set(Path(name), shown))
+            self._shell.attempt(lambda: write_label_set(Path(name), shown))
 
     def usual_set(self) -> None:
         """Use the program's own set."""
@@ -55,9 +50,3 @@ class LabelSetDialogs:
 
     def _use(self, label_set: LabelSet) -> None:
         self._apply(lambda labels, _: set_label_set(labels, label_set))
-
-    def _attempt(self, work: Callable[[], object]) -> None:
-        try:
-            work()
-        except (Sd2Error, OSError) as error:
-            self._report(str(error))

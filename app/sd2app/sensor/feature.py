@@ -78,7 +78,7 @@ class SensorFeature(Feature):
     def panels(self) -> Mapping[str, QWidget]:
         """The panel at the side, of two pages."""
         s, shell = self._session, self._shell
-        asks = PlacementDialogs(shell.dialog_parent, self.placements, shell.warn, shell.note)
+        asks = PlacementDialogs(shell, self.placements)
         to_camera, aim = shell.action("sensor_to_camera"), shell.action("aim_sensor")
         return {
             "Sensor": SensorPages(

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtWidgets import QFileDialog, QWidget
+from PySide6.QtWidgets import QFileDialog
 
+from sd2app.feature import Shell
 from sd2app.sensor.placements import PlacementsModel
-from sd2core.errors import Sd2Error
 from sd2core.placements.placements import read_placements, write_placements
 
 _READ = "Placements (*.json *.toml);;All files (*)"
@@ -16,28 +15,19 @@ _WRITTEN = "Placements (*.json)"
 
 
 class PlacementDialogs:
-    """Dialogs, followed by calls of the model; ``report`` shows the sentence of a failure."""
+    """Dialogs, followed by calls of the model."""
 
-    def __init__(
-        self,
-        parent: QWidget,
-        placements: PlacementsModel,
-        report: Callable[[str], None],
-        note: Callable[[str], None],
-    ) -> None:
-        self._parent = parent
-        self._placements = placements
-        self._report, self._note = report, note
+    def __init__(self, shell: Shell, placements: PlacementsModel) -> None:
+        self._shell, self._placements = shell, placements
+        self._parent = shell.dialog_parent
 
     def take(self) -> None:
         """Let the user choose a file with a plan."""
         name, _ = QFileDialog.getOpenFileName(self._parent, "Take placements", "", _READ)
-        if not name:
-            return
-        try:
-            self._placements.edits.plan_placements(read_placements(Path(name)))
-        except Sd2Error as error:
-            self._report(str(error))
+        if name:
+            self._shell.attempt(
+                lambda: self._placements.edits.plan_placements(read_placements(Path(name)))
+            )
 
     def export(self) -> None:
         """Let the user choose where the plan is written."""
@@ -55,6 +45,6 @@ class PlacementDialogs:
         try:
             write_placements(path, plan)
         except OSError as error:
-            self._report(f"{path} cannot be written ({error.strerror}).")
+            self._shell.warn(f"{path} cannot be written ({error.strerror}).")
         else:
-            self._note(f"The placements are in {path}.")
+            self._shell.note(f"The placements are in {path}.")

@@ -175,7 +175,7 @@ class PlacementsModel(QObject):
             self._runner.cancel()
         else:
             known = self._body
-            self._runner.submit(lambda emit: _worked_out(wish, known, emit))
+            self._runner.submit(lambda emit: _compute_view(wish, known, emit))
         self.changed.emit()
 
     def _receive(self, result: Any) -> None:
@@ -188,7 +188,7 @@ class PlacementsModel(QObject):
         self.changed.emit()
 
 
-def _worked_out(
+def _compute_view(
     wish: _Wish, known: tuple[MeshSequence, BodyExtent] | None, emit: Emit
 ) -> tuple[tuple[MeshSequence, BodyExtent], Planned]:
     """Compute in the background: the places first, then what they see."""

@@ -43,7 +43,7 @@ def run(paths: Sequence[Path] = (), *, screenshot: Path | None = None) -> int:
     application.setDesktopFileName("sd2-studio")
     settings = Settings() if screenshot is None else Settings.forgetful()
     apply_theme(application, is_dark(settings))
-    # A picture neither keeps anybody from editing labels nor says that somebody does.
+    # A picture takes no lock on labels.
     aside = None if screenshot is None else TemporaryDirectory()
     window = MainWindow(settings, Parts(recovery=None if aside is None else Path(aside.name)))
 

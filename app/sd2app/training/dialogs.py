@@ -2,31 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtWidgets import QApplication, QCheckBox, QFileDialog, QMessageBox, QWidget
+from PySide6.QtWidgets import QApplication, QCheckBox, QFileDialog, QMessageBox
 
+from sd2app.feature import Shell
 from sd2app.training.model import TrainingModel
 from sd2app.training.result import ModelAdoption
 from sd2app.widgets.dialogs import may_delete
-from sd2core.errors import Sd2Error
 
 
 class TrainingDialogs:
     """Dialogs, followed by calls of the models; ``report`` shows the sentence of a failure."""
 
-    def __init__(
-        self,
-        parent: QWidget,
-        training: TrainingModel,
-        use: ModelAdoption,
-        report: Callable[[str], None],
-    ) -> None:
-        self._parent = parent
-        self._training = training
-        self._use = use
-        self._report = report
+    def __init__(self, shell: Shell, training: TrainingModel, use: ModelAdoption) -> None:
+        self._shell, self._training, self._use = shell, training, use
+        self._parent = shell.dialog_parent
 
     def ask_store(self) -> None:
         """Let the user choose a store of pairs."""
@@ -38,21 +29,21 @@ class TrainingDialogs:
         """Let the user choose recordings to make pairs of."""
         name = QFileDialog.getExistingDirectory(self._parent, "A recording, or a folder of some")
         if name:
-            self._attempt(lambda: self._training.pair_maker.make(Path(name)))
+            self._shell.attempt(lambda: self._training.pair_maker.make(Path(name)))
 
     def start(self) -> None:
         """Start what is set up."""
-        self._attempt(self._training.start)
+        self._shell.attempt(self._training.start)
 
     def resume(self) -> None:
         """Resume the run in view."""
-        self._attempt(self._training.resume)
+        self._shell.attempt(self._training.resume)
 
     def open_run(self) -> None:
         """Let the user choose a run in another folder, such as one started in a terminal."""
         name = QFileDialog.getExistingDirectory(self._parent, "Folder of a run")
         if name:
-            self._attempt(lambda: self._training.open_run(Path(name)))
+            self._shell.attempt(lambda: self._training.open_run(Path(name)))
 
     def use(self) -> None:
         """Use the model of the run in view."""
@@ -60,7 +51,7 @@ class TrainingDialogs:
 
     def copy_command(self) -> None:
         """Put the command on the clipboard."""
-        self._attempt(lambda: QApplication.clipboard().setText(self._training.command))
+        self._shell.attempt(lambda: QApplication.clipboard().setText(self._training.command))
 
     def delete(self) -> None:
         """Ask, then delete the run in view."""
@@ -116,9 +107,3 @@ class TrainingDialogs:
         if always.isChecked() and chosen is not discard:
             training.set_closing("stop" if chosen is stop else "keep")
         return True
-
-    def _attempt(self, work: Callable[[], object]) -> None:
-        try:
-            work()
-        except (Sd2Error, OSError) as error:
-            self._report(str(error))

@@ -39,7 +39,7 @@ class TrainingFeature(Feature):
             user_models_folder,
             parent,
         )
-        self._dialogs = TrainingDialogs(shell.dialog_parent, self.model, self.adoption, shell.warn)
+        self._dialogs = TrainingDialogs(shell, self.model, self.adoption)
 
     def actions(self) -> Sequence[Action]:
         """The panel."""

@@ -20,6 +20,7 @@ from PySide6.QtWidgets import (
     QToolTip,
 )
 from training_pairs import write_pairs
+from window_models import NoShell
 
 from sd2app.background import run_monitor
 from sd2app.session.display import DisplayModel
@@ -63,6 +64,16 @@ class FakeDenoising(QObject):
         self.changed.emit()
 
 
+class SayingShell(NoShell):
+    """Keeps the sentences of what went wrong."""
+
+    def __init__(self, said: list[str]) -> None:
+        self._said = said
+
+    def warn(self, text: str) -> None:
+        self._said.append(text)
+
+
 class Window:
     """A panel with all that is behind it."""
 
@@ -77,7 +88,7 @@ class Window:
         )
         self.said: list[str] = []
         self.display = DisplayModel()
-        self.dialogs = TrainingDialogs(None, self.training, self.use, self.said.append)
+        self.dialogs = TrainingDialogs(SayingShell(self.said), self.training, self.use)
         self.panel = TrainingPanel(self.training, self.use, self.display, self.dialogs)
         self.side = SidePanel({"Train": self.panel})
         self.side.resize(300, 520)

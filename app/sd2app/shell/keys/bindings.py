@@ -98,7 +98,7 @@ class KeyBindings(QObject):
         return action_id not in self._chosen
 
     def owner(self, key: str, besides: str = "") -> str:
-        """Who has a key, in words; nobody: empty. ``besides`` is an action that may have it."""
+        """Action or label that has a key, in words; empty if none but ``besides`` has it."""
         key = canonical(key)
         if key in self._of_labels:
             return f"the label “{self._of_labels[key]}”"
@@ -118,7 +118,7 @@ class KeyBindings(QObject):
         Raises
         ------
         Sd2Error
-            When one is none, is needed elsewhere, or is somebody's; nothing is changed then.
+            When one is no key, is reserved or is taken; nothing is changed then.
         """
         wanted = tuple(dict.fromkeys(canonical(key) for key in keys))
         text = self._actions[action_id].text
@@ -138,7 +138,7 @@ class KeyBindings(QObject):
         if key in _RESERVED:
             raise Sd2Error(f"{shown} {_RESERVED[key]}", f"another key for {what}")
         if owner := self.owner(key, besides):
-            raise Sd2Error(f"{shown} belongs to {owner}", f"a key for {what} that nobody has")
+            raise Sd2Error(f"{shown} belongs to {owner}", f"a free key for {what}")
 
     def for_label(self, name: str, key: str) -> str:
         """The key that a label is to get, as labels have it; errors are those of :meth:`bind`."""

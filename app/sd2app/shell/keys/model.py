@@ -89,7 +89,7 @@ class KeyListModel(QAbstractTableModel):
         Raises
         ------
         Sd2Error
-            When the key is somebody else's, or cannot be one.
+            When the key is taken, or cannot be one.
         """
         at = self._rows[row]
         if at.action:
