@@ -79,7 +79,7 @@ class VisibilityMasks:
         Visibility is ``facing`` for ``frozen`` if no mask is kept.
         """
         if visibility == "exact" or visibility == "depth":
-            return self._worked_out(block, rows, position_m, visibility), visibility
+            return self._compute(block, rows, position_m, visibility), visibility
         if visibility == "frozen":
             mask = self._frozen(block, rows, position_m)
             return mask, "facing" if mask is None else "frozen"
@@ -164,7 +164,7 @@ class VisibilityMasks:
                 return mask
         return None
 
-    def _worked_out(
+    def _compute(
         self, block: Block, rows: slice, position_m: Position, occlusion: Occlusion
     ) -> NDArray[np.uint8]:
         """Mask of these rows, kept or computed now."""

@@ -81,7 +81,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
         raise Sd2Error(
             f"{path} does not exist",
             "a run that came as far as its first checkpoint",
-            "Start it anew in another folder",
+            "Start it again in another folder",
         )
     weights: dict[str, torch.Tensor] = {}
     moments: dict[int, dict[str, torch.Tensor]] = {}

@@ -172,8 +172,8 @@ def split_subjects(
         free = free[: len(free) - len(validation)]
     if not free:
         raise Sd2Error(
-            f"Of the subjects {', '.join(subjects)} nobody is left to learn from",
-            "somebody who neither validates nor tests",
+            f"Of the subjects {', '.join(subjects)} none is left to learn from",
+            "a person who neither validates nor tests",
         )
     return Split(tuple(free), tuple(validation), tuple(test), by_take=not validation)
 

@@ -72,7 +72,7 @@ def test_choices_are_counted_at_once(made, people, qtbot) -> None:
     # It swings from 1 s to 2 s.
     assert label_words(model.forecast) == "Labels: background 3 · swing 1"
     assert split_words(model.forecast) == (
-        "Split: all 4 to train (anna); nobody is left to judge on"
+        "Split: all 4 to train (anna); none to validate or test on"
     )
     model.choose(maps=frozenset({"radar"}))
     counted(model, qtbot)
