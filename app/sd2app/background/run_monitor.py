@@ -175,7 +175,7 @@ class RunMonitor(QObject, Generic[F]):
 
     @property
     def error(self) -> str:
-        """Reason of a failure as the run has told it; empty where it has not."""
+        """Reason of a failure as the run reported it; empty without one."""
         return ""
 
     # --- what is known ----------------------------------------------------------------------

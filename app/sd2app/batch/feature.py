@@ -34,8 +34,8 @@ class BatchFeature(Feature):
         return (
             Action(
                 "batch", "File", "Batch…", ("Ctrl+B",),
-                "Fit, synthesise, denoise and export many recordings from many places, beside the"
-                " window",
+                "Fit, synthesise, denoise and export many recordings from many places, in the"
+                " background",
                 self.dialogs.show,
             ),
         )  # fmt: skip

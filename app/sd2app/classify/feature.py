@@ -96,7 +96,7 @@ class ClassifyFeature(Feature):
             ),
             Action(
                 "train_classifier", "Model", "Train a classifier…", ("Shift+C",),
-                "Learn gestures from labelled maps, beside the window",
+                "Learn gestures from labelled maps, in the background",
                 lambda: self._shell.bring_up("Train", "Classifier"),
             ),
         )  # fmt: skip

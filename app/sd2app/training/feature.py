@@ -46,7 +46,7 @@ class TrainingFeature(Feature):
         return (
             Action(
                 "show_train", "View", "Train panel", ("Shift+T",),
-                "Train a denoiser beside the window, watch it, and use it",
+                "Train a denoiser in the background, watch it, and use it",
                 lambda: self._shell.bring_up("Train", "Denoiser"),
             ),
         )  # fmt: skip
