@@ -301,8 +301,10 @@ class RunMonitor(QObject, Generic[F]):
     def _phase_of(self, found: _Found) -> Phase:
         if found.live:
             return self._phase_under_way(found.word)
-        if found.launching and not self._has_begun:
-            return "starting"
+        ended = found.state in ("finished", "stopped", "failed", "cancelled")
+        if found.launching and not (self._has_begun and ended):
+            # It is taking its folder while one looks, or about to exit.
+            return self._phase if self._has_begun else "starting"
         if self._wish == "cancel":
             # It may have ended before it could clear up.
             self.folder.discard()

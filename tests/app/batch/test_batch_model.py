@@ -194,8 +194,8 @@ def test_a_start_waits_for_the_estimate_of_what_is_set_up(qtbot, made, meshes):
     assert "Add recordings" in model.why_not_start
     model.setup.add(meshes)
     looked(qtbot, model.setup)
-    assert "has not been worked out" in model.why_not_start
-    with pytest.raises(Sd2Error, match="has not been worked out"):
+    assert "have not been counted" in model.why_not_start
+    with pytest.raises(Sd2Error, match="have not been counted"):
         model.start()
     model.ask_estimate()
     assert "Working out" in model.why_not_start
@@ -216,7 +216,7 @@ def test_a_start_waits_for_the_estimate_of_what_is_set_up(qtbot, made, meshes):
     assert unusable_text({**facts, "unusable": []}) == ""
     assert model.why_not_start == ""
     model.setup.set_value("denoise", False)
-    assert "has not been worked out" in model.why_not_start
+    assert "have not been counted" in model.why_not_start
 
 
 def test_a_refused_estimate_is_said(qtbot, made, meshes):

@@ -304,12 +304,15 @@ def test_a_hand_interrupts_the_choosing(context, fake, qtbot, ball):
     open_ball(context, qtbot, ball)
     wait_until_done(context, qtbot)
     fake.gate.clear()
+    begun = len(fake.surveyed) + len(fake.asked)
     context.edits.place_sensor(VirtualSensor(position_m=(0.3, 0.0, 0.0)))
-    qtbot.waitUntil(lambda: context.trade.choosing, timeout=10_000)
+    # What has not begun is dropped, and cannot notice that it is cancelled.
+    qtbot.waitUntil(lambda: len(fake.surveyed) + len(fake.asked) > begun, timeout=60_000)
+    assert context.trade.choosing
     context.edits.begin_sensor_drag()
     assert not context.trade.choosing
     context.edits.drag_sensor((0.35, 0.0, 0.0))
-    qtbot.waitUntil(lambda: bool(fake.cancelled), timeout=5_000)
+    qtbot.waitUntil(lambda: bool(fake.cancelled), timeout=60_000)
     fake.gate.set()
     context.edits.end_sensor_drag()
     wait_until_done(context, qtbot)

@@ -87,6 +87,17 @@ def test_an_end_is_an_end_until_it_goes_on(run) -> None:
     assert phase_of(run, False, "died") == "died"
 
 
+def test_a_process_that_takes_its_folder_meanwhile_is_not_taken_for_dead(run) -> None:
+    """Its lock was looked for before it was there, its number was read after."""
+    run._has_begun = True
+    begins = _Found(True, False, False, None, None, "run", [], None)
+    assert run._phase_of(begins) == "starting"
+    run._phase = "running"
+    assert run._phase_of(begins._replace(exists=True, state="died")) == "running"
+    assert run._phase_of(begins._replace(exists=True, state="finished")) == "finished"
+    assert run._phase_of(begins._replace(launching=False, exists=True, state="died")) == "died"
+
+
 @pytest.mark.parametrize(
     ("word", "paused", "phase"),
     [

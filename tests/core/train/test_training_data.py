@@ -70,7 +70,7 @@ class TestSplit:
         [
             (["x"], None, "'x' is to be a validation subject and has no takes"),
             (["a"], ["a"], "a is to validate and to test"),
-            (["a"], ["b"], "nobody is left"),
+            (["a"], ["b"], "none is left"),
         ],
     )
     def test_refused(self, validation: Any, test: Any, said: str) -> None:
