@@ -171,7 +171,10 @@ def test_a_classifier_beside_the_denoisers_answers_as_the_library(
 def test_the_window_itself_never_loads_torch():
     code = (
         "import sys\n"
-        "import sd2app.shell.wiring, sd2app.denoise.model, sd2app.denoise.library as library\n"
+        "import sd2app.shell.wiring\n"
+        # It comes last, in a thread: everything else is usable while it loads.
+        "assert 'vtkmodules' not in sys.modules, 'vtkmodules'\n"
+        "import sd2app.denoise.model, sd2app.denoise.library as library\n"
         "import sd2app.classify.library as classifiers\n"
         "from sd2app.background.model_worker.client import ModelProcess\n"
         "process = ModelProcess()\n"

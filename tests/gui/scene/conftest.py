@@ -23,7 +23,7 @@ def make_stage(qtbot: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable
     made: list[Stage] = []
 
     def make(backend: str) -> Stage:
-        from sd2app.scene import SceneView
+        from sd2app.scene.view import SceneView
 
         monkeypatch.setenv("SD2_SCENE", backend)
         document, synthesis, placements = Document(), Synthesis(), Placements()

@@ -475,7 +475,7 @@ def test_a_machine_without_a_driver_gets_a_sentence_and_no_crash(tmp_path: Path)
 
 def test_importing_the_view_loads_neither_pyvista_nor_matplotlib() -> None:
     code = (
-        "import sys; import sd2app.scene, sd2app.scene.offscreen_backend;"
+        "import sys; import sd2app.scene.view, sd2app.scene.offscreen_backend;"
         "print([m for m in ('pyvista', 'pyvistaqt', 'matplotlib', 'scipy') if m in sys.modules])"
     )
     run = subprocess.run(

@@ -315,7 +315,7 @@ def test_the_bundled_sample_is_never_written_to(empty_window, qtbot, monkeypatch
 def test_a_mesh_longer_than_its_video_is_played_to_its_end(
     empty_window, small_recording, tmp_path, qtbot
 ):
-    from sd2app.scene import SceneView
+    from sd2app.scene.view import SceneView
 
     with np.load(small_recording / "mesh.npz") as data:
         vertices, faces = data["vertices"], data["faces"]
@@ -354,8 +354,8 @@ def test_a_drag_shows_a_preview_and_becomes_exact(window, qtbot):
 
 
 def test_dragging_the_sensor_in_3d_follows_the_mouse_in_one_step(window, qtbot):
-    from sd2app.scene import SceneView
     from sd2app.scene.offscreen_backend import ImageBackend
+    from sd2app.scene.view import SceneView
 
     c = models_of(window)
     view = window.findChild(SceneView)
