@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QProgressBar, QToolButton, QWidget
 
-from sd2app.fit.clock import FitPlayback
 from sd2app.fit.model import FitModel
-from sd2app.fit.offer import FitOffer
-from sd2app.fit.progress import left_in_words
-from sd2app.widgets.panel import ElidedLabel
+from sd2app.fit.on_screen import FitOnScreen
+from sd2app.widgets.panel import ElidedLabel, outlined, sentence
+from sd2app.widgets.text import about
 
 _STEPS = 1000
 _HEIGHT = 40
@@ -28,8 +26,7 @@ class FitBar(QFrame):
     def __init__(
         self,
         fit: FitModel,
-        follower: FitPlayback,
-        offer: FitOffer,
+        on_screen: FitOnScreen,
         begin: Callable[[], None],
         open_result: Callable[[], None],
         resume: Callable[[], None],
@@ -39,15 +36,12 @@ class FitBar(QFrame):
         self.setObjectName("panel")
         self.setAccessibleName("Fit of a body")
         self.setMinimumHeight(_HEIGHT)
-        self._fit, self._follower, self._offer = fit, follower, offer
+        self._fit, self._on_screen = fit, on_screen
         self._title = ElidedLabel(self)
         self._title.setObjectName("title")
         self._stage = ElidedLabel(self)
         self._stage.setObjectName("muted")
-        self._reason = QLabel(self)
-        self._reason.setObjectName("warning")
-        self._reason.setWordWrap(True)
-        self._reason.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self._reason = sentence("", "warning")
         self._bar = QProgressBar(self)
         self._bar.setFixedWidth(200)
         self._bar.setMaximumHeight(14)
@@ -66,8 +60,7 @@ class FitBar(QFrame):
         }
         self._buttons["follow"].setCheckable(True)
         self._lay_out()
-        for signal in (fit.changed, follower.changed, offer.changed):
-            signal.connect(self._refresh)
+        on_screen.changed.connect(self._refresh)
         self._refresh()
 
     def _lay_out(self) -> None:
@@ -83,14 +76,10 @@ class FitBar(QFrame):
             layout.addWidget(button)
 
     def _button(self, text: str, tip: str, run: Callable[[], object]) -> QToolButton:
-        button = QToolButton(self)
-        button.setText(text)
-        button.setToolTip(tip)
+        button = outlined(text, tip, run, self)
         button.setAccessibleName(tip)
-        button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-        if text != "✕":
-            button.setObjectName("outlined")
-        button.clicked.connect(lambda: run())
+        if text == "✕":
+            button.setObjectName("")
         return button
 
     # --- following the models -------------------------------------------------------------
@@ -117,10 +106,10 @@ class FitBar(QFrame):
             self._show_offer()
         else:
             self._show_fit()
-        self.setVisible(state != "idle" or self._offer.video is not None)
+        self.setVisible(state != "idle" or self._on_screen.offered is not None)
 
     def _show_offer(self) -> None:
-        video = self._offer.video
+        video = self._on_screen.offered
         if video is not None:
             self._title.setText(f"{video.name} has no mesh")
             self._stage.setText("A body can be fitted to the person in it.")
@@ -141,14 +130,14 @@ class FitBar(QFrame):
         self._stage.setText(self._stage_text())
         self._reason.setText(self._fit.text)
         self._buttons["cancel"].setEnabled(state == "running")
-        self._buttons["follow"].setChecked(self._follower.following)
-        self._buttons["follow"].setEnabled(self._follower.on_screen)
+        self._buttons["follow"].setChecked(self._on_screen.following)
+        self._buttons["follow"].setEnabled(self._on_screen.visible)
         self._show_progress()
 
     def _stage_text(self) -> str:
         progress, state = self._fit.progress, self._fit.state
         if state == "finished":
-            return " ".join(self._fit.notes) or "A body was fitted to its video."
+            return self._fit.notes or "A body was fitted to its video."
         if state == "stopped":
             reached = f" It had been {progress.text}." if progress and progress.stage else ""
             return f"It can be continued where it stopped.{reached}"
@@ -163,16 +152,16 @@ class FitBar(QFrame):
         self._bar.setRange(0, 0 if share is None else _STEPS)
         if share is not None:
             self._bar.setValue(round(share * _STEPS))
-        running = self._fit.state == "running" and progress is not None
-        self._left.setText(left_in_words(progress.left_s) if running and progress else "")
+        left_s = progress.left_s if progress and self._fit.state == "running" else None
+        self._left.setText("" if left_s is None else f"{about(left_s)} left")
 
     # --- what is clicked ------------------------------------------------------------------
 
     def _toggle(self) -> None:
-        self._follower.set_following(self._buttons["follow"].isChecked())
+        self._on_screen.set_following(self._buttons["follow"].isChecked())
 
     def _close(self) -> None:
         if self._fit.state == "idle":
-            self._offer.decline()
+            self._on_screen.decline()
         else:
             self._fit.dismiss()

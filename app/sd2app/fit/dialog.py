@@ -24,7 +24,7 @@ from sd2app.fit.person_picker import PersonPicker
 from sd2app.fit.setup import ANGLES_DEG, DEFAULT_STATURE_M, STATURES_M, FitSetupModel
 from sd2app.palette import Palette
 from sd2app.widgets.inputs import Choice, NumberBox
-from sd2app.widgets.panel import ElidedLabel, side_by_side
+from sd2app.widgets.panel import ElidedLabel, outlined, say, sentence, side_by_side
 from sd2app.widgets.time_axis import clock_text
 
 VIDEOS = "Video (*.mp4 *.mkv *.mov *.avi *.webm *.m4v *.mpg *.ts *.wmv);;All files (*)"
@@ -73,34 +73,39 @@ class NewFromVideoDialog(QDialog):
         setup = self._setup
         self._video = ElidedLabel(self)
         self._folder = ElidedLabel(self)
-        self._other_video = _small_button("Choose…", "Take another video", self._ask_video)
-        self._other_folder = _small_button("Choose…", "Save elsewhere", self._ask_folder)
-        self._person = QLabel(self)
-        self._person.setWordWrap(True)
-        self._clear = _small_button("Clear", "Have the person chosen", setup.clear_person)
+        self._other_video = self._button("Choose…", "Take another video", self._ask_video)
+        self._other_folder = self._button("Choose…", "Save elsewhere", self._ask_folder)
+        self._person = sentence("", "")
+        self._clear = self._button(
+            "Clear", "Have the person chosen", lambda: setup.change(person=None)
+        )
         self._stature = NumberBox(*STATURES_M, " m", "Height of the person", step=0.01)
         self._stature.setValue(DEFAULT_STATURE_M)
-        self._stature.valueChanged.connect(setup.set_stature)
+        self._stature.valueChanged.connect(lambda value_m: setup.change(stature_m=value_m))
         self._known = QCheckBox("known:", self)
         self._known.toggled.connect(
-            lambda known: setup.set_stature(self._stature.value() if known else None)
+            lambda known: setup.change(stature_m=self._stature.value() if known else None)
         )
         self._camera = Choice("How the focal length of the camera is known", self)
         for way, text in _CAMERAS:
-            self._camera.addItem(text.format(angle=setup.angle_deg), way)
+            self._camera.addItem(text.format(angle=setup.choices.angle_deg), way)
         self._camera.currentIndexChanged.connect(
-            lambda _: setup.set_camera(self._camera.currentData())
+            lambda _: setup.change(camera=self._camera.currentData())
         )
         self._angle = NumberBox(
             *ANGLES_DEG, "°", "Field of view across the longer side", decimals=1, step=1.0
         )
-        self._angle.valueChanged.connect(setup.set_angle)
+        self._angle.valueChanged.connect(lambda value_deg: setup.change(angle_deg=value_deg))
         self._focal = NumberBox(
             1.0, 100_000.0, " px", "Focal length in pixels of the video", decimals=0, step=10.0
         )
         self._focal.valueChanged.connect(setup.set_focal)
-        self._message = QLabel(self)
-        self._message.setWordWrap(True)
+        self._message = sentence("")
+
+    def _button(self, text: str, tip: str, run: Callable[[], object]) -> QToolButton:
+        button = outlined(text, tip, run, self)
+        button.setAccessibleName(tip)
+        return button
 
     def _lay_out(self) -> None:
         form = QFormLayout()
@@ -109,11 +114,11 @@ class NewFromVideoDialog(QDialog):
         form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
         form.addRow("Video", _row(self._video, self._other_video))
         form.addRow("Person", _row(self._person, self._clear))
-        form.addRow("", _hint("Drag a rectangle around the person, where there are several."))
+        form.addRow("", sentence("Drag a rectangle around the person, where there are several."))
         form.addRow("Body height", side_by_side(self._known, self._stature))
         form.addRow(
             "",
-            _hint(
+            sentence(
                 f"{DEFAULT_STATURE_M:g} m where it is not known. It fixes the scale: all distances"
                 " and velocities are proportional to it."
             ),
@@ -143,10 +148,10 @@ class NewFromVideoDialog(QDialog):
     # --- following the model --------------------------------------------------------------
 
     def _refresh(self) -> None:
-        setup = self._setup
+        setup, choices = self._setup, self._setup.choices
         self._video.setText(setup.video.name if setup.video is not None else "none")
-        self._folder.setText(str(setup.folder) if setup.folder is not None else "")
-        self._other_folder.setEnabled(setup.folder is not None)
+        self._folder.setText(str(choices.folder) if choices.folder is not None else "")
+        self._other_folder.setEnabled(choices.folder is not None)
         with QSignalBlocker(self._slider):
             self._slider.setRange(0, max(setup.frames - 1, 0))
             self._slider.setValue(setup.frame)
@@ -154,21 +159,21 @@ class NewFromVideoDialog(QDialog):
         self._where.setText(
             f"{clock_text(setup.time_s)} · frame {setup.frame}" if setup.frames else ""
         )
-        person = setup.person
+        person = choices.person
         self._person.setText(
             "who is seen best" if person is None else f"in the rectangle in frame {person.frame}"
         )
         self._clear.setVisible(person is not None)
         with QSignalBlocker(self._known):
-            self._known.setChecked(setup.stature_m is not None)
-        self._stature.setEnabled(setup.stature_m is not None)
-        if setup.stature_m is not None:
-            self._stature.show_value(setup.stature_m)
+            self._known.setChecked(choices.stature_m is not None)
+        self._stature.setEnabled(choices.stature_m is not None)
+        if choices.stature_m is not None:
+            self._stature.show_value(choices.stature_m)
         with QSignalBlocker(self._camera):
-            self._camera.setCurrentIndex(self._camera.findData(setup.camera))
-        self._angle.setVisible(setup.camera == "angle")
-        self._angle.show_value(setup.angle_deg)
-        self._focal.setVisible(setup.camera == "focal")
+            self._camera.setCurrentIndex(self._camera.findData(choices.camera))
+        self._angle.setVisible(choices.camera == "angle")
+        self._angle.show_value(choices.angle_deg)
+        self._focal.setVisible(choices.camera == "focal")
         if setup.focal_px is not None:
             self._focal.show_value(setup.focal_px)
         self._show_message()
@@ -184,11 +189,7 @@ class NewFromVideoDialog(QDialog):
             text = "A fit with other choices was stopped here: it will start again."
         elif setup.completes:
             text = "The mesh will be added to this recording."
-        if self._message.objectName() != role:
-            self._message.setObjectName(role)
-            self._message.style().unpolish(self._message)
-            self._message.style().polish(self._message)
-        self._message.setText(text)
+        say(self._message, text, role)
         self._begin.setEnabled(setup.ready)
         self._begin.setText("Continue" if setup.continues else "Fit")
 
@@ -202,20 +203,10 @@ class NewFromVideoDialog(QDialog):
 
     def _ask_folder(self) -> None:
         name, _ = QFileDialog.getSaveFileName(
-            self, "Save recording as", str(self._setup.folder), "Recording (*.sd2)"
+            self, "Save recording as", str(self._setup.choices.folder), "Recording (*.sd2)"
         )
         if name:
-            self._setup.set_folder(Path(name))
-
-
-def _small_button(text: str, tip: str, run: Callable[[], object]) -> QToolButton:
-    button = QToolButton()
-    button.setObjectName("outlined")
-    button.setText(text)
-    button.setToolTip(tip)
-    button.setAccessibleName(tip)
-    button.clicked.connect(lambda: run())
-    return button
+            self._setup.change(folder=Path(name))
 
 
 def _row(*widgets: QWidget) -> QHBoxLayout:
@@ -224,10 +215,3 @@ def _row(*widgets: QWidget) -> QHBoxLayout:
     for number, widget in enumerate(widgets):
         row.addWidget(widget, 0 if number else 1)
     return row
-
-
-def _hint(text: str) -> QLabel:
-    label = QLabel(text)
-    label.setObjectName("muted")
-    label.setWordWrap(True)
-    return label

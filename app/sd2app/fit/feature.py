@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QObject, SignalInstance
 from PySide6.QtWidgets import QDialog, QFileDialog, QMessageBox, QWidget
 
+from sd2app.background.run_command import COMMAND_IN_FOLDER
 from sd2app.feature import Action, Feature, Shell
 from sd2app.fit.bar import FitBar
-from sd2app.fit.clock import FitPlayback
 from sd2app.fit.dialog import VIDEOS, NewFromVideoDialog
-from sd2app.fit.importer import FitResultImporter
-from sd2app.fit.model import COMMAND, FitModel
-from sd2app.fit.offer import FitOffer
+from sd2app.fit.model import FitModel
+from sd2app.fit.on_screen import FitOnScreen
 from sd2app.fit.request import FitRequest
 from sd2app.fit.setup import FitSetupModel
 from sd2app.session.session import Session
@@ -29,11 +28,8 @@ class FitFeature(Feature):
         self, session: Session, shell: Shell, command: Sequence[str] | None, parent: QObject
     ) -> None:
         self._session, self._shell = session, shell
-        document = session.document
-        self.model = FitModel(session.settings, parent, command or COMMAND)
-        self.clock = FitPlayback(self.model, document, session.playback, parent)
-        self.offer = FitOffer(document, self.model, parent)
-        self.taker = FitResultImporter(self.model, self.clock, document, session.settings, parent)
+        self.model = FitModel(session.settings, parent, command or COMMAND_IN_FOLDER)
+        self.on_screen = FitOnScreen(session, self.model, parent)
 
     @property
     def landmarks_changed(self) -> tuple[SignalInstance, ...]:
@@ -42,7 +38,7 @@ class FitFeature(Feature):
 
     def landmarks_at(self, frame: int) -> NDArray[np.float32] | None:
         """Landmarks that the fit has found in a frame of the video on screen."""
-        if self.model.state == "idle" or not self.clock.on_screen:
+        if self.model.state == "idle" or not self.on_screen.visible:
             return None
         return self.model.landmarks_at(frame)
 
@@ -61,8 +57,7 @@ class FitFeature(Feature):
         return (
             FitBar(
                 self.model,
-                self.clock,
-                self.offer,
+                self.on_screen,
                 begin=self.new_from_video,
                 open_result=self._open_result,
                 resume=self._resume,
@@ -71,7 +66,7 @@ class FitFeature(Feature):
 
     def notes(self) -> Sequence[SignalInstance]:
         """Results that were taken over."""
-        return (self.taker.noted,)
+        return (self.on_screen.noted,)
 
     def changes(self) -> Sequence[SignalInstance]:
         """State of the fit."""
@@ -79,7 +74,7 @@ class FitFeature(Feature):
 
     def take_over(self) -> None:
         """Follow the fit again: staying elsewhere was a wish about the recording before."""
-        self.clock.set_following(True)
+        self.on_screen.set_following(True)
 
     def look_for_unfinished(self) -> None:
         """Find a fit that was stopped."""
@@ -92,7 +87,7 @@ class FitFeature(Feature):
         it has no mesh; else it is asked for.
         """
         window, model = self._shell.dialog_parent, self.model
-        video = video or self.offer.video
+        video = video or self.on_screen.offered
         if model.state in ("stopped", "failed") and model.request is not None:
             video = model.request.video
         if video is None:
@@ -114,7 +109,7 @@ class FitFeature(Feature):
     def _begin(self, request: FitRequest) -> None:
         if self._shell.attempt(lambda: (self.model.start(request), True)) is None:
             return
-        if not self.clock.on_screen and self._shell.may_discard():
+        if not self.on_screen.visible and self._shell.may_discard():
             self._session.document.open([request.video])
 
     def _resume(self) -> None:
@@ -126,7 +121,7 @@ class FitFeature(Feature):
 
     def _open_result(self) -> None:
         if self._shell.may_discard():
-            self.taker.open_result()
+            self.on_screen.open_result()
 
     def may_close(self) -> bool:
         """Ask whether a fit under way may stop with the window."""

@@ -12,15 +12,13 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.run_command import COMMAND_IN_FOLDER, CommandFolder
-from sd2app.fit.progress import FitProgress
 from sd2app.fit.request import FitRequest, read_request, settled
-from sd2app.fit.run import FitRun
+from sd2app.fit.run import FitProgress, FitRun
 from sd2app.settings import Settings
 from sd2core.errors import Sd2Error
 
 State = Literal["idle", "running", "cancelling", "stopped", "failed", "finished"]
 
-COMMAND = COMMAND_IN_FOLDER
 _CLOSING_S = 10.0
 """A killed process is gone at once, unless the machine is busy."""
 
@@ -37,33 +35,23 @@ class FitModel(QObject):
         self,
         settings: Settings,
         parent: QObject | None = None,
-        command: Sequence[str] = COMMAND,
+        command: Sequence[str] = COMMAND_IN_FOLDER,
     ) -> None:
         super().__init__(parent)
         self._settings = settings
         self._command = tuple(command)
-        self._state: State = "idle"
-        self._text = ""
-        self._request: FitRequest | None = None
+        self.state: State = "idle"
+        self.text = ""  # why it failed
+        self.request: FitRequest | None = None  # what is being fitted, or was last
         self._run: FitRun | None = None
         self._landmarks: dict[int, NDArray[np.float32]] = {}
 
     # --- what is there --------------------------------------------------------------------
 
     @property
-    def state(self) -> State:
-        """Current state."""
-        return self._state
-
-    @property
     def busy(self) -> bool:
         """True while a process works."""
-        return self._state in ("running", "cancelling")
-
-    @property
-    def request(self) -> FitRequest | None:
-        """Request that is being fitted, or was last."""
-        return self._request
+        return self.state in ("running", "cancelling")
 
     @property
     def progress(self) -> FitProgress | None:
@@ -71,23 +59,12 @@ class FitModel(QObject):
         return self._run.progress if self._run else None
 
     @property
-    def text(self) -> str:
-        """Reason why it failed."""
-        return self._text
-
-    @property
-    def notes(self) -> tuple[str, ...]:
+    def notes(self) -> str:
         """Sentences of the last run that the user should read."""
-        return tuple(self._run.notes) if self._run else ()
-
-    @property
-    def picture_size(self) -> tuple[int, int] | None:
-        """Width and height of the upright picture, once the video is open."""
-        started = self._run.started if self._run else None
-        return (started.width, started.height) if started else None
+        return " ".join(self.progress.notes) if self.progress else ""
 
     def landmarks_at(self, frame: int) -> NDArray[np.float32] | None:
-        """X, y in pixels and visibility, (33, 3), as far as they were told; see ``Found``."""
+        """X, y in pixels and visibility, (33, 3), as far as they were told; see `FitProgress`."""
         return self._landmarks.get(frame)
 
     # --- what one can do ------------------------------------------------------------------
@@ -110,10 +87,10 @@ class FitModel(QObject):
             )
         request.save()
         self._settings.set_unfinished_fit(request.folder)
-        if request != self._request:
+        if request != self.request:
             # Otherwise what was found before it was stopped is still so.
             self._landmarks = {}
-        self._request = request
+        self.request = request
         if request.mesh.exists():
             # Fitted, and the program ended before the recording was made.
             self._follow(None)
@@ -123,33 +100,33 @@ class FitModel(QObject):
 
     def resume(self) -> None:
         """Continue what was stopped or failed; raises what :meth:`start` does."""
-        if self._request is not None and self._state in ("stopped", "failed"):
-            self.start(self._request)
+        if self.request is not None and self.state in ("stopped", "failed"):
+            self.start(self.request)
 
     def cancel(self) -> None:
         """Stop; what was done is kept."""
-        if self._state == "running" and self._run is not None:
+        if self.state == "running" and self._run is not None:
             self._set_state("cancelling")
             self._run.stop()
 
     def discard(self) -> None:
         """Give up what was stopped, and remove it."""
-        if self._request is not None and not self.busy:
-            self._request.discard()
+        if self.request is not None and not self.busy:
+            self.request.discard()
             self.dismiss()
 
     def dismiss(self) -> None:
         """Hide the ended fit; a stopped one can still be continued from disk."""
         if not self.busy:
-            request = self._request
-            if self._state == "failed" and request is not None and not request.partial.exists():
+            request = self.request
+            if self.state == "failed" and request is not None and not request.partial.exists():
                 request.discard()
             self._settings.set_unfinished_fit(None)
             self._set_state("idle")
 
     def report_failure(self, text: str) -> None:
         """Fail for a reason that came after the fit."""
-        self._text = text
+        self.text = text
         self._set_state("failed")
 
     def look_for_unfinished(self) -> None:
@@ -170,13 +147,13 @@ class FitModel(QObject):
         if run.taken:
             if run.is_followed:
                 return False  # by another window
-            self._request, self._landmarks = request, {}
+            self.request, self._landmarks = request, {}
             run.take_up()
             self._follow(FitRun(run, self._landmarks, self))
             self._set_state("running")
             return True
         self._follow(None)
-        self._request = request
+        self.request = request
         self._set_state("stopped")
         return True
 
@@ -195,7 +172,7 @@ class FitModel(QObject):
     # --- the process ----------------------------------------------------------------------
 
     def _begin(self, request: FitRequest) -> None:
-        self._text = ""
+        self.text = ""
         folder = CommandFolder(request.run)
         try:
             process = folder.start(request.arguments(), {"what": "fit"}, self._command, {})
@@ -217,18 +194,18 @@ class FitModel(QObject):
 
     def _tell(self) -> None:
         self.changed.emit()
-        newest = self._run.take_newest() if self._run is not None else None
-        if newest is not None:
+        if self._run is not None and self._run.progress.newest is not None:
+            newest, self._run.progress.newest = self._run.progress.newest, None
             self.advanced.emit(newest)
 
     def _end(self) -> None:
-        run, request = self._run, self._request
+        run, request = self._run, self.request
         assert run is not None
         assert request is not None
         run.close()
         if run.phase == "finished" and request.mesh.exists():
             self._complete()
-        elif self._state == "cancelling":
+        elif self.state == "cancelling":
             self._set_state("stopped")
         else:
             silent = "The fit ended without saying why. What it has done is kept."
@@ -237,9 +214,9 @@ class FitModel(QObject):
     def _complete(self) -> None:
         self._settings.set_unfinished_fit(None)
         self._set_state("finished")
-        self.finished.emit(self._request)
+        self.finished.emit(self.request)
 
     def _set_state(self, state: State) -> None:
-        self._state = state
+        self.state = state
         self.state_changed.emit()
         self.changed.emit()

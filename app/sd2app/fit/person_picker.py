@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPainterPath, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from sd2app.fit.setup import FitSetupModel
@@ -69,7 +69,7 @@ class PersonPicker(QWidget):
         if size is None:
             return
         if (end - corner).manhattanLength() < 6:
-            self._setup.clear_person()
+            self._setup.change(person=None)
             return
         scale = size[0] / box.width()
         (x0, y0), (x1, y1) = (
@@ -99,7 +99,7 @@ class PersonPicker(QWidget):
         rectangle = self._rectangle()
         if rectangle is None:
             return
-        person = self._setup.person
+        person = self._setup.choices.person
         drawn_here = self._from is not None or (
             person is not None and person.frame == self._setup.frame
         )
@@ -112,26 +112,16 @@ class PersonPicker(QWidget):
         painter.drawRect(rectangle)
 
     def _dim_around(self, painter: QPainter, inside: QRectF) -> None:
-        box, shade = self.box, QColor(0, 0, 0, _DIMMED)
-        painter.fillRect(
-            QRectF(box.left(), box.top(), box.width(), inside.top() - box.top()), shade
-        )
-        painter.fillRect(
-            QRectF(box.left(), inside.bottom(), box.width(), box.bottom() - inside.bottom()), shade
-        )
-        painter.fillRect(
-            QRectF(box.left(), inside.top(), inside.left() - box.left(), inside.height()), shade
-        )
-        painter.fillRect(
-            QRectF(inside.right(), inside.top(), box.right() - inside.right(), inside.height()),
-            shade,
-        )
+        around = QPainterPath()  # odd-even: what both rectangles have stays as it is
+        around.addRect(self.box)
+        around.addRect(inside)
+        painter.fillPath(around, QColor(0, 0, 0, _DIMMED))
 
     def _rectangle(self) -> QRectF | None:
         """Rectangle on the widget: the one being drawn, else the chosen one."""
         if self._from is not None:
             return QRectF(self._from, self._to).normalized().intersected(self.box)
-        person, size = self._setup.person, self._setup.size
+        person, size = self._setup.choices.person, self._setup.size
         if person is None or size is None:
             return None
         box = self.box

@@ -1,8 +1,13 @@
-"""Monitor of one fit in a background process."""
+"""Monitor of one fit in a background process, and what its lines of progress tell.
+
+The lines are those of ``sd2 fit --progress-json``; see ``docs/formats.md``.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+import time
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,24 +15,140 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QObject
 
 from sd2app.background.run_command import CommandFolder
-from sd2app.background.run_monitor import RunMonitor
-from sd2app.fit.progress import (
-    FitProgress,
-    Found,
-    Noted,
-    Progressed,
-    Refused,
-    Started,
-    message_of,
-)
+from sd2app.background.run_monitor import RunMonitor, take_lines
+from sd2core.body.track import LANDMARKS
 from sd2core.processes import ProcessId
 
+FORMAT, VERSION = "sd2-fit-progress", 1
+
+WORDS = {
+    "models": "fetching the landmark models",
+    "find": "finding the person",
+    "refine": "looking again",
+    "lift": "estimating depth",
+    "fit": "fitting the body",
+    "write": "writing the mesh",
+}
+_WEIGHTS = {"models": 0.0, "find": 1.0, "refine": 4.0, "lift": 0.1, "fit": 3.0, "write": 0.3}
+"""Time of a frame in each stage, relative to the others."""
+_UNKNOWN_WEIGHT = 0.5
+_SETTLING_S = 2.0
+"""Shortest time from which the rest is estimated."""
 _POLL_MS = 100
 _PATIENCE_S = 3.0
 
 
+class FitProgress:
+    """What the lines of one fit tell: its stages, its landmarks, and notes for the user.
+
+    Landmarks are added to the given dict by their frame, each of shape (33, 3): x and y in pixels
+    of the upright picture, NaN where there is no person, and visibility from 0 to 1.
+    """
+
+    def __init__(
+        self,
+        landmarks: dict[int, NDArray[np.float32]],
+        clock_s: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.landmarks = landmarks
+        self._clock_s = clock_s
+        self._stages: tuple[str, ...] = ()
+        self._began: list[tuple[float, float]] = []  # time and share at a stage's first report
+        self.size: tuple[int, int] | None = None  # of the upright picture, once the video is open
+        self.resumed = False
+        self.stage = self.unit = ""
+        self.done = self.total = 0  # in this stage; a total of 0 is not known
+        self.newest: int | None = None  # frame of the landmarks that came last
+        self.notes: list[str] = []
+        self.error = ""
+
+    def take(self, events: Sequence[dict[str, Any]]) -> bool:
+        """Read new lines, leaving out what cannot be read; True if any was of use."""
+        return take_lines(self, _READERS, events)
+
+    def _start(self, event: dict[str, Any]) -> None:
+        if event["format"] != FORMAT or event["version"] > VERSION:
+            raise ValueError("lines of another program, or of a later version")
+        self.size = int(event["width"]), int(event["height"])
+        self._stages = tuple(map(str, event["stages"]))
+        self.resumed = bool(event.get("resumed", False))
+
+    def _report(self, event: dict[str, Any]) -> None:
+        stage, done, total = str(event["stage"]), int(event["done"]), int(event["total"])
+        another = stage != self.stage
+        self.stage, self.done, self.total = stage, done, total
+        self.unit = str(event.get("unit", ""))
+        share = self.share
+        if share is not None and (another or not self._began):
+            self._began.append((self._clock_s(), share))
+
+    def _find(self, event: dict[str, Any]) -> None:
+        image_px = np.array(event["image_px"], np.float32)  # null becomes NaN
+        visibility = np.array(event["visibility"], np.float32)
+        if image_px.shape != (len(LANDMARKS), 2) or visibility.shape != (len(LANDMARKS),):
+            raise ValueError("another number of landmarks")
+        self.newest = int(event["frame"])
+        self.landmarks[self.newest] = np.concatenate([image_px, visibility[:, None]], axis=1)
+
+    def _note(self, event: dict[str, Any]) -> None:
+        if (text := str(event["text"])) not in self.notes:
+            self.notes.append(text)
+
+    def _refuse(self, event: dict[str, Any]) -> None:
+        self.error = str(event["text"])
+
+    @property
+    def share(self) -> float | None:
+        """Share of the whole work that is done, None while it is not known."""
+        if self.stage not in self._stages:
+            return None
+        weights = [_WEIGHTS.get(stage, _UNKNOWN_WEIGHT) for stage in self._stages]
+        here = self._stages.index(self.stage)
+        within = min(self.done / self.total, 1.0) if self.total else 0.0
+        total = math.fsum(weights)
+        return (math.fsum(weights[:here]) + within * weights[here]) / total if total else None
+
+    @property
+    def left_s(self) -> float | None:
+        """Seconds to the end at the speed of this stage, None while it is not known.
+
+        At the beginning of a stage the speed is that since the one before, or before that.
+        """
+        share = self.share
+        if share is None:
+            return None
+        for began_s, began_share in reversed(self._began):
+            elapsed_s, gained = self._clock_s() - began_s, share - began_share
+            if elapsed_s >= _SETTLING_S and gained > 0:
+                return elapsed_s * (1.0 - share) / gained
+        return None
+
+    @property
+    def text(self) -> str:
+        """Stage and count in words."""
+        words = WORDS.get(self.stage, self.stage)
+        if not words:
+            return "starting"
+        if self.unit == "byte":
+            megabytes = f"{self.done / 1e6:.1f}"
+            return f"{words}, {megabytes} of {self.total / 1e6:.1f} MB" if self.total else words
+        if not self.total:
+            return words
+        unit = {"frame": "frame ", "step": "step "}.get(self.unit, "")
+        return f"{words}, {unit}{self.done} of {self.total}"
+
+
+_READERS = {
+    "start": FitProgress._start,
+    "progress": FitProgress._report,
+    "landmarks": FitProgress._find,
+    "note": FitProgress._note,
+    "error": FitProgress._refuse,
+}
+
+
 class FitRun(RunMonitor[CommandFolder]):
-    """A fit with its progress, its notes and the landmarks that it adds to the given dict."""
+    """A fit with its progress."""
 
     stop_patience_s = _PATIENCE_S
 
@@ -39,39 +160,14 @@ class FitRun(RunMonitor[CommandFolder]):
         *,
         process: ProcessId | None = None,
     ) -> None:
-        self.landmarks = landmarks
-        self.progress = FitProgress()
-        self.notes: list[str] = []
-        self.started: Started | None = None
-        self._refused = ""
-        self._newest: int | None = None
+        self.progress = FitProgress(landmarks)
         super().__init__(folder, parent, process=process, poll_ms=_POLL_MS)
 
     @property
     def error(self) -> str:
         """Sentence of the command on what is wrong."""
-        return self._refused
-
-    def take_newest(self) -> int | None:
-        """Newest frame whose landmarks came since the last call."""
-        newest, self._newest = self._newest, None
-        return newest
+        return self.progress.error
 
     def on_events(self, events: Sequence[dict[str, Any]]) -> bool:
         """Read stages, counts, landmarks and notes."""
-        messages = [message for event in events if (message := message_of(event)) is not None]
-        for message in messages:
-            match message:
-                case Started():
-                    self.started = message
-                    self.progress.start(message)
-                case Progressed():
-                    self.progress.report(message)
-                case Found():
-                    self.landmarks[message.frame] = message.points
-                    self._newest = message.frame
-                case Noted() if message.text not in self.notes:
-                    self.notes.append(message.text)
-                case Refused():
-                    self._refused = message.text
-        return bool(messages)
+        return self.progress.take(events)

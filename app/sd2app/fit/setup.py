@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, replace
 from itertools import count
 from pathlib import Path
 from typing import Any, Literal
@@ -16,13 +17,24 @@ from sd2app.fit.request import FitRequest, Person, read_request
 from sd2core.body.camera import DEFAULT_FIELD_OF_VIEW_DEG
 from sd2core.body.fit import DEFAULT_STATURE_M as DEFAULT_STATURE_M
 from sd2core.io.video import VideoReader, open_video
-from sd2core.recording.recording import SUFFIX, Recording
+from sd2core.recording.recording import FILE_NAME, SUFFIX, Recording
 
 CameraWay = Literal["file", "angle", "focal"]
 STATURES_M = (0.8, 2.3)
 ANGLES_DEG = (10.0, 150.0)
 _SMALLEST_PERSON = 0.02
 """Smallest side of a rectangle as share of the picture; less is a click."""
+
+
+@dataclass(frozen=True)
+class FitChoices:
+    """What the user chooses for the fit of a video."""
+
+    folder: Path | None = None  # the recording to be made
+    stature_m: float | None = None  # None: estimated
+    camera: CameraWay = "file"  # source of the focal length
+    angle_deg: float = DEFAULT_FIELD_OF_VIEW_DEG  # across the longer side of the picture
+    person: Person | None = None  # rectangle around the person; None: one is chosen
 
 
 class FitSetupModel(QObject):
@@ -33,16 +45,12 @@ class FitSetupModel(QObject):
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._video: Path | None = None
+        self.choices = FitChoices()
+        self.video: Path | None = None
+        self.problem = ""  # why the video cannot be shown
+        self.frame = 0  # the one to look at
+        self.picture: NDArray[np.uint8] | None = None  # RGB, (H, W, 3)
         self._reader: VideoReader | None = None
-        self._picture: NDArray[np.uint8] | None = None
-        self._frame = 0
-        self._problem = ""
-        self._folder: Path | None = None
-        self._stature_m: float | None = None
-        self._camera: CameraWay = "file"
-        self._angle_deg = DEFAULT_FIELD_OF_VIEW_DEG
-        self._person: Person | None = None
         self._opener = LatestRunner("fit-video", self)
         self._opener.finished.connect(self._take_video)
         self._opener.failed.connect(self._refuse)
@@ -53,23 +61,13 @@ class FitSetupModel(QObject):
     # --- the video ------------------------------------------------------------------------
 
     @property
-    def video(self) -> Path | None:
-        """The file."""
-        return self._video
-
-    @property
     def reading(self) -> bool:
         """True while the video is being opened."""
         return self._opener.busy
 
     @property
-    def problem(self) -> str:
-        """Reason why the video cannot be shown."""
-        return self._problem
-
-    @property
     def frames(self) -> int:
-        """Number of its frames, 0 while it is not open."""
+        """Number of frames, 0 while the video is not open."""
         return len(self._reader) if self._reader else 0
 
     @property
@@ -78,25 +76,16 @@ class FitSetupModel(QObject):
         return (self._reader.width, self._reader.height) if self._reader else None
 
     @property
-    def frame(self) -> int:
-        """Frame to look at."""
-        return self._frame
-
-    @property
     def time_s(self) -> float:
-        """Its time."""
-        return self._reader.timebase.time_of(self._frame) if self._reader else 0.0
-
-    @property
-    def picture(self) -> NDArray[np.uint8] | None:
-        """RGB, (H, W, 3)."""
-        return self._picture
+        """Time of the frame to look at."""
+        return self._reader.timebase.time_of(self.frame) if self._reader else 0.0
 
     def choose_video(self, path: Path, open_now: Recording | None = None) -> None:
         """Choose another video; the open recording of it, if saved, gets the mesh."""
         self._let_go()
-        self._video, self._problem, self._person, self._frame = path, "", None, 0
-        self._folder = folder_for(path, open_now)
+        self.video, self.problem, self.frame = path, "", 0
+        folder = folder_for(path, open_now)
+        self.choices = replace(self.choices, folder=folder, person=None)
 
         def read(emit: Emit) -> VideoReader:
             return open_video(path, lambda *_: emit(None))
@@ -108,9 +97,9 @@ class FitSetupModel(QObject):
     def show_frame(self, frame: int) -> None:
         """Look at another frame; the rectangle belongs to the one it was drawn on."""
         frame = min(max(frame, 0), self.frames - 1)
-        if self._reader is None or (frame == self._frame and self._picture is not None):
+        if self._reader is None or (frame == self.frame and self.picture is not None):
             return
-        self._frame = frame
+        self.frame = frame
         reader = self._reader
         self._decoder.submit(lambda emit: reader.read(frame))
         self.changed.emit()
@@ -118,47 +107,24 @@ class FitSetupModel(QObject):
     # --- the choices ----------------------------------------------------------------------
 
     @property
-    def folder(self) -> Path | None:
-        """The recording to be made."""
-        return self._folder
-
-    @property
     def completes(self) -> bool:
         """True if the recording exists and gets the mesh."""
-        return self._folder is not None and (self._folder / "recording.json").exists()
-
-    @property
-    def stature_m(self) -> float | None:
-        """Body height, None to have it estimated."""
-        return self._stature_m
-
-    @property
-    def camera(self) -> CameraWay:
-        """Source of the focal length."""
-        return self._camera
-
-    @property
-    def angle_deg(self) -> float:
-        """Field of view across the longer side of the picture."""
-        return self._angle_deg
+        folder = self.choices.folder
+        return folder is not None and (folder / FILE_NAME).exists()
 
     @property
     def focal_px(self) -> float | None:
-        """The same as a focal length in pixels, None while the video is not open."""
+        """Field of view as a focal length in pixels, None while the video is not open."""
         if self.size is None:
             return None
-        return max(self.size) / 2.0 / math.tan(math.radians(self._angle_deg) / 2.0)
-
-    @property
-    def person(self) -> Person | None:
-        """Rectangle around the person, None to have one chosen."""
-        return self._person
+        return max(self.size) / 2.0 / math.tan(math.radians(self.choices.angle_deg) / 2.0)
 
     @property
     def kept(self) -> FitRequest | None:
         """Request of a stopped fit of this video in the folder."""
-        kept = read_request(self._folder) if self._folder is not None else None
-        return kept if kept is not None and kept.video == self._video else None
+        folder = self.choices.folder
+        kept = read_request(folder) if folder is not None else None
+        return kept if kept is not None and kept.video == self.video else None
 
     @property
     def continues(self) -> bool:
@@ -168,30 +134,24 @@ class FitSetupModel(QObject):
     @property
     def ready(self) -> bool:
         """True if the fit can begin."""
-        return self._reader is not None and self._folder is not None and not self._problem
+        return self._reader is not None and self.choices.folder is not None and not self.problem
 
-    def set_folder(self, folder: Path) -> None:
-        """Choose another folder."""
-        self._change("_folder", folder)
-
-    def set_stature(self, stature_m: float | None) -> None:
-        """Set the height of the person; None to have it estimated."""
-        if stature_m is not None:
-            stature_m = min(max(stature_m, STATURES_M[0]), STATURES_M[1])
-        self._change("_stature_m", stature_m)
-
-    def set_camera(self, way: CameraWay) -> None:
-        """Choose how the focal length is known."""
-        self._change("_camera", way)
-
-    def set_angle(self, angle_deg: float) -> None:
-        """Say the field of view."""
-        self._change("_angle_deg", min(max(angle_deg, ANGLES_DEG[0]), ANGLES_DEG[1]))
+    def change(self, **changes: Any) -> None:
+        """Change some of the :attr:`choices`; height and field of view are held in bounds."""
+        if changes.get("stature_m") is not None:
+            changes["stature_m"] = min(max(changes["stature_m"], STATURES_M[0]), STATURES_M[1])
+        if "angle_deg" in changes:
+            changes["angle_deg"] = min(max(changes["angle_deg"], ANGLES_DEG[0]), ANGLES_DEG[1])
+        choices = replace(self.choices, **changes)
+        if choices != self.choices:
+            self.choices = choices
+            self.changed.emit()
 
     def set_focal(self, focal_px: float) -> None:
         """Say the focal length in pixels of the picture."""
         if self.size is not None and focal_px > 0:
-            self.set_angle(math.degrees(2.0 * math.atan(max(self.size) / 2.0 / focal_px)))
+            angle_rad = 2.0 * math.atan(max(self.size) / 2.0 / focal_px)
+            self.change(angle_deg=math.degrees(angle_rad))
 
     def set_person(self, left: float, top: float, right: float, bottom: float) -> None:
         """Draw the rectangle on the frame that is shown, corners in pixels in any order."""
@@ -202,22 +162,19 @@ class FitSetupModel(QObject):
         y0, y1 = (round(min(max(y, 0), height)) for y in ys)
         if min((x1 - x0) / width, (y1 - y0) / height) < _SMALLEST_PERSON:
             return
-        self._change("_person", Person(self._frame, x0, y0, x1 - x0, y1 - y0))
-
-    def clear_person(self) -> None:
-        """Let the fit choose the person."""
-        self._change("_person", None)
+        self.change(person=Person(self.frame, x0, y0, x1 - x0, y1 - y0))
 
     def request(self) -> FitRequest:
         """All of it; only when :attr:`ready`."""
-        assert self._video is not None
-        assert self._folder is not None
+        choices = self.choices
+        assert self.video is not None
+        assert choices.folder is not None
         return FitRequest(
-            video=self._video,
-            folder=self._folder,
-            stature_m=self._stature_m,
-            focal_px=None if self._camera == "file" else self.focal_px,
-            person=self._person,
+            video=self.video,
+            folder=choices.folder,
+            stature_m=choices.stature_m,
+            focal_px=None if choices.camera == "file" else self.focal_px,
+            person=choices.person,
         )
 
     def close(self) -> None:
@@ -228,39 +185,31 @@ class FitSetupModel(QObject):
 
     # --- inside ---------------------------------------------------------------------------
 
-    def _change(self, name: str, value: object) -> None:
-        if getattr(self, name) != value:
-            setattr(self, name, value)
-            self.changed.emit()
-
     def _take_video(self, reader: Any) -> None:
         self._reader = reader
-        if self.kept is not None:
-            self._take_choices(self.kept)
+        if (kept := self.kept) is not None:
+            self.change(stature_m=kept.stature_m, person=kept.person, camera="file")
+            if kept.focal_px is not None:
+                self.change(camera="focal")
+                self.set_focal(kept.focal_px)
+        person = self.choices.person
         # The middle: at both ends people walk in and out.
-        self.show_frame(len(reader) // 2 if self._person is None else self._person.frame)
+        self.show_frame(len(reader) // 2 if person is None else person.frame)
         self.changed.emit()
 
-    def _take_choices(self, kept: FitRequest) -> None:
-        self._stature_m, self._person = kept.stature_m, kept.person
-        self._camera = "file"
-        if kept.focal_px is not None:
-            self._camera = "focal"
-            self.set_focal(kept.focal_px)
-
     def _take_picture(self, picture: Any) -> None:
-        self._picture = picture
+        self.picture = picture
         self.picture_changed.emit()
 
     def _refuse(self, error: Exception) -> None:
-        self._problem = str(error)
+        self.problem = str(error)
         self.changed.emit()
 
     def _let_go(self) -> None:
         self._decoder.cancel()
         if self._reader is not None:
             self._reader.close()
-        self._reader = self._picture = None
+        self._reader = self.picture = None
 
 
 def folder_for(video: Path, open_now: Recording | None = None) -> Path:
@@ -270,7 +219,7 @@ def folder_for(video: Path, open_now: Recording | None = None) -> Path:
     folder in which a fit of this video was stopped; else a new name beside the video.
     """
     if open_now is not None and open_now.video == video and open_now.mesh is None:
-        saved = (open_now.folder / "recording.json").exists()
+        saved = (open_now.folder / FILE_NAME).exists()
         if saved:
             return open_now.folder
     for number in count(1):

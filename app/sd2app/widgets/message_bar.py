@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QToolButton, QWidget
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QToolButton, QWidget
+
+from sd2app.widgets.panel import say, sentence
 
 
 class MessageBar(QFrame):
@@ -12,9 +14,7 @@ class MessageBar(QFrame):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("panel")
-        self._text = QLabel(self)
-        self._text.setWordWrap(True)
-        self._text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self._text = sentence("")
         close = QToolButton(self)
         close.setText("✕")
         close.setToolTip("Close this message")
@@ -42,8 +42,5 @@ class MessageBar(QFrame):
             self._say(text, "muted")
 
     def _say(self, text: str, role: str) -> None:
-        self._text.setObjectName(role)
-        self._text.style().unpolish(self._text)
-        self._text.style().polish(self._text)
-        self._text.setText(text)
+        say(self._text, text, role)
         self.show()

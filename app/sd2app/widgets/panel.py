@@ -36,6 +36,15 @@ def sentence(text: str, role: str = "muted") -> QLabel:
     return label
 
 
+def say(label: QLabel, text: str, role: str) -> None:
+    """Show a text in the style of a role, such as ``muted`` or ``warning``."""
+    if label.objectName() != role:
+        label.setObjectName(role)
+        label.style().unpolish(label)
+        label.style().polish(label)
+    label.setText(text)
+
+
 def rule() -> QFrame:
     """A line between two parts."""
     line = QFrame()

@@ -11,8 +11,8 @@ import pytest
 from PySide6.QtCore import QLockFile
 
 from sd2app.command_line import main
-from sd2app.fit.importer import make_recording
 from sd2app.fit.model import FitModel
+from sd2app.fit.on_screen import make_recording
 from sd2app.fit.request import LOCK_NAME, FitRequest, Person, read_request, settled
 from sd2app.settings import Settings
 from sd2core.cli import build_parser
@@ -63,8 +63,8 @@ def test_a_fit_from_beginning_to_end(made, qtbot, request_, settings) -> None:
     until(qtbot, model, "finished")
     assert finished == [request_]
     assert request_.mesh.exists()
-    assert model.notes == ("This was no fit.",)
-    assert model.picture_size == (160, 120)
+    assert model.notes == "This was no fit."
+    assert model.progress.size == (160, 120)
     assert model.progress.stage == "write"
     assert model.landmarks_at(7)[0].tolist() == pytest.approx([75.0, 10.0, 1.0])
     assert model.landmarks_at(21) is None
@@ -95,7 +95,7 @@ def test_cancelled_says_so_at_once_and_is_continued(made, qtbot, request_, setti
     assert settings.unfinished_fit == request_.folder
     model.resume()
     until(qtbot, model, "finished")
-    assert model._run.started.resumed
+    assert model.progress.resumed
     assert model.landmarks_at(3) is not None  # still known from before it was stopped
 
 
@@ -110,7 +110,7 @@ def test_another_start_of_the_program_offers_to_continue(made, qtbot, request_, 
     assert later.request == request_
     later.resume()
     until(qtbot, later, "finished")
-    assert later._run.started.resumed
+    assert later.progress.resumed
 
 
 def test_a_fit_that_goes_on_without_its_window_is_found_again(
@@ -205,7 +205,7 @@ def test_other_choices_begin_anew(made, qtbot, request_) -> None:
     again = made("--frames", 30)
     again.start(taller)
     until(qtbot, again, "finished")
-    assert not again._run.started.resumed
+    assert not again.progress.resumed
 
 
 # --- requests -----------------------------------------------------------------------------

@@ -52,31 +52,31 @@ def test_nothing_said_leaves_all_to_the_fit(setup, video) -> None:
 
 
 def test_field_of_view_and_focal_length_are_one_thing(setup) -> None:
-    setup.set_camera("angle")
-    setup.set_angle(90.0)
+    setup.change(camera="angle")
+    setup.change(angle_deg=90.0)
     assert setup.request().focal_px == pytest.approx(80.0)
     setup.set_focal(160.0)
-    assert setup.angle_deg == pytest.approx(2 * math.degrees(math.atan(0.5)))
-    setup.set_camera("file")
+    assert setup.choices.angle_deg == pytest.approx(2 * math.degrees(math.atan(0.5)))
+    setup.change(camera="file")
     assert setup.request().focal_px is None
 
 
 def test_a_rectangle_may_be_drawn_from_any_corner_and_beyond_the_edge(setup) -> None:
     setup.show_frame(3)
     setup.set_person(100.4, 80.2, -20, 10.6)
-    assert setup.person == Person(frame=3, x=0, y=11, width=100, height=69)
+    assert setup.choices.person == Person(frame=3, x=0, y=11, width=100, height=69)
     setup.show_frame(7)
-    assert setup.person.frame == 3
+    assert setup.choices.person.frame == 3
     setup.set_person(10, 10, 11, 90)  # a slip of the hand
-    assert setup.person.width == 100
-    setup.clear_person()
+    assert setup.choices.person.width == 100
+    setup.change(person=None)
     assert setup.request().person is None
 
 
 def test_heights_stay_human(setup) -> None:
-    setup.set_stature(17.0)
-    assert setup.stature_m == 2.3
-    setup.set_stature(None)
+    setup.change(stature_m=17.0)
+    assert setup.choices.stature_m == 2.3
+    setup.change(stature_m=None)
     assert setup.request().stature_m is None
 
 
@@ -99,7 +99,7 @@ def test_a_stopped_fit_is_continued_with_its_choices_and_not_with_others(qtbot, 
     assert setup.continues
     assert setup.frame == 4
     assert setup.request().asks_the_same(kept)
-    setup.set_stature(1.8)
+    setup.change(stature_m=1.8)
     assert setup.kept is not None
     assert not setup.continues
     setup.close()

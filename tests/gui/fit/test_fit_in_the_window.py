@@ -64,7 +64,7 @@ def made(qtbot, compiled_kernels, fake):
     for window in windows:
         if window.ready:
             models_of(window).fit.close()
-            models_of(window).fit._state = "idle"
+            models_of(window).fit.state = "idle"
             models_of(window).document.undo_stack.clear()
         window.close()
         window.deleteLater()
@@ -147,11 +147,11 @@ def test_landmarks_are_drawn_and_the_clock_goes_along_until_it_is_moved(made, qt
     assert left > 50
     assert right > 50
     qtbot.keyClick(window, Qt.Key.Key_Left)
-    assert not c.fit_follower.following
+    assert not c.fit_on_screen.following
     qtbot.wait(200)
     assert c.playback.frame == 29
     click(window, qtbot, "Follow")
-    assert c.fit_follower.following
+    assert c.fit_on_screen.following
     click(window, qtbot, "Cancel")
     assert c.fit.state == "cancelling"
     qtbot.waitUntil(lambda: c.fit.state == "stopped", timeout=10_000)
@@ -238,7 +238,7 @@ def test_a_recording_that_is_open_keeps_its_edits_and_gets_the_mesh(made, qtbot,
     show(window, qtbot, saved.folder)
     c = models_of(window)
     setup = FitSetupModel()
-    setup.choose_video(c.fit_offer.video, c.document.recording)
+    setup.choose_video(c.fit_on_screen.offered, c.document.recording)
     qtbot.waitUntil(lambda: setup.ready, timeout=10_000)
     assert setup.completes
     c.fit.start(setup.request())

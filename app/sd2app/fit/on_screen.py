@@ -1,0 +1,167 @@
+"""A fit and the open recording: what is offered, what the clock follows, and the result."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from PySide6.QtCore import QObject, QTimer, Signal
+
+from sd2app.fit.model import FitModel
+from sd2app.fit.request import FitRequest
+from sd2app.session.session import Session
+from sd2core.errors import Sd2Error
+from sd2core.files.paths import plain_path
+from sd2core.files.recording_json import CameraEntry
+from sd2core.io.fitted import fitted_camera
+from sd2core.recording.recording import FILE_NAME, Recording, open_recording
+
+
+class FitOnScreen(QObject):
+    """Offers a fit where there is a video and no mesh, shows its frames, and opens its result.
+
+    The clock follows the frame under way until the user moves it. The recording is made as soon
+    as its mesh is there, and opened where nothing else is in use.
+    """
+
+    changed = Signal()
+    noted = Signal(str)  # remarks of the fit, once its recording is on screen
+
+    def __init__(self, session: Session, fit: FitModel, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._settings, self._document = session.settings, session.document
+        self._playback, self._fit = session.playback, fit
+        self._declined: set[Path] = set()
+        self.following = True
+        self._moving = False
+        self._was_busy = False
+        self._notes = ""
+        fit.advanced.connect(self._follow)
+        fit.changed.connect(self._restart)
+        fit.finished.connect(self._take)
+        for signal in (fit.changed, session.document.changed):
+            signal.connect(self.changed)
+        for signal in (session.playback.frame_changed, session.playback.playing_changed):
+            signal.connect(self._notice)
+        session.document.opened.connect(self._tell)
+
+    # --- the offer ------------------------------------------------------------------------
+
+    @property
+    def offered(self) -> Path | None:
+        """Video to which a body could be fitted; None where there is nothing to offer."""
+        content = self._document.content
+        if content is None or content.video is None or content.recording.mesh is not None:
+            return None
+        video = content.recording.video
+        if video is None or video in self._declined or self._fit.state != "idle":
+            return None
+        return video
+
+    def decline(self) -> None:
+        """Offer no more for this video."""
+        if self.offered is not None:
+            self._declined.add(self.offered)
+            self.changed.emit()
+
+    # --- the clock ------------------------------------------------------------------------
+
+    @property
+    def visible(self) -> bool:
+        """True if the window shows the video of the fit."""
+        request, recording = self._fit.request, self._document.recording
+        if request is None or recording is None or recording.video is None:
+            return False
+        return plain_path(recording.video) == request.video
+
+    def set_following(self, following: bool) -> None:
+        """Follow the frame under way, or stop following."""
+        if following != self.following:
+            self.following = following
+            self.changed.emit()
+
+    def _follow(self, frame: int) -> None:
+        video = self._document.video
+        if not (self.following and self.visible) or video is None or frame >= len(video):
+            return
+        self._moving = True
+        try:
+            self._playback.seek(video.timebase.time_of(frame))
+        finally:
+            self._moving = False
+
+    def _restart(self) -> None:
+        if self._fit.busy and not self._was_busy:
+            self.set_following(True)
+        self._was_busy = self._fit.busy
+
+    def _notice(self) -> None:
+        if not self._moving and self._fit.busy and self._document.content is not None:
+            self.set_following(False)
+
+    # --- the result -----------------------------------------------------------------------
+
+    def open_result(self) -> None:
+        """Open the recording that was made."""
+        request = self._fit.request
+        if request is None or self._fit.state != "finished":
+            return
+        self._notes = self._fit.notes
+        self._fit.dismiss()
+        self._document.open([request.folder])
+
+    def _take(self, request: FitRequest) -> None:
+        recording, progress = self._document.recording, self._fit.progress
+        try:
+            made = make_recording(request, progress.size if progress else None, recording)
+        except (Sd2Error, OSError) as error:
+            self._fit.report_failure(str(error))
+            return
+        self._settings.add_recent(made.folder)
+        waiting = self.visible and recording is not None and recording.mesh is None
+        if recording is not None and recording.folder == made.folder:
+            # Saving what is open must not take the mesh away again.
+            recording.mesh, recording.camera = made.mesh, made.camera
+        if self._document.content is None or (waiting and not self._document.modified):
+            self.open_result()
+
+    def _tell(self) -> None:
+        if self._notes:
+            notes, self._notes = self._notes, ""
+            # After what opening has to say.
+            QTimer.singleShot(0, self, lambda: self.noted.emit(notes))
+
+
+def make_recording(
+    request: FitRequest, size: tuple[int, int] | None, base: Recording | None
+) -> Recording:
+    """Record video, written mesh and camera of a request; ``size`` is (width, height) upright.
+
+    ``base`` is the open recording: where it is of the same video and has no mesh, its radar,
+    labels and sensor are taken along. Raises Sd2Error or OSError if it cannot be written.
+    """
+    camera = fitted_camera(request.mesh)
+    if camera is None and request.focal_px is not None:
+        width, height = size or (None, None)
+        camera = CameraEntry(focal_px=request.focal_px, width=width, height=height, source="user")
+    if (request.folder / FILE_NAME).exists():
+        recording = open_recording(request.folder)
+        recording.mesh, recording.camera = request.mesh, camera
+        recording.save()
+    elif base is not None and _awaits_mesh(base, request.video):
+        title = request.folder.stem
+        recording = replace(base, mesh=request.mesh, camera=camera, title=title)
+        recording = recording.save_as(request.folder)
+    else:
+        recording = Recording.create(
+            request.folder, video=request.video, mesh=request.mesh, camera=camera
+        )
+    request.forget()
+    return recording
+
+
+def _awaits_mesh(recording: Recording, video: Path) -> bool:
+    """True if a recording is of this video and has no mesh."""
+    if recording.video is None or recording.mesh is not None:
+        return False
+    return plain_path(recording.video) == plain_path(video)
