@@ -60,7 +60,7 @@ def training(application: QApplication, campaign: Path) -> None:
     model.start()
     wait_for(application, lambda: model.run is not None and model.run.history.epoch >= 12)
     save(window, "training.png")
-    model.cancel()
+    model.tell("cancel")
     wait_for(application, lambda: not model.under_way)
     window.close()
 

@@ -169,6 +169,11 @@ class RunMonitor(QObject, Generic[F]):
         return False
 
     @property
+    def share(self) -> float | None:
+        """Share of the whole that is done; None while that is not known."""
+        return None
+
+    @property
     def is_saving(self) -> bool:
         """True while a result is written that a stop would lose."""
         return False

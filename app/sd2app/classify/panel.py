@@ -24,8 +24,6 @@ class ClassPanel(RunPanel):
     ) -> None:
         super().__init__(
             training,
-            lambda: [(known.path, known.title) for known in training.runs],
-            lambda: training.run.folder.path if training.run is not None else None,
             "Trainings and comparisons: under way, or ended",
             parent=parent,
         )

@@ -155,6 +155,11 @@ class ClassRun(RunMonitor[CommandFolder]):
         return self.history.begun
 
     @property
+    def share(self) -> float | None:
+        """Share of the whole that is done; None while that is not known."""
+        return self.history.share
+
+    @property
     def is_saving(self) -> bool:
         """True while the model is written."""
         return self.history.saving

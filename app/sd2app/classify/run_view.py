@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QVBoxLayout, QWidget
 
 from sd2app.background.run_monitor import UNDER_WAY
@@ -63,11 +65,11 @@ class ClassRunView(QWidget):
             ),
             "stop": outlined(
                 "Stop", "End it now and keep what there is",
-                lambda: self._tell("stop"), self,
+                partial(self._training.tell, "stop"), self,
             ),
             "cancel": outlined(
                 "Cancel", "End it now and delete what it made",
-                lambda: self._tell("cancel"), self,
+                partial(self._training.tell, "cancel"), self,
             ),
             "again": outlined("Resume", "Train what is missing", asks.again, self),
             "delete": outlined("Delete…", "Delete it with what it made", asks.delete, self),
@@ -80,11 +82,6 @@ class ClassRunView(QWidget):
             row.addWidget(button)
         row.addStretch(1)
         return row
-
-    def _tell(self, what: str) -> None:
-        run = self._training.run
-        if run is not None:
-            run.stop() if what == "stop" else run.cancel()
 
     def _refresh(self) -> None:
         run = self._training.run

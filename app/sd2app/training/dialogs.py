@@ -74,7 +74,7 @@ class TrainingDialogs:
         if training.closing == "ask":
             return self._ask_what_becomes(training, run.folder.path.name)
         if training.closing == "stop":
-            training.stop()
+            training.tell("stop")
         return True
 
     def _ask_what_becomes(self, training: TrainingModel, name: str) -> bool:
@@ -99,9 +99,9 @@ class TrainingDialogs:
         chosen = box.clickedButton()
         box.deleteLater()
         if chosen is discard:
-            training.cancel()
+            training.tell("cancel")
         elif chosen is stop:
-            training.stop()
+            training.tell("stop")
         elif chosen is not keep:
             return False
         if always.isChecked() and chosen is not discard:

@@ -2,48 +2,52 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import shlex
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Literal
 
-from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtCore import QObject
 
 from sd2app.background.run_command import COMMAND, launch
+from sd2app.background.runs import KnownRun, Runs, Sentences, free_folder
 from sd2app.background.step_times import COMMAND as TIMING_COMMAND
 from sd2app.background.step_times import PatientTiming, StepKey, StepTimes
 from sd2app.settings import Settings
-from sd2app.training.command import (
-    new_run_folder,
-    quoted,
-    resume_arguments,
-    train_arguments,
-)
-from sd2app.training.library import TrainingLibrary, user_runs_folder
 from sd2app.training.pair_maker import PairMaker
 from sd2app.training.run import TrainingMonitor
 from sd2app.training.setup import TrainingSetupModel
+from sd2app.training.text import model_name, state_text
+from sd2app.widgets.text import clock_text
 from sd2core.errors import Sd2Error
 from sd2core.processes import ONE_THREAD
-from sd2core.train.folder import TrainingFolder
+from sd2core.runs.folder import LIVE
+from sd2core.train.config import DataConfig, TrainConfig, TrainingConfig
+from sd2core.train.folder import RunStatus, TrainingFolder, runs_in
 
 Closing = Literal["ask", "keep", "stop"]
 
 CLOSING: tuple[Closing, ...] = ("ask", "keep", "stop")
 """Choices for a run under way when the window is closed."""
-_LIBRARY_MS = 3000
+_SENTENCES = Sentences(
+    busy="{} is being trained. Wait for it, or stop it.",
+    found="{} is being trained. The Train panel shows it.",
+    finished="{} is trained. The Train panel puts its model to use.",
+    failed="{} could not be trained to its end. The Train panel says more.",
+)
+_OPTIONS = {"early_stopping_epochs": "--early-stopping"}
+"""Options whose names differ from their settings."""
 
 
-class TrainingModel(QObject):
-    """One run in view, the others in a list; one that the window started at a time.
+class TrainingModel(Runs[TrainingMonitor]):
+    """Trainings of denoisers, of which the window starts one at a time.
 
     ``command`` runs ``sd2`` commands, ``timing_command`` times a step. ``folder`` holds the
     runs; by default as the settings say, or in the user's data directory.
     """
-
-    changed = Signal()
-    phase_changed = Signal()  # phase of the run in view, or another run is in view
-    noted = Signal(str)
-    failed = Signal(str)
 
     def __init__(
         self,
@@ -53,43 +57,22 @@ class TrainingModel(QObject):
         timing_command: Sequence[str] = TIMING_COMMAND,
         folder: Path | None = None,
     ) -> None:
-        super().__init__(parent)
-        self._settings = settings
+        super().__init__(TrainingMonitor, settings, "training/run", _SENTENCES, parent)
         self._command = tuple(command)
+        chosen = settings.stored("training/folder", "")
+        self._folder = folder or (Path(chosen) if chosen else user_runs_folder())
+        self._statuses: dict[Path, tuple[object, RunStatus]] = {}
         self.step_times = StepTimes(settings, self, timing_command)
         self.setup = TrainingSetupModel(settings, self.step_times, self)
-        chosen = settings.stored("training/folder", "")
-        self.library = TrainingLibrary(
-            folder or (Path(chosen) if chosen else user_runs_folder()), self
-        )
-        self.pair_maker = PairMaker(self.library.folder.parent / "pairs", self, command)
+        self.setup.changed.connect(self.changed)
+        self.pair_maker = PairMaker(self._folder.parent / "pairs", self, command)
         self.pair_maker.changed.connect(self.changed)
         self.pair_maker.made.connect(self.setup.add_store)
         self.pair_maker.failed.connect(self.failed)
-        self._monitor: TrainingMonitor | None = None
-        self._was_under_way = False
-        self._looking_for_runs = False
-        self._watched = False
-        self._timer = QTimer(self)
-        self._timer.setInterval(_LIBRARY_MS)
-        self._timer.timeout.connect(self.library.refresh)
-        self.library.changed.connect(self.changed)
-        self.library.refreshed.connect(self._take_up)
-        self.setup.changed.connect(self.changed)
         self._timing = PatientTiming(self.step_times, self._to_be_timed, self)
         self.setup.changed.connect(self._timing.wait)
 
     # --- what is known --------------------------------------------------------------------
-
-    @property
-    def run(self) -> TrainingMonitor | None:
-        """The run in view; None while a new one is being set up."""
-        return self._monitor
-
-    @property
-    def under_way(self) -> bool:
-        """True while the run in view has a process."""
-        return self._monitor is not None and self._monitor.loaded and self._monitor.under_way
 
     def to_be_left(self) -> TrainingMonitor | None:
         """The run that would go on when the window is closed, brought into view.
@@ -97,21 +80,10 @@ class TrainingModel(QObject):
         Runs that were started from a terminal do not count here unless they are in view.
         """
         if not self.under_way:
-            live = self.library.live
-            if live is None or not TrainingFolder(live.path).output.exists():
+            if self.live is None or not TrainingFolder(self.live.path).output.exists():
                 return None
-            self.select(live.path)
-        return self._monitor
-
-    @property
-    def mark(self) -> str:
-        """Share of the run in view that is done, as text; empty when none is under way."""
-        if not self.under_way or self._monitor is None:
-            return ""
-        share = self._monitor.history.share
-        if self._monitor.phase == "paused":
-            return "paused"
-        return "…" if share is None else f"{100 * share:.0f} %"
+            self.select(self.live.path)
+        return self.run
 
     @property
     def closing(self) -> Closing:
@@ -127,45 +99,26 @@ class TrainingModel(QObject):
     @property
     def why_not_start(self) -> str:
         """Reason why no run can be started; empty when one can."""
-        live = self.library.live
-        path = self._monitor.path if self._monitor and self.under_way else None
-        if live is not None or path is not None:
-            return _busy_text(path or live.path)  # type: ignore[union-attr]
-        return self.setup.problem
+        return self.busy or self.setup.problem
 
     @property
     def command(self) -> str:
         """Command for a terminal that does what is set up; Sd2Error if it cannot be started."""
         config = self.setup.config
-        return quoted(train_arguments(config, Path(new_run_folder(Path(), config).name)))
+        return quoted(train_arguments(config, Path(_new_run(Path(), config).name)))
 
     def set_watched(self, watched: bool) -> None:
         """Note that the panel is visible or hidden: steps are timed only while it is visible."""
-        self._watched = watched
+        super().set_watched(watched)
         if watched:
             self.setup.refresh()
-            self.library.refresh()
         self._timing.look()
 
     def _to_be_timed(self) -> StepKey | None:
-        wanted = self._watched and self._monitor is None and not self.why_not_start
+        wanted = self._watched and self.run is None and not self.why_not_start
         return self.setup.step_key if wanted else None
 
     # --- one run after another ------------------------------------------------------------
-
-    def look_for_runs(self) -> None:
-        """At the start of the program: find what is under way, or what was in view last."""
-        self._looking_for_runs = True
-        self.library.refresh()
-        self._timer.start()
-
-    def select(self, path: Path | None) -> None:
-        """Show a run; None is a new one, to be set up."""
-        if path is None:
-            self._follow(None)
-            self._settings.set_value("training/run", "")
-        elif self._monitor is None or self._monitor.path != path:
-            self._follow(TrainingMonitor(path, self))
 
     def open_run(self, path: Path) -> None:
         """Show a run of another folder; Sd2Error if there is none."""
@@ -178,139 +131,103 @@ class TrainingModel(QObject):
             raise Sd2Error(self.why_not_start)
         config = self.setup.config
         self.step_times.stop()
-        self.library.folder.mkdir(parents=True, exist_ok=True)
-        path = new_run_folder(self.library.folder, config)
+        self._folder.mkdir(parents=True, exist_ok=True)
+        path = _new_run(self._folder, config)
         self._launch(path, train_arguments(config, path))
 
     def resume(self) -> None:
         """Go on with the run in view where it ended; raises what :meth:`start` does."""
-        run = self._monitor
+        run = self.run
         if run is None or run.under_way:
             return
-        # The folders are asked: what the library found may be over by now.
-        for other in self.library.runs:
+        # The folders are asked: what was listed may be over by now.
+        for other in self.known:
             if other.live and TrainingFolder(other.path).live:
-                raise Sd2Error(_busy_text(other.path))
-        self._launch(run.path, resume_arguments(run.path))
+                raise Sd2Error(_SENTENCES.busy.format(other.path.name))
+        self._launch(run.path, ["train", "--resume", str(run.path)])
 
     def _launch(self, path: Path, arguments: list[str]) -> None:
         # What moves on the screen comes first: the training gets by with one processor.
-        process = launch([*self._command, *arguments], TrainingFolder(path).output, ONE_THREAD)
-        self._follow(TrainingMonitor(path, self, process=process))
-        self.library.refresh()
-
-    # --- steering -------------------------------------------------------------------------
-
-    def pause(self) -> None:
-        """Pause, which frees the processor but not the memory."""
-        self._attempt(lambda run: run.tell("pause"))
-
-    def go_on(self) -> None:
-        """End the pause."""
-        self._attempt(lambda run: run.tell("run"))
-
-    def stop(self) -> None:
-        """End it now, and keep the best model so far."""
-        self._attempt(lambda run: run.tell("stop"))
-
-    def cancel(self) -> None:
-        """End it now, and delete what it made."""
-        self._attempt(lambda run: run.tell("cancel"))
-
-    def delete(self) -> None:
-        """Delete the run in view, which has ended, with its model."""
-        run = self._monitor
-        if run is not None and not run.under_way:
-            self._attempt(lambda run: run.delete())
-            self.select(None)
-            self.library.refresh()
+        words = [*self._command, *arguments]
+        self.follow_new(path, launch(words, TrainingFolder(path).output, ONE_THREAD))
 
     def close(self) -> None:
         """Stop polling; a running training goes on."""
-        self._timer.stop()
         self._timing.stop()
         self.pair_maker.close()
         self.setup.close()
-        self.library.close()
-        if self._monitor is not None:
-            self._monitor.close()
-
-    def _attempt(self, work: Callable[[TrainingMonitor], None]) -> None:
-        if self._monitor is not None:
-            try:
-                work(self._monitor)
-            except (OSError, Sd2Error) as error:
-                self.failed.emit(str(error))
+        super().close()
 
     # --- following ------------------------------------------------------------------------
 
-    def _follow(self, monitor: TrainingMonitor | None) -> None:
-        if self._monitor is not None:
-            self._monitor.close()
-            self._monitor.deleteLater()
-        self._monitor = monitor
-        self._was_under_way = False
-        if monitor is not None:
-            self._settings.set_value("training/run", str(monitor.path))
-            monitor.changed.connect(self._tell)
-            monitor.phase_changed.connect(self._notice)
-        self.phase_changed.emit()
-        self.changed.emit()
-
-    def _tell(self) -> None:
-        run = self._monitor
-        if run is not None and run.under_way and run.history.epoch_points:
-            self._learn_step_time(run)
-        self.changed.emit()
-
-    def _notice(self) -> None:
-        run = self._monitor
-        if run is None:
-            return
-        if run.phase == "gone":
-            # Cancelled: there is nothing to show any more.
-            self.library.refresh()
-            self.select(None)
-            return
-        ended = run.loaded and self._was_under_way and not run.under_way
-        self._was_under_way = run.loaded and run.under_way
-        self.library.refresh()
-        self.phase_changed.emit()
-        if ended:
-            self._learn_step_time(run)
-            self._say_ended(run)
-
-    def _say_ended(self, run: TrainingMonitor) -> None:
-        if self._watched:
-            return  # it is seen
-        name = run.path.name
-        if run.phase == "finished":
-            self.noted.emit(f"{name} is trained. The Train panel puts its model to use.")
-        elif run.phase in ("failed", "died"):
-            self.failed.emit(f"{name} could not be trained to its end. The Train panel says more.")
-
-    def _learn_step_time(self, run: TrainingMonitor) -> None:
+    def on_change(self, run: TrainingMonitor) -> None:
         """Store the measured time of a step as the estimate for the next run."""
         step_s, config = run.history.step_s, run.config
-        if step_s is not None and config is not None:
+        if step_s is not None and config is not None and run.history.epoch_points:
             key = StepKey.of_denoiser(config.model.name, config.training.batch_size)
             self.step_times.learn(key, step_s)
 
-    def _take_up(self) -> None:
-        """Select the run under way, or the last in view, after the first search for runs."""
-        if not self._looking_for_runs:
-            return
-        self._looking_for_runs = False
-        live = self.library.live
-        if live is not None:
-            self.select(live.path)
-            self.noted.emit(f"{live.path.name} is being trained. The Train panel shows it.")
-            return
-        last = self._settings.stored("training/run", "")
-        # It may lie elsewhere.
-        if last and TrainingFolder(Path(last)).exists:
-            self.select(Path(last))
+    def find(self) -> Sequence[KnownRun]:
+        """Read the status of every run in the folder."""
+        try:
+            folders = runs_in(self._folder)
+        except Sd2Error:
+            return ()  # there has been no run yet
+        found = [(one.path, status) for one in folders if (status := self._status(one)) is not None]
+        found.sort(key=lambda one: one[1].started_unix_s, reverse=True)
+        return [KnownRun(path, _title(status), status.state in LIVE) for path, status in found]
+
+    def _status(self, run: TrainingFolder) -> RunStatus | None:
+        """Status of a run; None where it is damaged, or deleted meanwhile."""
+        try:
+            stamps = [
+                path.stat().st_mtime_ns if path.exists() else 0
+                for path in (run.progress, run.description, run.best)
+            ]
+            # Without this every look would read all that every run has ever told.
+            live = run.live
+            kept = self._statuses.get(run.path)
+            if kept is not None and kept[0] == (stamps, live):
+                return kept[1]
+            status = run.status()
+        except (Sd2Error, OSError):
+            return None
+        # Otherwise it ended, or began, between two looks.
+        if (status.state in LIVE) == live:
+            self._statuses[run.path] = ((stamps, live), status)
+        return status
 
 
-def _busy_text(path: Path) -> str:
-    return f"{path.name} is being trained. Wait for it, or stop it."
+def user_runs_folder() -> Path:
+    """Default folder of runs."""
+    import platformdirs
+
+    return Path(platformdirs.user_data_dir("sd2-studio", appauthor=False)) / "runs"
+
+
+def train_arguments(config: TrainConfig, run: Path) -> list[str]:
+    """Arguments of ``sd2 train`` for all that differs from the defaults."""
+    # The model is named even where it is the default: it is what one looks for.
+    words = ["train", *map(str, config.data.pairs), "--model", config.model.name, "--background"]
+    for section, plain in (("data", DataConfig(config.data.pairs)), ("training", TrainingConfig())):
+        mine = getattr(config, section)
+        for one in fields(mine):
+            value = getattr(mine, one.name)
+            if value != getattr(plain, one.name):
+                words += [_OPTIONS.get(one.name, f"--{one.name.replace('_', '-')}"), f"{value}"]
+    return [*words, "--out", str(run)]
+
+
+def quoted(arguments: list[str]) -> str:
+    """Command line for a terminal."""
+    words = ["sd2", *arguments]
+    return subprocess.list2cmdline(words) if sys.platform == "win32" else shlex.join(words)
+
+
+def _new_run(folder: Path, config: TrainConfig) -> Path:
+    return free_folder(folder, config.model.name, config.data.pairs)
+
+
+def _title(status: RunStatus) -> str:
+    when = clock_text(status.started_unix_s)
+    return f"{when} · {model_name(status.model)} · {state_text(status.state)}"

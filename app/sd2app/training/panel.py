@@ -93,8 +93,6 @@ class TrainingPanel(RunPanel):
     ) -> None:
         super().__init__(
             training,
-            lambda: [(known.path, known.title) for known in training.library.runs],
-            lambda: training.run.folder.path if training.run is not None else None,
             "Runs: those under way, and those that have ended",
             asks.open_run,
             parent,

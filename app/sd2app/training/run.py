@@ -60,6 +60,11 @@ class TrainingMonitor(RunMonitor[TrainingFolder]):
         return self.history.paused
 
     @property
+    def share(self) -> float | None:
+        """Share of the whole that is done; None while that is not known."""
+        return self.history.share
+
+    @property
     def error(self) -> str:
         """Reason of a failure, from its last line."""
         return self.history.error

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 from PySide6.QtCore import QSignalBlocker
 from PySide6.QtWidgets import (
@@ -118,17 +119,17 @@ class TrainingRunView(QWidget):
         resume: Callable[[], None],
         delete: Callable[[], None],
     ) -> None:
-        training = self._training
+        tell = partial(partial, self._training.tell)
         self._buttons = {
             "use": outlined(
                 "Use this model", "Denoise with it, and compare with what was there before",
                 use, self,
             ),
-            "pause": outlined("Pause", "Rest, and give the processor back", training.pause, self),
-            "go_on": outlined("Continue", "Go on training", training.go_on, self),
-            "stop": outlined("Stop", "End it now and keep the best model", training.stop, self),
+            "pause": outlined("Pause", "Rest, and give the processor back", tell("pause"), self),
+            "go_on": outlined("Continue", "Go on training", tell("run"), self),
+            "stop": outlined("Stop", "End it now and keep the best model", tell("stop"), self),
             "cancel": outlined(
-                "Cancel", "End it now and delete what it made", training.cancel, self
+                "Cancel", "End it now and delete what it made", tell("cancel"), self
             ),
             "resume": outlined("Resume", "Go on where it ended", resume, self),
             "delete": outlined("Delete…", "Delete this run with its model", delete, self),

@@ -4,50 +4,35 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from PySide6.QtCore import QSignalBlocker
 from PySide6.QtGui import QHideEvent, QShowEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
+from sd2app.background.runs import KnownRun, Runs
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.panel import outlined
 
 _NEW = "New training"
 
 
-class Runs(Protocol):
-    """The model of such a panel; its signal ``changed`` is followed."""
-
-    changed: Any
-
-    def select(self, path: Path | None) -> None:
-        """Show a run; None is a new one, to be set up."""
-
-    def set_watched(self, watched: bool) -> None:
-        """Note that the panel is visible or hidden."""
-
-
 class RunPanel(QWidget):
     """The list of runs on top; below it the run in view, or the setup of a new one.
 
-    ``known`` gives path and title of every run, the newest first; ``here`` the path of the run in
-    view, None while a new one is being set up. ``tip`` describes the list. ``open_other`` lets the
-    user choose a run of another folder.
+    ``tip`` describes the list. ``open_other`` lets the user choose a run of another folder.
     """
 
     def __init__(
         self,
-        runs: Runs,
-        known: Callable[[], Sequence[tuple[Path, str]]],
-        here: Callable[[], Path | None],
+        runs: Runs[Any],
         tip: str,
         open_other: Callable[[], object] | None = None,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
         self.setObjectName("page")
-        self._model, self._known, self._here = runs, known, here
+        self._runs = runs
         self._list = RunChoice(tip, runs.select, open_other, self)
         self._new = outlined("New", "Set up another training", lambda: runs.select(None), self)
         self._column = QVBoxLayout(self)
@@ -65,26 +50,26 @@ class RunPanel(QWidget):
         for part in (setup, run):
             self._column.addWidget(part)
         self._column.addStretch(1)
-        self._model.changed.connect(self.refresh)
+        self._runs.changed.connect(self.refresh)
         self.refresh()
 
     def refresh(self) -> None:
         """Follow the model."""
-        here = self._here()
+        here = self._runs.run.path if self._runs.run is not None else None
         self._setup.setVisible(here is None)
         self._run.setVisible(here is not None)
         self._new.setVisible(here is not None)
-        self._list.show_runs(self._known(), here)
+        self._list.show_runs(self._runs.known, here)
 
     def showEvent(self, event: QShowEvent) -> None:
         """Read the runs again, and time a step where that is unknown."""
         super().showEvent(event)
-        self._model.set_watched(True)
+        self._runs.set_watched(True)
 
     def hideEvent(self, event: QHideEvent) -> None:
         """Note that the panel is hidden."""
         super().hideEvent(event)
-        self._model.set_watched(False)
+        self._runs.set_watched(False)
 
 
 class RunChoice(Choice):
@@ -108,10 +93,10 @@ class RunChoice(Choice):
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self.activated.connect(self._choose)
 
-    def show_runs(self, runs: Sequence[tuple[Path, str]], here: Path | None) -> None:
+    def show_runs(self, runs: Sequence[KnownRun], here: Path | None) -> None:
         """List them; ``here`` is in view."""
-        paths: list[Path | None] = [None, *(path for path, _ in runs)]
-        texts = [_NEW, *(text for _, text in runs)]
+        paths: list[Path | None] = [None, *(one.path for one in runs)]
+        texts = [_NEW, *(one.title for one in runs)]
         if here is not None and here not in paths:
             # Just begun: it is not in the list yet.
             paths.insert(1, here)

@@ -203,7 +203,7 @@ def test_what_cannot_be_learnt_from_is_named(set_up, tmp_path, qtbot):
     assert model.setup.problem == "Add labelled data to learn from."
 
 
-def test_a_training_is_followed_to_its_end_and_its_model_is_used(set_up):
+def test_a_training_is_followed_to_its_end_and_its_model_is_used(set_up, qtbot):
     model = set_up.training()
     set_up.ready(model)
     model.train()
@@ -229,7 +229,7 @@ def test_a_training_is_followed_to_its_end_and_its_model_is_used(set_up):
     # Deleting the run leaves what is in use.
     model.delete()
     assert model.run is None
-    assert model.runs == ()
+    qtbot.waitUntil(lambda: model.known == (), timeout=5_000)
     assert kept.exists()
 
 

@@ -95,11 +95,11 @@ def test_one_at_a_time(made, qtbot) -> None:
     model = made("--rest-at", 1)
     model.start()
     wait_for(qtbot, model, "running")
-    qtbot.waitUntil(lambda: model.library.live is not None)
+    qtbot.waitUntil(lambda: model.live is not None)
     assert "is being trained" in model.why_not_start
     with pytest.raises(Sd2Error, match="is being trained"):
         model.start()
-    model.stop()
+    model.tell("stop")
     wait_for(qtbot, model, "stopped")
     qtbot.waitUntil(lambda: not model.why_not_start)
 
@@ -108,11 +108,11 @@ def test_pausing_and_going_on(made, qtbot) -> None:
     model = made("--step-s", 0.05, epochs=50)
     model.start()
     wait_for(qtbot, model, "running")
-    model.pause()
+    model.tell("pause")
     assert model.run.phase == "pausing"
     assert read_control(model.run.folder.control) == "pause"
     wait_for(qtbot, model, "paused")
-    model.go_on()
+    model.tell("run")
     assert model.run.phase == "resuming"
     wait_for(qtbot, model, "running")
 
@@ -121,10 +121,10 @@ def test_stopping_keeps_the_best(made, qtbot) -> None:
     model = made("--rest-at", 2)
     model.start()
     qtbot.waitUntil(lambda: model.run.history.epoch == 2, timeout=15_000)
-    model.stop()
+    model.tell("stop")
     assert model.run.phase == "stopping"
     # What was said last does not count after that, unless it is to be discarded.
-    model.pause()
+    model.tell("pause")
     assert model.run.phase == "stopping"
     wait_for(qtbot, model, "stopped")
     assert model.run.folder.best.exists()
@@ -142,7 +142,7 @@ def test_cancelling_is_said_at_once_and_leaves_nothing(made, qtbot) -> None:
     model.start()
     wait_for(qtbot, model, "running")
     folder = model.run.folder
-    model.cancel()
+    model.tell("cancel")
     assert model.run.phase == "cancelling"
     qtbot.waitUntil(lambda: model.run is None, timeout=15_000)
     qtbot.waitUntil(lambda: not list(folder.path.parent.iterdir()))
@@ -152,7 +152,7 @@ def test_cancelling_before_there_is_a_folder(made, qtbot) -> None:
     model = made("--slow-start-s", 30)
     model.start()
     path = model.run.folder.path
-    model.cancel()
+    model.tell("cancel")
     assert model.run.phase == "cancelling"
     qtbot.waitUntil(lambda: model.run is None, timeout=15_000)
     assert not path.exists()
@@ -164,7 +164,7 @@ def test_one_that_does_not_hear_is_ended(made, qtbot) -> None:
     model.start()
     wait_for(qtbot, model, "running")
     folder, run = model.run.folder, model.run
-    model.cancel()
+    model.tell("cancel")
     real = run._clock_s
     run._clock_s = lambda: real() + 31.0
     qtbot.waitUntil(lambda: model.run is None, timeout=15_000)
@@ -213,7 +213,7 @@ def test_the_next_window_finds_the_run(made, qtbot) -> None:
     assert second.run.folder.path == path
     wait_for(qtbot, second, "running")
     assert second.run.history.best.epoch == 1
-    second.stop()
+    second.tell("stop")
     wait_for(qtbot, second, "stopped")
 
 
@@ -232,10 +232,10 @@ def test_the_next_window_shows_what_ended_meanwhile(made, qtbot) -> None:
     # Not shown again once it was put away.
     second.select(None)
     third = made(settings=settings)
-    with qtbot.waitSignal(third.library.refreshed):
+    with qtbot.waitSignal(third.listed):
         third.look_for_runs()
     assert third.run is None
-    assert [run.path for run in third.library.runs] == [path]
+    assert [run.path for run in third.known] == [path]
     third.select(path)
     wait_for(qtbot, third, "finished")
     third.delete()
@@ -260,7 +260,7 @@ def test_a_torn_line_waits_and_a_damaged_one_is_left_out(made, qtbot, tmp_path) 
         progress.write(line[40:])
     qtbot.waitUntil(lambda: len(model.run.history.epoch_points) == 2)
     assert model.run.history.best.validation_rmse == 0.2
-    model.cancel()
+    model.tell("cancel")
     qtbot.waitUntil(lambda: model.run is None, timeout=15_000)
 
 

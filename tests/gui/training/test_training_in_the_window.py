@@ -95,7 +95,7 @@ def test_a_run_outlives_its_window_and_is_found_by_the_next(made, qtbot, tmp_pat
     assert training.run.folder.path == path
     assert again.messages.text == f"{path.name} is being trained. The Train panel shows it."
     assert training.run.history.best.epoch == 1
-    training.stop()
+    training.tell("stop")
     qtbot.waitUntil(lambda: training.run.phase == "stopped", timeout=15_000)
     assert again.side.findChild(QTabBar).tabText(2) == "Train"
 
@@ -111,7 +111,7 @@ def test_a_trained_model_denoises_the_recording(
     qtbot.waitUntil(lambda: not c.training.setup.problem)
     c.training.start()
     qtbot.waitUntil(lambda: c.training.run.history.epoch == 1, timeout=15_000)
-    c.training.stop()
+    c.training.tell("stop")
     qtbot.waitUntil(lambda: c.training.run.phase == "stopped", timeout=15_000)
     window.side.bring_up("Train")
     kept = own_data / "sd2-studio" / "models" / f"{c.training.run.folder.path.name}.safetensors"

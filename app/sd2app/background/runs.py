@@ -1,0 +1,245 @@
+"""Runs of one kind: listed, taken up, followed one at a time, steered and deleted."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, Generic, NamedTuple, TypeVar
+
+from PySide6.QtCore import QObject, QTimer, Signal
+
+from sd2app.background.latest import LatestRunner
+from sd2app.background.run_monitor import RunMonitor
+from sd2app.settings import Settings
+from sd2core.errors import Sd2Error
+from sd2core.processes import ProcessId
+from sd2core.runs.control import Word
+
+_LIST_MS = 3000
+
+Run = TypeVar("Run", bound=RunMonitor[Any])
+
+
+class KnownRun(NamedTuple):
+    """A run on disk, with its title in the list."""
+
+    path: Path
+    title: str
+    live: bool
+
+
+class Sentences(NamedTuple):
+    """Remarks about a run of one kind; ``{}`` stands for its name."""
+
+    busy: str  # why no other can be started
+    found: str  # under way when the program starts
+    finished: str  # while nobody watched
+    failed: str
+
+
+class Runs(QObject, Generic[Run]):
+    """A run in view, or a new one that is being set up, and the others in a list.
+
+    ``follow`` makes the monitor of a folder. The run in view is remembered in the settings under
+    ``remembered``. Subclasses look for runs in :meth:`find`.
+    """
+
+    changed = Signal()
+    listed = Signal()  # the runs on disk have been looked at again
+    noted = Signal(str)
+    failed = Signal(str)
+
+    def __init__(
+        self,
+        follow: Callable[..., Run],
+        settings: Settings,
+        remembered: str,
+        sentences: Sentences,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._monitor_of, self._sentences = follow, sentences
+        self._settings, self._remembered = settings, remembered
+        self._run: Run | None = None
+        self._under_way = self._taking_up = self._watched = False
+        self._known: tuple[KnownRun, ...] = ()
+        self._lister = LatestRunner("runs", self)
+        self._lister.finished.connect(self._list)
+        # The disk may be away for a moment; it is looked at again.
+        self._lister.failed.connect(lambda error: self.listed.emit())
+        self._timer = QTimer(self)
+        self._timer.setInterval(_LIST_MS)
+        self._timer.timeout.connect(self.refresh)
+
+    # --- what subclasses say ----------------------------------------------------------------
+
+    def find(self) -> Sequence[KnownRun]:
+        """Look for runs on disk, in the background; the newest first."""
+        return ()
+
+    def on_change(self, run: Run) -> None:
+        """Take what the run in view has told."""
+
+    # --- what is known ----------------------------------------------------------------------
+
+    @property
+    def run(self) -> Run | None:
+        """The run in view; None while a new one is being set up."""
+        return self._run
+
+    @property
+    def known(self) -> tuple[KnownRun, ...]:
+        """Runs on disk, the newest first."""
+        return self._known
+
+    @property
+    def live(self) -> KnownRun | None:
+        """The newest run on disk that is under way."""
+        return next((one for one in self._known if one.live), None)
+
+    @property
+    def under_way(self) -> bool:
+        """True while the run in view has a process."""
+        return self._under_way
+
+    @property
+    def busy(self) -> str:
+        """Reason why no other run can be started; empty when one can."""
+        if self._run is not None and self._under_way:
+            return self._sentences.busy.format(self._run.path.name)
+        return self._sentences.busy.format(self.live.path.name) if self.live is not None else ""
+
+    @property
+    def mark(self) -> str:
+        """Share of the run in view that is done, as text; empty when none is under way."""
+        if self._run is None or not self._under_way:
+            return ""
+        if self._run.phase == "paused":
+            return "paused"
+        share = self._run.share
+        return "…" if share is None else f"{100 * share:.0f} %"
+
+    # --- one run after another --------------------------------------------------------------
+
+    def set_watched(self, watched: bool) -> None:
+        """Note that the runs are visible or hidden."""
+        self._watched = watched
+        if watched:
+            self.refresh()
+
+    def look_for_runs(self) -> None:
+        """At the start of the program: find what is under way, or what was in view last."""
+        self._taking_up = True
+        self.refresh()
+        self._timer.start()
+
+    def refresh(self) -> None:
+        """Look for runs on disk again."""
+        self._lister.submit(lambda emit: tuple(self.find()))
+
+    def select(self, path: Path | None) -> None:
+        """Show a run; None is a new one, to be set up."""
+        if path is None:
+            self._follow(None)
+        elif self._run is None or self._run.path != path:
+            self._follow(self._monitor_of(path, self))
+
+    def follow_new(self, path: Path, process: ProcessId) -> None:
+        """Show a run whose process was just started."""
+        self._follow(self._monitor_of(path, self, process=process), under_way=True)
+        self.refresh()
+
+    def tell(self, word: Word) -> None:
+        """Give the run in view an order."""
+        run = self._run
+        if run is not None:
+            self._attempt(lambda: run.tell(word))
+
+    def delete(self) -> None:
+        """Delete the run in view, which has ended, with what it made."""
+        run = self._run
+        if run is not None and not run.under_way:
+            self._attempt(run.delete)
+            self.select(None)
+            self.refresh()
+
+    def close(self) -> None:
+        """Stop looking; a process under way goes on."""
+        self._timer.stop()
+        self._lister.close()
+        if self._run is not None:
+            self._run.close()
+
+    # --- following --------------------------------------------------------------------------
+
+    def _follow(self, run: Run | None, under_way: bool = False) -> None:
+        if self._run is not None:
+            self._run.close()
+            self._run.deleteLater()
+        self._run, self._under_way = run, under_way
+        self._settings.set_value(self._remembered, "" if run is None else str(run.path))
+        if run is not None:
+            run.changed.connect(self._tell_change)
+            run.phase_changed.connect(self._notice)
+        self.changed.emit()
+
+    def _tell_change(self) -> None:
+        if self._run is not None:
+            self.on_change(self._run)
+        self.changed.emit()
+
+    def _notice(self) -> None:
+        """Follow another phase of the run in view."""
+        run = self._run
+        if run is None:
+            return
+        self.refresh()
+        if run.phase == "gone":
+            self.select(None)
+            return
+        ended = self._under_way and not run.under_way
+        self._under_way = run.under_way and (run.loaded or self._under_way)
+        if ended and not self._watched:
+            self.say_ended(run)
+
+    def say_ended(self, run: Run) -> None:
+        """Tell the user how a run ended that nobody watched."""
+        if run.phase == "finished":
+            self.noted.emit(self._sentences.finished.format(run.path.name))
+        elif run.phase in ("failed", "died"):
+            self.failed.emit(self._sentences.failed.format(run.path.name))
+
+    def _list(self, known: tuple[KnownRun, ...]) -> None:
+        if known != self._known:
+            self._known = known
+            self.changed.emit()
+        if self._taking_up:
+            self._taking_up = False
+            self._take_up()
+        self.listed.emit()
+
+    def _take_up(self) -> None:
+        if self.live is not None:
+            self.select(self.live.path)
+            self.noted.emit(self._sentences.found.format(self.live.path.name))
+            return
+        last = self._settings.stored(self._remembered, "")
+        if last and Path(last).is_dir():  # its disk may be away
+            self.select(Path(last))
+
+    def _attempt(self, work: Callable[[], None]) -> None:
+        try:
+            work()
+        except (OSError, Sd2Error) as error:
+            self.failed.emit(str(error))
+
+
+def free_folder(place: Path, what: str, data: Sequence[Path]) -> Path:
+    """Name of a new run in a folder: its kind, its data and the time."""
+    names = "+".join(path.stem for path in data)[:40]
+    name = f"{what} {names} {time.strftime('%Y-%m-%d %H.%M')}"
+    path, number = place / name, 2
+    while path.exists() or path.with_name(f".{path.name}.out").exists():
+        path, number = place / f"{name} {number}", number + 1
+    return path
