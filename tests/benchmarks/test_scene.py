@@ -28,7 +28,7 @@ class Player:
         self.backend.resize(*SIZE)
         self.scene = Scene(self.backend.renderer)
         self.scene.set_mesh(mesh)
-        self.scene.pose = self.scene.preset_pose("overview", SIZE)
+        self.scene.look_from("overview")
         self.backend.start(self.scene.prepare)
         self.visible = np.arange(mesh.vertex_count) % 2 == 0
         self.index = 0
@@ -68,7 +68,7 @@ def test_frames_per_second_of_the_image_backend(
     benchmark.extra_info["frames_per_s"] = 1.0 / median_s
     benchmark.extra_info["times_bare_rendering"] = median_s / player.bare_rendering_s()
     picture = player.backend.grab().toImage()
-    middle = player.scene.pose.project([player.scene.extent.centre_m], SIZE)[0]
+    middle = player.scene.pose.project([player.scene.extent.centre_m])[0]
     ground = QColor(player.scene.colours.background)
     assert picture.pixelColor(round(middle[0]), round(middle[1])) != ground
     player.backend.shut_down()

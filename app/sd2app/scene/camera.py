@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,7 +22,9 @@ _FARTHEST_M = 500.0
 _ORBIT_DEG_PER_PX = 0.35
 _LEAST_PX_PER_M = 4.0
 _FARTHEST_DRAG_M = 60.0
-STANDARD_ANGLE_DEG = 30.0
+
+Preset = Literal["overview", "camera", "sensor", "side", "top"]
+"""Ready-made views."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +45,8 @@ class EyePose:
     azimuth_deg: float = 0.0  # to the right of +z
     elevation_deg: float = 0.0  # above the horizon
     distance_m: float = 5.0
-    angle_deg: float = STANDARD_ANGLE_DEG  # vertical opening angle
+    angle_deg: float = 30.0  # vertical opening angle
+    size_px: tuple[float, float] = (640.0, 480.0)  # of the picture
 
     @cached_property
     def axes(self) -> tuple[Vector, Vector, Vector]:
@@ -69,81 +73,70 @@ class EyePose:
             elevation_deg=min(max(elevation, -_STEEPEST_DEG), _STEEPEST_DEG),
         )
 
-    def panned(self, dx_px: float, dy_px: float, height_px: float) -> EyePose:
+    def panned(self, dx_px: float, dy_px: float) -> EyePose:
         """Pose shifted so that the focus follows the drag."""
         right, down, _ = self.axes
-        scale = self.distance_m / self.pixels_per_tangent(height_px)
+        scale = self.distance_m / self.pixels_per_tangent
         focus = np.asarray(self.focus) - scale * (dx_px * right + dy_px * down)
-        return replace(self, focus=_triple(focus))
+        return replace(self, focus=triple(focus))
 
-    def zoomed(self, factor: float, x_px: float, y_px: float, size_px: ArrayLike) -> EyePose:
+    def zoomed(self, factor: float, x_px: float, y_px: float) -> EyePose:
         """Pose at ``factor`` times the distance; the point under the pointer stays in place."""
-        width, height = (float(value) for value in np.asarray(size_px))
         distance = min(max(self.distance_m * factor, _NEAREST_M), _FARTHEST_M)
-        right, down, _ = self.axes
-        shift = (self.distance_m - distance) / self.pixels_per_tangent(height)
-        focus = np.asarray(self.focus) + shift * (
-            (x_px - width / 2) * right + (y_px - height / 2) * down
-        )
-        return replace(self, focus=_triple(focus), distance_m=distance)
+        across = self.ray(x_px, y_px) - self.axes[2]
+        focus = np.asarray(self.focus) + (self.distance_m - distance) * across
+        return replace(self, focus=triple(focus), distance_m=distance)
 
-    def pixels_per_tangent(self, height_px: float) -> float:
+    @cached_property
+    def pixels_per_tangent(self) -> float:
         """Pixels per metre of width at one metre of depth."""
-        return 0.5 * height_px / math.tan(math.radians(self.angle_deg) / 2)
+        return 0.5 * self.size_px[1] / math.tan(math.radians(self.angle_deg) / 2)
 
-    def project(self, points: ArrayLike, size_px: ArrayLike) -> NDArray[np.float64]:
+    def project(self, points: ArrayLike) -> NDArray[np.float64]:
         """Pixels and depth of points, (n, 3); what lies behind the eye is NaN, NaN, depth."""
-        width, height = (float(value) for value in np.asarray(size_px))
-        right, down, forward = self.axes
         relative = np.atleast_2d(np.asarray(points, np.float64)) - self.position
-        depth = relative @ forward
-        safe = np.where(depth > 1e-6, depth, np.nan)
-        scale = self.pixels_per_tangent(height) / safe
-        return np.stack(
-            [
-                width / 2 + scale * (relative @ right),
-                height / 2 + scale * (relative @ down),
-                depth,
-            ],
-            axis=1,
-        )
+        x, y, depth = (relative @ axis for axis in self.axes)
+        scale = self.pixels_per_tangent / np.where(depth > 1e-6, depth, np.nan)
+        width, height = self.size_px
+        return np.stack([width / 2 + scale * x, height / 2 + scale * y, depth], axis=1)
 
-    def ray(self, x_px: float, y_px: float, size_px: ArrayLike) -> Vector:
+    def ray(self, x_px: float, y_px: float) -> Vector:
         """Direction from the eye through a pixel, with a forward part of one."""
-        width, height = (float(value) for value in np.asarray(size_px))
         right, down, forward = self.axes
-        scale = self.pixels_per_tangent(height)
-        return forward + (x_px - width / 2) / scale * right + (y_px - height / 2) / scale * down
+        across, downward = self.tangents(x_px, y_px)
+        return forward + across * right + downward * down
 
-    def metres_per_pixel(self, point: ArrayLike, height_px: float) -> float:
+    def tangents(self, x_px: float, y_px: float) -> Vector:
+        """Offset of a pixel from the middle of the picture, at one metre of depth."""
+        return (np.array([x_px, y_px]) - np.array(self.size_px) / 2) / self.pixels_per_tangent
+
+    def metres_per_pixel(self, point: ArrayLike) -> float:
         """Size of a pixel at a point's depth; infinite behind the eye."""
         depth = float((np.asarray(point, np.float64) - self.position) @ self.axes[2])
-        return depth / self.pixels_per_tangent(height_px) if depth > 1e-6 else math.inf
+        return depth / self.pixels_per_tangent if depth > 1e-6 else math.inf
 
-    def framed(self, points: ArrayLike, size_px: ArrayLike, margins: Margins) -> EyePose:
+    def framed(self, points: ArrayLike, margins: Margins) -> EyePose:
         """Pose of the same direction, as near as all points fit inside the margins."""
         points = np.atleast_2d(np.asarray(points, np.float64))
-        width, height = (float(value) for value in np.asarray(size_px))
-        scale = self.pixels_per_tangent(height)
-        axes = self.axes
         centre = points.mean(axis=0)
-        x, y, z = ((points - centre) @ axis for axis in axes)
-        room_x = _tangents(width, margins.left, margins.right, scale)
-        room_y = _tangents(height, margins.top, margins.bottom, scale)
+        x, y, z = ((points - centre) @ axis for axis in self.axes)
+        width, height = self.size_px
+        room_x = self._room(width, margins.left, margins.right)
+        room_y = self._room(height, margins.top, margins.bottom)
         distance = max(
             _least_distance(x, z, *room_x),
             _least_distance(y, z, *room_y),
             2.0 * _NEAREST_M - float(z.min()),
         )
-        across = _offset(x, z, *room_x, distance)
-        downward = _offset(y, z, *room_y, distance)
-        eye = centre + across * axes[0] + downward * axes[1] - distance * axes[2]
-        return replace(self, focus=_triple(eye + distance * axes[2]), distance_m=distance)
+        right, down, _ = self.axes
+        shift = _offset(x, z, *room_x, distance) * right + _offset(y, z, *room_y, distance) * down
+        return replace(self, focus=triple(centre + shift), distance_m=distance)
 
-
-def _tangents(size: float, before: float, after: float, scale: float) -> tuple[float, float]:
-    least = 0.1 * size
-    return (max(size / 2 - before, least) / scale, max(size / 2 - after, least) / scale)
+    def _room(self, size: float, before: float, after: float) -> tuple[float, float]:
+        """Tangents of the free picture on either side of its middle."""
+        least = 0.1 * size
+        before, after = max(size / 2 - before, least), max(size / 2 - after, least)
+        return before / self.pixels_per_tangent, after / self.pixels_per_tangent
 
 
 def _least_distance(x: Vector, z: Vector, low: float, high: float) -> float:
@@ -158,25 +151,19 @@ def _offset(x: Vector, z: Vector, low: float, high: float, distance: float) -> f
     return 0.5 * (least + most)
 
 
-def _triple(values: Vector) -> tuple[float, float, float]:
+def triple(values: Vector) -> tuple[float, float, float]:
+    """Three numbers of an array."""
     return (float(values[0]), float(values[1]), float(values[2]))
 
 
-def drag_in_view(
-    start: ArrayLike, pose: EyePose, x_px: float, y_px: float, size_px: ArrayLike
-) -> Vector:
+def drag_in_view(start: ArrayLike, pose: EyePose, x_px: float, y_px: float) -> Vector:
     """Point at which the pointer's ray meets the plane through ``start`` along the picture."""
     depth = float((np.asarray(start, np.float64) - pose.position) @ pose.axes[2])
-    return pose.position + depth * pose.ray(x_px, y_px, size_px)
+    return pose.position + depth * pose.ray(x_px, y_px)
 
 
 def drag_along(
-    start: ArrayLike,
-    direction: ArrayLike,
-    pose: EyePose,
-    x_px: float,
-    y_px: float,
-    size_px: ArrayLike,
+    start: ArrayLike, direction: ArrayLike, pose: EyePose, x_px: float, y_px: float
 ) -> Vector | None:
     """Point of a line through ``start`` whose picture is nearest to the pointer.
 
@@ -191,23 +178,19 @@ def drag_along(
     if length < 1e-9 or depth < 1e-6:
         return None
     unit = unit / length
-    width, height = (float(value) for value in np.asarray(size_px))
-    scale = pose.pixels_per_tangent(height)
     flat = np.array([(start - pose.position) @ right, (start - pose.position) @ down])
     slope = np.array([unit @ right, unit @ down])
     climb = float(unit @ forward)
     heading = slope / depth - flat * climb / depth**2  # of the line's picture, at its start
-    if np.linalg.norm(heading) * scale < _LEAST_PX_PER_M:
+    if np.linalg.norm(heading) * pose.pixels_per_tangent < _LEAST_PX_PER_M:
         return None
     heading /= np.linalg.norm(heading)
-    pointer = np.array([x_px - width / 2, y_px - height / 2]) / scale
-    wanted = float(pointer @ heading)
+    wanted = float(pose.tangents(x_px, y_px) @ heading)
     # heading . (flat + s slope) / (depth + s climb) = wanted, solved for s
     divisor = float(slope @ heading) - wanted * climb
     if abs(divisor) < 1e-9:
         return None
     amount = (wanted * depth - float(flat @ heading)) / divisor
-    new_depth = depth + amount * climb
-    if new_depth < _NEAREST_M or new_depth > _FARTHEST_DRAG_M:
+    if not _NEAREST_M <= depth + amount * climb <= _FARTHEST_DRAG_M:
         return None
     return start + amount * unit

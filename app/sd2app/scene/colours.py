@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sd2app.palette import Palette
+from sd2app.session.display import MeshColour
+from sd2app.widgets.time_axis import tick_step
 from sd2core.figures.colours import SEQUENTIAL, Rgb, look_up, rgb, velocity_colours
-
-MeshColour = Literal["velocity", "range", "visibility", "plain"]
 
 
 def fractions(colour: str) -> tuple[float, float, float]:
@@ -89,48 +88,43 @@ def range_limits(nearest_m: float, farthest_m: float) -> tuple[float, float]:
     The step grows with the span, so that moving the sensor a little does not
     change the limits at every step.
     """
-    step = nice_step(max(farthest_m - nearest_m, 0.05 * abs(farthest_m), 0.1), 8)
+    step = tick_step(max(farthest_m - nearest_m, 0.05 * abs(farthest_m), 0.1), 8)
     low = max(math.floor(nearest_m / step + 1e-9) * step, 0.0)
     high = math.ceil(farthest_m / step - 1e-9) * step
     return (low, max(high, low + step))
 
 
-def nice_step(span: float, most: int) -> float:
-    """1, 2 or 5 times a power of ten that divides ``span`` into at most ``most`` steps."""
-    raw = span / most
-    power = 10.0 ** math.floor(math.log10(raw))
-    for factor in (1.0, 2.0, 5.0):
-        if factor * power >= raw * (1.0 - 1e-9):
-            return factor * power
-    return 10.0 * power
+@dataclass(frozen=True, eq=False)
+class Colouring:
+    """What the colour of a mesh means, and what is known of its vertices, (V,) each."""
+
+    mode: MeshColour = "velocity"
+    v_max_mps: float = 2.0  # end of the velocity colours
+    velocity_mps: NDArray[np.floating] | None = None
+    range_m: NDArray[np.floating] | None = None
+    range_limits_m: tuple[float, float] = (0.0, 1.0)
+    visible: NDArray[np.bool_] | None = None
+    as_dots: bool = False
 
 
-def mesh_colours(
-    mode: MeshColour,
-    colours: SceneColours,
-    count: int,
-    *,
-    velocity_mps: NDArray[np.floating] | None = None,
-    v_max_mps: float = 2.0,
-    range_m: NDArray[np.floating] | None = None,
-    range_limits_m: tuple[float, float] = (0.0, 1.0),
-    visible: NDArray[np.bool_] | None = None,
-    as_dots: bool = False,
-) -> Rgb:
+def mesh_colours(colouring: Colouring, colours: SceneColours, count: int) -> Rgb:
     """Colours of ``count`` vertices, shape (count, 3).
 
     What is not known yet is drawn plain. Hidden vertices are muted in every
     mode but ``plain``: they do not contribute to the spectrum.
     """
-    if mode == "velocity" and velocity_mps is not None:
-        result = velocity_colours(velocity_mps, v_max_mps)
-    elif mode == "range" and range_m is not None:
-        result = range_colours(range_m, range_limits_m)
+    mode, visible, as_dots = colouring.mode, colouring.visible, colouring.as_dots
+    if mode == "velocity" and colouring.velocity_mps is not None:
+        result = velocity_colours(colouring.velocity_mps, colouring.v_max_mps)
+    elif mode == "range" and colouring.range_m is not None:
+        result = range_colours(colouring.range_m, colouring.range_limits_m)
     elif mode == "visibility" and visible is not None:
         result = np.tile(rgb(colours.visible), (count, 1))
     else:
-        return _dimmed(np.tile(rgb(colours.plain), (count, 1)), colours, as_dots)
-    result = _dimmed(result, colours, as_dots)
+        result, visible = np.tile(rgb(colours.plain), (count, 1)), None
+    # Dots have no shading: on a light ground the pale middle would vanish.
+    if as_dots and rgb(colours.background).mean() >= 128:
+        result = (0.76 * result).astype(np.uint8)
     if visible is None:
         return result
     # Dots do not cover one another: what is hidden has to step back further.
@@ -139,10 +133,3 @@ def mesh_colours(
         muted = (0.3 * result + 0.7 * rgb(hidden)).astype(np.uint8)
         return np.where(visible[:, None], result, muted)
     return np.where(visible[:, None], result, rgb(hidden))
-
-
-def _dimmed(result: Rgb, colours: SceneColours, as_dots: bool) -> Rgb:
-    # Dots have no shading: on a light ground the pale middle would vanish.
-    if not as_dots or rgb(colours.background).mean() < 128:
-        return result
-    return (0.76 * result).astype(np.uint8)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import SignalInstance
 from PySide6.QtWidgets import QVBoxLayout, QWidget
@@ -11,14 +11,13 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 from sd2app.feature import Action, Feature, Shell
 from sd2app.maps.model import SynthesisModel
 from sd2app.scene.bar import SceneBar
+from sd2app.scene.camera import Preset
 from sd2app.sensor.placements import PlacementsModel
 from sd2app.session.display import MeshColour
 from sd2app.session.session import Session
 
 if TYPE_CHECKING:
     from sd2app.scene.view import SceneView
-
-View = Literal["overview", "camera", "sensor", "side", "top"]
 
 
 class SceneFeature(Feature):
@@ -85,7 +84,7 @@ class SceneFeature(Feature):
             lambda: display.mesh_colour == colour,
         )  # fmt: skip
 
-    def _look(self, name: str, text: str, view: View, key: str, tip: str) -> Action:
+    def _look(self, name: str, text: str, view: Preset, key: str, tip: str) -> Action:
         def look() -> None:
             if self.view is not None:
                 self.view.set_view(view)
@@ -100,17 +99,7 @@ class SceneFeature(Feature):
         from sd2app.scene.view import SceneView
 
         s, pane = self._session, QWidget()
-        self.view = SceneView(
-            s.document,
-            s.playback,
-            s.sensor,
-            s.display,
-            self._synthesis,
-            self._placements,
-            begin_drag=s.edits.begin_sensor_drag,
-            drag=s.edits.drag_sensor,
-            end_drag=s.edits.end_sensor_drag,
-        )
+        self.view = SceneView(s, self._synthesis, self._placements)
         layout = QVBoxLayout(pane)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(0)

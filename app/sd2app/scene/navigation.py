@@ -8,14 +8,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from sd2app.scene.camera import Vector, drag_along, drag_in_view
+from sd2app.scene.camera import Vector, drag_along, drag_in_view, triple
 from sd2app.scene.scene import Scene
 
-Position = tuple[float, float, float]
+if TYPE_CHECKING:
+    from sd2app.session.undo import Edits
+
 Button = Literal["left", "middle", "right"]
 Constraint = Literal["view", "vertical", "sight"]
 
@@ -45,27 +47,18 @@ class Navigator:
     def __init__(
         self,
         scene: Scene,
-        begin_drag: Callable[[], None],
-        drag: Callable[[Position], None],
-        end_drag: Callable[[], None],
+        edits: Edits,
         pick: Callable[[int], None],
-        *,
-        size_px: Callable[[], tuple[float, float]],
         changed: Callable[[], None],
     ) -> None:
-        self._scene = scene
-        self._begin_drag = begin_drag
-        self._drag_to = drag
-        self._end_drag = end_drag
-        self._pick = pick
-        self._size_px = size_px
-        self._changed = changed
+        self._scene, self._edits = scene, edits
+        self._pick, self._changed = pick, changed
+        self.hovers_sensor = False  # the pointer is over the sensor
+        self.marker: int | None = None  # number of the planned place under the pointer
         self._button: Button | None = None
         self._held: _Held | None = None
         self._moving: Literal["orbit", "pan"] | None = None
         self._last_px = (0.0, 0.0)
-        self._hovering = False
-        self._marker: int | None = None
         self._clicking: tuple[int, float, float] | None = None
 
     @property
@@ -73,37 +66,21 @@ class Navigator:
         """True while the sensor is dragged."""
         return self._held is not None
 
-    @property
-    def hovers_sensor(self) -> bool:
-        """True while the pointer is over the sensor."""
-        return self._hovering
-
-    @property
-    def marker(self) -> int | None:
-        """Number of the planned place under the pointer."""
-        return self._marker
-
-    @property
-    def turning(self) -> bool:
-        """True while the view is rotated or panned."""
-        return self._moving is not None
-
     def sensor_at(self, x_px: float, y_px: float) -> bool:
         """True if the sensor is close enough to the pointer."""
-        size = self._size_px()
-        x, y, depth = self._scene.pose.project(self._scene.sensor.position_m, size)[0]
-        if not depth > 0.0 or not self._scene.sensor_shown:
+        scene, position_m = self._scene, self._scene.sensor.position_m
+        x, y, depth = scene.pose.project(position_m)[0]
+        if not depth > 0.0 or not scene.sensor_shown:
             return False
-        pixel = self._scene.pose.metres_per_pixel(self._scene.sensor.position_m, size[1])
-        radius = max(LEAST_GRAB_PX, self._scene.sensor_radius_m(size) / pixel)
-        return math.hypot(x - x_px, y - y_px) <= radius
+        radius_px = scene.sensor_radius_m / scene.pose.metres_per_pixel(position_m)
+        return math.hypot(x - x_px, y - y_px) <= max(LEAST_GRAB_PX, radius_px)
 
     def marker_at(self, x_px: float, y_px: float) -> int | None:
         """Number of the planned place within reach of a pointer, the nearest to it."""
         places = self._scene.markers.positions_m
         if not len(places) or self.sensor_at(x_px, y_px):
             return None
-        x, y, depth = self._scene.pose.project(places, self._size_px()).T
+        x, y, depth = self._scene.pose.project(places).T
         away = np.where(depth > 0.01, np.hypot(x - x_px, y - y_px), np.inf)
         nearest = int(away.argmin())
         return nearest if away[nearest] <= _MARKER_PX else None
@@ -116,9 +93,9 @@ class Navigator:
         self._last_px = (x_px, y_px)
         if button == "left" and self.sensor_at(x_px, y_px):
             start = np.asarray(self._scene.sensor.position_m)
-            x, y, _ = self._scene.pose.project(start, self._size_px())[0]
+            x, y, _ = self._scene.pose.project(start)[0]
             self._held = _Held(start, (x - x_px, y - y_px), _constraint(shift, ctrl))
-            self._begin_drag()
+            self._edits.begin_sensor_drag()
             self._show_hot()
         elif button == "left" and not shift:
             marker = self.marker_at(x_px, y_px)
@@ -138,11 +115,11 @@ class Navigator:
         self._last_px = (x_px, y_px)
         if self._held is not None:
             self._drag(self._held, x_px, y_px, _constraint(shift, ctrl))
-        elif self._moving == "orbit":
-            self._scene.pose = self._scene.pose.orbited(dx, dy)
-            self._changed()
-        elif self._moving == "pan":
-            self._scene.pose = self._scene.pose.panned(dx, dy, self._size_px()[1])
+        elif self._moving is not None:
+            pose = self._scene.pose
+            self._scene.preset = None
+            turn = pose.orbited if self._moving == "orbit" else pose.panned
+            self._scene.pose = turn(dx, dy)
             self._changed()
         else:
             self._look(x_px, y_px)
@@ -161,59 +138,50 @@ class Navigator:
         self._button = self._moving = self._clicking = None
         if self._held is not None:
             self._held = None
-            self._end_drag()
+            self._edits.end_sensor_drag()
             self._show_hot()
 
     def look_again(self) -> None:
         """Test again what is under a resting pointer."""
-        if (self._hovering or self._marker is not None) and self._held is None:
+        if (self.hovers_sensor or self.marker is not None) and self._held is None:
             self._look(*self._last_px)
 
     def leave(self) -> None:
         """Handle the pointer's leaving the view."""
-        self._hover(False)
-        self._hover_marker(None)
+        self._hover(False, None)
 
     def wheel(self, x_px: float, y_px: float, notches: float) -> None:
         """Zoom with the wheel; positive comes nearer."""
         if self._held is None:
-            factor = _ZOOM_PER_NOTCH**notches
-            self._scene.pose = self._scene.pose.zoomed(factor, x_px, y_px, self._size_px())
+            self._scene.pose = self._scene.pose.zoomed(_ZOOM_PER_NOTCH**notches, x_px, y_px)
             self._changed()
 
     def _drag(self, held: _Held, x_px: float, y_px: float, constraint: Constraint) -> None:
         x, y = x_px + held.offset_px[0], y_px + held.offset_px[1]
-        size, pose = self._size_px(), self._scene.pose
         if constraint != held.constraint:
             # Go on from here: the other constraint must not make it jump back.
             held.start_m = np.asarray(self._scene.sensor.position_m)
             held.constraint = constraint
         if constraint == "view":
-            position: Vector | None = drag_in_view(held.start_m, pose, x, y, size)
+            position: Vector | None = drag_in_view(held.start_m, self._scene.pose, x, y)
         else:
             down = np.array([0.0, 1.0, 0.0])
             sight = self._scene.extent.centre_m - held.start_m
             direction = down if constraint == "vertical" else sight
-            position = drag_along(held.start_m, direction, pose, x, y, size)
+            position = drag_along(held.start_m, direction, self._scene.pose, x, y)
         if position is not None:
-            self._drag_to((float(position[0]), float(position[1]), float(position[2])))
+            self._edits.drag_sensor(triple(position))
 
     def _look(self, x_px: float, y_px: float) -> None:
-        self._hover(self.sensor_at(x_px, y_px))
-        self._hover_marker(self.marker_at(x_px, y_px))
+        self._hover(self.sensor_at(x_px, y_px), self.marker_at(x_px, y_px))
 
-    def _hover_marker(self, marker: int | None) -> None:
-        if marker != self._marker:
-            self._marker = marker
-            self._changed()
-
-    def _hover(self, hovering: bool) -> None:
-        if hovering != self._hovering:
-            self._hovering = hovering
+    def _hover(self, sensor: bool, marker: int | None) -> None:
+        if (sensor, marker) != (self.hovers_sensor, self.marker):
+            self.hovers_sensor, self.marker = sensor, marker
             self._show_hot()
 
     def _show_hot(self) -> None:
-        self._scene.set_hot(self._hovering or self._held is not None)
+        self._scene.set_hot(self.hovers_sensor or self._held is not None)
         self._changed()
 
 

@@ -18,8 +18,7 @@ from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkLogger, vtkObject, vtkUnsignedCharArray
 from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindow
 
-from sd2app.scene.backend import NoOpenGL, Prepare
-from sd2app.scene.backend_choice import GL_BROKEN, GL_MISSING, missing_library
+from sd2app.scene.backend import GL_BROKEN, GL_MISSING, NoOpenGL, Prepare, missing_library
 
 _IDLE_MS = 160
 _SUPERSAMPLING = 2

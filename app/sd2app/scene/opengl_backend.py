@@ -8,8 +8,14 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidget
 from vtkmodules.vtkRenderingCore import vtkRenderer
 
-from sd2app.scene.backend import NoOpenGL, Prepare
-from sd2app.scene.backend_choice import GL_MISSING, is_software, missing_library, opengl_renderer
+from sd2app.scene.backend import (
+    GL_MISSING,
+    NoOpenGL,
+    Prepare,
+    is_software,
+    missing_library,
+    opengl_renderer,
+)
 
 
 class InteractorBackend:

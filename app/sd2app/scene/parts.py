@@ -14,32 +14,48 @@ from vtkmodules.vtkFiltersCore import vtkTriangleMeshPointNormals
 from vtkmodules.vtkFiltersSources import vtkSphereSource
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper, vtkRenderer
 
-from sd2app.scene import shapes, surface
-from sd2app.scene.colours import SceneColours, fractions, mixed
+from sd2app.scene import shapes
+from sd2app.scene.body import coarse_faces, is_closed_outward
+from sd2app.scene.colours import SceneColours, fractions, marker_colours, mixed
 from sd2core.figures.colours import rgb
 from sd2core.sensor import VirtualSensor
 
+_MARKER_M = 0.10
+_MARKER_LEAST_PX = 7.0
+_MARKER_STEP = 1.15
+"""Relative change of size from which markers are rebuilt."""
 
-def _cells(connectivity: NDArray[np.integer]) -> vtkCellArray:
+
+def _actor(renderer: vtkRenderer) -> vtkActor:
+    actor = vtkActor()
+    actor.SetMapper(vtkPolyDataMapper())
+    actor.PickableOff()
+    renderer.AddActor(actor)
+    return actor
+
+
+def _cells(connectivity: NDArray[np.integer] | None) -> vtkCellArray:
     """Cells of one size from an (n, k) array."""
-    flat = np.ascontiguousarray(connectivity, np.int32).ravel()
     cells = vtkCellArray()
-    cells.SetData(connectivity.shape[1], numpy_to_vtk(flat, deep=True))
+    if connectivity is not None:
+        flat = np.ascontiguousarray(connectivity, np.int32).ravel()
+        cells.SetData(connectivity.shape[1], numpy_to_vtk(flat, deep=True))
     return cells
 
 
 def _matrix(linear: NDArray[np.float64], offset: NDArray[np.float64]) -> vtkMatrix4x4:
     """Transform p -> linear p + offset."""
+    rows = np.vstack([np.column_stack([linear, offset]), (0.0, 0.0, 0.0, 1.0)])
     matrix = vtkMatrix4x4()
-    for row in range(3):
-        for column in range(3):
-            matrix.SetElement(row, column, float(linear[row, column]))
-        matrix.SetElement(row, 3, float(offset[row]))
+    matrix.DeepCopy(rows.ravel().tolist())
     return matrix
 
 
 class Shape:
-    """One actor over one polygon or line set, with optional colours per point."""
+    """One actor over one polygon or line set, with optional colours per point.
+
+    ``line_px`` is the width of its lines in pixels of the widget.
+    """
 
     def __init__(
         self,
@@ -49,23 +65,21 @@ class Shape:
         triangles: NDArray[np.integer] | None = None,
         segments: NDArray[np.integer] | None = None,
         lit: bool = False,
+        line_px: float = 1.0,
     ) -> None:
-        self._renderer = renderer
         self.points = np.zeros((0, 3), np.float32)
         self._points = vtkPoints()
         self.data = vtkPolyData()
         self.data.SetPoints(self._points)
-        self.mapper = vtkPolyDataMapper()
-        self.mapper.SetInputData(self.data)
-        self.actor = vtkActor()
-        self.actor.SetMapper(self.mapper)
-        self.actor.PickableOff()
-        self.actor.GetProperty().SetLighting(lit)
+        self.actor = _actor(renderer)
+        self.actor.GetMapper().SetInputData(self.data)
+        self.look = self.actor.GetProperty()
+        self.look.SetLighting(lit)
+        self._line_px = line_px
         self._colours: NDArray[np.uint8] | None = None
         self._colour_array: Any = None
         if points is not None:
             self.set_shape(points, triangles=triangles, segments=segments)
-        renderer.AddActor(self.actor)
 
     def set_shape(
         self,
@@ -78,9 +92,9 @@ class Shape:
         self.points = np.array(points, np.float32, order="C")
         self._point_array = numpy_to_vtk(self.points)
         self._points.SetData(self._point_array)
-        self.data.SetPolys(_cells(triangles) if triangles is not None else vtkCellArray())
-        self.data.SetLines(_cells(segments) if segments is not None else vtkCellArray())
-        self.data.SetVerts(vtkCellArray())
+        self.data.SetPolys(_cells(triangles))
+        self.data.SetLines(_cells(segments))
+        self.data.SetVerts(_cells(None))
         self.data.GetPointData().SetScalars(None)
         self._colours = None
         self.moved()
@@ -102,15 +116,9 @@ class Shape:
         self._colour_array.Modified()
         self.data.Modified()
 
-    @property
-    def point_colours(self) -> NDArray[np.uint8] | None:
-        """Colours that were set, or None."""
-        return self._colours
-
-    def set_colour(self, colour: str, opacity: float = 1.0) -> None:
+    def set_colour(self, colour: str) -> None:
         """Set one colour for all of it."""
-        self.actor.GetProperty().SetColor(*fractions(colour))
-        self.actor.GetProperty().SetOpacity(opacity)
+        self.look.SetColor(*fractions(colour))
 
     def place(self, linear: NDArray[np.float64], offset: NDArray[np.float64]) -> None:
         """Set its transform: p -> linear p + offset."""
@@ -120,9 +128,9 @@ class Shape:
         """Show or hide it."""
         self.actor.SetVisibility(visible)
 
-    def set_line_width(self, pixels: float) -> None:
-        """Width of its lines in pixels of the render window."""
-        self.actor.GetProperty().SetLineWidth(pixels)
+    def set_pixel_scale(self, scale: float) -> None:
+        """Set the pixels of the render window per pixel of the widget."""
+        self.look.SetLineWidth(self._line_px * scale)
 
 
 class Body(Shape):
@@ -137,28 +145,22 @@ class Body(Shape):
         # The shadow shares the vertices, has fewer faces, and is flattened by its matrix.
         self._shadow_data = vtkPolyData()
         self._shadow_data.SetPoints(self._points)
-        mapper = vtkPolyDataMapper()
-        mapper.SetInputData(self._shadow_data)
-        self.shadow = vtkActor()
-        self.shadow.SetMapper(mapper)
-        self.shadow.PickableOff()
+        self.shadow = _actor(renderer)
+        self.shadow.GetMapper().SetInputData(self._shadow_data)
         self.shadow.GetProperty().SetLighting(False)
-        renderer.AddActor(self.shadow)
         self.show(False)
-        look = self.actor.GetProperty()
-        look.SetAmbient(0.30)
-        look.SetDiffuse(0.76)
-        look.SetSpecular(0.0)
+        self.look.SetAmbient(0.30)
+        self.look.SetDiffuse(0.76)
+        self.look.SetSpecular(0.0)
 
     def set_topology(self, vertices: NDArray[np.floating], faces: NDArray | None) -> None:
         """Take over another mesh."""
         self.set_shape(vertices, triangles=faces)
         self._has_faces = faces is not None and len(faces) > 0
-        look = self.actor.GetProperty()
-        look.BackfaceCullingOff()
+        self.look.BackfaceCullingOff()
         if faces is not None and self._has_faces:
-            self._shadow_data.SetPolys(_cells(surface.coarse_faces(vertices, faces)))
-            look.SetBackfaceCulling(surface.is_closed_outward(vertices, faces))
+            self._shadow_data.SetPolys(_cells(coarse_faces(vertices, faces)))
+            self.look.SetBackfaceCulling(is_closed_outward(vertices, faces))
         self.set_as_dots(self._dots)
 
     def set_vertices(self, vertices: NDArray[np.floating]) -> None:
@@ -179,20 +181,16 @@ class Body(Shape):
     def set_as_dots(self, dots: bool) -> None:
         """Draw vertices instead of the surface."""
         self._dots = dots
-        look = self.actor.GetProperty()
+        self.look.SetLighting(not self.drawn_as_dots)
         if self.drawn_as_dots:
-            if self.data.GetNumberOfVerts() == 0 and len(self.points):
-                self.data.SetVerts(_cells(np.arange(len(self.points))[:, None]))
-            self.mapper.SetInputData(self.data)
-            look.SetLighting(False)
-            look.SetRepresentationToPoints()
+            self.data.SetVerts(_cells(np.arange(len(self.points))[:, None]))
+            self.actor.GetMapper().SetInputData(self.data)
+            self.look.SetRepresentationToPoints()
         else:
-            self.data.SetVerts(vtkCellArray())
-            self.mapper.SetInputConnection(self._normals.GetOutputPort())
-            look.SetLighting(True)
-            look.SetRepresentationToSurface()
-        self.data.Modified()
-        self._update_shadow()
+            self.data.SetVerts(_cells(None))
+            self.actor.GetMapper().SetInputConnection(self._normals.GetOutputPort())
+            self.look.SetRepresentationToSurface()
+        self.show(bool(self.actor.GetVisibility()))
 
     def set_floor(self, floor_m: float) -> None:
         """Height on which the shadow falls."""
@@ -200,44 +198,35 @@ class Body(Shape):
         self.shadow.SetUserMatrix(_matrix(flat, np.array([0.0, floor_m - 0.002, 0.0])))
 
     def show(self, visible: bool) -> None:
-        """Show or hide it."""
+        """Show or hide it; dots throw no shadow."""
         super().show(visible)
-        self._update_shadow()
-
-    def _update_shadow(self) -> None:
-        self.shadow.SetVisibility(bool(self.actor.GetVisibility()) and not self.drawn_as_dots)
-
-    def set_dot_size(self, pixels: float) -> None:
-        """Size of dots in pixels of the render window."""
-        self.actor.GetProperty().SetPointSize(pixels)
+        self.shadow.SetVisibility(visible and not self.drawn_as_dots)
 
 
 class SensorGlyph:
     """Sphere, boresight axis, field of view and a plumb line to the floor."""
 
     def __init__(self, renderer: vtkRenderer) -> None:
+        line = np.array([(0, 1)])
         points, triangles, wire = shapes.cone(90.0)
         self.cone = Shape(renderer, points, triangles=triangles)
         self.edges = Shape(renderer, points, segments=wire)
-        self.axis = Shape(renderer, np.array([(0, 0, 0), (0, 0, 1)]), segments=np.array([(0, 1)]))
-        self.plumb = Shape(renderer, np.array([(0, 0, 0), (0, 1, 0)]), segments=np.array([(0, 1)]))
+        self.axis = Shape(renderer, np.array([(0, 0, 0), (0, 0, 1)]), segments=line, line_px=1.8)
+        self.plumb = Shape(renderer, np.array([(0, 0, 0), (0, 1, 0)]), segments=line)
         points, circle = shapes.ring()
         self.foot = Shape(renderer, points, segments=circle)
+        self.shapes = (self.cone, self.edges, self.axis, self.plumb, self.foot)
         source = vtkSphereSource()
         source.SetThetaResolution(28)
         source.SetPhiResolution(20)
         source.SetRadius(1.0)
-        self.sphere = vtkActor()
-        mapper = vtkPolyDataMapper()
-        mapper.SetInputConnection(source.GetOutputPort())
-        self.sphere.SetMapper(mapper)
-        self.sphere.PickableOff()
-        self.sphere.GetProperty().SetAmbient(0.45)
-        self.sphere.GetProperty().SetDiffuse(0.6)
-        self.sphere.GetProperty().SetSpecular(0.25)
-        self.sphere.GetProperty().SetSpecularPower(20)
-        renderer.AddActor(self.sphere)
-        self._sensor = VirtualSensor()
+        self.sphere = _actor(renderer)
+        self.sphere.GetMapper().SetInputConnection(source.GetOutputPort())
+        look = self.sphere.GetProperty()
+        look.SetAmbient(0.45)
+        look.SetDiffuse(0.6)
+        look.SetSpecular(0.25)
+        look.SetSpecularPower(20)
         self._angle_deg = 90.0
 
     def set_sensor(self, sensor: VirtualSensor, floor_m: float, reach_m: float) -> None:
@@ -259,92 +248,106 @@ class SensorGlyph:
         self.foot.place(0.06 * np.eye(3), on_floor)
         self.sphere.SetPosition(*position)
 
-    def set_radius(self, radius_m: float) -> None:
-        """Size of the sphere."""
-        self.sphere.SetScale(radius_m)
-
     def set_colours(self, colours: SceneColours, hot: bool) -> None:
         """Colours of the theme; ``hot`` while the pointer is on it or drags it."""
         colour = colours.sensor_hot if hot else colours.sensor
         self.sphere.GetProperty().SetColor(*fractions(colour))
-        count = len(self.cone.points)
-        fade = np.zeros((count, 4), np.uint8)
+        fade = np.zeros((len(self.cone.points), 4), np.uint8)
         fade[:, :3] = rgb(colours.sensor)
         fade[0, 3] = 92
         fade[1:, 3] = 14
         self.cone.set_point_colours(fade)
         self.edges.set_colour(mixed(colours.sensor, colours.background, 0.45))
         self.axis.set_colour(colours.sensor)
-        quiet = mixed(colours.sensor, colours.background, 0.55)
-        self.plumb.set_colour(quiet)
-        self.foot.set_colour(quiet)
+        for quiet in (self.plumb, self.foot):
+            quiet.set_colour(mixed(colours.sensor, colours.background, 0.55))
 
     def show(self, visible: bool) -> None:
         """Show or hide it (the eye may be inside it)."""
         self.sphere.SetVisibility(visible)
-        for shape in (self.cone, self.edges, self.axis, self.plumb, self.foot):
+        for shape in self.shapes:
             shape.show(visible)
-
-    def set_pixel_scale(self, scale: float) -> None:
-        """Scale the widths of lines."""
-        self.axis.set_line_width(1.8 * scale)
-        for shape in (self.edges, self.plumb, self.foot):
-            shape.set_line_width(1.0 * scale)
-
-
-class CameraGlyph:
-    """A wire camera at the origin."""
-
-    SIZE_M = 0.20
-
-    def __init__(self, renderer: vtkRenderer) -> None:
-        points, segments = shapes.frustum()
-        self.wire = Shape(renderer, self.SIZE_M * points, segments=segments)
-
-    def set_colours(self, colours: SceneColours) -> None:
-        """Colours of the theme."""
-        self.wire.set_colour(colours.camera)
-
-    def show(self, visible: bool) -> None:
-        """Show or hide it (the eye may be inside it)."""
-        self.wire.show(visible)
-
-    def set_pixel_scale(self, scale: float) -> None:
-        """Scale the widths of lines."""
-        self.wire.set_line_width(1.3 * scale)
 
 
 class GroundGrid:
     """Grid on the floor; opacity is mixed into the colour, so nothing is translucent."""
 
     def __init__(self, renderer: vtkRenderer) -> None:
-        self._shapes = (Shape(renderer), Shape(renderer))
-        self._lines: tuple[shapes.Lines, shapes.Lines] | None = None
-        self.show(False)
+        self.shapes = (Shape(renderer), Shape(renderer))
+        self._opacity = np.zeros(0, np.float32)
 
     def set_ground(self, ground: shapes.Ground, colours: SceneColours) -> None:
         """Take over other lines."""
-        self._lines = (ground.minor, ground.major)
-        for shape, lines in zip(self._shapes, self._lines, strict=True):
-            shape.set_shape(lines.points, segments=lines.segments)
+        self._opacity = ground.opacity
+        for shape, segments in zip(self.shapes, (ground.minor, ground.major), strict=True):
+            shape.set_shape(ground.points, segments=segments)
         self.set_colours(colours)
-        self.show(True)
 
     def set_colours(self, colours: SceneColours) -> None:
         """Colours of the theme."""
-        if self._lines is None:
-            return
-        for shape, lines, strength in zip(self._shapes, self._lines, (0.42, 1.0), strict=True):
-            share = (strength * lines.opacity)[:, None]
+        for shape, strength in zip(self.shapes, (0.42, 1.0), strict=True):
+            share = (strength * self._opacity)[:, None]
             blend = (1 - share) * rgb(colours.background) + share * rgb(colours.grid)
             shape.set_point_colours(np.rint(blend).astype(np.uint8))
 
     def show(self, visible: bool) -> None:
         """Show or hide it."""
-        for shape in self._shapes:
+        for shape in self.shapes:
             shape.show(visible)
 
-    def set_pixel_scale(self, scale: float) -> None:
-        """Scale the widths of lines."""
-        for shape in self._shapes:
-            shape.set_line_width(1.0 * scale)
+
+class Markers(Shape):
+    """Planned places of sensors: a small pyramid each, whose tip points where the sensor looks."""
+
+    def __init__(self, renderer: vtkRenderer, colours: SceneColours) -> None:
+        super().__init__(renderer, lit=True)
+        self._theme = colours
+        self.positions_m = np.zeros((0, 3))
+        self._directions = np.zeros((0, 3))
+        self._range_m = np.zeros(0)
+        self._beyond: NDArray[np.bool_] | None = None
+        self._length_m = _MARKER_M
+        self.look.SetInterpolationToFlat()
+        self.look.SetAmbient(0.55)
+        self.look.SetDiffuse(0.45)
+        self.look.EdgeVisibilityOn()
+        # An eye at a place looks out of its marker.
+        self.look.BackfaceCullingOn()
+
+    def set_sensors(
+        self,
+        sensors: tuple[VirtualSensor, ...],
+        range_m: NDArray[np.floating],
+        beyond: NDArray[np.bool_] | None,
+    ) -> None:
+        """Show N other places, or none.
+
+        ``range_m``, shape (N,), is the distance from the body, for the colours; ``beyond``, shape
+        (N,), marks those that a radar would see folded.
+        """
+        self.positions_m = np.array([one.position_m for one in sensors]).reshape(-1, 3)
+        self._directions = np.array([one.boresight for one in sensors]).reshape(-1, 3)
+        self._range_m, self._beyond = np.asarray(range_m), beyond
+        self.show(bool(sensors))
+        self._build()
+
+    def set_colours(self, colours: SceneColours) -> None:
+        """Colours of the theme."""
+        self._theme = colours
+        self.look.SetEdgeColor(*fractions(mixed(colours.text, colours.background, 0.35)))
+        if len(self.positions_m):
+            shades = marker_colours(self._range_m, self._beyond, colours)
+            self.set_point_colours(np.repeat(shades, shapes.PYRAMID_POINTS, axis=0))
+
+    def set_pixel(self, metres: float) -> None:
+        """Size of a pixel where the body is; markers are never too small to be clicked."""
+        length_m = max(_MARKER_M, _MARKER_LEAST_PX * metres)
+        if not 1 / _MARKER_STEP < length_m / self._length_m < _MARKER_STEP:
+            self._length_m = length_m
+            self._build()
+
+    def _build(self) -> None:
+        if len(self.positions_m):
+            points, triangles = shapes.pyramids(self.positions_m, self._directions, self._length_m)
+            self.set_shape(points, triangles=triangles)
+            self.set_colours(self._theme)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,23 +10,16 @@ from vtkmodules.vtkRenderingCore import vtkLight, vtkRenderer
 
 from sd2app.palette import palette_for
 from sd2app.scene import shapes
-from sd2app.scene.camera import EyePose, Margins
-from sd2app.scene.colours import (
-    MeshColour,
-    SceneColours,
-    fractions,
-    mesh_colours,
-    range_limits,
-)
-from sd2app.scene.extent import Extent
-from sd2app.scene.markers import Markers
-from sd2app.scene.parts import Body, CameraGlyph, GroundGrid, SensorGlyph
+from sd2app.scene.body import Extent
+from sd2app.scene.camera import EyePose, Margins, Preset, triple
+from sd2app.scene.colours import Colouring, SceneColours, fractions, mesh_colours, range_limits
+from sd2app.scene.parts import Body, GroundGrid, Markers, SensorGlyph, Shape
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.sensor import VirtualSensor
 
-Preset = Literal["overview", "camera", "sensor", "side", "top"]
 SENSOR_RADIUS_M = 0.045
 SENSOR_LEAST_PX = 7.0
+_CAMERA_M = 0.20
 _DOTS_PX = (1.4, 6.0)
 _INSIDE_M = 0.25
 _FAR_OFF_M = 30.0
@@ -43,71 +36,54 @@ class Scene:
         self.renderer = renderer
         self.colours = SceneColours.of(palette_for(False), False)
         self.pose = EyePose()
+        self.preset: Preset | None = None  # ready-made view that is kept when the size changes
         self.margins = Margins(left=64.0, top=28.0, right=144.0, bottom=28.0)
         self.extent = _NOTHING
         self.sensor = VirtualSensor()
         self.metre_labels: tuple[shapes.MetreLabel, ...] = ()
-        self.range_limits_m = (0.0, 1.0)
-        self._mode: MeshColour = "velocity"
-        self._v_max_mps = 2.0
-        self._velocity: NDArray[np.floating] | None = None
-        self._visible: NDArray[np.bool_] | None = None
-        self._has_mesh = False
+        self.colouring = Colouring()
+        self.has_mesh = False
         self._hot = False
         self._stale_colours = False
         self._covered: shapes.GridRectangle | None = None
+        self._framed: tuple[object, ...] | None = None
         self._light_up()
         # One convex cone needs no sorting, which costs 4 ms on a CPU.
         renderer.SetUseOIT(False)
         self.ground = GroundGrid(renderer)
         self.body = Body(renderer)
-        self.camera_glyph = CameraGlyph(renderer)
+        points, segments = shapes.frustum(_CAMERA_M)
+        self.camera_glyph = Shape(renderer, points, segments=segments, line_px=1.3)
         self.sensor_glyph = SensorGlyph(renderer)
         self.markers = Markers(renderer, self.colours)
-        self._set_floor()
-        self.set_sensor(self.sensor)
+        self._set_extent(_NOTHING)
         self.set_colours(self.colours)
 
     # What is shown
-
-    @property
-    def has_mesh(self) -> bool:
-        """True if there is a mesh."""
-        return self._has_mesh
-
-    @property
-    def mode(self) -> MeshColour:
-        """Quantity that the colour of the mesh shows."""
-        return self._mode
-
-    @property
-    def v_max_mps(self) -> float:
-        """End of the velocity colours."""
-        return self._v_max_mps
 
     @property
     def vertices_m(self) -> NDArray[np.float32]:
         """Vertices on screen, (V, 3)."""
         return self.body.points
 
+    @property
+    def knows_hidden(self) -> bool:
+        """True once the visibility of the vertices is known."""
+        return self.colouring.visible is not None
+
     def set_mesh(self, mesh: MeshSequence, frame: int = 0) -> None:
         """Take over another clip and show one frame of it."""
-        self.extent = Extent.of_mesh(mesh)
-        self._velocity = self._visible = None
+        extent = Extent.of_mesh(mesh)
         self.body.set_topology(mesh.frame(frame), mesh.faces)
-        self.body.show(True)
-        self._has_mesh = True
-        self._set_floor()
-        self.set_sensor(self.sensor)
+        self.has_mesh = True
+        self.show_mesh(True)
+        self._set_extent(extent)
 
     def clear_mesh(self) -> None:
         """Show sensor and camera alone."""
-        self._has_mesh = False
-        self._velocity = self._visible = None
-        self.body.show(False)
-        self.extent = _NOTHING
-        self._set_floor()
-        self.set_sensor(self.sensor)
+        self.has_mesh = False
+        self.show_mesh(False)
+        self._set_extent(_NOTHING)
 
     def show_mesh(self, shown: bool) -> None:
         """Draw the mesh, or leave it out at a time that it does not cover."""
@@ -118,30 +94,20 @@ class Scene:
         self.body.set_vertices(vertices)
         self._stale_colours = True
 
+    def change_colours(self, **changes: object) -> None:
+        """Change some of what the colour of the mesh means; see :class:`Colouring`."""
+        self.colouring = replace(self.colouring, **changes)  # type: ignore[arg-type]
+        self._stale_colours = True
+
     def set_scattering(
         self,
         velocity_mps: NDArray[np.floating] | None,
         visible: NDArray[np.bool_] | None,
     ) -> None:
         """Radial velocity and visibility of the frame's vertices, (V,) each; None if unknown."""
-        self._velocity = self._of_this_mesh(velocity_mps)
-        self._visible = self._of_this_mesh(visible)
-        self._stale_colours = True
-
-    def set_v_max(self, v_max_mps: float) -> None:
-        """End of the velocity colours."""
-        self._v_max_mps = v_max_mps
-        self._stale_colours = True
-
-    def set_mode(self, mode: MeshColour) -> None:
-        """Choose what the colour of the mesh means."""
-        self._mode = mode
-        self._stale_colours = True
-
-    def set_as_dots(self, dots: bool) -> None:
-        """Draw vertices instead of the surface."""
-        self.body.set_as_dots(dots)
-        self._stale_colours = True
+        self.change_colours(
+            velocity_mps=self._of_this_mesh(velocity_mps), visible=self._of_this_mesh(visible)
+        )
 
     def set_sensor(self, sensor: VirtualSensor) -> None:
         """Place the sensor."""
@@ -152,9 +118,8 @@ class Scene:
             sensor, self.extent.floor_m, reach_m=min(max(0.38 * away, 0.3), 1.0)
         )
         ranges = np.linalg.norm(self.extent.points_m - position, axis=1)
-        self.range_limits_m = range_limits(float(ranges.min()), float(ranges.max()))
+        self.change_colours(range_limits_m=range_limits(float(ranges.min()), float(ranges.max())))
         self._lay_ground()
-        self._stale_colours = True
 
     def set_markers(
         self,
@@ -164,6 +129,7 @@ class Scene:
     ) -> None:
         """Show planned places; see :meth:`Markers.set_sensors`."""
         self.markers.set_sensors(sensors, range_m, beyond)
+        self._framed = None
         self._lay_ground()
 
     def set_hot(self, hot: bool) -> None:
@@ -177,7 +143,7 @@ class Scene:
         self.colours = colours
         self.renderer.SetBackground(*fractions(colours.background))
         self.ground.set_colours(colours)
-        self.camera_glyph.set_colours(colours)
+        self.camera_glyph.set_colour(colours.camera)
         self.sensor_glyph.set_colours(colours, self._hot)
         self.markers.set_colours(colours)
         self.body.shadow.GetProperty().SetColor(*fractions(colours.shadow))
@@ -185,17 +151,20 @@ class Scene:
 
     # Where it is seen from
 
-    def preset_pose(self, preset: Preset, size_px: tuple[float, float]) -> EyePose:
-        """Pose of one of the ready-made views for a widget of this size."""
+    def look_from(self, preset: Preset) -> None:
+        """Keep to one of the ready-made views until the user turns away."""
+        self.preset, self._framed = preset, None
+
+    def preset_pose(self, preset: Preset) -> EyePose:
+        """Pose of one of the ready-made views in the present size."""
         body, sensor = self.extent, np.asarray(self.sensor.position_m)
-        if preset in ("camera", "sensor"):
-            position = np.zeros(3) if preset == "camera" else sensor
-            azimuth = 0.0 if preset == "camera" else self.sensor.azimuth_deg
-            elevation = 0.0 if preset == "camera" else self.sensor.elevation_deg
-            return self._looking_from(position, azimuth, elevation, size_px)
+        if preset == "camera":
+            return self._looking_from(np.zeros(3), 0.0, 0.0)
+        if preset == "sensor":
+            return self._looking_from(sensor, self.sensor.azimuth_deg, self.sensor.elevation_deg)
         points = [body.points_m]
         if np.linalg.norm(body.centre_m) < _FAR_OFF_M:
-            points.append(_box(np.zeros(3), CameraGlyph.SIZE_M))
+            points.append(_box(np.zeros(3), _CAMERA_M))
         if np.linalg.norm(body.centre_m - sensor) < _FAR_OFF_M:
             points.append(_box(sensor, 0.25))
             points.append(np.array([[sensor[0], body.floor_m, sensor[2]]]))
@@ -205,17 +174,14 @@ class Scene:
             "side": (-90.0, 0.0),
             "top": (0.0, -89.5),
         }[preset]
-        pose = EyePose(azimuth_deg=azimuth, elevation_deg=elevation)
-        return pose.framed(np.concatenate(points), size_px, self.margins)
+        pose = EyePose(azimuth_deg=azimuth, elevation_deg=elevation, size_px=self.pose.size_px)
+        return pose.framed(np.concatenate(points), self.margins)
 
     def _looking_from(
-        self,
-        position: NDArray[np.float64],
-        azimuth_deg: float,
-        elevation_deg: float,
-        size_px: tuple[float, float],
+        self, position: NDArray[np.float64], azimuth_deg: float, elevation_deg: float
     ) -> EyePose:
         # The eye stays put, so the angle has to open until the body fits.
+        width, height = self.pose.size_px
         pose = EyePose(tuple(position), azimuth_deg, elevation_deg, distance_m=1e-9)
         right, down, forward = pose.axes
         relative = self.extent.points_m - position
@@ -225,19 +191,18 @@ class Scene:
         tangent = 0.45
         if ahead.any():
             # Half the picture's height is one unit; the colour bar keeps its place free.
-            unit = size_px[1] / 2
-            room_left = size_px[0] / 2 / unit
-            room_right = max(size_px[0] / 2 - self.margins.right, 0.1 * size_px[0]) / unit
+            room_left = width / height
+            room_right = max(width / 2 - self.margins.right, 0.1 * width) / (height / 2)
             x, y = relative[ahead] @ right, np.abs(relative[ahead] @ down)
             tallest = np.maximum(np.maximum(x / room_right, -x / room_left), y) / depth[ahead]
             tangent = float(np.clip(1.06 * tallest.max(), 0.12, 1.4))
-        focus = position + distance * forward
         return EyePose(
-            (float(focus[0]), float(focus[1]), float(focus[2])),
+            triple(position + distance * forward),
             azimuth_deg,
             elevation_deg,
             distance,
             2 * float(np.degrees(np.arctan(tangent))),
+            self.pose.size_px,
         )
 
     # Before a rendering
@@ -248,22 +213,30 @@ class Scene:
         ``size_px`` is the widget's size in device-independent pixels, ``pixel_scale`` the pixels of
         the render window per such pixel.
         """
+        self.pose = replace(self.pose, size_px=size_px)
+        # While the sensor moves the view stands still, or the sensor would slip from under the
+        # pointer; only the view from the sensor goes with it.
+        framed = (self.preset, size_px, self.sensor if self.preset == "sensor" else None)
+        if self.preset is not None and self._framed != framed:
+            self._framed = framed
+            self.pose = self.preset_pose(self.preset)
         if self._stale_colours:
             self._colour_mesh()
-        for part in (self.sensor_glyph, self.camera_glyph, self.ground):
-            part.set_pixel_scale(pixel_scale)
-        if self._has_mesh and self.body.drawn_as_dots:
-            self.body.set_dot_size(self._dot_px(size_px) * pixel_scale)
-        eye = self.pose.position
-        pixel = self.pose.metres_per_pixel(tuple(self.extent.centre_m), size_px[1])
-        self.markers.set_pixel(pixel if np.isfinite(pixel) else 0.0, pixel_scale)
-        self.sensor_glyph.set_radius(self.sensor_radius_m(size_px))
+        for shape in (
+            self.camera_glyph, self.markers, *self.sensor_glyph.shapes, *self.ground.shapes,
+        ):  # fmt: skip
+            shape.set_pixel_scale(pixel_scale)
+        if self.has_mesh and self.body.drawn_as_dots:
+            self.body.look.SetPointSize(self._dot_px() * pixel_scale)
+        pixel = self.pose.metres_per_pixel(self.extent.centre_m)
+        self.markers.set_pixel(pixel if np.isfinite(pixel) else 0.0)
+        self.sensor_glyph.sphere.SetScale(self.sensor_radius_m)
         self.sensor_glyph.show(self.sensor_shown)
         self.camera_glyph.show(self.camera_shown)
         _, down, forward = self.pose.axes
         camera = self.renderer.GetActiveCamera()
-        camera.SetPosition(*eye)
-        camera.SetFocalPoint(*(eye + forward))
+        camera.SetPosition(*self.pose.position)
+        camera.SetFocalPoint(*(self.pose.position + forward))
         camera.SetViewUp(*-down)
         camera.SetViewAngle(self.pose.angle_deg)
         camera.SetClippingRange(
@@ -282,37 +255,23 @@ class Scene:
         return bool(np.linalg.norm(self.pose.position) > _INSIDE_M)
 
     @property
-    def knows_hidden(self) -> bool:
-        """True once the visibility of the vertices is known."""
-        return self._visible is not None
-
-    @property
-    def legend_state(self) -> tuple[object, ...]:
-        """Everything that a legend depends on."""
-        return (
-            self._has_mesh,
-            self._mode,
-            self._v_max_mps,
-            self.range_limits_m,
-            self.knows_hidden,
-        )
-
-    def sensor_radius_m(self, size_px: tuple[float, float]) -> float:
+    def sensor_radius_m(self) -> float:
         """Radius of the sphere: never too small on screen to take hold of."""
-        pixel = self.pose.metres_per_pixel(self.sensor.position_m, size_px[1])
+        pixel = self.pose.metres_per_pixel(self.sensor.position_m)
         return max(SENSOR_RADIUS_M, SENSOR_LEAST_PX * pixel) if np.isfinite(pixel) else 0.01
 
-    def body_box_px(self, size_px: tuple[float, float]) -> tuple[float, float, float, float] | None:
+    @property
+    def body_box_px(self) -> tuple[float, float, float, float] | None:
         """Left, top, right and bottom of where the body moves, None behind the eye."""
-        pixels = self.pose.project(self.extent.points_m, size_px)
+        pixels = self.pose.project(self.extent.points_m)
         pixels = pixels[pixels[:, 2] > 0.1, :2]
         if not len(pixels):
             return None
         return (*pixels.min(axis=0), *pixels.max(axis=0))
 
-    def _dot_px(self, size_px: tuple[float, float]) -> float:
+    def _dot_px(self) -> float:
         """Size of dots that leaves gaps between those of a dense mesh."""
-        box = self.body_box_px(size_px)
+        box = self.body_box_px
         if box is None:
             return _DOTS_PX[0]
         area = (box[2] - box[0]) * (box[3] - box[1])
@@ -320,28 +279,16 @@ class Scene:
 
     def _colour_mesh(self) -> None:
         self._stale_colours = False
-        if not self._has_mesh:
+        if not self.has_mesh:
             return
-        ranges = None
-        if self._mode == "range":
+        colouring = replace(self.colouring, as_dots=self.body.drawn_as_dots)
+        if colouring.mode == "range":
             offset = self.vertices_m - np.asarray(self.sensor.position_m, np.float32)
-            ranges = np.sqrt(np.einsum("ij,ij->i", offset, offset))
-        self.body.set_point_colours(
-            mesh_colours(
-                self._mode,
-                self.colours,
-                len(self.vertices_m),
-                velocity_mps=self._velocity,
-                v_max_mps=self._v_max_mps,
-                range_m=ranges,
-                range_limits_m=self.range_limits_m,
-                visible=self._visible,
-                as_dots=self.body.drawn_as_dots,
-            )
-        )
+            colouring = replace(colouring, range_m=np.sqrt(np.einsum("ij,ij->i", offset, offset)))
+        self.body.set_point_colours(mesh_colours(colouring, self.colours, len(self.vertices_m)))
 
     def _of_this_mesh(self, values: NDArray | None) -> NDArray | None:
-        fits = values is not None and self._has_mesh and len(values) == len(self.vertices_m)
+        fits = values is not None and self.has_mesh and len(values) == len(self.vertices_m)
         return values if fits else None
 
     def _near_markers_m(self) -> NDArray[np.float64]:
@@ -349,10 +296,13 @@ class Scene:
         places = self.markers.positions_m
         return places[np.linalg.norm(places - self.extent.centre_m, axis=1) < _FAR_OFF_M]
 
-    def _set_floor(self) -> None:
-        self.body.set_floor(self.extent.floor_m)
+    def _set_extent(self, extent: Extent) -> None:
+        """Take over the space of another body, of which nothing else is known yet."""
+        self.extent = extent
+        self.body.set_floor(extent.floor_m)
         self._covered = None
-        self._lay_ground()
+        self.set_scattering(None, None)
+        self.set_sensor(self.sensor)
 
     def _lay_ground(self) -> None:
         """Grid under body, camera and sensor; in steps, so that it rarely changes."""

@@ -6,24 +6,14 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 _LONGEST_GRID_M = 24.0
 PYRAMID_POINTS = 5
 _PYRAMID_WIDTH = 0.72
 
-
 GridRectangle = tuple[float, float, float, float, float]
 """x0, z0, x1, z1 and the distance of the lines, metres."""
-
-
-@dataclass(frozen=True)
-class Lines:
-    """Line segments with an opacity per point."""
-
-    points: NDArray[np.float32]  # (n, 3)
-    segments: NDArray[np.int32]  # (m, 2)
-    opacity: NDArray[np.float32]  # (n,)
 
 
 @dataclass(frozen=True)
@@ -37,10 +27,12 @@ class MetreLabel:
 
 @dataclass(frozen=True)
 class Ground:
-    """Grid lines on the floor, and their metre labels."""
+    """Grid on the floor: its lines, those at whole metres apart from the others, and labels."""
 
-    minor: Lines
-    major: Lines
+    points: NDArray[np.float32]  # (n, 3)
+    opacity: NDArray[np.float32]  # (n,), fading outwards
+    minor: NDArray[np.int32]  # segments (m, 2)
+    major: NDArray[np.int32]
     labels: tuple[MetreLabel, ...]
 
 
@@ -78,30 +70,18 @@ def ring(sides: int = 32) -> tuple[NDArray, NDArray]:
     return points.astype(np.float32), np.stack([here, np.roll(here, -1)], axis=1)
 
 
-def frustum(width: float = 4.0, height: float = 3.0, depth: float = 3.4) -> tuple[NDArray, NDArray]:
+def frustum(length: float) -> tuple[NDArray, NDArray]:
     """Wire camera along +z with its optical centre at the origin: points and segments."""
-    w, h = width / 2, height / 2
     points = np.array(
         [
-            (0, 0, 0),
-            (-w, -h, depth),
-            (w, -h, depth),
-            (w, h, depth),
-            (-w, h, depth),
-            (-0.35 * w, -1.12 * h, depth),
-            (0.35 * w, -1.12 * h, depth),
-            (0, -1.5 * h, depth),
-        ],
-        np.float32,
-    )
-    segments = np.array(
-        [
-            (0, 1), (0, 2), (0, 3), (0, 4), (1, 2), (2, 3), (3, 4), (4, 1),
-            (5, 6), (6, 7), (7, 5),
-        ],
-        np.int32,
+            (0, 0, 0), (-2, -1.5, 3.4), (2, -1.5, 3.4), (2, 1.5, 3.4), (-2, 1.5, 3.4),
+            (-0.7, -1.68, 3.4), (0.7, -1.68, 3.4), (0, -2.25, 3.4),
+        ]
     )  # fmt: skip
-    return points / depth, segments
+    segments = np.array(
+        [(0, 1), (0, 2), (0, 3), (0, 4), (1, 2), (2, 3), (3, 4), (4, 1), (5, 6), (6, 7), (7, 5)]
+    )
+    return length / 3.4 * points, segments
 
 
 def pyramids(
@@ -111,30 +91,25 @@ def pyramids(
 
     Each has its tip first, then its base, with the given position in the middle.
     """
-    half = _PYRAMID_WIDTH * length / 2
-    # As rotation_to, for all at once.
-    level = np.stack([directions[:, 2], np.zeros(len(directions)), -directions[:, 0]], axis=1)
-    steepness = np.linalg.norm(level, axis=1, keepdims=True)
-    right = np.where(steepness > 1e-9, level / np.maximum(steepness, 1e-9), (1.0, 0.0, 0.0))
-    down = np.cross(directions, right)
-    points = np.empty((len(positions), PYRAMID_POINTS, 3), np.float32)
-    points[:, 0] = positions + length * directions
-    for corner, (across, downward) in enumerate(((-1, -1), (1, -1), (1, 1), (-1, 1)), start=1):
-        points[:, corner] = positions + half * (across * right + downward * down)
+    half = _PYRAMID_WIDTH / 2
+    one = np.array(
+        [(0, 0, 1), (-half, -half, 0), (half, -half, 0), (half, half, 0), (-half, half, 0)]
+    )
+    points = positions[:, None] + length * (one @ np.swapaxes(rotation_to(directions), 1, 2))
     sides = np.array([(0, 1, 2), (0, 2, 3), (0, 3, 4), (0, 4, 1), (1, 3, 2), (1, 4, 3)], np.int32)
     first = PYRAMID_POINTS * np.arange(len(positions), dtype=np.int32)
     triangles = (first[:, None, None] + sides).reshape(-1, 3)
-    return points.reshape(-1, 3), triangles
+    return points.reshape(-1, 3).astype(np.float32), triangles
 
 
-def rotation_to(direction: tuple[float, float, float]) -> NDArray[np.float64]:
-    """Rotation (3, 3) that turns +z into ``direction`` and keeps the horizon level."""
-    forward = np.asarray(direction, np.float64)
-    forward = forward / np.linalg.norm(forward)
-    level = np.array([forward[2], 0.0, -forward[0]])
-    length = np.linalg.norm(level)
-    right = level / length if length > 1e-9 else np.array([1.0, 0.0, 0.0])
-    return np.stack([right, np.cross(forward, right), forward], axis=1)
+def rotation_to(directions: ArrayLike) -> NDArray[np.float64]:
+    """Rotations (..., 3, 3) that turn +z into ``directions``, (..., 3), and keep the horizon."""
+    forward = np.asarray(directions, np.float64)
+    forward = forward / np.linalg.norm(forward, axis=-1, keepdims=True)
+    level = np.stack([forward[..., 2], 0 * forward[..., 0], -forward[..., 0]], axis=-1)
+    length = np.linalg.norm(level, axis=-1, keepdims=True)
+    right = np.where(length > 1e-9, level / np.maximum(length, 1e-9), (1.0, 0.0, 0.0))
+    return np.stack([right, np.cross(forward, right), forward], axis=-1)
 
 
 def grid_rectangle(low_xz: NDArray[np.float64], high_xz: NDArray[np.float64]) -> GridRectangle:
@@ -149,56 +124,29 @@ def grid_rectangle(low_xz: NDArray[np.float64], high_xz: NDArray[np.float64]) ->
 
 def ground(floor_m: float, x0: float, z0: float, x1: float, z1: float, step: float) -> Ground:
     """A grid on the floor that fades outwards, with a label at every metre."""
-    xs, zs = _ticks(x0, x1, step), _ticks(z0, z1, step)
-    lines: dict[bool, list[tuple[NDArray, NDArray]]] = {False: [], True: []}
-    for x in xs:
-        lines[_is_major(x)].append((np.full(len(zs), x), zs))
-    for z in zs:
-        lines[_is_major(z)].append((xs, np.full(len(xs), z)))
-    centre = np.array([(x0 + x1) / 2, (z0 + z1) / 2])
-    reach = np.array([(x1 - x0) / 2, (z1 - z0) / 2])
+    xs, zs = (
+        np.linspace(low, high, round((high - low) / step) + 1) for low, high in ((x0, x1), (z0, z1))
+    )
+    x, z = np.meshgrid(xs, zs, indexing="ij")
+    away = np.maximum(abs(2 * x - x0 - x1) / (x1 - x0), abs(2 * z - z0 - z1) / (z1 - z0))
+    points = np.stack([x, np.full_like(x, floor_m), z], axis=-1).reshape(-1, 3)
+    number = np.arange(x.size, dtype=np.int32).reshape(x.shape)
+    along_z, along_x = _segments(number), _segments(number.T)
+    whole_x, whole_z = (abs(values - values.round()) < 1e-6 for values in (xs, zs))
+    minor = _joined(along_z[~whole_x], along_x[~whole_z])
+    major = _joined(along_z[whole_x], along_x[whole_z])
     labels = tuple(
-        MetreLabel(
-            f"{z:.0f} m".replace("-", "\u2212"),
-            (float(x0), floor_m, float(z)),
-            (float(x1), floor_m, float(z)),
-        )
-        for z in zs
-        if _is_major(z)
+        MetreLabel(f"{at:.0f} m".replace("-", "\u2212"), (x0, floor_m, at), (x1, floor_m, at))
+        for at in map(float, zs[whole_z])
     )
-    minor, major = (_joined(lines[kind], floor_m, centre, reach) for kind in (False, True))
-    return Ground(minor, major, labels)
+    opacity = np.clip(1.25 - away**2, 0.12, 1.0).ravel()
+    return Ground(points.astype(np.float32), opacity.astype(np.float32), minor, major, labels)
 
 
-def _ticks(low: float, high: float, step: float) -> NDArray[np.float64]:
-    return np.linspace(low, high, round((high - low) / step) + 1)
+def _segments(number: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Segments (lines, n - 1, 2) of lines whose n points have these numbers, (lines, n)."""
+    return np.stack([number[:, :-1], number[:, 1:]], axis=-1)
 
 
-def _is_major(value: float) -> bool:
-    return abs(value - round(value)) < 1e-6
-
-
-def _joined(
-    strips: list[tuple[NDArray, NDArray]],
-    floor_m: float,
-    centre: NDArray[np.float64],
-    reach: NDArray[np.float64],
-) -> Lines:
-    points: list[NDArray] = []
-    segments: list[NDArray] = []
-    count = 0
-    for x, z in strips:
-        points.append(np.stack([x, np.full(len(x), floor_m), z], axis=1))
-        first = np.arange(count, count + len(x) - 1)
-        segments.append(np.stack([first, first + 1], axis=1))
-        count += len(x)
-    if not points:
-        return Lines(np.zeros((0, 3), np.float32), np.zeros((0, 2), np.int32), np.zeros(0, "f4"))
-    together = np.concatenate(points)
-    away = np.abs((together[:, [0, 2]] - centre) / reach).max(axis=1)
-    opacity = np.clip(1.25 - away**2, 0.12, 1.0)
-    return Lines(
-        together.astype(np.float32),
-        np.concatenate(segments).astype(np.int32),
-        opacity.astype(np.float32),
-    )
+def _joined(*lines: NDArray[np.int32]) -> NDArray[np.int32]:
+    return np.concatenate([segments.reshape(-1, 2) for segments in lines])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, get_args
@@ -12,21 +12,18 @@ from PySide6.QtCore import QEvent, QObject, QSize, Qt
 from PySide6.QtGui import QCloseEvent, QMouseEvent, QResizeEvent, QWheelEvent
 from PySide6.QtWidgets import QLabel, QWidget
 
-from sd2app.scene.backend import Backend, NoOpenGL
-from sd2app.scene.backend_choice import chosen_backend
+from sd2app.scene.backend import Backend, NoOpenGL, chosen_backend
+from sd2app.scene.camera import Preset
 from sd2app.scene.colours import SceneColours
-from sd2app.scene.navigation import Button, Navigator, Position
+from sd2app.scene.navigation import Button, Navigator
 from sd2app.scene.overlay import Overlay
-from sd2app.scene.scene import Preset, Scene
+from sd2app.scene.scene import Scene
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
     from sd2app.maps.model import SynthesisModel
     from sd2app.sensor.placements import PlacementsModel
-    from sd2app.session.display import DisplayModel
-    from sd2app.session.document import DocumentModel
-    from sd2app.session.playback import PlaybackModel
-    from sd2app.session.sensor import SensorModel
+    from sd2app.session.session import Session
     from sd2core.mesh.sequence import MeshSequence
 
 _BUTTONS: dict[Qt.MouseButton, Button] = {
@@ -47,33 +44,16 @@ _NOTCH = 120.0
 class SceneView(QWidget):
     """Mesh, sensor, camera and planned places; the sensor can be dragged, a place picked.
 
-    It changes no model: a drag goes to the three callables (``drag`` gets the position in
-    metres), a click on a place to the model of placements, which makes it an edit, and what is
-    on screen follows the models' signals. Vertices and colours are fetched when the picture is
-    drawn, so a hidden view costs nothing.
+    It changes no model: a drag goes to the session's edits, a click on a place to the model of
+    placements, which makes it an edit, and what is on screen follows the models' signals.
+    Vertices and colours are fetched when the picture is drawn, so a hidden view costs nothing.
     """
 
     def __init__(
-        self,
-        document: DocumentModel,
-        playback: PlaybackModel,
-        sensor: SensorModel,
-        display: DisplayModel,
-        synthesis: SynthesisModel,
-        placements: PlacementsModel,
-        *,
-        begin_drag: Callable[[], None],
-        drag: Callable[[Position], None],
-        end_drag: Callable[[], None],
-        parent: QWidget | None = None,
+        self, session: Session, synthesis: SynthesisModel, placements: PlacementsModel
     ) -> None:
-        super().__init__(parent)
-        self._document = document
-        self._playback = playback
-        self._sensor = sensor
-        self._display = display
-        self._synthesis = synthesis
-        self._placements = placements
+        super().__init__()
+        self._session, self._synthesis, self._placements = session, synthesis, placements
         self._backend: Backend | None = None
         self.setMinimumSize(200, 150)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
@@ -83,28 +63,18 @@ class SceneView(QWidget):
             self._explain(str(problem))
             return
         self.scene = Scene(self._backend.renderer)
-        self.navigator = Navigator(
-            self.scene,
-            begin_drag,
-            drag,
-            end_drag,
-            placements.use,
-            size_px=self._size_px,
-            changed=self._moved,
-        )
+        self.navigator = Navigator(self.scene, session.edits, placements.use, self.request_render)
         self.overlay = Overlay(self.scene, self.navigator, self)
-        self._preset: Preset | None = "overview"
-        self._framed: tuple[object, ...] | None = None
         self._frame: int | None = None
         self._stale_scattering = True
         self._planned: object = None
         self._backend.widget.installEventFilter(self)
         self._followed = (
-            (document.opened, self._take_over),
-            (playback.time_changed, self._follow_clock),
-            (sensor.changed, self._follow_sensor),
-            (display.mesh_changed, self._follow_colour),
-            (display.theme_changed, self._follow_theme),
+            (session.document.opened, self._take_over),
+            (session.playback.time_changed, self._follow_clock),
+            (session.sensor.changed, self._follow_sensor),
+            (session.display.mesh_changed, self._follow_colour),
+            (session.display.theme_changed, self._follow_theme),
             (synthesis.frame_changed, self._follow_scattering),
             (placements.changed, self._follow_placements),
         )
@@ -131,12 +101,8 @@ class SceneView(QWidget):
         if preset not in get_args(Preset):
             raise ValueError(f"view {preset!r} is not one of {get_args(Preset)}")
         if self._backend is not None:
-            self._preset, self._framed = preset, None
+            self.scene.look_from(preset)
             self.request_render()
-
-    def reset_view(self) -> None:
-        """Look at sensor, camera and body from beside them."""
-        self.set_view("overview")
 
     def request_render(self) -> None:
         """Draw again."""
@@ -186,7 +152,7 @@ class SceneView(QWidget):
         if kind == QEvent.Type.MouseButtonRelease:
             self.navigator.release(*place, button)
         elif kind == QEvent.Type.MouseButtonDblClick and not self._at_something(place):
-            self.reset_view()
+            self.set_view("overview")
         else:
             # Also the second press of a double click: a hurried hand takes the sensor.
             self.navigator.press(*place, button, *_modifiers(event))
@@ -198,27 +164,25 @@ class SceneView(QWidget):
     # What changed
 
     def _take_over(self) -> None:
-        self._preset, self._framed = "overview", None
+        self.scene.look_from("overview")
         self._frame = None
         self.scene.clear_mesh()
-        self.overlay.message = ""
-        mesh = self._document.mesh
-        if mesh is None:
-            self.overlay.message = "No mesh in this recording"
-        else:
-            frame = mesh.timebase.frame_at(self._playback.time_s)
+        mesh = self._session.document.mesh
+        self.overlay.message = "No mesh in this recording" if mesh is None else ""
+        if mesh is not None:
+            frame = mesh.timebase.frame_at(self._session.playback.time_s)
             with self._explaining():
                 self.scene.set_mesh(mesh, frame)
                 self._frame = frame
         self._follow_sensor()
 
     def _follow_clock(self) -> None:
-        if self._document.mesh is not None:
+        if self._session.document.mesh is not None:
             self._stale_scattering = True
             self.request_render()
 
     def _follow_sensor(self) -> None:
-        self.scene.set_sensor(self._sensor.sensor)
+        self.scene.set_sensor(self._session.sensor.sensor)
         self.navigator.look_again()
         self._follow_scattering()
 
@@ -227,12 +191,14 @@ class SceneView(QWidget):
         self.request_render()
 
     def _follow_colour(self) -> None:
-        self.scene.set_mode(self._display.mesh_colour)
-        self.scene.set_as_dots(self._display.as_dots)
+        display = self._session.display
+        self.scene.body.set_as_dots(display.as_dots)
+        self.scene.change_colours(mode=display.mesh_colour)
         self._follow_scattering()
 
     def _follow_theme(self) -> None:
-        self.scene.set_colours(SceneColours.of(self._display.palette, self._display.dark))
+        display = self._session.display
+        self.scene.set_colours(SceneColours.of(display.palette, display.dark))
         self.request_render()
 
     def _follow_placements(self) -> None:
@@ -248,35 +214,22 @@ class SceneView(QWidget):
             sensors, range_m, None if coverage is None else coverage.beyond(radar)
         )
         self.overlay.marker_words = [place.words for place in model.planned.places]
-        self._framed = None
         self.navigator.look_again()
-        self.request_render()
-
-    def _moved(self) -> None:
-        if self.navigator.turning:
-            self._preset = None
         self.request_render()
 
     # Drawing
 
     def _prepare(self, size_px: tuple[float, float], pixel_scale: float) -> None:
         """Fetch what changed since the last picture, right before the next."""
-        mesh = self._document.mesh
+        mesh = self._session.document.mesh
         if mesh is not None and self.scene.has_mesh:
             with self._explaining():
                 self._fetch(mesh)
-        # A ready-made view is kept when the widget is resized. While the sensor moves
-        # the view stands still, or the sensor would slip from under the pointer;
-        # only the view from the sensor goes with it.
-        framed = (self._preset, size_px, self.scene.sensor if self._preset == "sensor" else None)
-        if self._preset is not None and self._framed != framed:
-            self._framed = framed
-            self.scene.margins = replace(self.scene.margins, right=self.overlay.legend_room_px)
-            self.scene.pose = self.scene.preset_pose(self._preset, size_px)
+        self.scene.margins = replace(self.scene.margins, right=self.overlay.legend_room_px)
         self.scene.prepare(size_px, pixel_scale)
 
     def _fetch(self, mesh: MeshSequence) -> None:
-        time_s = self._playback.time_s
+        time_s = self._session.playback.time_s
         frame = mesh.timebase.frame_at(time_s)
         covered, someone = mesh.timebase.covers(time_s), bool(mesh.presence.there[frame])
         self.scene.show_mesh(covered and someone)
@@ -290,10 +243,10 @@ class SceneView(QWidget):
 
     def _fetch_scattering(self) -> None:
         self._stale_scattering = False
-        if self.scene.mode == "plain":
+        if self.scene.colouring.mode == "plain":
             return
         scattering = self._synthesis.frame
-        self.scene.set_v_max(self._synthesis.v_max_mps)
+        self.scene.change_colours(v_max_mps=self._synthesis.v_max_mps)
         if scattering is None:
             self.scene.set_scattering(None, None)
         else:
@@ -306,9 +259,6 @@ class SceneView(QWidget):
             yield
         except (Sd2Error, OSError) as error:
             self.overlay.message = f"The mesh cannot be read: {error}"
-
-    def _size_px(self) -> tuple[float, float]:
-        return (max(self.width(), 1), max(self.height(), 1))
 
     def _lay_out(self) -> None:
         for child in self.findChildren(QWidget, options=Qt.FindChildOption.FindDirectChildrenOnly):

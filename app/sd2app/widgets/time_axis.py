@@ -47,7 +47,8 @@ def tick_step(span: float, most: int) -> float:
     """Smallest step of 1, 2 or 5 times a power of ten with at most ``most`` ticks."""
     raw = span / max(most, 1)
     power = 10.0 ** math.floor(math.log10(raw))
-    return next(factor * power for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= raw)
+    least = raw * (1.0 - 1e-9)
+    return next(factor * power for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= least)
 
 
 def ticks(low: float, high: float, most: int) -> list[float]:

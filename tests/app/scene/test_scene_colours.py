@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,13 +11,14 @@ from hypothesis import strategies as st
 
 from sd2app.palette import palette_for
 from sd2app.scene.colours import (
+    Colouring,
     SceneColours,
     marker_colours,
     mesh_colours,
-    nice_step,
     range_colours,
     range_limits,
 )
+from sd2app.widgets.time_axis import tick_step
 from sd2core.figures.colours import DIVERGING, SEQUENTIAL, rgb, velocity_colours
 
 LIGHT = SceneColours.of(palette_for(False), False)
@@ -72,14 +75,14 @@ def test_range_limits_enclose_and_are_not_empty(nearest: float, span: float) -> 
     ("span", "most", "step"), [(2.0, 5, 0.5), (1.0, 5, 0.2), (1.4, 8, 0.2), (40.0, 12, 5.0)]
 )
 def test_steps_are_round(span: float, most: int, step: float) -> None:
-    assert nice_step(span, most) == pytest.approx(step)
+    assert tick_step(span, most) == pytest.approx(step)
 
 
 def test_hidden_vertices_are_grey_in_velocity_and_visibility() -> None:
     visible = np.array([True, False])
     for mode in ("velocity", "visibility"):
         seen, hidden = mesh_colours(
-            mode, LIGHT, 2, velocity_mps=np.array([1.5, 1.5]), visible=visible
+            Colouring(mode, velocity_mps=np.array([1.5, 1.5]), visible=visible), LIGHT, 2
         )
         np.testing.assert_array_equal(hidden, rgb(LIGHT.hidden))
         assert np.ptp(seen.astype(int)) > 60
@@ -87,12 +90,14 @@ def test_hidden_vertices_are_grey_in_velocity_and_visibility() -> None:
 
 def test_hidden_vertices_keep_a_trace_of_their_range() -> None:
     colours = mesh_colours(
-        "range",
+        Colouring(
+            "range",
+            range_m=np.array([1.0, 1.0, 3.0]),
+            range_limits_m=(1.0, 3.0),
+            visible=np.array([True, False, False]),
+        ),
         LIGHT,
         3,
-        range_m=np.array([1.0, 1.0, 3.0]),
-        range_limits_m=(1.0, 3.0),
-        visible=np.array([True, False, False]),
     )
     saturation = np.ptp(colours.astype(int), axis=1)
     assert saturation[1] < 0.5 * saturation[0]
@@ -100,16 +105,16 @@ def test_hidden_vertices_keep_a_trace_of_their_range() -> None:
 
 
 def test_hidden_dots_step_back_towards_the_background() -> None:
-    kwargs = {"velocity_mps": np.array([0.0]), "visible": np.array([False])}
-    surface = mesh_colours("velocity", LIGHT, 1, **kwargs)
-    dots = mesh_colours("velocity", LIGHT, 1, as_dots=True, **kwargs)
+    still = Colouring(velocity_mps=np.array([0.0]), visible=np.array([False]))
+    surface = mesh_colours(still, LIGHT, 1)
+    dots = mesh_colours(replace(still, as_dots=True), LIGHT, 1)
     ground = rgb(LIGHT.background).astype(int)
     assert abs(dots.astype(int) - ground).sum() < abs(surface.astype(int) - ground).sum()
 
 
 @pytest.mark.parametrize("mode", ["velocity", "range", "visibility", "plain"])
 def test_what_is_not_known_yet_is_plain(mode: str) -> None:
-    colours = mesh_colours(mode, LIGHT, 4)
+    colours = mesh_colours(Colouring(mode), LIGHT, 4)
     np.testing.assert_array_equal(colours, np.tile(rgb(LIGHT.plain), (4, 1)))
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from vtkmodules.vtkRenderingCore import vtkRenderer
 
+from sd2app.scene.camera import EyePose
 from sd2app.scene.navigation import LEAST_GRAB_PX, Navigator
 from sd2app.scene.scene import Scene
 from sd2core.mesh.sequence import MeshSequence
@@ -19,34 +20,33 @@ SIZE = (640.0, 460.0)
 
 
 class Hand:
-    """A scene, a navigator, and the drag it reports."""
+    """A scene, a navigator, and the edits that it makes of a drag."""
 
     def __init__(self) -> None:
         self.scene = Scene(vtkRenderer())
+        self.scene.pose = EyePose(size_px=SIZE)
         vertices = np.random.default_rng(1).uniform((-0.3, -0.6, 1.9), (0.3, 1.0, 2.4), (60, 3))
         faces = np.arange(60).reshape(20, 3)
         self.scene.set_mesh(MeshSequence(vertices[None], faces, Timebase([0.0])))
         self.scene.set_sensor(VirtualSensor((0.4, -0.2, 0.3)))
-        self.scene.pose = self.scene.preset_pose("overview", SIZE)
+        self.scene.pose = self.scene.preset_pose("overview")
         self.log: list[str] = []
         self.picked: list[int] = []
-        self.navigator = Navigator(
-            self.scene,
-            lambda: self.log.append("begin"),
-            self.place,
-            lambda: self.log.append("end"),
-            self.picked.append,
-            size_px=lambda: SIZE,
-            changed=lambda: None,
-        )
+        self.navigator = Navigator(self.scene, self, self.picked.append, lambda: None)
 
-    def place(self, position: tuple[float, float, float]) -> None:
+    def begin_sensor_drag(self) -> None:
+        self.log.append("begin")
+
+    def drag_sensor(self, position_m: tuple[float, float, float]) -> None:
         self.log.append("drag")
-        self.scene.set_sensor(replace(self.scene.sensor, position_m=position))
+        self.scene.set_sensor(replace(self.scene.sensor, position_m=position_m))
+
+    def end_sensor_drag(self) -> None:
+        self.log.append("end")
 
     @property
     def sensor_px(self) -> np.ndarray:
-        return self.scene.pose.project(self.scene.sensor.position_m, SIZE)[0][:2]
+        return self.scene.pose.project(self.scene.sensor.position_m)[0][:2]
 
     @property
     def sensor_m(self) -> np.ndarray:
@@ -141,31 +141,31 @@ def test_the_wheel_comes_nearer_but_not_while_the_sensor_is_held(hand: Hand) -> 
 
 
 def test_the_sensor_cannot_be_taken_while_one_looks_from_it(hand: Hand) -> None:
-    hand.scene.pose = hand.scene.preset_pose("sensor", SIZE)
+    hand.scene.pose = hand.scene.preset_pose("sensor")
     assert not hand.scene.sensor_shown
     assert not hand.navigator.sensor_at(SIZE[0] / 2, SIZE[1] / 2)
 
 
 @pytest.mark.parametrize("preset", ["overview", "side", "top"])
 def test_ready_made_views_show_body_sensor_and_camera(hand: Hand, preset: str) -> None:
-    pose = hand.scene.preset_pose(preset, SIZE)
+    pose = hand.scene.preset_pose(preset)
     corners = np.concatenate([hand.scene.extent.points_m, [hand.sensor_m, (0, 0, 0)]])
-    x, y, depth = pose.project(corners, SIZE).T
+    x, y, depth = pose.project(corners).T
     assert (depth > 0).all()
     assert ((x > 0) & (x < SIZE[0]) & (y > 0) & (y < SIZE[1])).all()
 
 
 def test_the_view_from_the_camera_is_the_cameras(hand: Hand) -> None:
-    pose = hand.scene.preset_pose("camera", SIZE)
+    pose = hand.scene.preset_pose("camera")
     np.testing.assert_allclose(pose.position, 0.0, atol=1e-12)
     np.testing.assert_allclose(pose.axes[2], (0, 0, 1), atol=1e-12)
-    x, y, _ = pose.project(hand.scene.extent.points_m, SIZE).T
+    x, y, _ = pose.project(hand.scene.extent.points_m).T
     assert ((x > 0) & (x < SIZE[0]) & (y > 0) & (y < SIZE[1])).all()
 
 
 def test_a_sensor_far_away_does_not_shrink_the_view_to_nothing(hand: Hand) -> None:
     hand.scene.set_sensor(VirtualSensor((1e6, 0.0, 0.0)))
-    assert hand.scene.preset_pose("overview", SIZE).distance_m < 30.0
+    assert hand.scene.preset_pose("overview").distance_m < 30.0
 
 
 def test_another_button_does_not_end_a_drag(hand: Hand) -> None:
@@ -187,12 +187,12 @@ def planned(hand: Hand) -> Hand:
     places = (Place(2.0, 60.0), Place(2.02, 60.0), Place(1.5, -40.0, 30.0))
     sensors = tuple(place.sensor((0.0, 0.2, 2.1)) for place in places)
     hand.scene.set_markers(sensors, np.array([one.range_m for one in places]), None)
-    hand.scene.pose = hand.scene.preset_pose("overview", SIZE)
+    hand.scene.pose = hand.scene.preset_pose("overview")
     return hand
 
 
 def marker_px(hand: Hand, number: int) -> np.ndarray:
-    return hand.scene.pose.project(hand.scene.markers.positions_m[number], SIZE)[0][:2]
+    return hand.scene.pose.project(hand.scene.markers.positions_m[number])[0][:2]
 
 
 def test_every_place_is_in_the_overview(planned: Hand) -> None:

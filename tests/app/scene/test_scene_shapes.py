@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from sd2app.scene.body import coarse_faces, is_closed_outward
 from sd2app.scene.shapes import (
     PYRAMID_POINTS,
     cone,
@@ -15,7 +16,6 @@ from sd2app.scene.shapes import (
     pyramids,
     rotation_to,
 )
-from sd2app.scene.surface import coarse_faces, is_closed_outward
 from sd2core.placements.placements import Place
 from sd2core.sensor import VirtualSensor, direction_from_angles
 
@@ -50,9 +50,9 @@ def test_the_grid_covers_what_stands_on_it_and_names_its_metres() -> None:
     assert z0 <= -2.2
     assert z1 >= 1.7
     grid = ground(1.2, *rectangle)
-    for lines in (grid.minor, grid.major):
-        np.testing.assert_allclose(lines.points[:, 1], 1.2)
-        assert lines.segments.max() < len(lines.points)
+    np.testing.assert_allclose(grid.points[:, 1], 1.2)
+    for segments in (grid.minor, grid.major):
+        assert segments.max() < len(grid.points)
     assert "−2 m" in [label.text for label in grid.labels]
     assert step == 0.5
 

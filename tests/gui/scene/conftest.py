@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from PySide6.QtGui import QGuiApplication
-from scene_stage import Document, Placements, Stage, Synthesis, two_plates
+from scene_stage import Document, Drag, Placements, Stage, Synthesis, two_plates
 
 from sd2app.session.display import DisplayModel
 from sd2app.session.playback import PlaybackModel
@@ -30,21 +30,14 @@ def make_stage(qtbot: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable
         playback, sensor, display = PlaybackModel(), SensorModel(), DisplayModel()
         log: list[str] = []
 
-        def drag(position: tuple[float, float, float]) -> None:
-            log.append("drag")
-            sensor.set_sensor(replace(sensor.sensor, position_m=position))
-
-        view = SceneView(
-            document,
-            playback,
-            sensor,
-            display,
-            synthesis,
-            placements,
-            begin_drag=lambda: log.append("begin"),
-            drag=drag,
-            end_drag=lambda: log.append("end"),
+        session = SimpleNamespace(
+            document=document,
+            playback=playback,
+            sensor=sensor,
+            display=display,
+            edits=Drag(sensor, log),
         )
+        view = SceneView(session, synthesis, placements)
         qtbot.addWidget(view)
         view.resize(*SIZE)
         view.show()

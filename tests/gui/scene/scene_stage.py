@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -64,6 +64,23 @@ class Placements(QObject):
         self.picked.append(number)
 
 
+class Drag:
+    """Edits of the sensor by a drag, which are written down."""
+
+    def __init__(self, sensor: SensorModel, log: list[str]) -> None:
+        self._sensor, self._log = sensor, log
+
+    def begin_sensor_drag(self) -> None:
+        self._log.append("begin")
+
+    def drag_sensor(self, position_m: tuple[float, float, float]) -> None:
+        self._log.append("drag")
+        self._sensor.set_sensor(replace(self._sensor.sensor, position_m=position_m))
+
+    def end_sensor_drag(self) -> None:
+        self._log.append("end")
+
+
 @dataclass
 class Stage:
     """The view with everything it follows."""
@@ -111,8 +128,7 @@ class Stage:
 
     def pixel_of(self, point_m: tuple[float, float, float]) -> QPoint:
         """Where in the view a point is."""
-        size = (self.view.width(), self.view.height())
-        x, y, _ = self.view.scene.pose.project(point_m, size)[0]
+        x, y, _ = self.view.scene.pose.project(point_m)[0]
         return QPoint(round(x), round(y))
 
     def colour_at(self, point_m: tuple[float, float, float]) -> QColor:

@@ -16,7 +16,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel
 from scene_stage import LEFT, RIGHT, Stage, two_plates
 
-from sd2app.scene import backend_choice as choose
+from sd2app.scene import backend as choose
 from sd2app.scene import offscreen_backend as image_backend
 from sd2app.scene.colours import SceneColours
 from sd2core.mesh.sequence import MeshSequence
@@ -75,7 +75,7 @@ def test_range_colours_follow_the_distance_to_the_sensor(stage: Stage) -> None:
     stage.sensor.set_sensor(VirtualSensor((-2.0, 0.0, 2.0)))
     near, far = stage.colour_at(LEFT), stage.colour_at(RIGHT)
     assert near.green() > far.green() + 40
-    low, high = stage.view.scene.range_limits_m
+    low, high = stage.view.scene.colouring.range_limits_m
     assert low <= 1.35
     assert high >= 2.65
     assert high - low < 2.2
@@ -203,7 +203,7 @@ def test_vtk_draws_where_the_projection_says(stage: Stage, preset: str) -> None:
     stage.view.scene.body.shadow.SetPosition(0.0, 9.0, 0.0)
     stage.view.set_view(preset)
     picture = as_array(stage.view.grab().toImage())
-    expected = stage.view.scene.pose.project(where, (stage.view.width(), stage.view.height()))[0]
+    expected = stage.view.scene.pose.project(where)[0]
     x0, y0 = round(expected[0]), round(expected[1])
     patch = picture[y0 - 14 : y0 + 15, x0 - 14 : x0 + 15]
     rows, columns = np.nonzero(patch[..., 2] - patch[..., 0] > 50)
@@ -297,7 +297,7 @@ def test_resizing_keeps_a_ready_made_view_framed(stage: Stage) -> None:
     QGuiApplication.processEvents()
     stage.view.grab()
     points = stage.view.scene.extent.points_m
-    x, y, _ = stage.view.scene.pose.project(points, (320, 400)).T
+    x, y, _ = stage.view.scene.pose.project(points).T
     assert ((x > 0) & (x < 320) & (y > 0) & (y < 400)).all()
 
 

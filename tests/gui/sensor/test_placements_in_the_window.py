@@ -127,8 +127,7 @@ def test_a_click_in_the_scene_puts_the_sensor_there_and_undo_takes_it_back(windo
     view = window.features.scene.view
     view.grab()
     places = view.scene.markers.positions_m
-    size = (view.width(), view.height())
-    pixels = view.scene.pose.project(places, size)[:, :2]
+    pixels = view.scene.pose.project(places)[:, :2]
     number = next(n for n in range(6) if view.navigator.marker_at(*pixels[n]) == n)
     before = context.sensor.sensor
     place = QPoint(*(round(value) for value in pixels[number]))

@@ -363,8 +363,7 @@ def test_dragging_the_sensor_in_3d_follows_the_mouse_in_one_step(window, qtbot):
     view.grab()
 
     def pixel() -> QPoint:
-        size = (canvas.width(), canvas.height())
-        x, y, _ = view.scene.pose.project(c.sensor.sensor.position_m, size)[0]
+        x, y, _ = view.scene.pose.project(c.sensor.sensor.position_m)[0]
         return QPoint(round(x), round(y))
 
     start = pixel()
