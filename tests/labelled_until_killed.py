@@ -17,8 +17,8 @@ import sys
 import time
 from pathlib import Path
 
+from fake_accuracy import FakeAccuracy
 from fake_denoisers import FakeDenoisers
-from fake_ladder import FakeLadder
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QToolButton
@@ -113,7 +113,7 @@ class Editor:
 def edit_on(recording: Path, seed: int, told: int) -> None:
     """Open, restore, edit for ever."""
     application = QApplication(sys.argv[:1])
-    parts = Parts(ladder=FakeLadder().ladder, denoisers=FakeDenoisers().library)
+    parts = Parts(accuracy=FakeAccuracy(), denoisers=FakeDenoisers().library)
     window = MainWindow(Settings.forgetful(), parts)
     window.show()
     window.populate()

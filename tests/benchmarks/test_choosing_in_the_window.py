@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import random
 import time
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -25,16 +24,17 @@ def ended():
 
 @pytest.fixture
 def window(qtbot, ended):
-    from sd2app.accuracy.ladder import CORE
+    from sd2app.accuracy.library import AccuracyLibrary
     from sd2app.shell.parts import Parts
 
-    def survey(*place):
-        try:
-            return CORE.survey(*place)
-        finally:
-            ended.append(time.perf_counter())
+    class Timed(AccuracyLibrary):
+        def survey(self, *place):
+            try:
+                return super().survey(*place)
+            finally:
+                ended.append(time.perf_counter())
 
-    with window_on_sample(qtbot, Parts(ladder=replace(CORE, survey=survey))) as window:
+    with window_on_sample(qtbot, Parts(accuracy=Timed())) as window:
         yield window
 
 

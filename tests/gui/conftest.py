@@ -8,9 +8,9 @@ import av
 import numpy as np
 import pytest
 import trimesh
+from fake_accuracy import FakeAccuracy
 from fake_classifiers import FakeClassifiers
 from fake_denoisers import FakeDenoisers
-from fake_ladder import FakeLadder
 from PySide6.QtCore import QCoreApplication, QEvent
 from window_models import models_of
 
@@ -94,9 +94,9 @@ def own_data(tmp_path_factory, monkeypatch) -> Path:
 
 
 @pytest.fixture
-def fake() -> FakeLadder:
+def fake() -> FakeAccuracy:
     """Chooses exact visibility unless a test tells it otherwise."""
-    return FakeLadder()
+    return FakeAccuracy()
 
 
 @pytest.fixture
@@ -120,7 +120,7 @@ def empty_window(qtbot, compiled_kernels, fake, fake_models, fake_classes):
 
     window = MainWindow(
         Settings.forgetful(),
-        Parts(ladder=fake.ladder, denoisers=fake_models.library, classifiers=fake_classes.library),
+        Parts(accuracy=fake, denoisers=fake_models.library, classifiers=fake_classes.library),
     )
     window.resize(1280, 800)
     window.show()

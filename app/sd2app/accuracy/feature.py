@@ -1,4 +1,4 @@
-"""The trade of speed for accuracy in the window."""
+"""Accuracy of maps and its cost in the window."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from PySide6.QtCore import QObject, SignalInstance
 from PySide6.QtWidgets import QWidget
 
-from sd2app.accuracy.ladder import CORE, Ladder
+from sd2app.accuracy.library import AccuracyLibrary
 from sd2app.accuracy.model import AccuracyModel
 from sd2app.accuracy.panel import AccuracyPanel
 from sd2app.feature import Action, Feature, Shell
@@ -18,10 +18,12 @@ class AccuracyFeature(Feature):
     """Choice and measurement of accuracy plans."""
 
     def __init__(
-        self, session: Session, shell: Shell, ladder: Ladder | None, parent: QObject
+        self, session: Session, shell: Shell, library: AccuracyLibrary | None, parent: QObject
     ) -> None:
         self._session, self._shell = session, shell
-        self.model = AccuracyModel(session.jobs, session.settings, ladder or CORE, parent)
+        self.model = AccuracyModel(
+            session.jobs, session.settings, library or AccuracyLibrary(), parent
+        )
 
     def actions(self) -> Sequence[Action]:
         """Panel and measurement."""

@@ -1,16 +1,16 @@
-"""The trade between error and cost: a tolerance, and the plan that holds it."""
+"""The accuracy of the map: a tolerance, and the plan that holds it."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.accuracy.ladder import Ladder
+from sd2app.accuracy.library import AccuracyLibrary
 from sd2app.accuracy.measurements import MeasuredModel, serves_at_rest
 from sd2app.accuracy.text import InUse
-from sd2app.background.latest import LatestRunner
-from sd2app.session.tasks import Job, TaskList
+from sd2app.session.tasks import ListedRunner, TaskList
 from sd2app.settings import Settings
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.mesh.sequence import MeshSequence
@@ -18,6 +18,7 @@ from sd2core.progress import Progress
 from sd2core.sensor import VirtualSensor
 
 if TYPE_CHECKING:
+    from sd2core.accuracy.choosing import Survey
     from sd2core.accuracy.results import Choice, PlanResult
 
 PRESETS = (0.005, 0.01, 0.02, 0.05, 0.1)
@@ -37,7 +38,7 @@ class _Surveyed(NamedTuple):
 
     mesh: MeshSequence
     sensor: VirtualSensor
-    survey: Any
+    survey: Survey
 
 
 class AccuracyModel(QObject):
@@ -59,27 +60,26 @@ class AccuracyModel(QObject):
         self,
         jobs: TaskList,
         settings: Settings,
-        ladder: Ladder,
+        library: AccuracyLibrary,
         parent: QObject | None = None,
     ) -> None:
         super().__init__(parent)
-        self._jobs = jobs
         self._settings = settings
-        self.ladder = ladder
-        self.measured = MeasuredModel(jobs, ladder, self)
+        self.library = library
+        self.measured = MeasuredModel(jobs, library, self)
         self.measured.changed.connect(self._follow_measured)
         self.measured.failed.connect(self.failed)
-        self._tolerance = settings.tolerance
+        self.tolerance = settings.tolerance  # relative L1 after smoothing that the user accepts
         self._scene: tuple[MeshSequence, SynthesisOptions] | None = None
-        self._runner = LatestRunner("choose", self)
-        self._runner.partial.connect(self._report)
-        self._runner.finished.connect(self._receive)
+        self._runner = ListedRunner("choose", jobs, self)
+        self._runner.finished.connect(self._decide)
         self._runner.failed.connect(self._fail)
-        self._job: Job | None = None
+        self._runner.cancelled.connect(self._decide)
+        self._runner.idle_changed.connect(self.changed)
         self._forget()
 
     def _forget(self) -> None:
-        self._choice: Choice | None = None
+        self.choice: Choice | None = None  # newest by tolerance; its place may be the one before
         self._dragging: Choice | None = None
         self._decided_for: _Wish | None = None
         self._asking: _Wish | None = None
@@ -90,19 +90,9 @@ class AccuracyModel(QObject):
     # --- what is known --------------------------------------------------------------------
 
     @property
-    def tolerance(self) -> float:
-        """Relative L1 after smoothing that the user accepts."""
-        return self._tolerance
-
-    @property
     def frames(self) -> int:
         """Frames of the clip; none without a mesh to choose for."""
         return self._scene[0].frame_count if self._scene else 0
-
-    @property
-    def choice(self) -> Choice | None:
-        """The newest choice by tolerance; its place may be the one before."""
-        return self._choice
 
     @property
     def in_use(self) -> InUse | None:
@@ -116,7 +106,7 @@ class AccuracyModel(QObject):
                 "clicked",
                 self._clicked_elsewhere,
             )
-        return _in_use(self._choice)
+        return _in_use(self.choice)
 
     @property
     def while_dragging(self) -> InUse | None:
@@ -126,7 +116,7 @@ class AccuracyModel(QObject):
     @property
     def choosing(self) -> bool:
         """True while a plan is being chosen."""
-        return self._job is not None
+        return self._runner.busy
 
     @property
     def current_point(self) -> PlanResult | None:
@@ -147,8 +137,8 @@ class AccuracyModel(QObject):
             for result in self.measured.counting.results
             if serves_at_rest(result)
         ]
-        if self._choice is not None:
-            known.append((self._choice.errors.l1, self._choice.cost_ms))
+        if self.choice is not None:
+            known.append((self.choice.errors.l1, self.choice.cost_ms))
         return min((cost_ms for error, cost_ms in known if error <= tolerance), default=None)
 
     def is_decided(self, sensor: VirtualSensor, budget_ms: float) -> bool:
@@ -156,7 +146,7 @@ class AccuracyModel(QObject):
         return self._decided_for == self._wish(sensor, budget_ms)
 
     def _wish(self, sensor: VirtualSensor, budget_ms: float) -> _Wish:
-        return _Wish(None if self._clicked else self._tolerance, budget_ms, sensor)
+        return _Wish(None if self._clicked else self.tolerance, budget_ms, sensor)
 
     # --- requests -------------------------------------------------------------------------
 
@@ -178,26 +168,25 @@ class AccuracyModel(QObject):
         wish = self._wish(sensor, budget_ms)
         if self._scene is None or wish == self._decided_for:
             return
-        if self._job is not None and wish == self._asking:
+        if self.choosing and wish == self._asking:
             return
-        self._end_job()
         self._asking = wish
-        self._job = self._jobs.start("Choosing what the scene requires", self._give_up)
         mesh, options = self._scene
         self._runner.submit(
-            lambda emit: self._compute(mesh, options, wish, lambda done, total: emit((done, total)))
+            lambda emit: self._compute(
+                mesh, options, wish, lambda done, total: emit((done, total))
+            ),
+            "Choosing what the scene requires",
         )
-        self.changed.emit()
 
     def hold(self) -> None:
         """Stop choosing, which frees the processor for the moving sensor."""
         self._runner.cancel()
-        self._end_job()
 
     def set_tolerance(self, tolerance: float) -> None:
         """Accept another error; a clicked point no longer rules."""
-        if tolerance != self._tolerance or self._clicked is not None:
-            self._tolerance = self._settings.tolerance = tolerance
+        if tolerance != self.tolerance or self._clicked is not None:
+            self.tolerance = self._settings.tolerance = tolerance
             self.choose_by_tolerance()
 
     def choose_by_tolerance(self) -> None:
@@ -233,7 +222,6 @@ class AccuracyModel(QObject):
         """Stop every thread."""
         self._runner.close()
         self.measured.close()
-        self._end_job()
 
     # --- choosing -------------------------------------------------------------------------
 
@@ -244,55 +232,35 @@ class AccuracyModel(QObject):
         known = self._surveyed
         if known is None or known.mesh is not mesh or known.sensor != wish.sensor:
             like = known.survey if known is not None and known.mesh is mesh else None
-            survey = self.ladder.survey(mesh, wish.sensor, options, progress, like)
+            survey = self.library.survey(mesh, wish.sensor, options, progress, like)
             self._surveyed = known = _Surveyed(mesh, wish.sensor, survey)
         limits = [{"budget_ms": wish.budget_ms}]
         if wish.tolerance is not None:
             limits.insert(0, {"tolerance": wish.tolerance})
         return [
-            self.ladder.choose(
+            self.library.choose(
                 mesh, wish.sensor, options=options, survey=known.survey, progress=progress, **limit
             )
             for limit in limits
         ]
 
-    def _report(self, progress: Any) -> None:
-        if self._job is not None:
-            self._jobs.report(self._job, *progress)
-
-    def _receive(self, choices: list[Choice]) -> None:
+    def _decide(self, choices: Sequence[Choice] = ()) -> None:
+        """Use the chosen plans, or keep those in use; the same place is not asked for again."""
         before = self.in_use, self.while_dragging
         for choice in choices:
             if choice.tolerance is not None:
-                self._choice = choice
+                self.choice = choice
             else:
                 self._dragging = choice
-        self._decide()
+        self._decided_for = self._asking
         if before != (self.in_use, self.while_dragging):
             self.plan_changed.emit()
-        self.decided.emit()
-
-    def _give_up(self) -> None:
-        """Cancel on the user's request; the plan in use stays."""
-        self._runner.cancel()
-        self._decide()
+        self.changed.emit()
         self.decided.emit()
 
     def _fail(self, error: Exception) -> None:
-        # Not asked again for the same place.
         self._decide()
         self.failed.emit(str(error))
-        self.decided.emit()
-
-    def _decide(self) -> None:
-        self._decided_for = self._asking
-        self._end_job()
-
-    def _end_job(self) -> None:
-        if self._job is not None:
-            self._jobs.finish(self._job)
-            self._job = None
-            self.changed.emit()
 
     def _follow_measured(self) -> None:
         """Keep the plan of a clicked point, with figures for this sensor once measured."""

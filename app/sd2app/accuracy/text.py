@@ -25,6 +25,11 @@ class InUse:
     elsewhere: bool = False  # measured with the sensor at another place
 
     @property
+    def brief(self) -> str:
+        """Plan and error in few words."""
+        return f"{short(self.plan)}, {deviation(self.error)}"
+
+    @property
     def figures(self) -> str:
         """Error and cost."""
         figures = f"{deviation(self.error)} · {milliseconds(self.cost_ms)}/frame"

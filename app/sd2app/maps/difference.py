@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.session.display import DisplayModel, HeatmapLevels
-from sd2app.session.maps import MapModel, Reading
-from sd2app.settings import Settings
+from sd2app.session.display import HeatmapLevels
+from sd2app.session.maps import Reading
+from sd2app.session.session import Session
 
 _SHOWN = "difference"
 
@@ -24,35 +24,21 @@ class DifferenceModel(QObject):
     changed = Signal()  # values
     state_changed = Signal()  # existence or visibility
 
-    def __init__(
-        self,
-        denoised: MapModel,
-        real: MapModel,
-        display: DisplayModel,
-        settings: Settings,
-        parent: QObject | None = None,
-    ) -> None:
+    def __init__(self, session: Session, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self.denoised = denoised
-        self.real = real
-        self._display = display
-        self._settings = settings
-        self._wanted = settings.flag(_SHOWN, False)
-        self._state = self._wanted, self.why_not
-        for signal in (denoised.changed, real.changed, display.levels_changed):
+        self.denoised, self.real = session.maps.denoised, session.maps.real
+        self._session = session
+        self.wanted = session.settings.flag(_SHOWN, False)  # by the user
+        self._state = self.wanted, self.why_not
+        for signal in (self.denoised.changed, self.real.changed, session.display.levels_changed):
             signal.connect(self._follow)
 
     def _follow(self) -> None:
         self.changed.emit()
-        state = self._wanted, self.why_not
+        state = self.wanted, self.why_not
         if state != self._state:
             self._state = state
             self.state_changed.emit()
-
-    @property
-    def wanted(self) -> bool:
-        """True while the user wants to see the difference."""
-        return self._wanted
 
     @property
     def why_not(self) -> str:
@@ -68,7 +54,7 @@ class DifferenceModel(QObject):
     @property
     def shown(self) -> bool:
         """True while it is on screen."""
-        return self._wanted and not self.why_not
+        return self.wanted and not self.why_not
 
     @property
     def against(self) -> str:
@@ -86,9 +72,9 @@ class DifferenceModel(QObject):
 
     def set_wanted(self, wanted: bool) -> None:
         """Show or hide it, and store the choice."""
-        if wanted != self._wanted:
-            self._wanted = wanted
-            self._settings.set_value(_SHOWN, wanted)
+        if wanted != self.wanted:
+            self.wanted = wanted
+            self._session.settings.set_value(_SHOWN, wanted)
             self._follow()
 
     def full_scale(self, levels: HeatmapLevels) -> tuple[float, str]:
@@ -117,14 +103,11 @@ class DifferenceModel(QObject):
         if one is None or other is None:
             return None
         note = one.note or other.note
-        levels = self._display.levels
+        levels = self._session.display.levels
         full, unit = self.full_scale(levels)
-        assert self.denoised.map is not None
         shade = float(
-            (
-                self.denoised.shade(np.array([one.value], np.float32), levels)
-                - self.real.shade(np.array([other.value], np.float32), levels)
-            )[0]
+            self.denoised.shade(np.array(one.value, np.float32), levels)
+            - self.real.shade(np.array(other.value, np.float32), levels)
         )
         text = "not defined" if note else f"{full * shade:+.1f} {unit}".replace("-", "−")
         return Reading(

@@ -12,10 +12,8 @@ from PySide6.QtWidgets import QWidget
 from sd2app.maps.difference import DifferenceModel
 from sd2app.maps.heatmap import HeatmapView
 from sd2app.maps.heatmap_image import difference_image
-from sd2app.session.display import DisplayModel
-from sd2app.session.maps import PointerModel, Reading
-from sd2app.session.playback import PlaybackModel
-from sd2app.session.time_window import TimeWindow
+from sd2app.session.maps import Reading
+from sd2app.session.session import Session
 from sd2app.widgets.colour_maps import signed_table
 from sd2app.widgets.time_plot import Overlay
 
@@ -31,16 +29,11 @@ class DifferenceView(HeatmapView):
     def __init__(
         self,
         difference: DifferenceModel,
-        span: TimeWindow,
-        playback: PlaybackModel,
-        display: DisplayModel,
-        pointer: PointerModel,
+        session: Session,
         overlays: Sequence[Overlay] = (),
         parent: QWidget | None = None,
     ) -> None:
-        super().__init__(
-            difference.denoised, span, playback, display, pointer, overlays, parent=parent
-        )
+        super().__init__(difference.denoised, session, overlays, parent=parent)
         self._difference = difference
         difference.changed.connect(self.invalidate)
 

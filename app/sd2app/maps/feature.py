@@ -14,14 +14,12 @@ from sd2app.maps.difference import DifferenceModel
 from sd2app.maps.heatmap import HeatmapView
 from sd2app.maps.level_bar import LevelBar
 from sd2app.maps.model import SynthesisModel
-from sd2app.maps.spectrum import Curve, SpectrumView
+from sd2app.maps.spectrum import SpectrumView
 from sd2app.maps.stack import MapStack
 from sd2app.maps.uncertainty import UncertaintyModel
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
 from sd2app.widgets.time_plot import Overlay
-
-_COLOURS = ("synthetic", "denoised", "before", "real")
 
 
 class MapsFeature(Feature):
@@ -30,16 +28,11 @@ class MapsFeature(Feature):
     def __init__(
         self, session: Session, shell: Shell, accuracy: AccuracyModel, parent: QObject
     ) -> None:
-        self._session, self._shell = s, _ = session, shell
-        maps = s.maps
-        self.synthesis = SynthesisModel(
-            s.document, s.sensor, s.playback, s.span, maps.synthetic, s.jobs, accuracy, parent
-        )
-        self.uncertainty = UncertaintyModel(
-            s.document, self.synthesis, accuracy, maps.synthetic, s.jobs, s.settings, parent
-        )
-        self.difference = DifferenceModel(maps.denoised, maps.real, s.display, s.settings, parent)
-        s.document.changed.connect(s.follow_capture)
+        self._session, self._shell = session, shell
+        self.synthesis = SynthesisModel(session, accuracy, parent)
+        self.uncertainty = UncertaintyModel(session, self.synthesis, accuracy, parent)
+        self.difference = DifferenceModel(session, parent)
+        session.document.changed.connect(session.follow_capture)
 
     @property
     def busy(self) -> bool:
@@ -95,18 +88,16 @@ class MapsFeature(Feature):
 
     def view_of(self, track: MapModel, overlays: Sequence[Overlay]) -> HeatmapView:
         """View of one more map on the shared time axis."""
-        s = self._session
-        return HeatmapView(track, s.span, s.playback, s.display, s.pointer, overlays)
+        return HeatmapView(track, self._session, overlays)
 
     def panels(self) -> Mapping[str, QWidget]:
         """The spectra of this frame over the levels of all maps."""
-        s, maps, pane = self._session, self._session.maps.all, QWidget()
-        curves = tuple(Curve(track, colour) for track, colour in zip(maps, _COLOURS, strict=True))
+        pane = QWidget()
         layout = QVBoxLayout(pane)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(0)
-        layout.addWidget(SpectrumView(curves, s.playback, s.display, s.pointer), 1)
-        layout.addWidget(LevelBar(s.display, maps, self._shell.action("uncertain")))
+        layout.addWidget(SpectrumView(self._session), 1)
+        layout.addWidget(LevelBar(self._session, self._shell.action("uncertain")))
         return {"spectrum": pane}
 
     def warnings(self) -> Sequence[SignalInstance]:

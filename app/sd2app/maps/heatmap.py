@@ -5,28 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import (
-    QBrush,
-    QColor,
-    QMouseEvent,
-    QPainter,
-    QPaintEvent,
-    QPen,
-    QWheelEvent,
-)
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+from PySide6.QtGui import QBrush, QColor, QMouseEvent, QPainter, QPaintEvent, QPen, QWheelEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from sd2app.maps.map_widget import MapWidget
-from sd2app.session.display import DisplayModel
-from sd2app.session.maps import UNCERTAIN_SHARE, MapModel, PointerModel, Reading
-from sd2app.session.playback import PlaybackModel
-from sd2app.session.time_window import TimeWindow
+from sd2app.maps.heatmap_image import MapWidget
+from sd2app.session.maps import UNCERTAIN_SHARE, MapModel, Reading
+from sd2app.session.session import Session
 from sd2app.widgets.cached_paint import CachedPaint
 from sd2app.widgets.colour_maps import lookup_table
 from sd2app.widgets.time_axis import (
     GUTTER_PX,
-    MARGIN_PX,
     TimeScale,
     paint_cursor,
     signed_text,
@@ -34,6 +23,7 @@ from sd2app.widgets.time_axis import (
     turn_wheel,
 )
 from sd2app.widgets.time_plot import Overlay
+from sd2core.maps import DopplerMap
 
 _HEADER_PX = 24
 
@@ -41,54 +31,38 @@ _HEADER_PX = 24
 class HeatmapView(MapWidget):
     """Shows one track; click or drag seeks, wheel zooms, Shift+wheel pans.
 
-    ``offset_dragged`` and ``offset_released`` are emitted while the user drags
-    the header of a track that can be aligned; the view itself moves nothing.
+    A drag of the header of a track that is ``alignable`` moves the capture in time.
     """
 
-    offset_grabbed = Signal()
-    offset_dragged = Signal(float)
-    offset_released = Signal()
+    TOP_PX = _HEADER_PX
 
     def __init__(
         self,
         track: MapModel,
-        span: TimeWindow,
-        playback: PlaybackModel,
-        display: DisplayModel,
-        pointer: PointerModel,
+        session: Session,
         overlays: Sequence[Overlay] = (),
         *,
         alignable: bool = False,
         parent: QWidget | None = None,
     ) -> None:
-        super().__init__(track, display, parent)
-        self._span = span
-        self._playback = playback
-        self._pointer = pointer
-        self._overlays = tuple(overlays)
+        super().__init__(track, session, overlays, parent)
+        self._pointer = session.pointer
         self._alignable = alignable
-        self._grab: tuple[str, float] | None = None
+        if alignable:
+            self.setToolTip("Drag the title to align the capture in time")
         self._hint = ""
         self._button: QWidget | None = None
         self.setMinimumHeight(96)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self._still = CachedPaint(self)
         self._room_px = 0
-        span.changed.connect(self.invalidate)
-        shown = [signal for overlay in overlays for signal in overlay.changed]
-        for signal in (track.status_changed, *shown):
-            signal.connect(self.redraw)
-        for signal in (playback.frame_changed, pointer.changed):
-            signal.connect(self.update)
+        self._span.changed.connect(self.invalidate)
+        track.status_changed.connect(self.redraw)
+        self._pointer.changed.connect(self.update)
 
     def sizeHint(self) -> QSize:
         """Size with room for 32 bins of 5 pixels."""
         return QSize(640, _HEADER_PX + 160)
-
-    def invalidate(self) -> None:
-        """Draw the map again, and all that is around it."""
-        self._still.forget()
-        super().invalidate()
 
     def redraw(self) -> None:
         """Draw overlays and surroundings of the map again."""
@@ -120,20 +94,9 @@ class HeatmapView(MapWidget):
 
     def marked_bins(self) -> tuple[tuple[tuple[int, ...], Qt.BrushStyle], ...]:
         """Bins without information, and their hatching."""
-        doppler_map = self._track.map
-        assert doppler_map is not None
         return (
-            (doppler_map.null_bins, Qt.BrushStyle.BDiagPattern),
-            (doppler_map.unseen_bins, Qt.BrushStyle.DiagCrossPattern),
-        )
-
-    def plot_rect(self) -> QRectF:
-        """Rectangle of the map, in pixels."""
-        return QRectF(
-            GUTTER_PX,
-            _HEADER_PX,
-            max(self.width() - GUTTER_PX - MARGIN_PX, 1),
-            max(self.height() - _HEADER_PX - 4, 1),
+            (self._map.null_bins, Qt.BrushStyle.BDiagPattern),
+            (self._map.unseen_bins, Qt.BrushStyle.DiagCrossPattern),
         )
 
     @property
@@ -141,16 +104,20 @@ class HeatmapView(MapWidget):
         """Time axis of this widget."""
         return TimeScale(self._span.start_s, self._span.end_s, self.width())
 
+    @property
+    def _map(self) -> DopplerMap:
+        """The map, where there is one."""
+        assert self._track.map is not None
+        return self._track.map
+
     def y_of(self, velocity_mps: float) -> float:
         """Pixel of a velocity."""
-        assert self._track.map is not None
-        plot, v_max = self.plot_rect(), self._track.map.axis.v_max_mps
+        plot, v_max = self.plot_rect(), self._map.axis.v_max_mps
         return plot.top() + plot.height() * (v_max - velocity_mps) / (2.0 * v_max)
 
     def velocity_of(self, y_px: float) -> float:
         """Velocity of a pixel."""
-        assert self._track.map is not None
-        plot, v_max = self.plot_rect(), self._track.map.axis.v_max_mps
+        plot, v_max = self.plot_rect(), self._map.axis.v_max_mps
         return v_max - 2.0 * v_max * (y_px - plot.top()) / plot.height()
 
     # --- painting -------------------------------------------------------------------------
@@ -243,9 +210,7 @@ class HeatmapView(MapWidget):
         return " · ".join(filter(None, parts))
 
     def _paint_marked_bins(self, painter: QPainter, plot: QRectF) -> None:
-        doppler_map = self._track.map
-        assert doppler_map is not None
-        edges = doppler_map.axis.edges_mps
+        edges = self._map.axis.edges_mps
         stretches = [
             (self.scale.x_of(start_s), self.scale.x_of(end_s))
             for start_s, end_s in self._track.covered_s
@@ -265,10 +230,7 @@ class HeatmapView(MapWidget):
         painter.restore()
 
     def _paint_axis(self, painter: QPainter, plot: QRectF) -> None:
-        doppler_map = self._track.map
-        assert doppler_map is not None
-        colours = self._display.palette
-        v_max = doppler_map.axis.v_max_mps
+        colours, v_max = self._display.palette, self._map.axis.v_max_mps
         painter.setPen(QPen(QColor(colours.border), 1))
         painter.drawRect(plot.adjusted(-0.5, -0.5, 0.5, 0.5))
         line_px = painter.fontMetrics().height()
@@ -307,7 +269,7 @@ class HeatmapView(MapWidget):
         elif event.button() == Qt.MouseButton.LeftButton:
             if self._alignable and position.y() < _HEADER_PX:
                 self._grab = ("offset", position.x())
-                self.offset_grabbed.emit()
+                self._session.edits.begin_offset_drag()
             else:
                 self._grab = ("seek", position.x())
                 self._playback.seek(self.scale.time_of(position.x()))
@@ -329,12 +291,13 @@ class HeatmapView(MapWidget):
             self._span.pan((start_x - position.x()) * self.scale.seconds_per_px)
             self._grab = ("pan", position.x())
         else:
-            self.offset_dragged.emit((position.x() - start_x) * self.scale.seconds_per_px)
+            shift_s = (position.x() - start_x) * self.scale.seconds_per_px
+            self._session.edits.drag_offset(shift_s)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         """End the drag."""
         if self._grab is not None and self._grab[0] == "offset":
-            self.offset_released.emit()
+            self._session.edits.end_offset_drag()
         self._grab = None
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:

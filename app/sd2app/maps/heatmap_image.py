@@ -1,18 +1,26 @@
-"""Pixels of a Doppler map in the time window."""
+"""Picture of a Doppler map: its pixels, and the base of the widgets that show it."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtGui import QImage
+from PySide6.QtCore import QRectF, Qt
+from PySide6.QtGui import QBrush, QColor, QImage, QPainter, QResizeEvent
+from PySide6.QtWidgets import QWidget
 
 from sd2app.maps.difference import DifferenceModel
 from sd2app.session.display import HeatmapLevels
 from sd2app.session.maps import MapModel
+from sd2app.session.session import Session
 from sd2app.widgets.colour_maps import lookup_table, uncertain_table
+from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, TimeScale
+from sd2app.widgets.time_plot import Overlay, TimePlot
+
+_NOBODY = "no person"
 
 
 def column_frames(
@@ -161,3 +169,89 @@ def image_of(colours: NDArray[np.uint32]) -> QImage:
     pixels = np.ascontiguousarray(colours[::-1])
     height, width = pixels.shape
     return QImage(pixels.data, width, height, 4 * width, QImage.Format.Format_RGB32).copy()
+
+
+class MapWidget(TimePlot):
+    """Keeps the picture of a map until map, stretch, levels, theme or size change."""
+
+    TOP_PX: ClassVar[int]
+    """Room above the map."""
+
+    def __init__(
+        self,
+        track: MapModel,
+        session: Session,
+        overlays: Sequence[Overlay] = (),
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._track = track
+        self._session = session
+        self._span, self._playback = session.span, session.playback
+        self._display = display = session.display
+        self._overlays = tuple(overlays)
+        self._image: QImage | None = None
+        self._grab: tuple[str, float] | None = None  # what is dragged, and from which pixel
+        self.setMouseTracking(True)
+        for signal in (track.changed, display.levels_changed, display.theme_changed):
+            signal.connect(self.invalidate)
+        self._playback.frame_changed.connect(self.update)
+        for overlay in overlays:
+            for signal in overlay.changed:
+                signal.connect(self.redraw)
+
+    def plot_rect(self) -> QRectF:
+        """Rectangle of the map, in pixels."""
+        width, height = self.width() - GUTTER_PX - MARGIN_PX, self.height() - self.TOP_PX - 4
+        return QRectF(GUTTER_PX, self.TOP_PX, max(width, 1), max(height, 1))
+
+    def invalidate(self) -> None:
+        """Draw the map again, and all that is around it."""
+        self._image = None
+        self.redraw()
+
+    def redraw(self) -> None:
+        """Draw overlays and surroundings of the map again."""
+        self.update()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Draw the map again for the new number of columns."""
+        self.invalidate()
+
+    def paint_map(self, painter: QPainter, plot: QRectF, start_s: float, end_s: float) -> None:
+        """The map from ``start_s`` to ``end_s``, one column per device pixel."""
+        if self._image is None:
+            columns = max(round(plot.width() * self.devicePixelRatioF()), 1)
+            self._image = self.make_image(start_s, end_s, columns)
+        painter.drawImage(plot, self._image)
+
+    def make_image(self, start_s: float, end_s: float, columns: int) -> QImage:
+        """Image of the time window, one pixel per column and bin."""
+        background = QColor(self._display.palette.well).rgb()
+        return heatmap_image(self._track, self._display.levels, start_s, end_s, columns, background)
+
+    def paint_gaps(self, painter: QPainter, plot: QRectF, scale: TimeScale) -> None:
+        """Hatch the frames without a person."""
+        colours = self._display.palette
+        painter.save()
+        painter.setClipRect(plot)
+        for start_s, end_s in self._track.gaps_s:
+            left, right = scale.x_of(start_s), scale.x_of(end_s)
+            # The narrowest is still seen.
+            box = QRectF(left, plot.top(), max(right - left, 1.0), plot.height())
+            if not box.intersects(plot):
+                continue
+            painter.fillRect(box, QColor(colours.well))
+            painter.fillRect(box, QBrush(QColor(colours.hatch), Qt.BrushStyle.FDiagPattern))
+            self._name_gap(painter, box & plot)
+        painter.restore()
+
+    def _name_gap(self, painter: QPainter, box: QRectF) -> None:
+        size = painter.fontMetrics().size(Qt.TextFlag.TextSingleLine, _NOBODY)
+        if box.width() < size.width() + 24 or box.height() < 2 * size.height():
+            return
+        label = QRectF(0, 0, size.width() + 12, size.height() + 6)
+        label.moveCenter(box.center())
+        painter.fillRect(label, QColor(self._display.palette.well))
+        painter.setPen(QColor(self._display.palette.muted))
+        painter.drawText(label, Qt.AlignmentFlag.AlignCenter, _NOBODY)

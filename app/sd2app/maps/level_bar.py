@@ -5,15 +5,10 @@ from __future__ import annotations
 import numpy as np
 from PySide6.QtCore import QRectF, QSignalBlocker, QSize
 from PySide6.QtGui import QAction, QColor, QImage, QPainter, QPaintEvent
-from PySide6.QtWidgets import (
-    QGridLayout,
-    QHBoxLayout,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
-from sd2app.session.display import COLOUR_MAPS, DisplayModel
-from sd2app.session.maps import MapModel
+from sd2app.session.display import COLOUR_MAPS
+from sd2app.session.session import Session
 from sd2app.widgets.colour_maps import lookup_table, uncertain_table
 from sd2app.widgets.inputs import Choice, NumberBox, action_button
 from sd2app.widgets.panel import ElidedLabel
@@ -24,19 +19,12 @@ _STRIP_PX = 14
 class _ColourStrip(QWidget):
     """The colours of the levels; below them those of uncertain cells, where there are any."""
 
-    def __init__(
-        self,
-        display: DisplayModel,
-        tracks: tuple[MapModel, ...],
-        parent: QWidget | None = None,
-    ) -> None:
+    def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._display = display
-        self._tracks = tracks
+        self._display, self._tracks = session.display, session.maps.all
         self.setFixedHeight(_STRIP_PX)
-        display.levels_changed.connect(self.update)
-        for track in tracks:
-            track.changed.connect(self.update)
+        for signal in (self._display.levels_changed, *(track.changed for track in self._tracks)):
+            signal.connect(self.update)
 
     def sizeHint(self) -> QSize:
         return QSize(200, _STRIP_PX)
@@ -60,34 +48,28 @@ class _ColourStrip(QWidget):
 class LevelBar(QWidget):
     """Colour strip with its two ends, scale, colour map, and what 0 dB means."""
 
-    def __init__(
-        self,
-        display: DisplayModel,
-        tracks: tuple[MapModel, ...],
-        uncertain: QAction,
-        parent: QWidget | None = None,
-    ) -> None:
+    def __init__(self, session: Session, uncertain: QAction, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._display = display
-        self._tracks = tracks
+        self._display, self._tracks = session.display, session.maps.all
+        set_levels = session.display.set_levels
         self._low, self._high = (
             NumberBox(-90.0, 20.0, " dB", tip, decimals=0, step=3.0)
             for tip in ("Level shown as the first colour", "Level shown as the last colour")
         )
-        self._low.valueChanged.connect(lambda value: display.set_levels(low_db=value))
-        self._high.valueChanged.connect(lambda value: display.set_levels(high_db=value))
+        self._low.valueChanged.connect(lambda value: set_levels(low_db=value))
+        self._high.valueChanged.connect(lambda value: set_levels(high_db=value))
         self._scale = Choice("Logarithmic or linear levels, for all heatmaps", self)
         self._scale.addItems(["dB", "linear"])
-        self._scale.currentTextChanged.connect(lambda text: display.set_levels(scale=text))
+        self._scale.currentTextChanged.connect(lambda text: set_levels(scale=text))
         self._colours = Choice("Colour map of all heatmaps", self)
         self._colours.addItems(list(COLOUR_MAPS))
-        self._colours.currentTextChanged.connect(lambda text: display.set_levels(colour_map=text))
+        self._colours.currentTextChanged.connect(lambda text: set_levels(colour_map=text))
         # One line each: the plot above needs the height.
-        self._references = [ElidedLabel(self) for _ in tracks]
+        self._references = [ElidedLabel(self) for _ in self._tracks]
         layout = QVBoxLayout(self)
         layout.setContentsMargins(8, 4, 8, 8)
         layout.setSpacing(4)
-        layout.addWidget(_ColourStrip(display, tracks, self))
+        layout.addWidget(_ColourStrip(session, self))
         ends = QHBoxLayout()
         ends.addWidget(self._low)
         ends.addStretch(1)
@@ -95,16 +77,15 @@ class LevelBar(QWidget):
         ends.addStretch(1)
         ends.addWidget(self._high)
         layout.addLayout(ends)
-        choices = QGridLayout()
-        choices.addWidget(self._scale, 0, 0)
-        choices.addWidget(self._colours, 0, 1)
+        choices = QHBoxLayout()
+        choices.addWidget(self._scale, 1)
+        choices.addWidget(self._colours, 1)
         layout.addLayout(choices)
         for label in self._references:
             label.setObjectName("muted")
             layout.addWidget(label)
-        display.levels_changed.connect(self._refresh)
-        for track in tracks:
-            track.changed.connect(self._refresh)
+        for signal in (self._display.levels_changed, *(track.changed for track in self._tracks)):
+            signal.connect(self._refresh)
         self._refresh()
 
     def _refresh(self) -> None:

@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING, Any
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from sd2app.accuracy.model import AccuracyModel
-from sd2app.background.latest import LatestRunner
 from sd2app.maps.partial_map import FINAL, Part, ShownMap, View
 from sd2app.maps.quality import (
     Companion,
     QualityLevel,
+    SynthesizerCache,
     budget_ms,
     compute_part,
-    distance_m,
     final_quality,
     final_words,
     is_swept_whole,
@@ -25,19 +24,13 @@ from sd2app.maps.quality import (
     refine,
 )
 from sd2app.maps.readout import FrameReader, Readout
-from sd2app.maps.synthesizers import SynthesizerCache
 from sd2app.maps.warm_up import CompilerModel, MaskPrefetcher
-from sd2app.session.document import DocumentModel
-from sd2app.session.maps import MapModel
-from sd2app.session.playback import PlaybackModel
-from sd2app.session.sensor import SensorModel
-from sd2app.session.tasks import Job, TaskList
-from sd2app.session.time_window import TimeWindow
+from sd2app.session.session import Session
+from sd2app.session.tasks import ListedRunner
 from sd2core.doppler.options import PRESETS
 from sd2core.doppler.synthesizer import FrameScattering, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
-from sd2core.progress import Cancelled
 from sd2core.sensor import Vector, VirtualSensor
 
 if TYPE_CHECKING:
@@ -57,58 +50,45 @@ class SynthesisModel(QObject):
     new move interrupts all of it. A map stays until it is replaced.
     """
 
-    frame_changed = Signal()
-    target_changed = Signal()
-    readout_changed = Signal()
+    frame_changed = Signal()  # what the sensor sees of the frame on screen
+    readout_changed = Signal()  # the numbers of it
     moving_changed = Signal()
     completed = Signal()
     painted = Signal(object)  # Part that came onto the map
     failed = Signal(str)
 
     def __init__(
-        self,
-        document: DocumentModel,
-        sensor: SensorModel,
-        playback: PlaybackModel,
-        span: TimeWindow,
-        track: MapModel,
-        jobs: TaskList,
-        trade: AccuracyModel,
-        parent: QObject | None = None,
+        self, session: Session, accuracy: AccuracyModel, parent: QObject | None = None
     ) -> None:
         super().__init__(parent)
-        self._document = document
-        self._sensor = sensor
-        self._span = span
-        self._track = track
-        self._shown_map = ShownMap(track)
+        self._session, self._accuracy = session, accuracy
+        self.moving = False  # then the time budget decides, otherwise the tolerance
+        self._track = session.maps.synthetic
+        self._shown_map = ShownMap(self._track)
         self._companion: Callable[[], Companion | None] = lambda: None
-        self._jobs = jobs
-        self._trade = trade
-        self._reader = FrameReader(document, sensor, playback)
-        self._job: Job | None = None
+        self._reader = FrameReader(session)
         self._synthesizers: SynthesizerCache | None = None
-        self._moving = False
         self._prefetcher = MaskPrefetcher(self)
-        self._prefetcher.failed.connect(self.failed)
+        self._prefetcher.failed.connect(lambda error: self.failed.emit(str(error)))
         self._forget()
-        self._runner = LatestRunner("synthesis", self)
+        self._runner = ListedRunner("synthesis", session.jobs, self)
         self._runner.partial.connect(self._receive)
         self._runner.finished.connect(self._finish)
         self._runner.failed.connect(self._fail)
+        self._runner.cancelled.connect(self._say_quality)
         self._compiler = CompilerModel(self)
         self._compiler.finished.connect(self._follow)
         self._rest = QTimer(self)
         self._rest.setSingleShot(True)
         self._rest.setInterval(_REST_MS)
         self._rest.timeout.connect(self._settle)
-        sensor.changed.connect(self._follow)
-        sensor.dragging_changed.connect(lambda _: self._follow())
-        span.changed.connect(self._reorder)
-        playback.frame_changed.connect(self._follow_clock)
-        trade.plan_changed.connect(self._take_plan)
-        trade.decided.connect(self._go_on)
-        trade.wished.connect(self._go_on)
+        session.sensor.changed.connect(self._follow)
+        session.sensor.dragging_changed.connect(self._follow)
+        session.span.changed.connect(self._reorder)
+        session.playback.frame_changed.connect(self._follow_clock)
+        accuracy.plan_changed.connect(self._take_plan)
+        accuracy.decided.connect(self._go_on)
+        accuracy.wished.connect(self._go_on)
 
     # --- what is known --------------------------------------------------------------------
 
@@ -123,20 +103,19 @@ class SynthesisModel(QObject):
         return self._runner.busy or self._compiler.busy
 
     @property
-    def moving(self) -> bool:
-        """True while the sensor moves: then the time budget decides, otherwise the tolerance."""
-        return self._moving
+    def _sensor(self) -> VirtualSensor:
+        return self._session.sensor.sensor
 
     @property
     def complete(self) -> bool:
         """True once every frame has its final quality for the current sensor."""
         partial = self._shown_map.partial
-        return partial.final and partial.sensor == self._sensor.sensor
+        return partial.final and partial.sensor == self._sensor
 
     @property
     def shows_sensor(self) -> bool:
         """True while the map is of the current sensor, at any quality."""
-        return self._shown_map.partial.sensor == self._sensor.sensor
+        return self._shown_map.partial.sensor == self._sensor
 
     @property
     def torso_m(self) -> Vector | None:
@@ -151,7 +130,7 @@ class SynthesisModel(QObject):
         full = self._synthesizers.full
         if full.options.visibility == "none":
             return self._reader.scattering(full, "none")
-        if self._compiler.ready and not self._moving:
+        if self._compiler.ready and not self.moving:
             return self._reader.scattering(full, full.options.visibility)
         # The mask of the map, where the map has one and all vertices.
         synthesizer = self._synthesizers.ready(self._plan)
@@ -171,15 +150,15 @@ class SynthesisModel(QObject):
         self._forget()
         self._set_moving(False)
         self._track.set_map(None)
-        mesh, options = self._document.mesh, PRESETS["paper"]
+        mesh, options = self._session.document.mesh, PRESETS["paper"]
         if mesh is not None and mesh.faces is None:
             options = replace(options, visibility="none")
-        self._trade.take_over(mesh, options)
+        self._accuracy.take_over(mesh, options)
         if mesh is None:
             self._announce()
             return
         try:
-            self._synthesizers = SynthesizerCache(mesh, options, self._trade.ladder)
+            self._synthesizers = SynthesizerCache(mesh, options, self._accuracy.library)
         except Sd2Error as error:
             self.failed.emit(str(error))
             return
@@ -194,9 +173,9 @@ class SynthesisModel(QObject):
         Asking for the synthesizer may take long.
         """
         synthesizers, plan = self._synthesizers, self._plan
-        if synthesizers is None or self._moving or not self.complete:
+        if synthesizers is None or self.moving or not self.complete:
             return None
-        return lambda: synthesizers.of(plan), self._sensor.sensor
+        return lambda: synthesizers.of(plan), self._sensor
 
     def accompany(self, companion: Callable[[], Companion | None]) -> None:
         """Ask ``companion`` before each sweep what is to be made of it, in step with it."""
@@ -213,8 +192,8 @@ class SynthesisModel(QObject):
         """
         if self._synthesizers is None or not self.complete:
             raise Sd2Error("The synthetic map is not complete yet", "a final map", "Wait for it")
-        made = self._synthesizers.of(self._plan).map(self._sensor.sensor)
-        in_use = self._trade.in_use
+        made = self._synthesizers.of(self._plan).map(self._sensor)
+        in_use = self._accuracy.in_use
         if in_use is not None:
             made = replace(made, meta=made.meta | in_use.plan.provenance(in_use.error))
         return replace(made, uncertainty=self._track.uncertainty)
@@ -230,7 +209,6 @@ class SynthesisModel(QObject):
         self._rest.stop()
         self._runner.cancel()
         self._prefetcher.cancel()
-        self._end_job()
 
     # --- following ------------------------------------------------------------------------
 
@@ -244,7 +222,6 @@ class SynthesisModel(QObject):
         self._sweeping = False
 
     def _announce(self) -> None:
-        self.target_changed.emit()
         self.frame_changed.emit()
         self.readout_changed.emit()
 
@@ -255,30 +232,29 @@ class SynthesisModel(QObject):
     def _follow(self) -> None:
         if self._synthesizers is None:
             return
-        self._trade.hold()
+        self._accuracy.hold()
         self._prefetcher.cancel()
-        if self._sensor.dragging:
+        if self._session.sensor.dragging:
             self._rest.start()
-            self._set_moving(self._moving or self._sensor.sensor != self._shown_map.partial.sensor)
+            self._set_moving(self.moving or self._sensor != self._shown_map.partial.sensor)
             self._follow_clock()
             if self._sweeping and self._runner.busy:
                 self._again = True
-            elif self._moving:
+            elif self.moving:
                 self._sweep()
         else:
             self._settle()
             self._follow_clock()
 
     def _set_moving(self, moving: bool) -> None:
-        if moving != self._moving:
-            self._moving = moving
+        if moving != self.moving:
+            self.moving = moving
             self.moving_changed.emit()
 
     def _sweep(self) -> None:
         """One rough pass for the sensor where it is now, never interrupted."""
-        self._end_job()
         self._again, self._sweeping = False, True
-        sensor, level, (start, stop) = self._sensor.sensor, self._preview_quality(), self._swept()
+        sensor, level, (start, stop) = self._sensor, self._preview_quality(), self._swept()
         companion = self._companion()
         self._runner.submit(
             lambda emit: compute_part(level, sensor, start, stop, companion=companion)
@@ -289,10 +265,9 @@ class SynthesisModel(QObject):
         if self._synthesizers is None:
             return
         self._rest.stop()
-        self._end_job()
         self._again = self._sweeping = False
-        sensor = self._sensor.sensor
-        self._trade.rest_at(sensor)
+        sensor = self._sensor
+        self._accuracy.rest_at(sensor)
         quality = self._shown_map.partial.quality_for(sensor)
         if quality.min() >= FINAL:
             self._set_moving(False)
@@ -301,43 +276,39 @@ class SynthesisModel(QObject):
         view, rough, vertices = self._frames_in_view(), self._preview_quality(), self._vertices
         self._set_moving(False)
         final = self._final_quality()
-        if final is not None:
-            self._job = self._jobs.start("Synthesising the map", self._cancel)
         # Much of a long clip can wait until it is known how it is to be done.
         long = not is_swept_whole(vertices, len(quality))
         only_view = final is None and not self._compiler.busy and long
         self._runner.submit(
             lambda emit: refine(
                 sensor, quality, view, rough, final, vertices, emit, only_view=only_view
-            )
+            ),
+            "Synthesising the map" if final is not None else "",
         )
 
     def _go_on(self) -> None:
         """Start the next task while the sensor rests."""
-        if self._synthesizers is None or self._moving or self.busy:
+        if self._synthesizers is None or self.moving or self.busy:
             return
         if self._may_choose():
-            self._trade.choose(self._sensor.sensor, self._budget_ms())
+            self._accuracy.choose(self._sensor, self._budget_ms())
         elif not self.complete:
             self._settle()
-        elif (
-            self._dragging_plan is not None
-            and self._prefetcher.prefetched_for != self._sensor.sensor
-        ):
+        elif self._dragging_plan is not None and self._prefetcher.prefetched_for != self._sensor:
             self._prefetcher.prefetch(
-                self._synthesizers, self._dragging_plan, self._sensor.sensor, self._swept()
+                self._synthesizers, self._dragging_plan, self._sensor, self._swept()
             )
 
     def _may_choose(self) -> bool:
         """True if the plans are for another sensor and the kernels are compiled."""
-        decided = self._trade.is_decided(self._sensor.sensor, self._budget_ms())
+        decided = self._accuracy.is_decided(self._sensor, self._budget_ms())
         return self._compiler.ready and not decided
 
     def _take_plan(self) -> None:
         """Follow the plans; what was made by another stays until it is replaced."""
         plan, dragging = (
             use.plan if use is not None else None
-            for use in (self._trade.in_use, self._trade.while_dragging)
+            for use in (self._accuracy.in_use, self._accuracy.while_dragging)
         )
         if dragging != self._dragging_plan:
             self._dragging_plan = dragging
@@ -347,37 +318,28 @@ class SynthesisModel(QObject):
             return
         self._plan = plan
         self._shown_map.mark_stale()
-        if not self._moving:
+        if not self.moving:
             self._settle()
 
     def _reorder(self) -> None:
         start, stop = self._frames_in_view()
-        if self._synthesizers is None or self._moving or stop <= start:
+        if self._synthesizers is None or self.moving or stop <= start:
             return
         self._say_quality()
         partial = self._shown_map.partial
         if partial.quality[start:stop].min() < FINAL and partial.frames > stop - start:
             self._settle()
 
-    def _cancel(self) -> None:
-        self._runner.cancel()
-        self._end_job()
-        self._say_quality()
-
     # --- results --------------------------------------------------------------------------
 
     def _receive(self, result: Any) -> None:
         if isinstance(result, Part):
             self._take(result)
-        elif self._job is not None:
-            self._jobs.report(self._job, *result)
 
     def _finish(self, result: Any) -> None:
-        if isinstance(result, Part):
-            self._take(result)
+        self._receive(result)
         self._sweeping = False
-        self._end_job()
-        if self._again and self._sensor.dragging:
+        if self._again and self._session.sensor.dragging:
             self._sweep()
             return
         if self.complete:
@@ -392,26 +354,24 @@ class SynthesisModel(QObject):
 
     def _say_quality(self) -> None:
         if self._synthesizers is not None:
-            final = final_words(self._synthesizers, self._trade.in_use)
+            final = final_words(self._synthesizers, self._accuracy.in_use)
             self._shown_map.say_quality(self._frames_in_view(), final, self._compiler.busy)
 
     def _fail(self, error: Exception) -> None:
         self._sweeping = False
-        self._end_job()
-        if not isinstance(error, Cancelled):
-            self.failed.emit(str(error))
-
-    def _end_job(self) -> None:
-        if self._job is not None:
-            self._jobs.finish(self._job)
-            self._job = None
+        self.failed.emit(str(error))
 
     # --- helpers --------------------------------------------------------------------------
 
     def _preview_quality(self) -> QualityLevel:
         assert self._synthesizers is not None
-        moved_m = distance_m(self._prefetcher.prefetched_for, self._sensor.sensor)
-        return preview_quality(self._synthesizers, self._plan, self._trade.while_dragging, moved_m)
+        return preview_quality(
+            self._synthesizers,
+            self._plan,
+            self._accuracy.while_dragging,
+            self._prefetcher.prefetched_for,
+            self._sensor,
+        )
 
     def _final_quality(self) -> QualityLevel | None:
         """Quality that the tolerance asks for; None until it is chosen."""
@@ -419,7 +379,7 @@ class SynthesisModel(QObject):
             return None
         if self._plan is None and self._may_choose():
             return None
-        return final_quality(self._synthesizers, self._plan, self._trade.in_use)
+        return final_quality(self._synthesizers, self._plan, self._accuracy.in_use)
 
     @property
     def _vertices(self) -> int:
@@ -436,7 +396,7 @@ class SynthesisModel(QObject):
         return budget_ms(stop - start)
 
     def _frames_in_view(self) -> View:
-        mesh = self._document.mesh
+        mesh = self._session.document.mesh
         if mesh is None:
             return (0, 0)
-        return mesh.timebase.frames_between(self._span.start_s, self._span.end_s)
+        return mesh.timebase.frames_between(self._session.span.start_s, self._session.span.end_s)

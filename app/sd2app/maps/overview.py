@@ -8,46 +8,27 @@ from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QWidget
 
-from sd2app.maps.map_widget import MapWidget
-from sd2app.session.display import DisplayModel
+from sd2app.maps.heatmap_image import MapWidget
 from sd2app.session.maps import MapModel
-from sd2app.session.playback import PlaybackModel
-from sd2app.session.time_window import TimeWindow
-from sd2app.widgets.time_axis import (
-    GUTTER_PX,
-    MARGIN_PX,
-    TimeScale,
-    paint_cursor,
-)
+from sd2app.session.session import Session
+from sd2app.widgets.time_axis import GUTTER_PX, TimeScale, paint_cursor
 from sd2app.widgets.time_plot import Overlay
 
 _EDGE_PX = 6
-
-
 _LABELS_PX = 4.0
 
 
 class Overview(MapWidget):
     """The whole recording; drag the frame to pan, its edges to zoom."""
 
+    TOP_PX = 2
+
     def __init__(
-        self,
-        track: MapModel,
-        span: TimeWindow,
-        playback: PlaybackModel,
-        display: DisplayModel,
-        overlays: Sequence[Overlay] = (),
-        parent: QWidget | None = None,
+        self, session: Session, overlays: Sequence[Overlay] = (), parent: QWidget | None = None
     ) -> None:
-        super().__init__(track, display, parent)
-        self._span = span
-        self._playback = playback
-        self._overlays = tuple(overlays)
-        self._grab: tuple[str, float] | None = None
+        super().__init__(session.maps.synthetic, session, overlays, parent)
         self.setFixedHeight(40)
-        shown = [signal for overlay in overlays for signal in overlay.changed]
-        for signal in (span.changed, playback.frame_changed, *shown):
-            signal.connect(self.update)
+        self._span.changed.connect(self.update)
 
     def set_track(self, track: MapModel) -> None:
         """Show another track."""
@@ -60,15 +41,6 @@ class Overview(MapWidget):
     def scale(self) -> TimeScale:
         """Time axis of this widget: always everything."""
         return TimeScale(*self._span.extent_s, self.width())
-
-    def plot_rect(self) -> QRectF:
-        """Rectangle of the map, in pixels."""
-        return QRectF(
-            GUTTER_PX,
-            2,
-            max(self.width() - GUTTER_PX - MARGIN_PX, 1),
-            max(self.height() - 6, 1),
-        )
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Small map, spans, frame around the time window, cursor."""

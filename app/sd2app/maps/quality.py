@@ -1,20 +1,24 @@
-"""Quality levels of a map: quick while the sensor moves, final as the tolerance asks."""
+"""Synthesizers of accuracy plans, and the quality of what they make of the open mesh."""
 
 from __future__ import annotations
 
 import math
+import threading
+from collections import OrderedDict
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2app.accuracy.text import InUse, deviation, short
+from sd2app.accuracy.library import AccuracyLibrary
+from sd2app.accuracy.text import InUse
 from sd2app.background.latest import Emit
 from sd2app.maps.partial_map import FINAL, PREVIEW, ROUGH, Part, View, pieces
-from sd2app.maps.synthesizers import SynthesizerCache
+from sd2core.doppler.options import SynthesisOptions
 from sd2core.doppler.synthesizer import Synthesizer, Visibility
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.sensor import VirtualSensor
 
 if TYPE_CHECKING:
@@ -27,10 +31,76 @@ of the time left to drawing."""
 AT_ONCE = 12_000_000
 """Vertices times frames that are swept roughly in one go: a few ms up to some 20 ms."""
 _EXACT_PARTS = 16
+_KEPT = 3
+"""Number of kept synthesizers: for the rest, for dragging, and the one before."""
+
 _ROUGH_WORDS = "preview: vertices facing the sensor"
+_ALL_WORDS = "all vertices of the point cloud"
 Companion = Callable[[int, NDArray[np.float32]], Any]
 """Makes something more of a stretch, given its first frame and its values (bins, frames), in
 the same background task."""
+
+
+class SynthesizerCache:
+    """Makes a synthesizer per plan on demand, and keeps the newest.
+
+    Those that count as many vertices share what is prepared, as far as they can.
+    ``options`` are those that no plan chooses; ``library`` makes synthesizers, where decimating
+    the mesh takes long. ``full`` is the synthesizer on the full mesh with these options, for
+    readouts of single vertices and for use without a plan.
+    """
+
+    def __init__(
+        self, mesh: MeshSequence, options: SynthesisOptions, library: AccuracyLibrary
+    ) -> None:
+        self.mesh = mesh
+        self.options = options
+        self.full = Synthesizer(mesh, options)
+        self._library = library
+        self._made: OrderedDict[AccuracyPlan, Synthesizer] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def of(self, plan: AccuracyPlan | None) -> Synthesizer:
+        """The synthesizer of a plan; the first time it takes as long as decimating."""
+        if plan is None:
+            return self.full
+        key = _key(plan)
+        with self._lock:
+            synthesizer = self._made.get(key)
+            if synthesizer is None:
+                synthesizer = self._library.synthesizer_for(
+                    key, self.mesh, self.options, self._like(key)
+                )
+                self._made[key] = synthesizer
+            self._made.move_to_end(key)
+            while len(self._made) > _KEPT:
+                self._made.popitem(last=False)
+        return synthesizer
+
+    def ready(self, plan: AccuracyPlan | None) -> Synthesizer | None:
+        """The synthesizer of a plan if there is one already; never waits."""
+        return self.full if plan is None else self._made.get(_key(plan))
+
+    def _like(self, plan: AccuracyPlan) -> Synthesizer | None:
+        if plan.vertices_kept == 1:
+            return self.full
+        same = [made for key, made in self._made.items() if key.vertices_kept == plan.vertices_kept]
+        return same[-1] if same else None
+
+
+def _key(plan: AccuracyPlan) -> AccuracyPlan:
+    # How long a mask is kept is up to the window; it changes no synthesizer.
+    return replace(plan, mask_reuse_m=0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class QualityLevel:
+    """Synthesizer and visibility with which frames are computed."""
+
+    synthesizer: Callable[[], Synthesizer]  # the first call may take long
+    quality: int  # rank of the computed frames
+    words: str  # the same for people
+    visibility: Visibility | None = None  # None: that of the synthesizer's options
 
 
 def budget_ms(frames: int) -> float:
@@ -39,36 +109,30 @@ def budget_ms(frames: int) -> float:
     return float(_MAP_BUDGET_MS / 2 ** (steps / 2))
 
 
-def distance_m(one: VirtualSensor | None, other: VirtualSensor) -> float:
-    """Distance between two sensors; infinite without the first."""
-    return math.inf if one is None else math.dist(one.position_m, other.position_m)
-
-
 def preview_quality(
     synthesizers: SynthesizerCache,
     plan: AccuracyPlan | None,
     dragging: InUse | None,
-    moved_m: float,
+    masks_of: VirtualSensor | None,
+    sensor: VirtualSensor,
 ) -> QualityLevel:
     """Quality for a moving sensor, and where no frame is computed yet.
 
-    ``plan`` is in use at rest: its masks serve until one for dragging is known. ``moved_m`` is
-    the distance from where masks for dragging were made.
+    ``plan`` is in use at rest: its masks serve until one for dragging is known. Masks for
+    dragging were made for ``masks_of``.
     """
     synthesizer = synthesizers.ready(dragging.plan) if dragging is not None else None
     if dragging is not None and synthesizer is not None:
-        words = f"while dragging: {short(dragging.plan)}, {deviation(dragging.error)}"
-        if dragging.plan.mask_reuse_m == 0:
+        words, reuse_m = f"while dragging: {dragging.brief}", dragging.plan.mask_reuse_m
+        if reuse_m == 0:
             return QualityLevel(lambda: synthesizer, PREVIEW, words)
-        if moved_m <= dragging.plan.mask_reuse_m:
+        if masks_of is not None and math.dist(masks_of.position_m, sensor.position_m) <= reuse_m:
             return QualityLevel(lambda: synthesizer, PREVIEW, words, "frozen")
     newest = synthesizers.ready(plan) or synthesizers.full
     if synthesizers.options.visibility == "none":
-        return QualityLevel(lambda: newest, PREVIEW, "all vertices of the point cloud", "none")
+        return QualityLevel(lambda: newest, PREVIEW, _ALL_WORDS, "none")
     if dragging is not None:
-        return QualityLevel(
-            lambda: newest, PREVIEW, "preview: vertices facing the sensor", "facing"
-        )
+        return QualityLevel(lambda: newest, PREVIEW, _ROUGH_WORDS, "facing")
     return QualityLevel(
         lambda: newest, PREVIEW, "preview: visibility of the nearest place", "frozen"
     )
@@ -84,19 +148,8 @@ def final_quality(
 def final_words(synthesizers: SynthesizerCache, in_use: InUse | None) -> str:
     """Text about the quality of a map of the plan in use."""
     if in_use is not None:
-        return f"{short(in_use.plan)}, {deviation(in_use.error)}"
-    cloud = synthesizers.options.visibility == "none"
-    return "all vertices of the point cloud" if cloud else "exact visibility"
-
-
-@dataclass(frozen=True, eq=False)
-class QualityLevel:
-    """Synthesizer and visibility with which frames are computed."""
-
-    synthesizer: Callable[[], Synthesizer]  # the first call may take long
-    quality: int  # rank of the computed frames
-    words: str  # the same for people
-    visibility: Visibility | None = None  # None: that of the synthesizer's options
+        return in_use.brief
+    return _ALL_WORDS if synthesizers.options.visibility == "none" else "exact visibility"
 
 
 def compute_part(

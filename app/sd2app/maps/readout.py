@@ -7,9 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from sd2app.session.document import DocumentModel
-from sd2app.session.playback import PlaybackModel
-from sd2app.session.sensor import SensorModel
+from sd2app.session.session import Session
 from sd2core.doppler.synthesizer import FrameScattering, Synthesizer, Visibility
 from sd2core.sensor import Vector
 
@@ -26,12 +24,9 @@ class Readout:
 class FrameReader:
     """Reads the frame on screen; what was read last is kept."""
 
-    def __init__(
-        self, document: DocumentModel, sensor: SensorModel, playback: PlaybackModel
-    ) -> None:
-        self._document = document
-        self._sensor = sensor
-        self._playback = playback
+    def __init__(self, session: Session) -> None:
+        self._document, self._sensor = session.document, session.sensor
+        self._playback = session.playback
         self.forget()
 
     def forget(self) -> None:

@@ -29,18 +29,13 @@ class MapStack(QWidget):
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
-        self._session, self._difference = s, _ = session, difference
-        maps, common = s.maps, (s.span, s.playback, s.display, s.pointer, over_maps)
-        self.synthetic = HeatmapView(maps.synthetic, *common)
-        self.denoised = HeatmapView(maps.denoised, *common)
-        self.before = HeatmapView(maps.before, *common)
-        self.real = HeatmapView(maps.real, *common, alignable=True)
-        self.difference = DifferenceView(difference, *common)
-        self.real.setToolTip("Drag the title to align the capture in time")
-        self.real.offset_grabbed.connect(s.edits.begin_offset_drag)
-        self.real.offset_dragged.connect(s.edits.drag_offset)
-        self.real.offset_released.connect(s.edits.end_offset_drag)
-        self.overview = Overview(maps.synthetic, s.span, s.playback, s.display, over_all)
+        self._session, self._difference, maps = session, difference, session.maps
+        self.synthetic = HeatmapView(maps.synthetic, session, over_maps)
+        self.denoised = HeatmapView(maps.denoised, session, over_maps)
+        self.before = HeatmapView(maps.before, session, over_maps)
+        self.real = HeatmapView(maps.real, session, over_maps, alignable=True)
+        self.difference = DifferenceView(difference, session, over_maps)
+        self.overview = Overview(session, over_all)
         self._offer: QWidget | None = None
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)

@@ -9,7 +9,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 
 from sd2app.background.latest import Emit, LatestRunner
 from sd2app.maps.partial_map import View
-from sd2app.maps.synthesizers import SynthesizerCache
+from sd2app.maps.quality import SynthesizerCache
 from sd2core.numerics.compiled import compile_in_background, kernels_ready
 from sd2core.sensor import VirtualSensor
 
@@ -19,22 +19,13 @@ if TYPE_CHECKING:
 _POLL_MS = 500
 
 
-class MaskPrefetcher(QObject):
+class MaskPrefetcher(LatestRunner):
     """Prepares the mesh of the plan for dragging, and its masks from where the sensor rests."""
 
-    failed = Signal(str)
-
     def __init__(self, parent: QObject | None = None) -> None:
-        super().__init__(parent)
-        self._prefetched_for: VirtualSensor | None = None
-        self._runner = LatestRunner("ready", self)
-        self._runner.finished.connect(self._note)
-        self._runner.failed.connect(lambda error: self.failed.emit(str(error)))
-
-    @property
-    def prefetched_for(self) -> VirtualSensor | None:
-        """Sensor for which visibility masks were prefetched."""
-        return self._prefetched_for
+        super().__init__("ready", parent)
+        self.prefetched_for: VirtualSensor | None = None  # whose masks are there
+        self.finished.connect(self._note)
 
     def prefetch(
         self,
@@ -50,23 +41,15 @@ class MaskPrefetcher(QObject):
             synthesizer.stretch(sensor, *frames, progress=lambda *_: emit(None))
             return sensor
 
-        self._runner.submit(work)
+        self.submit(work)
 
     def forget(self) -> None:
         """Drop the masks: plan or mesh have changed."""
-        self._runner.cancel()
-        self._prefetched_for = None
-
-    def cancel(self) -> None:
-        """Stop, and free the processor."""
-        self._runner.cancel()
-
-    def close(self) -> None:
-        """Stop the thread."""
-        self._runner.close()
+        self.cancel()
+        self.prefetched_for = None
 
     def _note(self, sensor: VirtualSensor) -> None:
-        self._prefetched_for = sensor
+        self.prefetched_for = sensor
 
 
 class CompilerModel(QObject):

@@ -78,7 +78,7 @@ class SensorPanel(QWidget):
         layout.addWidget(self._capture)
         layout.addStretch(1)
         sensor.changed.connect(self._refresh_placement)
-        synthesis.target_changed.connect(self._refresh_placement)
+        synthesis.frame_changed.connect(self._refresh_placement)
         synthesis.readout_changed.connect(self._refresh_readout)
         document.changed.connect(self._refresh_capture)
         self._refresh_placement()

@@ -31,7 +31,7 @@ class HeatmapLevels:
 
 
 class DisplayModel(QObject):
-    """Choices that change no data."""
+    """Choices that change no data. Others read the attributes; the methods change them."""
 
     levels_changed = Signal()
     mesh_changed = Signal()
@@ -39,63 +39,43 @@ class DisplayModel(QObject):
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._levels = HeatmapLevels()
-        self._mesh_colour: MeshColour = "velocity"
-        self._as_dots = False
-        self._dark = False
-
-    @property
-    def levels(self) -> HeatmapLevels:
-        """Level control of the heatmaps."""
-        return self._levels
-
-    @property
-    def mesh_colour(self) -> MeshColour:
-        """Quantity that the colour of the mesh shows."""
-        return self._mesh_colour
-
-    @property
-    def as_dots(self) -> bool:
-        """True if vertices are drawn as dots instead of a surface."""
-        return self._as_dots
-
-    @property
-    def dark(self) -> bool:
-        """True while the dark theme is on."""
-        return self._dark
+        self.levels = HeatmapLevels()
+        self.mesh_colour: MeshColour = "velocity"  # quantity that the colour of the mesh shows
+        self.as_dots = False  # vertices are drawn instead of the surface
+        self.dark = False
 
     @property
     def palette(self) -> Palette:
         """Colours of the theme that is on."""
-        return palette_for(self._dark)
+        return palette_for(self.dark)
 
     def set_levels(self, **changes: object) -> None:
         """Change some of the levels."""
-        levels = replace(self._levels, **changes)  # type: ignore[arg-type]
+        levels = replace(self.levels, **changes)  # type: ignore[arg-type]
         if levels.high_db - levels.low_db < 1.0:
             # The end that was moved pushes the other along.
             if "low_db" in changes:
                 levels = replace(levels, high_db=levels.low_db + 1.0)
             else:
                 levels = replace(levels, low_db=levels.high_db - 1.0)
-        if levels != self._levels:
-            self._levels = levels
+        if levels != self.levels:
+            self.levels = levels
             self.levels_changed.emit()
 
     def set_mesh_colour(self, colour: MeshColour) -> None:
         """Choose what the colour of the mesh means."""
-        if colour != self._mesh_colour:
-            self._mesh_colour = colour
+        if colour != self.mesh_colour:
+            self.mesh_colour = colour
             self.mesh_changed.emit()
 
     def set_as_dots(self, as_dots: bool) -> None:
         """Draw vertices as dots, or the surface."""
-        if as_dots != self._as_dots:
-            self._as_dots = as_dots
+        if as_dots != self.as_dots:
+            self.as_dots = as_dots
             self.mesh_changed.emit()
 
     def set_dark(self, dark: bool) -> None:
         """Choose the theme."""
-        if dark != self._dark:
-            self._dark = dark
+        if dark != self.dark:
+            self.dark = dark
             self.theme_changed.emit()

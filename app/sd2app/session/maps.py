@@ -47,7 +47,8 @@ class MapModel(QObject):
 
     ``reference`` is the value shown as 0 dB. It is set when a recording is
     opened and stays, so that a placement farther away looks weaker. ``revision`` counts
-    how often the map was set, also to one whose values changed in place.
+    how often the map was set, also to one whose values changed in place. Others read the
+    attributes; the methods change them.
     """
 
     changed = Signal()
@@ -57,44 +58,14 @@ class MapModel(QObject):
         super().__init__(parent)
         self.title = title
         self.revision = 0
-        self._map: DopplerMap | None = None
-        self._covered: NDArray[np.bool_] | None = None
-        self._uncertainty: CellUncertainty | None = None
+        self.map: DopplerMap | None = None  # on its own clock, without the offset
+        self.covered: NDArray[np.bool_] | None = None  # (frames,): is computed; None: all are
+        self.uncertainty: CellUncertainty | None = None  # None: unknown or switched off
+        self.offset_s = 0.0  # start of the map's clock on the recording's clock
+        self.reference = 1.0  # value shown as 0 dB
+        self.status = ""  # quality of the map in a few words, e.g. "exact"
         self._gaps: tuple[tuple[int, int], ...] = ()
-        self._offset_s = 0.0
-        self._reference = 1.0
-        self._status = ""
         self._strongest: float | None = None
-
-    @property
-    def map(self) -> DopplerMap | None:
-        """The map on its own clock, without the offset."""
-        return self._map
-
-    @property
-    def covered(self) -> NDArray[np.bool_] | None:
-        """Frames that are computed already, shape (frames,); None when all are."""
-        return self._covered
-
-    @property
-    def offset_s(self) -> float:
-        """Start of the map's clock on the recording's clock, in seconds."""
-        return self._offset_s
-
-    @property
-    def reference(self) -> float:
-        """Value shown as 0 dB."""
-        return self._reference
-
-    @property
-    def status(self) -> str:
-        """Quality of the map in a few words, e.g. ``exact``."""
-        return self._status
-
-    @property
-    def uncertainty(self) -> CellUncertainty | None:
-        """Uncertainty of the map's cells; None while it is unknown or switched off."""
-        return self._uncertainty
 
     @property
     def gaps_s(self) -> tuple[tuple[float, float], ...]:
@@ -104,15 +75,15 @@ class MapModel(QObject):
     @property
     def covered_s(self) -> tuple[tuple[float, float], ...]:
         """Stretches that are computed already, half-open on the recording's clock."""
-        if self._map is None:
+        if self.map is None:
             return ()
-        whole = ((0, len(self._map.timebase)),)
-        return self._seconds(whole if self._covered is None else runs(self._covered))
+        whole = ((0, len(self.map.timebase)),)
+        return self._seconds(whole if self.covered is None else runs(self.covered))
 
     def _seconds(self, stretches: Iterable[tuple[int, int]]) -> tuple[tuple[float, float], ...]:
-        if self._map is None:
+        if self.map is None:
             return ()
-        timebase, offset_s = self._map.timebase, self._offset_s
+        timebase, offset_s = self.map.timebase, self.offset_s
         return tuple(
             (
                 timebase.time_of(start) + offset_s,
@@ -125,7 +96,7 @@ class MapModel(QObject):
     def strongest_db(self) -> float:
         """Level of the strongest bin of the map, minus infinity for an empty one."""
         if self._strongest is None:
-            self._strongest = float(self._map.values.max()) if self._map is not None else 0.0
+            self._strongest = float(self.map.values.max()) if self.map is not None else 0.0
         return float(self.levels_db(np.array(self._strongest, np.float32)))
 
     def set_map(
@@ -133,9 +104,9 @@ class MapModel(QObject):
     ) -> None:
         """Show another map, or none."""
         self.revision += 1
-        self._map = doppler_map
-        self._covered = covered
-        self._uncertainty = None
+        self.map = doppler_map
+        self.covered = covered
+        self.uncertainty = None
         present = None if doppler_map is None else doppler_map.present
         self._gaps = () if present is None else runs(~present)
         self._strongest = None
@@ -143,37 +114,37 @@ class MapModel(QObject):
 
     def set_uncertainty(self, uncertainty: CellUncertainty | None) -> None:
         """Set the uncertainty of the map's cells."""
-        if uncertainty is not self._uncertainty:
-            self._uncertainty = uncertainty
+        if uncertainty is not self.uncertainty:
+            self.uncertainty = uncertainty
             self.changed.emit()
 
     def set_offset(self, offset_s: float) -> None:
         """Align the map in time."""
-        if offset_s != self._offset_s:
-            self._offset_s = offset_s
+        if offset_s != self.offset_s:
+            self.offset_s = offset_s
             self.changed.emit()
 
     def set_status(self, status: str) -> None:
         """Set the text about the map's quality."""
-        if status != self._status:
-            self._status = status
+        if status != self.status:
+            self.status = status
             self.status_changed.emit()
 
     def set_reference(self, reference: float) -> None:
         """Choose the value shown as 0 dB."""
-        self._reference = reference if reference > 0 else 1.0
+        self.reference = reference if reference > 0 else 1.0
         self.changed.emit()
 
     def frame_at(self, time_s: float) -> int | None:
         """Frame of the map at a time of the recording, or None outside."""
-        if self._map is None or not self._map.timebase.covers(time_s - self._offset_s):
+        if self.map is None or not self.map.timebase.covers(time_s - self.offset_s):
             return None
-        return self._map.timebase.frame_at(time_s - self._offset_s)
+        return self.map.timebase.frame_at(time_s - self.offset_s)
 
     def levels_db(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
         """Values in dB above the reference; minus infinity for zero."""
         with np.errstate(divide="ignore"):
-            levels: NDArray[np.float32] = 10.0 * np.log10(values / np.float32(self._reference))
+            levels: NDArray[np.float32] = 10.0 * np.log10(values / np.float32(self.reference))
         return levels
 
     def shade(self, values: NDArray[np.float32], levels: HeatmapLevels) -> NDArray[np.float32]:
@@ -181,14 +152,14 @@ class MapModel(QObject):
         if levels.scale == "dB":
             shade = (self.levels_db(values) - levels.low_db) / (levels.high_db - levels.low_db)
         else:
-            shade = values / np.float32(self._reference * 10.0 ** (levels.high_db / 10.0))
+            shade = values / np.float32(self.reference * 10.0 ** (levels.high_db / 10.0))
         return np.clip(shade, 0.0, 1.0).astype(np.float32)
 
     def _deviation(self, index: int, frame: int) -> float | None:
-        if self._map is None or self._uncertainty is None:
+        if self.map is None or self.uncertainty is None:
             return None
-        column = self._map.values[:, frame : frame + 1]
-        return float(self._uncertainty.between(frame, frame + 1).deviation(column)[index, 0])
+        column = self.map.values[:, frame : frame + 1]
+        return float(self.uncertainty.between(frame, frame + 1).deviation(column)[index, 0])
 
     def uncertain(self, levels: HeatmapLevels, start: int, stop: int) -> NDArray[np.bool_] | None:
         """Cells that are known to worse than :data:`UNCERTAIN_SHARE` of their value.
@@ -198,40 +169,40 @@ class MapModel(QObject):
         Deviations are those of :meth:`CellUncertainty.deviation`. The shape is
         (bins, stop - start); None if no uncertainty is known.
         """
-        if self._map is None or self._uncertainty is None:
+        if self.map is None or self.uncertainty is None:
             return None
-        values = self._map.values[:, start:stop]
-        highest = self._reference * 10.0 ** (levels.high_db / 10.0)
+        values = self.map.values[:, start:stop]
+        highest = self.reference * 10.0 ** (levels.high_db / 10.0)
         faintest = _FAINT_SHARE * highest
         if levels.scale == "dB":
-            faintest = self._reference * 10.0 ** (levels.low_db / 10.0)
+            faintest = self.reference * 10.0 ** (levels.low_db / 10.0)
         shows = np.float32(UNCERTAIN_SHARE) * values
         limit = np.where(values >= faintest, shows, np.float32(_SHOWS_SHARE * highest))
-        deviation = self._uncertainty.between(start, stop).deviation(values)
+        deviation = self.uncertainty.between(start, stop).deviation(values)
         found: NDArray[np.bool_] = deviation > limit
         return found
 
     def read(self, time_s: float, velocity_mps: float) -> Reading | None:
         """Cell at a time and velocity, or None where there is none."""
         frame = self.frame_at(time_s)
-        if self._map is None or frame is None:
+        if self.map is None or frame is None:
             return None
-        index = self._map.axis.bin_of(velocity_mps)
-        if index is None or (self._covered is not None and not self._covered[frame]):
+        index = self.map.axis.bin_of(velocity_mps)
+        if index is None or (self.covered is not None and not self.covered[frame]):
             return None
-        value = self._map.values[index, frame]
+        value = self.map.values[index, frame]
         note = ""
-        if self._map.present is not None and not self._map.present[frame]:
+        if self.map.present is not None and not self.map.present[frame]:
             note = "no person"
-        elif index in self._map.null_bins:
+        elif index in self.map.null_bins:
             note = "nulled bin"
-        elif index in self._map.unseen_bins:
+        elif index in self.map.unseen_bins:
             note = "beyond the radar's v_max"
         return Reading(
             track=self.title,
-            time_s=self._map.timebase.time_of(frame) + self._offset_s,
+            time_s=self.map.timebase.time_of(frame) + self.offset_s,
             frame=frame,
-            velocity_mps=float(self._map.axis.centres_mps[index]),
+            velocity_mps=float(self.map.axis.centres_mps[index]),
             value=float(value),
             level_db=float(self.levels_db(value)),
             note=note,
@@ -246,32 +217,17 @@ class PointerModel(QObject):
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._time_s: float | None = None
-        self._velocity_mps: float | None = None
-        self._reading: Reading | None = None
-
-    @property
-    def time_s(self) -> float | None:
-        """Time under the pointer, None when it is elsewhere."""
-        return self._time_s
-
-    @property
-    def velocity_mps(self) -> float | None:
-        """Velocity under the pointer."""
-        return self._velocity_mps
-
-    @property
-    def reading(self) -> Reading | None:
-        """Cell under the pointer."""
-        return self._reading
+        self.time_s: float | None = None  # None while the pointer is elsewhere
+        self.velocity_mps: float | None = None
+        self.reading: Reading | None = None
 
     def point_at(self, time_s: float, velocity_mps: float, reading: Reading | None) -> None:
         """Set the track, time and velocity under the pointer."""
-        self._time_s, self._velocity_mps, self._reading = time_s, velocity_mps, reading
+        self.time_s, self.velocity_mps, self.reading = time_s, velocity_mps, reading
         self.changed.emit()
 
     def leave(self) -> None:
         """Clear the reading."""
-        if self._time_s is not None:
-            self._time_s = self._velocity_mps = self._reading = None
+        if self.time_s is not None:
+            self.time_s = self.velocity_mps = self.reading = None
             self.changed.emit()

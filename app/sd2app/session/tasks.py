@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 from PySide6.QtCore import QObject, Signal
 
+from sd2app.background.latest import LatestRunner, Task
+
 
 @dataclass(eq=False)
 class Job:
@@ -58,3 +60,40 @@ class TaskList(QObject):
             job.cancelling = True
             self.changed.emit()
             job.cancel()
+
+
+class ListedRunner(LatestRunner):
+    """Background thread whose task stands in the list while it runs, if it has a title.
+
+    A partial result ``(done, total)`` is the progress of the task.
+    """
+
+    cancelled = Signal()  # by the user
+
+    def __init__(self, name: str, tasks: TaskList, parent: QObject | None = None) -> None:
+        super().__init__(name, parent)
+        self._tasks = tasks
+        self.job: Job | None = None
+        self.partial.connect(self._report)
+        self.idle_changed.connect(self._end)
+
+    def submit(self, task: Task, title: str = "") -> int:
+        """Ask for ``task(emit)`` in the background, in place of the one before."""
+        self._end()
+        revision = super().submit(task)
+        if title and self.busy:
+            self.job = self._tasks.start(title, self._cancel)
+        return revision
+
+    def _report(self, result: object) -> None:
+        if self.job is not None and isinstance(result, tuple):
+            self._tasks.report(self.job, *result)
+
+    def _cancel(self) -> None:
+        self.cancel()
+        self.cancelled.emit()
+
+    def _end(self) -> None:
+        if self.job is not None:
+            job, self.job = self.job, None
+            self._tasks.finish(job)

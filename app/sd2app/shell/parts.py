@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from sd2app.accuracy.ladder import Ladder
+    from sd2app.accuracy.library import AccuracyLibrary
     from sd2app.classify.library import ClassifierLibrary
     from sd2app.denoise.library import DenoiserLibrary
 
@@ -17,11 +17,11 @@ if TYPE_CHECKING:
 class Parts:
     """Parts that may be replaced, e.g. by faster ones in a test.
 
-    Accuracy backend, denoisers and classifiers are the library's, the commands that fit, train
+    Accuracy functions, denoisers and classifiers are the library's, the commands that fit, train
     and work in batches ``sd2`` itself, and the recovery folder of labels is the user's by default.
     """
 
-    ladder: Ladder | None = None
+    accuracy: AccuracyLibrary | None = None
     fit_command: Sequence[str] | None = None
     denoisers: DenoiserLibrary | None = None
     train_command: Sequence[str] | None = None

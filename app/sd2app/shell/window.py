@@ -181,9 +181,7 @@ class MainWindow(QMainWindow):
         for runs in (features.training.model, features.classify.training):
             runs.changed.connect(self._mark_training)
         # Without a person in the frame there is nothing to aim at.
-        features.maps.synthesis.target_changed.connect(
-            lambda: self._menus.refresh_one("aim_sensor")
-        )
+        features.maps.synthesis.frame_changed.connect(lambda: self._menus.refresh_one("aim_sensor"))
         s.display.theme_changed.connect(self._restyle)
 
     def _mark_training(self) -> None:

@@ -77,7 +77,7 @@ class Features:
 def build_features(session: Session, shell: Shell, parts: Parts, parent: QObject) -> Features:
     """Make all features and let them follow the document."""
     process = ModelProcess()
-    accuracy = AccuracyFeature(session, shell, parts.ladder, parent)
+    accuracy = AccuracyFeature(session, shell, parts.accuracy, parent)
     maps = MapsFeature(session, shell, accuracy.model, parent)
     denoisers = parts.denoisers or core_library(process)
     denoise = DenoiseFeature(session, shell, maps.synthesis, denoisers, parent)

@@ -82,6 +82,38 @@ def tick_text(value: float) -> str:
     return f"{value:.10f}".rstrip("0").rstrip(".")
 
 
+def paint_axes(
+    painter: QPainter,
+    plot: QRectF,
+    colours: Palette,
+    across: Iterable[Tick],
+    upwards: Iterable[Tick],
+    below: str,
+) -> None:
+    """Paint both axes with their grid and the name of the lower one; the pen is muted then."""
+    line_px = painter.fontMetrics().height()
+    grid, ink = QPen(QColor(colours.border), 1), QColor(colours.muted)
+    for x, text in across:
+        painter.setPen(grid)
+        painter.drawLine(QPointF(x, plot.top()), QPointF(x, plot.bottom()))
+        painter.setPen(ink)
+        box = QRectF(x - 30, plot.bottom() + 3, 60, line_px)
+        painter.drawText(box, Qt.AlignmentFlag.AlignCenter, text)
+    for y, text in upwards:
+        painter.setPen(grid)
+        painter.drawLine(QPointF(plot.left(), y), QPointF(plot.right(), y))
+        painter.setPen(ink)
+        box = QRectF(0, y - line_px / 2, plot.left() - 6, line_px)
+        right = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+        painter.drawText(box, right, text)
+    painter.setPen(QPen(QColor(colours.hatch), 1))
+    painter.drawLine(plot.bottomLeft(), plot.bottomRight())
+    painter.drawLine(plot.topLeft(), plot.bottomLeft())
+    painter.setPen(ink)
+    name = QRectF(plot.left(), plot.bottom() + line_px + 3, plot.width(), line_px)
+    painter.drawText(name, Qt.AlignmentFlag.AlignCenter, below)
+
+
 class PointPlot(QWidget):
     """Base of plots of points with axes, a point under the pointer and a keyboard focus.
 
@@ -160,31 +192,7 @@ class PointPlot(QWidget):
         self, painter: QPainter, across: Iterable[Tick], upwards: Iterable[Tick], below: str
     ) -> None:
         """Both axes with their grid and what the lower one is called; the pen is muted then."""
-        colours, plot = self._display.palette, self.plot_rect()
-        line_px = painter.fontMetrics().height()
-        grid, ink = QPen(QColor(colours.border), 1), QColor(colours.muted)
-        for x, text in across:
-            painter.setPen(grid)
-            painter.drawLine(QPointF(x, plot.top()), QPointF(x, plot.bottom()))
-            painter.setPen(ink)
-            box = QRectF(x - 30, plot.bottom() + 3, 60, line_px)
-            painter.drawText(box, Qt.AlignmentFlag.AlignCenter, text)
-        for y, text in upwards:
-            painter.setPen(grid)
-            painter.drawLine(QPointF(plot.left(), y), QPointF(plot.right(), y))
-            painter.setPen(ink)
-            box = QRectF(0, y - line_px / 2, plot.left() - 6, line_px)
-            right = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-            painter.drawText(box, right, text)
-        painter.setPen(QPen(QColor(colours.hatch), 1))
-        painter.drawLine(plot.bottomLeft(), plot.bottomRight())
-        painter.drawLine(plot.topLeft(), plot.bottomLeft())
-        painter.setPen(ink)
-        painter.drawText(
-            QRectF(plot.left(), plot.bottom() + line_px + 3, plot.width(), line_px),
-            Qt.AlignmentFlag.AlignCenter,
-            below,
-        )
+        paint_axes(painter, self.plot_rect(), self._display.palette, across, upwards, below)
 
     def most_upwards(self, painter: QPainter) -> int:
         """Number of ticks for which the left axis has room."""

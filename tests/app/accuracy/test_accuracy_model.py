@@ -4,7 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fake_ladder import COUNTING, EXACT, FACING, WAVES, FakeLadder, measurement_of, result_of, stale
+from fake_accuracy import (
+    COUNTING,
+    EXACT,
+    FACING,
+    WAVES,
+    FakeAccuracy,
+    measurement_of,
+    result_of,
+    stale,
+)
 from PySide6.QtCore import QObject
 
 from sd2app.accuracy.model import AccuracyModel
@@ -27,14 +36,14 @@ def still_mesh():
 
 
 class Desk:
-    """A trade model with a scene, a fake ladder and what was emitted."""
+    """A trade model with a scene, a fake library and what was emitted."""
 
     def __init__(self, settings=None, **answers):
         self.parent = QObject()
-        self.fake = FakeLadder(**answers)
+        self.fake = FakeAccuracy(**answers)
         self.jobs = TaskList(self.parent)
         self.settings = settings or Settings.forgetful()
-        self.trade = AccuracyModel(self.jobs, self.settings, self.fake.ladder, self.parent)
+        self.trade = AccuracyModel(self.jobs, self.settings, self.fake, self.parent)
         self.failures, self.notes = [], []
         self.trade.failed.connect(self.failures.append)
         self.trade.noted.connect(self.notes.append)

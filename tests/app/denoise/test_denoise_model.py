@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from fake_accuracy import FakeAccuracy
 from fake_denoisers import FakeDenoisers, card_of, fading
-from fake_ladder import FakeLadder
 from PySide6.QtCore import QObject
 from window_models import build_models
 
@@ -64,14 +64,14 @@ def make(qapp, compiled_kernels):
     made = []
 
     def context(models):
-        parent, ladder = QObject(), FakeLadder()
+        parent = QObject()
         made.append(
             (
                 parent,
                 build_models(
                     parent,
                     Settings.forgetful(),
-                    Parts(ladder=ladder.ladder, denoisers=models.library),
+                    Parts(accuracy=FakeAccuracy(), denoisers=models.library),
                 ),
             )
         )
@@ -429,7 +429,7 @@ def test_a_real_model_gives_the_map_that_the_library_gives(
     card = replace(card_of(tmp_path), options={"channels": 8}, path=None)
     save_model(tmp_path / "own.safetensors", TrainedDenoiser(network, card))
     parent = QObject()
-    context = build_models(parent, Settings.forgetful(), Parts(ladder=FakeLadder().ladder))
+    context = build_models(parent, Settings.forgetful(), Parts(accuracy=FakeAccuracy()))
     open_it(context, qtbot, ball)
     context.denoise.use(tmp_path / "own.safetensors")
     qtbot.waitUntil(lambda: not context.denoise.busy, timeout=120_000)

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import trimesh
+from fake_accuracy import COUNTING, EXACT, FACING, FakeAccuracy
 from fake_denoisers import FakeDenoisers
-from fake_ladder import COUNTING, EXACT, FACING, FakeLadder
 from window_models import build_models
 
 from sd2app.maps import warm_up as map_warm_up
@@ -36,7 +36,7 @@ def ball(tmp_path_factory):
 
 @pytest.fixture
 def fake():
-    return FakeLadder()
+    return FakeAccuracy()
 
 
 @pytest.fixture
@@ -47,7 +47,7 @@ def context(qapp, compiled_kernels, fake):
     context = build_models(
         parent,
         Settings.forgetful(),
-        Parts(ladder=fake.ladder, denoisers=FakeDenoisers().library),
+        Parts(accuracy=fake, denoisers=FakeDenoisers().library),
     )
     yield context
     fake.gate.set()
@@ -345,7 +345,7 @@ def test_the_exported_map_names_its_plan(context, fake, qtbot, ball, tmp_path):
 
 
 def test_the_library_chooses_for_a_small_scene(qapp, qtbot, ball, compiled_kernels):
-    """The real ladder: it finds a plan within the tolerance, and the map is that plan's."""
+    """The real library: it finds a plan within the tolerance, and the map is that plan's."""
     from PySide6.QtCore import QObject
 
     parent = QObject()

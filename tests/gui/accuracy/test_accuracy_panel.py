@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from fake_ladder import COUNTING, EXACT, FACING, WAVES, measurement_of, result_of, stale
+from fake_accuracy import COUNTING, EXACT, FACING, WAVES, measurement_of, result_of, stale
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QLabel, QTabBar, QToolButton, QToolTip
 from window_models import models_of

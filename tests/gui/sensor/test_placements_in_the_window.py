@@ -114,7 +114,7 @@ def test_limits_and_cost_are_said(window, page, qtbot):
     models_of(window).edits.plan_placements(PlacementGrid((0.2, 2.0, 20.0)))
     settle(qtbot, window)
     said = words(page)
-    # The fake ladder says 0.6 ms per frame; 60 frames.
+    # The fake library says 0.6 ms per frame; 60 frames.
     assert "3 maps in about 108 ms, 24 kB" in said
     assert "In the body" in said
     assert "Beyond R max 9.6 m" in said

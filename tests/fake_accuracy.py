@@ -1,4 +1,4 @@
-"""A ladder that gives known answers, for tests of what the window does with them."""
+"""Accuracy plans with known answers, for tests of what the window does with them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import threading
 import time
 from dataclasses import replace
 
-from sd2app.accuracy.ladder import Ladder
+from sd2app.accuracy.library import AccuracyLibrary
 from sd2core.accuracy.plans import AccuracyPlan, reference_plan
 from sd2core.accuracy.results import (
     Choice,
@@ -18,7 +18,6 @@ from sd2core.accuracy.results import (
     Reason,
     Spread,
 )
-from sd2core.accuracy.trial import synthesizer_for
 
 EXACT = AccuracyPlan()
 FACING = AccuracyPlan(visibility="facing")
@@ -61,7 +60,7 @@ WAVES = (
 )
 
 
-class FakeLadder:
+class FakeAccuracy(AccuracyLibrary):
     """What it answers, what it was asked, and a gate that keeps an answer back.
 
     Without a plan for a tolerance the one given as ``plan`` is chosen; ``gate``
@@ -77,15 +76,10 @@ class FakeLadder:
         self.gate = threading.Event()
         self.gate.set()
         self.known = {}
-        self.ladder = Ladder(
-            self._survey,
-            self._choose,
-            self._measure,
-            lambda mesh, sensor, options, family: self.known.get((family, sensor)),
-            self._remember,
-            lambda plan, mesh, options, like: synthesizer_for(plan, mesh, options, like=like),
-        )
         self.remembered = []
+
+    def recall(self, mesh, sensor, options, family):
+        return self.known.get((family, sensor))
 
     def _wait(self, progress):
         try:
@@ -96,13 +90,13 @@ class FakeLadder:
             raise
         progress(10, 10)
 
-    def _survey(self, mesh, sensor, options, progress, like):
+    def survey(self, mesh, sensor, options, progress, like):
         self.surveyed.append(sensor)
         self.alike.append(like)
         self._wait(progress)
         return sensor
 
-    def _choose(self, mesh, sensor, *, tolerance=None, budget_ms=None, progress, **parts):
+    def choose(self, mesh, sensor, *, tolerance=None, budget_ms=None, progress, **parts):
         self.asked.append((tolerance, budget_ms, sensor))
         assert parts["survey"] == sensor
         self._wait(progress)
@@ -113,12 +107,12 @@ class FakeLadder:
         plan = self.plans.get(tolerance, self.plan)
         return Choice(plan, self.holds, errors_of(self.error), 0.6, REASONS, tolerance, None, 0.1)
 
-    def _measure(self, mesh, sensor, *, options, family, progress):
+    def measure(self, mesh, sensor, *, options, family, progress):
         self._wait(progress)
         results = COUNTING if family == "histogram" else WAVES
         return measurement_of(*results, family=family)
 
-    def _remember(self, mesh, measurement):
+    def store(self, mesh, measurement):
         self.remembered.append(measurement)
 
 
