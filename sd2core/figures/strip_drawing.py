@@ -46,8 +46,8 @@ class Body:
     def at(cls, source: StripSource, frame: int, options: StripOptions) -> Body | None:
         """The mesh at a frame of the strip's clock, None where there is none."""
         mesh = source.mesh
-        number = source.mesh_frame(source.clock.time_of(frame))
-        if mesh is None or number is None or not mesh.presence.there[number]:
+        number = None if mesh is None else mesh.person_at(source.clock.time_of(frame))
+        if mesh is None or number is None:
             return None
         vertices = np.asarray(mesh.frame(number), np.float64)
         colours = np.tile(rgb(_PLAIN), (len(vertices), 1))

@@ -85,12 +85,6 @@ class StripSource:
         assert part is not None
         return part.timebase
 
-    def mesh_frame(self, time_s: float) -> int | None:
-        """Frame of the mesh at a time, None where it has none."""
-        if self.mesh is None or not self.mesh.timebase.covers(time_s):
-            return None
-        return self.mesh.timebase.frame_at(time_s)
-
 
 def check_strip(source: StripSource, frames: Sequence[int], options: StripOptions) -> None:
     """Refuse what cannot be drawn."""

@@ -181,6 +181,13 @@ class MeshSequence:
         vertices: NDArray[Any] = self.read(index, index + 1)[0]
         return vertices
 
+    def person_at(self, time_s: float) -> int | None:
+        """Frame at a time, None where the mesh has no frame or no person."""
+        if not self.timebase.covers(time_s):
+            return None
+        frame = self.timebase.frame_at(time_s)
+        return frame if self.presence.there[frame] else None
+
 
 def refuse_missing(vertices: NDArray[Any], first_frame: int, source: str) -> None:
     """Raise Sd2Error for a coordinate that is NaN or infinite, naming frame and vertex.

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from PySide6.QtWidgets import QDialog
+
 from sd2app.feature import Action, Feature, Shell
-from sd2app.figures.map_dialog import MapFigureDialog
-from sd2app.figures.map_figure import FigureModel
-from sd2app.figures.strip import StripModel
-from sd2app.figures.strip_dialog import StripDialog
+from sd2app.figures.dialogs import MapFigureDialog, StripDialog
+from sd2app.figures.model import DrawnFigure, MapFigure, StripModel
 from sd2app.maps.difference import DifferenceModel
 from sd2app.session.session import Session
 from sd2core.labels.spans import Labels
@@ -49,39 +49,18 @@ class FiguresFeature(Feature):
 
     def _export_maps(self) -> None:
         s, window = self._session, self._shell.dialog_parent
-        titles = {s.maps.denoised: self._denoiser(), s.maps.before: s.maps.before.status}
-        about = {
-            "recording": s.document.title,
-            "simulated": s.document.simulated,
-            "sensor_position_m": list(s.sensor.sensor.position_m),
-            "denoiser": self._denoiser(),
-            "synthetic": s.maps.synthetic.status,
-        }
-        clock = s.playback.timebase
-        model = FigureModel(
-            [(track, titles.get(track, "")) for track in s.maps.all],
-            self._difference,
-            s.display.levels,
-            self._labels(),
-            (s.span.start_s, s.span.end_s),
-            (clock.start_s, clock.end_s),
-            about,
-            window,
-        )
-        dialog = MapFigureDialog(model, s.display.palette, "doppler-maps", window)
-        dialog.exec()
-        model.close()
-        model.deleteLater()
-        dialog.deleteLater()
+        model = MapFigure(s, self._difference, self._labels(), self._denoiser(), window)
+        self._ask(MapFigureDialog(model, s.display.palette, "doppler-maps", window), model)
 
     def _export_strip(self) -> None:
         s, content = self._session, self._session.document.content
-        if content is None:
-            return
-        model = StripModel(content, s.playback.time_s, self._shell.dialog_parent)
-        dialog = StripDialog(
-            model, s.display.palette, content.recording.title, self._shell.dialog_parent
-        )
+        if content is not None:
+            window, title = self._shell.dialog_parent, content.recording.title
+            model = StripModel(content, s.playback.time_s, window)
+            self._ask(StripDialog(model, s.display.palette, title, window), model)
+
+    @staticmethod
+    def _ask(dialog: QDialog, model: DrawnFigure) -> None:
         dialog.exec()
         model.close()
         model.deleteLater()

@@ -9,9 +9,8 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from sd2app.feature import Action, Feature, Shell
 from sd2app.session.session import Session
-from sd2app.video.bar import VideoBar
 from sd2app.video.overlay_settings import OverlayModel
-from sd2app.video.view import Landmarks, VideoView
+from sd2app.video.view import Landmarks, VideoBar, VideoView
 
 
 class VideoFeature(Feature):
@@ -47,13 +46,12 @@ class VideoFeature(Feature):
 
     def panels(self) -> Mapping[str, QWidget]:
         """The video under its bar."""
-        s, pane = self._session, QWidget()
+        pane = QWidget()
         layout = QVBoxLayout(pane)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(0)
         layout.addWidget(VideoBar(self.overlay, self._shell.action))
-        view = VideoView(s.video, s.document, s.playback, s.display, self.overlay, self._landmarks)
-        layout.addWidget(view, 1)
+        layout.addWidget(VideoView(self._session, self.overlay, self._landmarks), 1)
         return {"video": pane}
 
     def warnings(self) -> Sequence[SignalInstance]:

@@ -1,22 +1,24 @@
-"""The video, with the mesh drawn over the person."""
+"""The video, with the mesh drawn over the person, and the bar above it."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QRectF, QSize, Qt, SignalInstance
-from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent
-from PySide6.QtWidgets import QWidget
+from PySide6.QtCore import QRectF, QSignalBlocker, QSize, Qt, SignalInstance
+from PySide6.QtGui import QAction, QColor, QPainter, QPaintEvent
+from PySide6.QtWidgets import QHBoxLayout, QSlider, QWidget
 
-from sd2app.session.display import DisplayModel
-from sd2app.session.document import DocumentModel
-from sd2app.session.playback import PlaybackModel
-from sd2app.session.video import VideoModel
+from sd2app.session.session import Session
 from sd2app.video.landmark_overlay import draw_landmarks
 from sd2app.video.overlay_settings import OverlayModel
-from sd2app.widgets.mesh_painting import draw_mesh
+from sd2app.widgets.inputs import action_button
+from sd2app.widgets.mesh_painting import draw_mesh, paint_picture
+from sd2app.widgets.panel import title
+
+_OPACITY_STEPS = 20
 
 
 class Landmarks(Protocol):
@@ -33,30 +35,18 @@ class Landmarks(Protocol):
 class VideoView(QWidget):
     """Fits the picture into the space there is."""
 
-    def __init__(
-        self,
-        video: VideoModel,
-        document: DocumentModel,
-        playback: PlaybackModel,
-        display: DisplayModel,
-        overlay: OverlayModel,
-        landmarks: Landmarks,
-        parent: QWidget | None = None,
-    ) -> None:
-        super().__init__(parent)
-        self._video = video
-        self._document = document
-        self._playback = playback
-        self._display = display
-        self._overlay = overlay
-        self._found = landmarks
+    def __init__(self, session: Session, overlay: OverlayModel, landmarks: Landmarks) -> None:
+        super().__init__()
+        self._session, self._overlay, self._found = session, overlay, landmarks
         self.setMinimumSize(200, 150)
-        video.frame_changed.connect(self.update)
-        overlay.changed.connect(self.update)
-        for signal in landmarks.landmarks_changed:
+        for signal in (
+            session.video.frame_changed,
+            session.display.theme_changed,
+            session.document.changed,
+            overlay.changed,
+            *landmarks.landmarks_changed,
+        ):
             signal.connect(self.update)
-        display.theme_changed.connect(self.update)
-        document.changed.connect(self.update)
 
     def sizeHint(self) -> QSize:
         """Size of two thirds of VGA."""
@@ -68,55 +58,80 @@ class VideoView(QWidget):
             self._paint(painter)
 
     def _paint(self, painter: QPainter) -> None:
-        colours = self._display.palette
+        colours, video = self._session.display.palette, self._session.video
         painter.fillRect(self.rect(), QColor(colours.well))
-        picture = self._video.picture
-        if picture is None:
+        if video.picture is None:
             painter.setPen(QColor(colours.muted))
             painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, self._absence())
             return
-        height, width = picture.shape[:2]
-        picture = np.ascontiguousarray(picture)
-        image = QImage(picture.data, width, height, 3 * width, QImage.Format.Format_RGB888)
-        scale = min(self.width() / width, self.height() / height)
-        box = QRectF(0, 0, width * scale, height * scale)
-        box.moveCenter(QRectF(self.rect()).center())
-        painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
-        painter.drawImage(box, image)
+        height, width = video.picture.shape[:2]
+        box = paint_picture(painter, self.rect(), video.picture)
         if self._overlay.style.shown:
             self._paint_mesh(painter, box)
-        landmarks = self._landmarks()
-        if landmarks is not None:
-            draw_landmarks(painter, landmarks, box, (width, height))
+        # Landmarks of this frame, until the mesh takes their place.
+        if self._session.document.mesh is None:
+            landmarks = self._found.landmarks_at(video.shown_frame)
+            if landmarks is not None:
+                draw_landmarks(painter, landmarks, box, (width, height))
 
     def _absence(self) -> str:
-        recording = self._document.recording
-        if recording is None or self._video.reader is not None:
+        recording = self._session.document.recording
+        if recording is None or self._session.video.reader is not None:
             return ""
         if recording.video is None:
             return "No video in this recording"
         return "The video cannot be shown"
 
-    def _landmarks(self) -> NDArray[np.float32] | None:
-        """Landmarks of this frame, until the mesh takes their place."""
-        if self._document.mesh is not None:
-            return None
-        return self._found.landmarks_at(self._video.shown_frame)
-
     def _paint_mesh(self, painter: QPainter, box: QRectF) -> None:
-        mesh, reader = self._document.mesh, self._video.reader
-        if mesh is None or reader is None:
+        s, style, reader = self._session, self._overlay.style, self._session.video.reader
+        if reader is None:
             return
-        time_s = reader.timebase.time_of(self._video.shown_frame)
-        if not mesh.timebase.covers(time_s):
-            return
-        frame = mesh.timebase.frame_at(time_s)
-        if not mesh.presence.there[frame]:
-            return
-        style = self._overlay.style
         # Dots cover little: they have to be stronger to be seen at all.
         opacity = style.opacity**0.5 if style.as_dots else style.opacity
-        faces = None if style.as_dots else mesh.faces
-        colour = QColor(self._display.palette.overlay)
-        camera = self._document.camera
-        draw_mesh(painter, box, mesh.frame(frame), faces, camera, colour, opacity)
+        draw_mesh(
+            painter,
+            box,
+            s.document.mesh,
+            reader.timebase.time_of(s.video.shown_frame),
+            s.document.camera,
+            QColor(s.display.palette.overlay),
+            opacity,
+            as_dots=style.as_dots,
+        )
+
+
+class VideoBar(QWidget):
+    """Bar with the mesh's visibility, dots or surface, and opacity."""
+
+    def __init__(
+        self, overlay: OverlayModel, action: Callable[[str], QAction], parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self._overlay = overlay
+        self._mesh = action("overlay")
+        self._slider = QSlider(Qt.Orientation.Horizontal, self)
+        self._slider.setRange(1, _OPACITY_STEPS)
+        self._slider.setFixedWidth(80)
+        self._slider.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+        self._slider.setAccessibleName("Opacity of the mesh over the video")
+        self._slider.valueChanged.connect(
+            lambda value: overlay.set_style(opacity=value / _OPACITY_STEPS)
+        )
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(8, 2, 4, 2)
+        layout.setSpacing(4)
+        layout.addWidget(title("Video"))
+        layout.addStretch(1)
+        layout.addWidget(action_button(self._mesh, "Mesh"))
+        layout.addWidget(self._slider)
+        layout.addWidget(action_button(action("overlay_dots"), "Dots"))
+        overlay.changed.connect(self._refresh)
+        self._mesh.changed.connect(self._refresh)
+        self._refresh()
+
+    def _refresh(self) -> None:
+        style = self._overlay.style
+        with QSignalBlocker(self._slider):
+            self._slider.setValue(round(style.opacity * _OPACITY_STEPS))
+        self._slider.setEnabled(self._mesh.isEnabled() and style.shown)
+        self._slider.setToolTip(f"Opacity of the mesh over the video: {style.opacity:.0%}")

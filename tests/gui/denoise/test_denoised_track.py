@@ -11,7 +11,7 @@ from PySide6.QtGui import QColor, QDropEvent
 from PySide6.QtWidgets import QApplication, QFileDialog, QLabel, QPushButton
 from window_models import models_of
 
-from sd2app.figures.map_dialog import MapFigureDialog
+from sd2app.figures.dialogs import MapFigureDialog
 from sd2app.maps.spectrum import SpectrumView
 from sd2app.shell.status_bar import StatusLine
 from sd2app.widgets.model_card_dialog import ModelCardDialog

@@ -12,8 +12,8 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QCheckBox, QFileDialog, QPushButton
 from window_models import models_of
 
-from sd2app.figures.strip import StripModel
-from sd2app.figures.strip_dialog import StripDialog
+from sd2app.figures.dialogs import StripDialog
+from sd2app.figures.model import StripModel
 
 
 @pytest.fixture
@@ -78,7 +78,7 @@ def test_exported_by_hand(window, qtbot, tmp_path, monkeypatch):
     def choose(dialog: StripDialog) -> None:
         model = dialog._model
         model.choose(way="list")
-        field = dialog._list
+        field = dialog._typed
         field.clear()
         qtbot.keyClicks(field, "4,8")
         overlay = next(b for b in dialog.findChildren(QCheckBox) if b.text() == "mesh over video")

@@ -6,7 +6,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QSlider, QToolButton
 from window_models import models_of
 
-from sd2app.video.bar import VideoBar
+from sd2app.video.view import VideoBar
 
 
 def buttons(window):

@@ -1,0 +1,240 @@
+"""Dialogs that export a figure: a preview above, the choices below."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from functools import partial
+from typing import Any, ClassVar
+
+from PySide6.QtCore import QSignalBlocker, QSize, Qt
+from PySide6.QtGui import QColor, QPainter, QPaintEvent
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QDialog,
+    QFormLayout,
+    QHBoxLayout,
+    QLabel,
+    QLayout,
+    QLineEdit,
+    QVBoxLayout,
+    QWidget,
+)
+
+from sd2app.figures.model import DrawnFigure, MapFigure, StripModel
+from sd2app.palette import Palette
+from sd2app.widgets.dialogs import ExportButtons, ask_figure
+from sd2app.widgets.inputs import Choice, NumberBox
+from sd2app.widgets.mesh_painting import paint_picture
+from sd2app.widgets.panel import side_by_side
+
+_WAYS = (("spread", "spread evenly"), ("around", "around the cursor"), ("list", "list or ranges"))
+_ROWS = (("video", "video"), ("mesh", "mesh"), ("overlay", "mesh over video"))
+
+
+class FigurePreview(QWidget):
+    """A figure on its own background, as large as there is room."""
+
+    def __init__(self, model: DrawnFigure, palette: Palette, parent: QWidget) -> None:
+        super().__init__(parent)
+        self._model, self._colours = model, palette
+        self.setAccessibleName("Preview of the figure")
+        self.setMinimumSize(480, 200)
+        model.drawn.connect(self.update)
+        model.changed.connect(self.update)
+
+    def sizeHint(self) -> QSize:
+        """Wide size, as figures have."""
+        return QSize(960, 320)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Paint the figure, or a message."""
+        with QPainter(self) as painter:
+            painter.fillRect(self.rect(), QColor(self._colours.well))
+            picture = self._model.picture
+            if picture is not None and not self._model.problem:
+                paint_picture(painter, self.rect().adjusted(8, 8, -8, -8), picture, enlarge=False)
+                return
+            painter.setPen(QColor(self._colours.muted))
+            text = self._model.problem or "Drawing…"
+            flags = Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap
+            painter.drawText(self.rect().adjusted(16, 16, -16, -16), flags, text)
+
+
+class FigureDialog(QDialog):
+    """Preview, choices and a button to export; ``name`` is proposed for the file."""
+
+    TITLE: ClassVar[str]
+
+    def __init__(
+        self, model: Any, palette: Palette, name: str, parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self._model, self._name = model, name
+        self.setWindowTitle(self.TITLE)
+        self._buttons = ExportButtons(self, self._ask)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(16, 16, 16, 16)
+        layout.setSpacing(16)
+        layout.addWidget(FigurePreview(model, palette, self), 1)
+        layout.addLayout(self._choices())
+        layout.addWidget(self._buttons)
+        model.changed.connect(self._refresh)
+        model.written.connect(lambda _: self.accept())
+        self._refresh()
+
+    def _choices(self) -> QLayout:
+        raise NotImplementedError
+
+    def _refresh(self) -> None:
+        model = self._model
+        self._buttons.show_state(possible=not model.problem, exporting=model.exporting)
+
+    def _ask(self) -> None:
+        path = ask_figure(self, self.TITLE, self._name)
+        if path is not None:
+            self._model.export(path)
+
+    # --- parts of the choices -------------------------------------------------------------
+
+    def _box(self, text: str, chosen: Callable[[bool], object], checked: bool = True) -> QCheckBox:
+        box = QCheckBox(text, self)
+        box.setChecked(checked)
+        box.toggled.connect(chosen)
+        return box
+
+    def _list(
+        self, tip: str, entries: Iterable[tuple[Any, str]], chosen: Callable[[Any], object]
+    ) -> Choice:
+        """A list of values, each with its text."""
+        choice = Choice(tip, self)
+        for value, text in entries:
+            choice.addItem(text, value)
+        choice.currentIndexChanged.connect(lambda at: chosen(choice.itemData(at)))
+        return choice
+
+    @staticmethod
+    def _form() -> QFormLayout:
+        form = QFormLayout()
+        form.setHorizontalSpacing(16)
+        form.setVerticalSpacing(8)
+        return form
+
+
+class MapFigureDialog(FigureDialog):
+    """Choices of a :class:`MapFigure`."""
+
+    TITLE = "Export figure of the maps"
+
+    def __init__(
+        self, model: MapFigure, palette: Palette, name: str, parent: QWidget | None = None
+    ) -> None:
+        super().__init__(model, palette, name, parent)
+        self.resize(900, 720)
+
+    def _choices(self) -> QLayout:
+        model = self._model
+        maps = [self._box(title, partial(model.set_shown, title)) for title in model.titles]
+        stretches = ((False, "what is in view"), (True, "the whole recording"))
+        stretch = self._list(
+            "Time range of the recording", stretches, lambda whole: model.choose(whole=whole)
+        )
+        more = []
+        if model.has_labels:
+            more.append(self._box("labels", lambda on: model.choose(with_labels=on)))
+        if model.has_difference:
+            more.append(
+                self._box("difference to the radar", lambda on: model.choose(with_difference=on))
+            )
+        form = self._form()
+        form.addRow("Maps", side_by_side(*maps, spacing_px=16))
+        form.addRow("Stretch", side_by_side(stretch, spacing_px=16))
+        if more:
+            form.addRow("With", side_by_side(*more, spacing_px=16))
+        return form
+
+
+class StripDialog(FigureDialog):
+    """Choices of a :class:`StripModel`."""
+
+    TITLE = "Export strip of frames"
+
+    def __init__(
+        self, model: StripModel, palette: Palette, name: str, parent: QWidget | None = None
+    ) -> None:
+        super().__init__(model, palette, name, parent)
+        self.resize(1040, 640)
+
+    def _choices(self) -> QLayout:
+        model = self._model
+        self._way = self._list("Which frames", _WAYS, lambda way: model.choose(way=way))
+        self._count = NumberBox(1, 100, " frames", "How many frames", decimals=0, step=1)
+        self._count.valueChanged.connect(lambda value: model.choose(count=int(value)))
+        self._step = NumberBox(1, 1000, " apart", "How many frames apart", decimals=0, step=1)
+        self._step.valueChanged.connect(lambda value: model.choose(step=int(value)))
+        self._typed = QLineEdit(self)
+        self._typed.setToolTip("Frames such as 0,15,30, or ranges FROM:TO:STEP such as 0:90:15")
+        self._typed.setAccessibleName(self._typed.toolTip())
+        self._typed.textEdited.connect(lambda text: model.choose(text=text))
+        self._columns = NumberBox(
+            1, 50, " side by side", "More frames than that go below", decimals=0, step=1
+        )
+        self._columns.valueChanged.connect(lambda value: model.set_options(columns=int(value)))
+        self._rows = {
+            row: self._box(text, partial(model.set_row, row), checked=False) for row, text in _ROWS
+        }
+        for row, box in self._rows.items():
+            box.setEnabled(row in model.available)
+        self._shape = self._list(
+            "How the mesh is drawn",
+            ((False, "surface"), (True, "dots")),
+            lambda as_dots: model.set_options(as_dots=as_dots),
+        )
+        self._colour = self._list(
+            "What the colour of the mesh means",
+            (("velocity", "radial velocity"), ("plain", "plain")),
+            lambda colour: model.set_options(colour=colour),
+        )
+        self._limit = NumberBox(0.1, 20.0, " m/s", "Where the colours end", decimals=1, step=0.5)
+        self._limit.valueChanged.connect(lambda value: model.set_options(v_max_mps=value))
+        self._whole = self._box(
+            "whole picture", lambda whole: model.set_options(whole=whole), checked=False
+        )
+        self._whole.setToolTip("Otherwise what is around the body in these frames")
+        left, right = self._form(), self._form()
+        left.addRow("Frames", side_by_side(self._way, self._count, self._step, self._typed))
+        left.addRow("Columns", side_by_side(self._columns))
+        right.addRow("Rows", side_by_side(*self._rows.values()))
+        right.addRow("Mesh", side_by_side(self._shape, QLabel("colour"), self._colour, self._limit))
+        right.addRow("Part", side_by_side(self._whole))
+        columns = QHBoxLayout()
+        columns.setSpacing(32)
+        columns.addLayout(left, 1)
+        columns.addLayout(right, 1)
+        return columns
+
+    def _refresh(self) -> None:
+        super()._refresh()
+        choice, options = self._model.choice, self._model.options
+        for combo, value in (
+            (self._way, choice.way),
+            (self._shape, options.as_dots),
+            (self._colour, options.colour),
+        ):
+            with QSignalBlocker(combo):
+                combo.setCurrentIndex(combo.findData(value))
+        for box, checked in (
+            (self._whole, options.whole),
+            *((box, row in options.rows) for row, box in self._rows.items()),
+        ):
+            with QSignalBlocker(box):
+                box.setChecked(checked)
+        self._count.show_value(choice.count)
+        self._count.setVisible(choice.way != "list")
+        self._step.show_value(choice.step)
+        self._step.setVisible(choice.way == "around")
+        self._typed.setVisible(choice.way == "list")
+        if self._typed.text() != choice.text:
+            self._typed.setText(choice.text)
+        self._columns.show_value(options.columns)
+        self._limit.show_value(options.v_max_mps)
+        self._limit.setEnabled(options.colour == "velocity")
