@@ -63,14 +63,9 @@ class MeshComparisonFeature(Feature):
         if path is None or not s.has_mesh:
             return
         self.close()
-        model = ComparisonModel(s.document, s.sensor, s.jobs, path, shell.dialog_parent)
         window = ComparisonWindow(
-            model,
-            s.document,
-            s.video,
-            s.span,
-            s.playback,
-            s.display,
+            ComparisonModel(s, path),
+            s,
             self._overlay,
             map_view=self._map_view,
             ruler=TimeRuler(s.span, s.playback, s.display),

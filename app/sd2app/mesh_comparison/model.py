@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.background.latest import Emit, LatestRunner
+from sd2app.background.latest import Emit
 from sd2app.session.content import UNTITLED, reference_of
-from sd2app.session.document import DocumentModel
 from sd2app.session.maps import MapModel
-from sd2app.session.sensor import SensorModel
-from sd2app.session.tasks import Job, TaskList
+from sd2app.session.session import Session
+from sd2app.session.tasks import ListedRunner
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.recording.recording import MeshReading, Recording, is_recording, open_recording
 
@@ -44,36 +43,27 @@ class _Result:
 
 
 class ComparisonModel(QObject):
-    """Two meshes: number 0 is the recording's, number 1 the other."""
+    """Two meshes: number 0 is the recording's, number 1 the other.
+
+    Others read the attributes; the methods change them.
+    """
 
     changed = Signal()  # result, reference, joint, or computing began or ended
 
-    def __init__(
-        self,
-        document: DocumentModel,
-        sensor: SensorModel,
-        jobs: TaskList,
-        other: Path,
-        parent: QObject | None = None,
-    ) -> None:
+    def __init__(self, session: Session, other: Path, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._document = document
-        self._sensor = sensor
-        self._jobs = jobs
-        self._job: Job | None = None
-        self._other = other
-        self._reference = 0
-        self._joint = JOINT
+        self._session, self._other = session, other
+        self.reference = 0  # number of the mesh that the other is measured against
+        self.joint = JOINT  # the one whose velocity is shown
+        self.problem = ""  # why the meshes cannot be compared
         self._result: _Result | None = None
-        self._problem = ""
-        self._closed = False
         self.tracks = (MapModel("", self), MapModel("", self))
-        self._runner = LatestRunner("compare", self)
-        self._runner.partial.connect(self._report)
+        self._runner = ListedRunner("compare", session.jobs, self)
         self._runner.finished.connect(self._receive)
         self._runner.failed.connect(self._refuse)
-        sensor.changed.connect(self._follow_sensor)
-        sensor.dragging_changed.connect(self._follow_sensor)
+        self._runner.cancelled.connect(self.changed)
+        session.sensor.changed.connect(self._follow_sensor)
+        session.sensor.dragging_changed.connect(self._follow_sensor)
         self.work_out()
 
     # --- what is there --------------------------------------------------------------------
@@ -81,15 +71,10 @@ class ComparisonModel(QObject):
     @property
     def labels(self) -> tuple[str, str]:
         """Names of the two meshes."""
-        recording = self._document.recording
+        recording = self._session.document.recording
         own = name_of(recording.mesh) if recording and recording.mesh else "this recording"
         other = name_of(self._other)
         return (own, other) if own != other else (f"{own} (open)", f"{other} (other)")
-
-    @property
-    def reference(self) -> int:
-        """Index of the mesh that the other is measured against."""
-        return self._reference
 
     @property
     def busy(self) -> bool:
@@ -97,19 +82,9 @@ class ComparisonModel(QObject):
         return self._runner.busy
 
     @property
-    def problem(self) -> str:
-        """Reason why the meshes cannot be compared."""
-        return self._problem
-
-    @property
     def comparison(self) -> Comparison | None:
         """Result of the comparison."""
         return self._result.comparison if self._result else None
-
-    @property
-    def joint(self) -> str:
-        """Joint whose velocity is shown."""
-        return self._joint
 
     def mesh(self, number: int) -> MeshSequence | None:
         """One of the two, all of its frames."""
@@ -123,7 +98,7 @@ class ComparisonModel(QObject):
             return ()
         from sd2core.compare.joints import JOINTS
 
-        found = comparison.differences[1 - self._reference]
+        found = comparison.differences[1 - self.reference]
         jitters = [one.jitter_mps3 for one in comparison.differences]
         return tuple(
             JointRow(
@@ -140,7 +115,7 @@ class ComparisonModel(QObject):
     def map_l1(self) -> float | None:
         """Relative difference of the two Doppler maps."""
         comparison = self.comparison
-        return comparison.differences[1 - self._reference].map_l1 if comparison else None
+        return comparison.differences[1 - self.reference].map_l1 if comparison else None
 
     def curve(self, number: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Times, and velocities of the joint towards the sensor; NaN without a person."""
@@ -149,32 +124,32 @@ class ComparisonModel(QObject):
             return np.zeros(0), np.zeros(0)
         from sd2core.compare.joints import JOINTS
 
-        velocity = comparison.velocity_mps[number][:, JOINTS.index(self._joint)]
+        velocity = comparison.velocity_mps[number][:, JOINTS.index(self.joint)]
         return comparison.times_s, np.where(comparison.measured, velocity, np.nan)
 
     # --- what one can do ------------------------------------------------------------------
 
     def set_joint(self, joint: str) -> None:
         """Show another joint."""
-        if joint != self._joint:
-            self._joint = joint
+        if joint != self.joint:
+            self.joint = joint
             self.changed.emit()
 
     def set_reference(self, number: int) -> None:
         """Measure against the other one."""
-        if number != self._reference:
-            self._reference = number
+        if number != self.reference:
+            self.reference = number
             self.work_out()
 
     def work_out(self) -> None:
         """Compare again with the present sensor."""
-        recording = self._document.recording
-        own = self._document.mesh
+        document = self._session.document
+        recording, own = document.recording, document.mesh
         if recording is None or own is None:
             return
         known = self._result.meshes[1] if self._result else None
-        other, sensor, reference = self._other, self._sensor.sensor, self._reference
-        labels, focal_px = self.labels, self._document.camera.focal_px
+        other, sensor, reference = self._other, self._session.sensor.sensor, self.reference
+        labels, focal_px = self.labels, document.camera.focal_px
 
         def compare(emit: Emit) -> _Result:
             from sd2core.compare.meshes import compare_meshes
@@ -189,10 +164,8 @@ class ComparisonModel(QObject):
             )
             return _Result((own, mesh), comparison)
 
-        self._problem = ""
-        self._end_job()
-        self._job = self._jobs.start(f"Comparing with {self._other.name}", self._cancel)
-        self._runner.submit(compare)
+        self.problem = ""
+        self._runner.submit(compare, f"Comparing with {other.name}")
         self.changed.emit()
 
     def save_figure(self, path: Path) -> None:
@@ -205,29 +178,16 @@ class ComparisonModel(QObject):
 
     def close(self) -> None:
         """Stop comparing."""
-        if self._closed:
-            return
-        self._closed = True
-        self._end_job()
         self._runner.close()
-        self._sensor.changed.disconnect(self._follow_sensor)
-        self._sensor.dragging_changed.disconnect(self._follow_sensor)
 
     # --- inside ---------------------------------------------------------------------------
 
     def _follow_sensor(self) -> None:
-        if self._sensor.dragging:
-            return
-        comparison = self.comparison
-        if comparison is None or comparison.sensor != self._sensor.sensor:
+        sensor, comparison = self._session.sensor, self.comparison
+        if not sensor.dragging and (comparison is None or comparison.sensor != sensor.sensor):
             self.work_out()
 
-    def _report(self, progress: Any) -> None:
-        if self._job is not None:
-            self._jobs.report(self._job, *progress)
-
     def _receive(self, result: _Result) -> None:
-        self._end_job()
         self._result = result
         comparison = result.comparison
         top = max(reference_of(one.values, one.null_bins) for one in comparison.maps)
@@ -241,19 +201,15 @@ class ComparisonModel(QObject):
         self.changed.emit()
 
     def _refuse(self, error: Exception) -> None:
-        self._end_job()
-        self._problem = str(error)
+        self.problem = str(error)
         self.changed.emit()
 
-    def _cancel(self) -> None:
-        self._runner.cancel()
-        self._end_job()
-        self.changed.emit()
 
-    def _end_job(self) -> None:
-        if self._job is not None:
-            self._jobs.finish(self._job)
-            self._job = None
+def joint_words(name: str) -> str:
+    """``hand.R`` as ``Right hand``."""
+    part, _, side = name.partition(".")
+    words = {"L": f"left {part}", "R": f"right {part}"}.get(side, part)
+    return words[0].upper() + words[1:]
 
 
 def name_of(path: Path) -> str:

@@ -3,34 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
 
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QAction, QCloseEvent
-from PySide6.QtWidgets import (
-    QFileDialog,
-    QFrame,
-    QHBoxLayout,
-    QLabel,
-    QToolButton,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
-from sd2app.mesh_comparison.curves import JointCurves
 from sd2app.mesh_comparison.model import ComparisonModel
-from sd2app.mesh_comparison.pictures import ComparedPicture
-from sd2app.mesh_comparison.table import JointTable
-from sd2app.session.display import DisplayModel
-from sd2app.session.document import DocumentModel
+from sd2app.mesh_comparison.views import ComparedPicture, JointCurves, JointTable
 from sd2app.session.maps import MapModel
-from sd2app.session.playback import PlaybackModel
-from sd2app.session.time_window import TimeWindow
-from sd2app.session.video import VideoModel
+from sd2app.session.session import Session
 from sd2app.video.overlay_settings import OverlayModel
-from sd2app.widgets.dialogs import FIGURES
+from sd2app.widgets.dialogs import ask_figure
 from sd2app.widgets.inputs import Choice
-from sd2app.widgets.panel import ElidedLabel, fill, panel, splitter
+from sd2app.widgets.panel import ElidedLabel, fill, outlined, panel, say, splitter
 
 
 class ComparisonWindow(QWidget):
@@ -41,11 +26,7 @@ class ComparisonWindow(QWidget):
     def __init__(
         self,
         model: ComparisonModel,
-        document: DocumentModel,
-        video: VideoModel,
-        span: TimeWindow,
-        playback: PlaybackModel,
-        display: DisplayModel,
+        session: Session,
         overlay: OverlayModel,
         *,
         map_view: Callable[[MapModel], QWidget],
@@ -55,27 +36,25 @@ class ComparisonWindow(QWidget):
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent, Qt.WindowType.Window)
-        self._model = model
-        self._display = display
-        self._attempt = attempt
-        simulated = " (simulated)" if document.simulated else ""
-        self.setWindowTitle(f"{document.title}{simulated}: compare meshes")
+        self._model, self._attempt = model, attempt
+        model.setParent(self)
+        simulated = " (simulated)" if session.document.simulated else ""
+        self.setWindowTitle(f"{session.document.title}{simulated}: compare meshes")
         self.addActions(keys)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(8, 8, 8, 8)
         layout.setSpacing(8)
         layout.addLayout(self._head())
-        pictures = [
-            ComparedPicture(number, model, document, video, playback, display, overlay)
-            for number in (0, 1)
-        ]
-        tracks = [*map(map_view, model.tracks), JointCurves(model, span, playback, display)]
+        pictures = [ComparedPicture(number, model, session, overlay) for number in (0, 1)]
+        tracks = [*map(map_view, model.tracks), JointCurves(model, session)]
+        table = panel("joints")
+        fill(table, JointTable(model, session.display))
         left = splitter(
             Qt.Orientation.Vertical,
             [_side_by_side("pictures", pictures), _below("tracks", tracks, ruler)],
             (320, 420),
         )
-        body = splitter(Qt.Orientation.Horizontal, [left, self._table()], (820, 400))
+        body = splitter(Qt.Orientation.Horizontal, [left, table], (820, 400))
         layout.addWidget(body, 1)
         self._notes = QLabel(self)
         self._notes.setWordWrap(True)
@@ -97,21 +76,13 @@ class ComparisonWindow(QWidget):
         self._reference.setMinimumContentsLength(14)
         self._reference.addItems(list(self._model.labels))
         self._reference.currentIndexChanged.connect(self._model.set_reference)
-        self._export = QToolButton(self)
-        self._export.setObjectName("outlined")
-        self._export.setText("Export figure…")
-        self._export.setToolTip("Write maps and velocities of both (.png, .svg, .pdf)")
-        self._export.clicked.connect(self._ask)
+        tip = "Write maps and velocities of both (.png, .svg, .pdf)"
+        self._export = outlined("Export figure…", tip, self._ask, self)
         row.addWidget(self._summary, 1)
         row.addWidget(QLabel("measured against", self))
         row.addWidget(self._reference)
         row.addWidget(self._export)
         return row
-
-    def _table(self) -> QFrame:
-        frame = panel("joints")
-        fill(frame, JointTable(self._model, self._display))
-        return frame
 
     # --- following the model --------------------------------------------------------------
 
@@ -123,7 +94,8 @@ class ComparisonWindow(QWidget):
         self._export.setEnabled(comparison is not None and not model.busy)
         self._summary.setText(self._words())
         notes = " ".join(comparison.notes) if comparison is not None else ""
-        self._say(model.problem or notes, "warning" if model.problem else "muted")
+        say(self._notes, model.problem or notes, "warning" if model.problem else "muted")
+        self._notes.setVisible(bool(self._notes.text()))
 
     def _words(self) -> str:
         model = self._model
@@ -142,18 +114,10 @@ class ComparisonWindow(QWidget):
             f" Doppler maps differ by {model.map_l1:.2f} (relative L1)"
         )
 
-    def _say(self, text: str, role: str) -> None:
-        if self._notes.objectName() != role:
-            self._notes.setObjectName(role)
-            self._notes.style().unpolish(self._notes)
-            self._notes.style().polish(self._notes)
-        self._notes.setText(text)
-        self._notes.setVisible(bool(text))
-
     def _ask(self) -> None:
-        name, _ = QFileDialog.getSaveFileName(self, "Export comparison", "comparison.png", FIGURES)
-        if name:
-            self._attempt(lambda: self._model.save_figure(Path(name)))
+        path = ask_figure(self, "Export comparison", "comparison")
+        if path is not None:
+            self._attempt(lambda: self._model.save_figure(path))
 
     def closeEvent(self, event: QCloseEvent) -> None:
         """Stop comparing, and discard the results."""

@@ -11,11 +11,9 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QComboBox, QFileDialog, QToolButton
 from window_models import models_of
 
-from sd2app.mesh_comparison.curves import JointCurves, joint_words
 from sd2app.mesh_comparison.feature import mesh_of
-from sd2app.mesh_comparison.model import name_of
-from sd2app.mesh_comparison.pictures import ComparedPicture
-from sd2app.mesh_comparison.table import JointTable
+from sd2app.mesh_comparison.model import joint_words, name_of
+from sd2app.mesh_comparison.views import ComparedPicture, JointCurves, JointTable
 from sd2app.mesh_comparison.window import ComparisonWindow
 from sd2core.body.model import Body
 from sd2core.body.rotations import about
