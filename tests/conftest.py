@@ -13,12 +13,23 @@ from sd2core.body.landmark_models import LandmarkModels, landmark_models
 from sd2core.errors import Sd2Error
 from sd2core.files.lock import FileLock
 from sd2core.numerics.compiled import cache_directory, kernels_ready, warm_up
+from sd2core.runs import pace
 
 # A busy machine is no failure: no test asserts a time.
 settings.register_profile("sd2", deadline=None)
 settings.load_profile("sd2")
 
 REPOSITORY = Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture(autouse=True)
+def no_known_pace(
+    tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Forget what this machine has measured before."""
+    path = tmp_path_factory.getbasetemp() / "pace.json"
+    path.unlink(missing_ok=True)
+    monkeypatch.setattr(pace, "_path", lambda: path)
 
 
 @pytest.fixture(scope="session")

@@ -1,7 +1,7 @@
 """Keeps a folder as ``sd2 batch`` does, and makes nothing.
 
 ``fake_batch.py [--step-s S] [--refuse TEXT] [--fail N] [--die-at N] [--break TEXT] batch PLAN
---workers N [--dry-run --json]``: per file of the plan one map and one denoised map.
+--workers N``: per file of the plan one map and one denoised map.
 """
 
 from __future__ import annotations
@@ -35,36 +35,12 @@ def main() -> int:
     parser.add_argument("command", choices=["batch"])
     parser.add_argument("plan", type=Path)
     parser.add_argument("--workers", type=int)
-    parser.add_argument("--dry-run", action="store_true")
-    parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
     time.sleep(options.slow_start_s)
     if options.refuse:
         print(f"sd2: {options.refuse}", file=sys.stderr)
         return 1
-    plan = read_plan(options.plan)
-    if options.dry_run:
-        print(json.dumps(estimate(plan, options.workers), indent=2))
-        return 0
-    return run(plan, options)
-
-
-def estimate(plan, workers: int) -> dict:
-    files = len(plan.recordings.files)
-    step = {
-        "there": 1,
-        "to_do": 4,
-        "frames": 120,
-        "seconds": 180.0,
-        "bytes": 2_000_000,
-        "basis": "",
-    }
-    nothing = {"there": 2, "to_do": 0, "frames": 0, "seconds": 0.0, "bytes": 0, "basis": ""}
-    return {
-        "recordings": files, "looked_at": files - 1, "workers": workers,
-        "steps": {"inspect": nothing, "synthesise": step}, "hours": 0.5, "bytes": 2_000_000,
-        "unusable": ["a.npz: It is damaged.", "b.npz: It is not there."],
-    }  # fmt: skip
+    return run(read_plan(options.plan), options)
 
 
 def run(plan, options: argparse.Namespace) -> int:

@@ -35,9 +35,9 @@ class Tally:
     done: Counter[str] = field(default_factory=Counter)
     failed: Counter[str] = field(default_factory=Counter)
     waiting: Counter[str] = field(default_factory=Counter)
-    # Seconds and frames of the tasks done.
+    # Seconds and work of the tasks done.
     seconds: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
-    frames: Counter[str] = field(default_factory=Counter)
+    work: Counter[str] = field(default_factory=Counter)
 
     def settled(self, step: str) -> int:
         """Number of tasks of a step that need no more work."""
@@ -217,7 +217,7 @@ class Driver:
         if self._follow(task):
             self.tally.done[task.step] += 1
             self.tally.seconds[task.step] += seconds
-            self.tally.frames[task.step] += task.frames
+            self.tally.work[task.step] += task.work
             self.last = task
 
     def _found(self, task: Task) -> None:

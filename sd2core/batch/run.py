@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from sd2core.batch.driver import Driver, Failure, Stopped, event_of
-from sd2core.batch.estimate import remember_fit_rate
+from sd2core.batch.estimate import pace_kind
 from sd2core.batch.exporting import dataset_path
 from sd2core.batch.folder import PROGRESS_FORMAT, PROGRESS_VERSION, BatchFolder
 from sd2core.batch.inputs import find_origins
@@ -25,6 +25,7 @@ from sd2core.batch.tasks import BEGUN
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
 from sd2core.runs.control import Control, signals_kept, write_control
+from sd2core.runs.pace import keep_pace
 from sd2core.runs.progress import Event, ProgressWriter
 from sd2core.version import __version__
 
@@ -266,17 +267,18 @@ class _Run:
             "dataset": str(dataset) if dataset is not None and dataset.exists() else None,
             "error": told,
         }
-        self._remember_rate()
+        self._keep_pace()
         self._write_report(facts)
         self._folder.set_state(outcome)  # type: ignore[arg-type]
         self._lines.say("end", **facts)
         return facts
 
-    def _remember_rate(self) -> None:
-        fit = self._graph.plan.fit
-        if self._driver is not None and fit is not None and self._scheduler is None:
+    def _keep_pace(self) -> None:
+        """Keep the pace of each step; that of other machines is of no use here."""
+        if self._driver is not None and self._scheduler is None:
             tally = self._driver.tally
-            remember_fit_rate(fit.resolution, tally.seconds["fit"], tally.frames["fit"])
+            for step in self._graph.steps:
+                keep_pace(pace_kind(self._graph.plan, step), tally.seconds[step], tally.work[step])
 
     def _write_report(self, facts: dict[str, Any]) -> None:
         """Write all facts, then one failure after the other, as there may be many."""

@@ -37,9 +37,15 @@ class Task:
     origin: Origin
     details: Mapping[str, Any]  # arguments, as JSON can hold them
     placement: int | None = None
-    frames: int = 0  # to work on, for rates
+    frames: int = 0  # to work on
     group: str = ""  # best done by one process
     out: str = ""  # file that is written last; empty where that is not a file of its own
+
+    @property
+    def work(self) -> int:
+        """Amount that the time grows with: frames, times vertices where it is made of a mesh."""
+        mesh = self.details.get("mesh")
+        return max(self.frames, 1) * (mesh["vertices"] if mesh else 1)
 
     def record(self, folder: Path, most_deaths: int = 2) -> dict[str, Any]:
         """Return what is sent to a worker."""

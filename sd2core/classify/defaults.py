@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from sd2core.runs.pace import Kind
+
 MODELS = ("lstm", "s4")
 """The paper's network, and one of the denoiser's S4 layers."""
 
@@ -12,3 +17,8 @@ DELAY_S = 0.5
 """Frames of so many seconds after a frame are seen before its answer (the paper's: none)."""
 
 LONGEST_DELAY_S = 5.0
+
+
+def pace_kind(model: str, features: str, width: int) -> Kind:
+    """Kind of work whose items are steps of a training, see :mod:`sd2core.runs.pace`."""
+    return ("classify train", model, features, width)

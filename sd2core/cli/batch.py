@@ -41,7 +41,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             "at the end and does not stop the others; the exit code is then 1."
         ),
         examples=(
-            "  sd2 batch plan.toml --dry-run       (how many tasks, hours and bytes)\n"
+            "  sd2 batch plan.toml --dry-run       (how many tasks, what time and bytes)\n"
             "  sd2 batch plan.toml\n"
             "  sd2 batch plan.toml --scheduler tcp://10.0.0.5:8786\n"
             "  sd2 batch --status made"
@@ -60,7 +60,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     )
     what = parser.add_mutually_exclusive_group()
     what.add_argument(
-        "--dry-run", action="store_true", help="print tasks, hours and bytes, and do nothing"
+        "--dry-run", action="store_true", help="print tasks, time and bytes, and do nothing"
     )
     what.add_argument(
         "--status", type=Path, metavar="FOLDER", help="print the state of the batch in this folder"
@@ -226,34 +226,22 @@ def _dry_run(plan: BatchPlan, options: argparse.Namespace) -> int:
 
 
 def print_estimate(made: BatchEstimate, plan: BatchPlan) -> None:
-    """Print tasks, hours and bytes of a batch."""
+    """Print tasks, time and bytes of a batch."""
     print(
         f"{plan.out}: {counted(made.recordings, 'recording')},"
         f" {counted(plan.placement_count, 'placement')} each"
     )
-    rows = [("step", "to do", "there", "one process", "written", "basis of the time")]
+    size = f"At most {bytes_words(made.bytes)}."
+    rows = [("step", "to do", "there", "one process", "written")]
     for step, one in made.steps.items():
-        rows.append(
-            (
-                step,
-                f"{one.to_do:,}",
-                f"{one.there:,}",
-                duration(one.seconds),
-                bytes_words(one.bytes),
-                one.basis if one.to_do else "",
-            )
-        )
+        time = "not known" if one.seconds is None else duration(one.seconds)
+        rows.append((step, f"{one.to_do:,}", f"{one.there:,}", time, bytes_words(one.bytes)))
     print_rows(rows, right=(1, 2, 3, 4))
     workers = "1 process" if made.workers == 1 else f"{made.workers} processes"
-    print(
-        f"Estimated: {duration(made.hours * 3600)} on {workers}, {bytes_words(made.bytes)};"
-        " some seconds more to start them"
-    )
-    if made.assumed_share > 0:
-        print(
-            f"{made.assumed_share:.0%} of that rests on another machine's figures: `sd2 fit` on a"
-            " video of yours gives your own."
-        )
+    if made.seconds is None:
+        print(f"Time: this machine has not done all of it before; the first tasks tell. {size}")
+    else:
+        print(f"Estimated: {duration(made.seconds)} on {workers}, as such tasks took here. {size}")
     if made.looked_at < made.recordings:
         print(f"Estimated from {made.looked_at:,} recordings; the others are assumed to be alike.")
     if made.unusable:

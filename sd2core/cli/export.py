@@ -23,6 +23,7 @@ from sd2core.cli.options import (
 )
 from sd2core.cli.output import counted, duration, print_facts, print_json, progress_bar
 from sd2core.errors import Sd2Error
+from sd2core.runs.pace import Pace
 
 if TYPE_CHECKING:
     from sd2core.datasets.forecast import Forecast
@@ -193,14 +194,18 @@ def _exported(options: argparse.Namespace, lines: _Lines | None) -> int:
         return _dry_run(options, sources, wanted, making)
     from sd2core.datasets.preview import write_preview
     from sd2core.datasets.writing import write_dataset
+    from sd2core.runs.pace import keep_pace
 
+    begun_s = time.monotonic()
     if lines is not None:
         lines.say("start", format="sd2-export-progress", version=1, sources=len(sources))
         written = write_dataset(options.out, sources, wanted, lines.progress)
-        lines.say("progress", done=0, total=0, stage="sheet")
+        lines.say("progress", done=0, total=0, stage="sheet", left_s=None)
     else:
         with progress_bar("Exporting", "step") as progress:
             written = write_dataset(options.out, sources, wanted, progress)
+    if written.added == written.sources:
+        keep_pace(making.pace_kind, time.monotonic() - begun_s, written.segments)
     sheet = write_preview(options.out)
     if lines is not None:
         lines.say("done", **_said(written, sheet))
@@ -253,11 +258,13 @@ def _dry_run(
     options: argparse.Namespace, sources: list[LazySource], wanted: DatasetOptions, making: Making
 ) -> int:
     from sd2core.datasets.forecast import Counting
+    from sd2core.runs.pace import known_pace_s
 
     with progress_bar("Counting", "source") as progress:
         counting = Counting.of(sources, progress)
     forecast = counting.forecast(wanted, making.synthesis.axis.bins)
-    simulating_s = _simulating_s(options, making)
+    each_s = known_pace_s(making.pace_kind)
+    seconds = None if each_s is None else each_s * forecast.segments
     if options.json:
         print_json(
             {
@@ -270,27 +277,20 @@ def _dry_run(
                 "segments_of_split": forecast.of_split(),
                 "frame_rate_hz": forecast.frame_rate_hz,
                 "total_bytes": forecast.total_bytes,
-                "simulating_s": simulating_s,
+                "seconds": seconds,
                 "failed": list(forecast.failed),
             }
         )
     else:
         facts = _forecast_facts(forecast)
-        if simulating_s is not None:
-            facts["simulating"] = f"about {duration(simulating_s)} in all, measured on some frames"
+        facts["time"] = (
+            "not known before the first source is written"
+            if seconds is None
+            else f"about {duration(seconds)}, as such maps took here before"
+        )
         print_facts(f"{options.out} would hold", facts)
     _complain(forecast.failed)
     return 1 if forecast.failed else 0
-
-
-def _simulating_s(options: argparse.Namespace, making: Making) -> float | None:
-    """Estimate the seconds of simulating radars; None where it is not asked for."""
-    if making.simulation is None:
-        return None
-    from sd2core.datasets.forecast import simulation_s
-    from sd2core.datasets.sources import recordings_of
-
-    return simulation_s(recordings_of(options.inputs), making)
 
 
 def _forecast_facts(forecast: Forecast) -> dict[str, str]:
@@ -349,12 +349,17 @@ class _Lines:
 
     def __init__(self) -> None:
         self._last_s = -1.0
+        self._total, self._pace = 0, Pace()
 
     def say(self, event: str, **content: Any) -> None:
         print(json.dumps({"event": event, **content}, ensure_ascii=False), flush=True)
 
     def progress(self, done: int, total: int) -> None:
         now_s = time.monotonic()
+        if total != self._total:  # packing into one file has steps of its own
+            self._total, self._pace = total, Pace()
+        self._pace.take(done, now_s)
         if now_s - self._last_s >= _LINE_EVERY_S or done == total:
             self._last_s = now_s
-            self.say("progress", done=done, total=total, stage="segments")
+            left_s = self._pace.left_s(total - done)
+            self.say("progress", done=done, total=total, stage="segments", left_s=left_s)

@@ -157,9 +157,9 @@ def _make(options: argparse.Namespace, lines: FitLines | None) -> None:
         from sd2core.cli.reading import check_output
 
         check_output(options.landmarks, ".npz")
-    from sd2core.batch.estimate import remember_fit_rate
     from sd2core.body.fit_folder import PARTIAL, check_fit_output
     from sd2core.body.fit_video import fit_video
+    from sd2core.runs.pace import keep_pace
 
     check_fit_output(options.out)
     goes_on = options.out.with_name(options.out.name + PARTIAL).exists() and not options.restart
@@ -178,7 +178,7 @@ def _make(options: argparse.Namespace, lines: FitLines | None) -> None:
     seconds = time.perf_counter() - begun_s
     if not goes_on:
         core_s = time.process_time() - begun_core_s
-        remember_fit_rate(options.resolution, core_s, made.frames)
+        keep_pace(("fit", options.resolution), core_s, made.frames)
     if lines is not None:
         lines.done(made, seconds)
     elif options.json:

@@ -1,30 +1,20 @@
-"""Forecast of an export: segments, bytes and time, before any map is made."""
+"""Forecast of an export: segments and bytes, before any map is made."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
-from pathlib import Path
 
 from sd2core.datasets.cutting import count_segments
 from sd2core.datasets.layout import bytes_per_segment
 from sd2core.datasets.options import DatasetOptions
-from sd2core.datasets.recording_sources import Making, places_of
-from sd2core.datasets.simulating import simulated_map
 from sd2core.datasets.source import KINDS, LazySource, Outline, Source
 from sd2core.datasets.splitting import split_people
 from sd2core.errors import Sd2Error
 from sd2core.maps import MapKind
-from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Progress, silent
-from sd2core.recording.recording import open_recording
-from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
 from sd2core.train.data import Split
-
-_TIMED_FRAMES = 60
-_WARMING_FRAMES = 4
 
 
 @dataclass(frozen=True)
@@ -111,39 +101,3 @@ class Counting:
             total_bytes=segments * bytes_per_segment(options.length, bins, len(of_kind)),
             failed=tuple(self.failed),
         )
-
-
-def simulation_s(recordings: Sequence[Path], making: Making) -> float:
-    """Estimate the seconds that simulating all recordings from all places takes.
-
-    Timed on some frames of the first recording that can be simulated; the others are assumed to
-    cost the same per frame. Recordings that cannot be read are left out.
-    """
-    if making.simulation is None or "simulated" not in making.kinds:
-        return 0.0
-    frames, each_s = 0, 0.0
-    for path in recordings:
-        try:
-            recording = open_recording(path)
-            mesh = recording.load_mesh() if recording.mesh is not None else None
-        except Sd2Error:
-            continue  # the counting says it
-        if mesh is None or mesh.faces is None:
-            continue
-        if not frames:
-            each_s = _timed_s(mesh, recording.sensor, making)
-        frames += mesh.frame_count * (1 + len(places_of(recording, making)))
-    return frames * each_s
-
-
-def _timed_s(mesh: MeshSequence, sensor: VirtualSensor, making: Making) -> float:
-    """Measure the seconds per frame in the middle of the clip."""
-    assert making.simulation is not None
-    middle = mesh.frame_count // 2
-    begun_s = 0.0
-    for count in (_WARMING_FRAMES, _TIMED_FRAMES):
-        start = max(middle - count // 2, 0)
-        stop = min(start + count, mesh.frame_count)
-        begun_s = time.perf_counter()
-        simulated_map(mesh, sensor, making.simulation, making.synthesis.axis, (start, stop))
-    return (time.perf_counter() - begun_s) / (stop - start)

@@ -41,6 +41,7 @@ from sd2core.placements.body_extent import BodyExtent
 from sd2core.placements.placements import Place, Placements
 from sd2core.progress import Progress
 from sd2core.recording.recording import Recording, open_recording
+from sd2core.runs.pace import Kind
 from sd2core.sensor import Vector, VelocityAxis, VirtualSensor
 from sd2core.timebase import Timebase
 
@@ -84,6 +85,12 @@ class Making:
     placements: Placements | Literal["planned"] | None = None
     simulation: Simulation | None = None
     model: str | None = None
+
+    @property
+    def pace_kind(self) -> Kind:
+        """Kind of work whose items are segments of recordings, see :mod:`sd2core.runs.pace`."""
+        told = (self.synthesis.visibility, self.tolerance, self.model, self.simulation is not None)
+        return ("export", *self.kinds, *map(str, told))
 
 
 def recording_sources(

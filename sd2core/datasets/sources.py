@@ -87,11 +87,6 @@ def gather(
     return found
 
 
-def recordings_of(paths: Sequence[Path]) -> list[Path]:
-    """Return the recordings among inputs and in folders of them."""
-    return [one for path in paths for one in _expanded(Path(path)) if is_recording(one)]
-
-
 def recordings_in(folder: Path) -> list[Path]:
     """Return the recordings directly in a folder, by name."""
     return sorted(path for path in folder.glob(f"*{SUFFIX}") if is_recording(path))

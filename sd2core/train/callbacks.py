@@ -14,6 +14,7 @@ from sd2core.denoise.scaling import Scaling
 from sd2core.errors import Sd2Error
 from sd2core.runs.control import Control, Word
 from sd2core.runs.folder import State
+from sd2core.runs.pace import Pace
 from sd2core.runs.progress import ProgressWriter, StepLines
 from sd2core.sensor import VelocityAxis
 from sd2core.train.checkpoint import Checkpoint, Position, write_checkpoint
@@ -72,7 +73,7 @@ class TrainingCallbacks:
         self._counted: torch.Tensor | None = None
         self._squares: torch.Tensor | None = None
         self._line_squares, self._line_segments = position.squares, position.segments
-        self._clock = Clock(position.elapsed_s)
+        self._clock, self._pace = Clock(position.elapsed_s), Pace()
         self._kept_s = self._clock.elapsed_s
         self._share = 0.0
 
@@ -104,7 +105,6 @@ class TrainingCallbacks:
         )
         self._clock = Clock(self.position.elapsed_s)
         self._kept_s = self._clock.elapsed_s
-        self._clock.left_s(self._share_done())
         self._set_state("running")
 
     def counted_on(self, device: torch.device) -> torch.Tensor:
@@ -253,6 +253,7 @@ class TrainingCallbacks:
             weights, moments = self._learner.checkpoint_tensors()
             checkpoint = Checkpoint(weights, moments, position, self._about)
             write_checkpoint(self._folder.last, self._folder.last_record, checkpoint)
+            self._pace.keep(self.config.pace_kind)
 
     def _keep_what_there_is(self) -> None:
         """Keep the model of a run that is stopped in its first epoch.
@@ -280,10 +281,13 @@ class TrainingCallbacks:
         return squares
 
     def _times(self) -> dict[str, float | None]:
-        return {
-            "elapsed_s": self._clock.elapsed_s,
-            "left_s": self._clock.left_s(min(1.0, self._share_done())),
-        }
+        elapsed_s, done, total = self._clock.elapsed_s, self.position.steps_done, self.total_steps
+        minutes = self.config.training.minutes
+        self._pace.take(done, elapsed_s)
+        left_s = None if total is None else self._pace.left_s(total - done)
+        if minutes is not None:
+            left_s = max(60.0 * minutes - elapsed_s, 0.0)
+        return {"elapsed_s": elapsed_s, "left_s": left_s}
 
     @property
     def _leads(self) -> bool:

@@ -12,6 +12,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.paths import located_path
 from sd2core.files.toml import toml_lines
 from sd2core.pairs.segments import LENGTH, OVERLAP
+from sd2core.runs.pace import Kind
 from sd2core.train.rules import Allowed, choice, flag, number, paths, refused, table, text, texts
 
 
@@ -171,6 +172,17 @@ class TrainConfig:
     model: ModelConfig = field(default_factory=ModelConfig)
     training: TrainingConfig = field(default_factory=TrainingConfig)
     machine: MachineConfig = field(default_factory=MachineConfig)
+
+    @property
+    def pace_kind(self) -> Kind:
+        """Kind of work whose items are steps, see :mod:`sd2core.runs.pace`."""
+        model, machine = self.model, self.machine
+        options = ",".join(f"{name}={value}" for name, value in sorted(model.options.items()))
+        threads = machine.threads or "all"
+        return (
+            "train", model.name, options, self.training.batch_size,
+            machine.device, machine.devices, machine.precision, f"{threads} threads",
+        )  # fmt: skip
 
     def with_values(self, values: Mapping[str, Mapping[str, Any]]) -> TrainConfig:
         """Copy with settings replaced: ``{section: {name: value}}``."""

@@ -53,7 +53,6 @@ def test_playing_while_a_training_runs(benchmark, sample_window, qtbot, tmp_path
     alone = intervals_ms(window, qtbot)
     training.setup.add_store(write_pairs(tmp_path / "campaign.zarr", frames=2000))
     qtbot.waitUntil(lambda: not training.setup.problem)
-    training.step_times.stop()
     training.start()
     qtbot.waitUntil(lambda: training.run.history.epoch >= 2, timeout=300_000)
     beside = benchmark.pedantic(intervals_ms, (window, qtbot), rounds=1)
@@ -83,7 +82,6 @@ def test_an_update_of_the_panel(benchmark, sample_window, qtbot, tmp_path):
     window, training = sample_window, models_of(sample_window).training
     training.setup.add_store(write_pairs(tmp_path / "campaign.zarr"))
     qtbot.waitUntil(lambda: not training.setup.problem)
-    training.step_times.stop()
     training.start()
     qtbot.waitUntil(lambda: training.run.history.epoch >= 1, timeout=300_000)
     training.pause()

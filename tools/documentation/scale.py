@@ -7,25 +7,30 @@ Every figure is measured when this runs; what a million recordings need follows 
 from __future__ import annotations
 
 import argparse
+import itertools
 import statistics
 import subprocess
 import sys
 import tempfile
+import timeit
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from sd2core.accuracy.cache import this_machine
+from sd2core.batch.denoising import denoise
 from sd2core.batch.driver import AHEAD
-from sd2core.batch.estimate import task_rates
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.inputs import find_origins, glance
+from sd2core.batch.plan import BatchPlan
 from sd2core.batch.plan_file import plan_from_text
-from sd2core.batch.synthesis import LONGEST_FRAMES
+from sd2core.batch.synthesis import LONGEST_FRAMES, Choosing, synthesise
 from sd2core.batch.task_graph import TaskGraph
 from sd2core.cli.batch import bytes_words
 from sd2core.files.resources import resource_path
 from sd2core.numerics.compiled import warm_up
 from sd2core.recording.recording import open_recording
+from sd2core.sensor import VirtualSensor
 from tools.documentation.places import BENCHMARKS, DOCS
 
 sys.path.insert(0, str(BENCHMARKS))
@@ -43,6 +48,8 @@ from long_fits import LongFit, long_fit, sample_landmarks
 
 RECORDINGS, FRAMES, PLACES = 1_000_000, 1800, 8
 """Size of the estimated batch: recordings of a minute each at 30 frames/s."""
+
+_TIMED_FRAMES = (450, 120)
 
 INTRODUCTION = """\
 # Batches at scale
@@ -347,23 +354,55 @@ def _costs(folder: Path, fits: list[Fitted]) -> list[Cost]:
             f'out = "{folder / "made"}"\n[recordings]\nfiles = ["{sample}"]\n'
             f"[synthesise]\n{how}\n[denoise]\n"
         )
-        plan = plan_from_text(text, folder)
-        origins = find_origins(plan.recordings, Path(plan.out))
-        flow = TaskGraph(plan, BatchFolder(Path(plan.out)), origins)
-        rates = task_rates(flow, glance(origins[0]))
-        for step in ("synthesise", "denoise"):
-            if step == "synthesise" or not how:
-                rate = rates[step]
-                costs.append(
-                    Cost(
-                        title if step == "synthesise" else step,
-                        rate.frame_s,
-                        rate.seconds,
-                        rate.frame_bytes,
-                        rate.bytes,
-                    )
-                )
+        made, denoised = _costs_of_maps(plan_from_text(text, folder), folder / title, title)
+        costs += [made] if how else [made, denoised]
     return costs
+
+
+def _costs_of_maps(plan: BatchPlan, folder: Path, title: str) -> tuple[Cost, Cost]:
+    """Costs of a map and of denoising it, from many frames of a recording and from few."""
+    folder.mkdir()
+    origins = find_origins(plan.recordings, Path(plan.out))
+    model, digest = TaskGraph(plan, BatchFolder(Path(plan.out)), origins).model
+    found, section = glance(origins[0]), plan.synthesise
+    mesh, counts = found.mesh, _TIMED_FRAMES
+    assert mesh is not None
+    assert section is not None
+    choosing = None
+    if section.tolerance is not None:
+        choosing = Choosing(folder / "plan.json", (found.sensor,), mesh.frames)
+    places = (VirtualSensor((1e-3 * number, 0.0, 0.0)) for number in itertools.count(1))
+
+    def made(count: int) -> Path:
+        return folder / f"{count}.npz"
+
+    def denoised(count: int) -> Path:
+        return folder / f"denoised-{count}.npz"
+
+    def make(count: int) -> None:
+        # From another place each time: masks of a place are kept, and would cost nothing.
+        synthesise(mesh, next(places), section, (0, count), choosing, made(count))
+
+    def clean(count: int) -> None:
+        denoise([made(count)], model, digest, [denoised(count)])
+
+    for count in counts:  # what is opened and chosen once is not counted
+        make(count)
+        clean(count)
+    return _cost(title, make, made), _cost("denoise", clean, denoised)
+
+
+def _cost(title: str, work: Callable[[int], None], out: Callable[[int], Path]) -> Cost:
+    """Cost per task and per frame."""
+    long, short = _TIMED_FRAMES
+    seconds = {count: min(timeit.repeat(lambda c=count: work(c), number=1, repeat=2))
+               for count in _TIMED_FRAMES}  # fmt: skip
+    sizes = {count: out(count).stat().st_size for count in _TIMED_FRAMES}
+    frame_s, frame_bytes = (
+        max((values[long] - values[short]) / (long - short), 0.0) for values in (seconds, sizes)
+    )
+    task_s = max(seconds[short] - frame_s * short, 0.0)
+    return Cost(title, frame_s, task_s, frame_bytes, max(sizes[short] - frame_bytes * short, 0.0))
 
 
 def _fits(folder: Path, frames: tuple[int, ...]) -> list[Fitted]:

@@ -78,9 +78,6 @@ class Runs(QObject, Generic[Run]):
         """Look for runs on disk, in the background; the newest first."""
         return ()
 
-    def on_change(self, run: Run) -> None:
-        """Take what the run in view has told."""
-
     # --- what is known ----------------------------------------------------------------------
 
     @property
@@ -180,13 +177,8 @@ class Runs(QObject, Generic[Run]):
         self._run, self._under_way = run, under_way
         self._settings.set_value(self._remembered, "" if run is None else str(run.path))
         if run is not None:
-            run.changed.connect(self._tell_change)
+            run.changed.connect(self.changed)
             run.phase_changed.connect(self._notice)
-        self.changed.emit()
-
-    def _tell_change(self) -> None:
-        if self._run is not None:
-            self.on_change(self._run)
         self.changed.emit()
 
     def _notice(self) -> None:

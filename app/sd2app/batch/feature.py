@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 
 from PySide6.QtCore import QObject, SignalInstance
 
+from sd2app.background.run_command import COMMAND
 from sd2app.batch.dialog import BatchDialogs
-from sd2app.batch.estimate import COMMAND
 from sd2app.batch.model import BatchModel
 from sd2app.feature import Action, Feature, Shell
 from sd2app.sensor.placements import PlacementsModel

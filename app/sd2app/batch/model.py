@@ -7,14 +7,16 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject, Signal
 
+from sd2app.background.latest import LatestRunner
 from sd2app.background.run_command import COMMAND, launch
-from sd2app.batch.estimate import BatchEstimateModel
 from sd2app.batch.results import BatchResults
 from sd2app.batch.run import BatchMonitor, plan_of
 from sd2app.batch.setup import BatchSetupModel
 from sd2app.settings import Settings
 from sd2app.widgets.text import counted
+from sd2core.batch.estimate import BatchEstimate, estimate
 from sd2core.batch.folder import BatchFolder
+from sd2core.batch.plan import BatchPlan
 from sd2core.batch.plan_file import write_plan
 from sd2core.errors import Sd2Error
 
@@ -22,7 +24,8 @@ from sd2core.errors import Sd2Error
 class BatchModel(QObject):
     """One batch in view, or a new one that is being set up.
 
-    ``command`` is the program that runs ``sd2`` commands.
+    ``command`` is the program that runs ``sd2`` commands. ``estimate`` is that of the set-up,
+    None until it has been asked for and computed.
     """
 
     changed = Signal()
@@ -40,11 +43,16 @@ class BatchModel(QObject):
         self._settings = settings
         self._command = tuple(command)
         self.setup = BatchSetupModel(settings, self)
-        self.estimate = BatchEstimateModel(self, command)
         self.results = BatchResults(self)
+        self.estimate: BatchEstimate | None = None
+        self._asked: tuple[BatchPlan, int] | None = None
+        self._refusal = ""
+        self._estimating = LatestRunner("estimate", self)
+        self._estimating.finished.connect(self._take_estimate)
+        self._estimating.failed.connect(self._refuse_estimate)
         self._monitor: BatchMonitor | None = None
         self._was_under_way = self._taking_up = self._watched = False
-        for signal in (self.setup.changed, self.estimate.changed, self.results.changed):
+        for signal in (self.setup.changed, self.results.changed):
             signal.connect(self.changed)
 
     # --- what is known --------------------------------------------------------------------
@@ -57,14 +65,19 @@ class BatchModel(QObject):
     @property
     def why_not_start(self) -> str:
         """Reason why the set-up cannot be started; empty when it can."""
-        setup, estimate = self.setup, self.estimate
+        setup = self.setup
         if setup.problem:
             return setup.problem
-        if not estimate.of(setup.plan(), setup.workers):
+        if self._asked != (setup.plan(), setup.workers):
             return "Its tasks have not been counted yet."
-        if estimate.busy:
+        if self._estimating.busy:
             return "Working out what it would do…"
-        return estimate.problem
+        return self._refusal
+
+    @property
+    def refused(self) -> bool:
+        """True if what is set up cannot be done."""
+        return bool(self._refusal) and self.why_not_start == self._refusal
 
     def set_watched(self, watched: bool) -> None:
         """Note that the batch is visible or hidden."""
@@ -94,8 +107,14 @@ class BatchModel(QObject):
 
     def ask_estimate(self) -> None:
         """Compute the estimate for the set-up, unless it is known."""
-        if not self.setup.problem:
-            self.estimate.ask(self.setup.plan(), self.setup.workers)
+        if self.setup.problem:
+            return
+        asked = self.setup.plan(), self.setup.workers
+        if asked != self._asked:
+            self._forget_estimate()
+            self._asked = asked
+            self._estimating.submit(lambda emit: estimate(*asked, lambda done, of: emit(None)))
+            self.changed.emit()
 
     def start(self) -> None:
         """Begin as set up; Sd2Error if it cannot start, OSError if its plan cannot be written."""
@@ -125,7 +144,7 @@ class BatchModel(QObject):
 
     def close(self) -> None:
         """Stop polling; a running batch goes on."""
-        self.estimate.close()
+        self._estimating.close()
         self.setup.close()
         self.results.close()
         if self._monitor is not None:
@@ -137,8 +156,22 @@ class BatchModel(QObject):
         output.unlink(missing_ok=True)
         words = ["batch", str(plan), "--workers", str(self.setup.workers)]
         process = launch([*self._command, *words], output)
-        self.estimate.forget()  # of what is about to be done
+        self._forget_estimate()  # of what is about to be done
         self._follow(BatchMonitor(out, self, process=process))
+
+    # --- the estimate ---------------------------------------------------------------------
+
+    def _forget_estimate(self) -> None:
+        self._estimating.cancel()
+        self._asked, self.estimate, self._refusal = None, None, ""
+
+    def _take_estimate(self, found: BatchEstimate) -> None:
+        self.estimate = found
+        self.changed.emit()
+
+    def _refuse_estimate(self, error: Exception) -> None:
+        self._refusal = str(error)
+        self.changed.emit()
 
     # --- following ------------------------------------------------------------------------
 

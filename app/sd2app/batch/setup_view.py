@@ -231,14 +231,14 @@ class BatchSetupView(QWidget):
         self._show_estimate()
 
     def _show_estimate(self) -> None:
-        batch, estimate = self._batch, self._batch.estimate
+        batch = self._batch
         why_not = batch.why_not_start
-        facts = None if why_not else estimate.facts
-        self._total.setVisible(facts is not None)
-        self._total.setText(estimate_headline(facts) if facts is not None else "")
-        self._facts.show_facts(() if facts is None else estimate_facts(facts)[:_MOST_FACTS])
-        text = why_not if facts is None else unusable_text(facts)
-        bad = facts is not None or why_not == estimate.problem
+        made = None if why_not else batch.estimate
+        self._total.setVisible(made is not None)
+        self._total.setText("" if made is None else estimate_headline(made))
+        self._facts.show_facts(() if made is None else estimate_facts(made)[:_MOST_FACTS])
+        text = why_not if made is None else unusable_text(made)
+        bad = made is not None or batch.refused
         bad |= any(entry.problem for entry in self._setup.entries)
         role = "warning" if bad else "muted"
         if self._problem.objectName() != role:

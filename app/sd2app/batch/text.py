@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from sd2app.background.run_monitor import Phase
 from sd2app.batch.run import BatchMonitor, Failed
 from sd2app.batch.setup import Entry
 from sd2app.widgets.text import about, bytes_text, counted, duration_text, exact_text
+from sd2core.batch.estimate import BatchEstimate, StepEstimate
 
 STEP_WORDS = {
     "inspect": "Look at recordings",
@@ -86,46 +85,44 @@ def failure_text(failed: Failed) -> str:
     return f"{failed.recording}, {step}{place}: {failed.reason}"
 
 
-def estimate_headline(facts: dict[str, Any]) -> str:
-    """Summary of a dry run in one line."""
-    recordings = counted(facts["recordings"], "recording")
-    if not any(step["to_do"] for step in facts["steps"].values()):
+def estimate_headline(made: BatchEstimate) -> str:
+    """Summary of an estimate in one line."""
+    recordings = counted(made.recordings, "recording")
+    if not any(step.to_do for step in made.steps.values()):
         return f"{recordings}: all of it is there already"
-    time = about(3600 * facts["hours"])
-    return f"{recordings}: {time} on {counted(facts['workers'], 'worker')}, {_size(facts['bytes'])}"
+    time = "the first tasks tell how long it takes"
+    if made.seconds is not None:
+        time = f"{about(made.seconds)} on {counted(made.workers, 'worker')}"
+    return f"{recordings}: {time}, at most {bytes_text(made.bytes)}"
 
 
-def estimate_facts(facts: dict[str, Any]) -> list[tuple[str, str]]:
+def estimate_facts(made: BatchEstimate) -> list[tuple[str, str]]:
     """The same step by step."""
     rows = [
         (STEP_WORDS.get(name, name), _step_text(step))
-        for name, step in facts["steps"].items()
-        if step["to_do"] or step["there"]
+        for name, step in made.steps.items()
+        if step.to_do or step.there
     ]
-    if facts["looked_at"] < facts["recordings"]:
-        rows.append(("Looked at", f"{facts['looked_at']:,}; the others are taken to be like them"))
+    if made.looked_at < made.recordings:
+        rows.append(("Looked at", f"{made.looked_at:,}; the others are taken to be like them"))
     return rows
 
 
-def unusable_text(facts: dict[str, Any]) -> str:
+def unusable_text(made: BatchEstimate) -> str:
     """Recordings that cannot be used, with the first reason; empty where all can."""
-    unusable = facts["unusable"]
+    unusable = made.unusable
     if not unusable:
         return ""
     more = f" ({len(unusable) - 1:,} more cannot, either.)" if len(unusable) > 1 else ""
     return f"Cannot be used: {unusable[0]}{more}"
 
 
-def _step_text(step: dict[str, Any]) -> str:
-    parts = [f"{step['to_do']:,} to do"]
-    if step["there"]:
-        parts.append(f"{step['there']:,} there already")
-    if step["to_do"]:
-        parts.append(about(step["seconds"]))
-    if step["bytes"]:
-        parts.append(_size(step["bytes"]))
+def _step_text(step: StepEstimate) -> str:
+    parts = [f"{step.to_do:,} to do"]
+    if step.there:
+        parts.append(f"{step.there:,} there already")
+    if step.to_do and step.seconds is not None:
+        parts.append(about(step.seconds))
+    if step.bytes:
+        parts.append(f"at most {bytes_text(step.bytes)}")
     return " · ".join(parts)
-
-
-def _size(count: float) -> str:
-    return f"some {bytes_text(round(count))}"

@@ -8,7 +8,6 @@ from pathlib import Path
 from PySide6.QtCore import QObject, SignalInstance
 from PySide6.QtWidgets import QMenu, QWidget
 
-from sd2app.background.step_times import StepTimes
 from sd2app.classify.chooser import ClassifierChooser
 from sd2app.classify.dialogs import ClassifyDialogs
 from sd2app.classify.finder import GestureFinder
@@ -40,7 +39,6 @@ class ClassifyFeature(Feature):
         labels: LabelsModel,
         edits: LabelEdits,
         library: ClassifierLibrary,
-        step_times: StepTimes,
         suggest: Callable[[GestureFinder], object],
         parent: QObject,
     ) -> None:
@@ -51,9 +49,7 @@ class ClassifyFeature(Feature):
             maps, session.playback, standing, labels, session.settings, library, parent
         )
         self.gestures = GestureFinder(self.model)
-        self.training = ClassTraining(
-            session.settings, self.model.use, parent, step_times=step_times
-        )
+        self.training = ClassTraining(session.settings, self.model.use, parent)
         self.dialogs = ClassifyDialogs(shell, self.model, self.training, session)
         self._menu: ModelMenu | None = None
 

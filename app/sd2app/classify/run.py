@@ -12,6 +12,7 @@ from PySide6.QtCore import QObject
 from sd2app.background.run_command import CommandFolder
 from sd2app.background.run_monitor import RunMonitor, take_lines
 from sd2core.processes import ProcessId
+from sd2core.runs.pace import Pace
 
 MODEL_NAME = "classifier.safetensors"
 TABLE_NAME = "table"
@@ -47,7 +48,7 @@ class ClassHistory:
         self.begun = False
         self.saving = False
         self._stride, self._skipped = 1, 0
-        self._first: tuple[int, float] | None = None
+        self._pace = Pace()
 
     @property
     def share(self) -> float | None:
@@ -55,18 +56,9 @@ class ClassHistory:
         return min(self.done / self.total, 1.0) if self.total else None
 
     @property
-    def step_s(self) -> float | None:
-        """Time of a step, or of a training of a comparison; None until that can be told."""
-        if self._first is None or self.elapsed_s is None:
-            return None
-        done, since_s = self._first
-        return (self.elapsed_s - since_s) / (self.done - done) if self.done > done else None
-
-    @property
     def left_s(self) -> float | None:
         """Time left at the pace so far; None until that can be told."""
-        step_s = self.step_s
-        return None if step_s is None or self.saving else step_s * (self.total - self.done)
+        return None if self.saving else self._pace.left_s(self.total - self.done)
 
     @property
     def best(self) -> CheckPoint | None:
@@ -110,8 +102,7 @@ class ClassHistory:
         self.done = done
         if 0 <= elapsed_s < math.inf:
             self.elapsed_s = elapsed_s
-            if self._first is None:
-                self._first = (done, elapsed_s)
+            self._pace.take(done, elapsed_s)
 
 
 _READERS = {

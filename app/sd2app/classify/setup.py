@@ -9,11 +9,11 @@ from typing import Any
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.latest import LatestRunner
-from sd2app.background.step_times import StepKey
 from sd2app.classify.data import DataSource, division_of, looked_into, why_not_together
 from sd2app.settings import Settings, StoredChoices
-from sd2core.classify.defaults import DELAY_S, LONGEST_DELAY_S, MODELS, WIDTH
+from sd2core.classify.defaults import DELAY_S, LONGEST_DELAY_S, MODELS, WIDTH, pace_kind
 from sd2core.files.paths import plain_path
+from sd2core.runs.pace import known_pace_s
 from sd2core.train.data import Split
 
 MAPS = ("radar", "synthetic", "denoised")
@@ -154,10 +154,10 @@ class ClassSetup(QObject):
         return None if self.problem else division_of(self._data)
 
     @property
-    def step_key(self) -> StepKey:
-        """Settings that the time of a step depends on."""
+    def step_s(self) -> float | None:
+        """Seconds per step, as this machine has measured such steps; None where it has not."""
         values = self._values
-        return StepKey.of_classifier(values["model"], values["features"], values["width"])
+        return known_pace_s(pace_kind(values["model"], values["features"], values["width"]))
 
     def train_arguments(self, out: Path) -> list[str]:
         """Arguments of ``sd2 classify train`` for all that differs from the defaults."""

@@ -183,7 +183,7 @@ class ClassSetupView(QWidget):
         self._copy = outlined(
             "Copy command", "The same as a command for a terminal", asks.copy_command, self
         )
-        self._estimate = EstimateLines(self._training.step_times, self)
+        self._estimate = EstimateLines(self)
         layout.addWidget(self._estimate)
         layout.addWidget(self._problem)
         layout.addLayout(side_by_side(self._start, self._copy, spacing_px=6))
@@ -232,11 +232,9 @@ class ClassSetupView(QWidget):
         with QSignalBlocker(self._quick):
             self._quick.setChecked(setup.value("quick") == "yes")
         self._estimate.setVisible(not setup.problem)
-        steps = steps_text(setup.value("steps"))
-        self._estimate.show_estimate(
-            training.estimate_s, f"The data is read first; then {steps}", training.step,
-            setup.step_key,
-        )  # fmt: skip
+        steps = setup.value("steps")
+        count = f"The data is read first; then {steps_text(steps)}"
+        self._estimate.show_estimate(count, steps, setup.step_s)
         why_not = training.why_not_train
         # What is wrong with the data, or that there is none, is said above.
         said = not setup.data or any(one.problem for one in setup.data)

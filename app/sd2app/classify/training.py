@@ -10,7 +10,6 @@ from PySide6.QtCore import QObject
 
 from sd2app.background.run_command import COMMAND_IN_FOLDER, CommandFolder, commands_in
 from sd2app.background.runs import KnownRun, Runs, Sentences, free_folder
-from sd2app.background.step_times import PatientTiming, StepKey, StepTime, StepTimes
 from sd2app.classify.library import user_classifiers_folder
 from sd2app.classify.run import MODEL_NAME, TABLE_NAME, ClassRun
 from sd2app.classify.setup import ClassSetup
@@ -34,7 +33,6 @@ class ClassTraining(Runs[ClassRun]):
 
     ``use`` classifies with a file. ``folder`` is that of the classifiers, with the runs in
     ``runs`` below it. ``command`` is the program that runs ``sd2`` commands in a folder.
-    ``step_times`` is shared with the training of denoisers.
     """
 
     def __init__(
@@ -44,17 +42,12 @@ class ClassTraining(Runs[ClassRun]):
         parent: QObject | None = None,
         folder: Path | None = None,
         command: Sequence[str] = COMMAND_IN_FOLDER,
-        step_times: StepTimes | None = None,
     ) -> None:
         super().__init__(ClassRun, settings, "classify/train/run", _SENTENCES, parent)
         self._use, self._command = use, tuple(command)
         self._folder = folder or user_classifiers_folder()
         self.setup = ClassSetup(settings, self)
-        self.step_times = step_times or StepTimes(settings, self)
-        self._timing = PatientTiming(self.step_times, self._to_be_timed, self)
         self.setup.changed.connect(self.changed)
-        self.setup.changed.connect(self._timing.wait)
-        self.step_times.changed.connect(self.changed)
         self._used: Path | None = None
 
     # --- what is known --------------------------------------------------------------------
@@ -75,16 +68,6 @@ class ClassTraining(Runs[ClassRun]):
         return self.busy or self.setup.problem
 
     @property
-    def step(self) -> StepTime | None:
-        """Time of a training step on this machine; None until it is known."""
-        return self.step_times.of(self.setup.step_key)
-
-    @property
-    def estimate_s(self) -> float | None:
-        """Estimated time of the training once the data has been read; None: not known."""
-        return None if self.step is None else self.step.seconds * self.setup.value("steps")
-
-    @property
     def command(self) -> str:
         """Command for a terminal that does what is set up."""
         return quoted(self.setup.train_arguments(Path(MODEL_NAME)))
@@ -92,15 +75,10 @@ class ClassTraining(Runs[ClassRun]):
     # --- one run after another ------------------------------------------------------------
 
     def set_watched(self, watched: bool) -> None:
-        """Note that the panel is visible or hidden: steps are timed only while it is visible."""
+        """Note that the panel is visible or hidden."""
         super().set_watched(watched)
         if watched:
             self.setup.refresh()
-        self._timing.look()
-
-    def _to_be_timed(self) -> StepKey | None:
-        wanted = self._watched and self.run is None and not self.why_not_train
-        return self.setup.step_key if wanted else None
 
     def find(self) -> Sequence[KnownRun]:
         """Read the folder of runs."""
@@ -113,8 +91,7 @@ class ClassTraining(Runs[ClassRun]):
             raise Sd2Error(self.why_not_train)
         path = self._new_folder(str(self.setup.value("model")))
         words = self.setup.train_arguments(path / MODEL_NAME)
-        timed_as = list(self.setup.step_key.words)
-        self._start(path, [*words, "--progress-json"], {"what": "train", "timed_as": timed_as})
+        self._start(path, [*words, "--progress-json"], {"what": "train"})
 
     def compare(self) -> None:
         """Begin to compare the radar alone with synthetic data added; raises as :meth:`train`."""
@@ -151,22 +128,14 @@ class ClassTraining(Runs[ClassRun]):
 
     def close(self) -> None:
         """Stop polling; a running process goes on."""
-        self._timing.stop()
         self.setup.close()
         super().close()
 
     def _start(self, path: Path, arguments: list[str], about: dict[str, Any]) -> None:
-        self.step_times.stop()
         self.follow_new(path, CommandFolder(path).start(arguments, about, self._command))
 
     def _new_folder(self, what: str) -> Path:
         return free_folder(self._folder / "runs", what, [one.path for one in self.setup.data])
-
-    def on_change(self, run: ClassRun) -> None:
-        """Store the measured time of a step as the estimate for the next training."""
-        step_s, words = run.history.step_s, run.about.get("timed_as")
-        if step_s is not None and isinstance(words, list):
-            self.step_times.learn(StepKey(tuple(map(str, words))), step_s)
 
 
 def _title(folder: CommandFolder) -> str:

@@ -195,7 +195,8 @@ class ExportDialog(QDialog):
             self._labels.setText("")
             self._splits.setText("")
         else:
-            self._size.setText(size_words(forecast, model.choice.length))
+            parts = (size_words(forecast, model.choice.length), model.time)
+            self._size.setText(" · ".join(filter(None, parts)))
             self._labels.setText(label_words(forecast))
             self._splits.setText(split_words(forecast))
         left_out = [] if forecast is None else list(forecast.failed)

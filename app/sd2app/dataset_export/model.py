@@ -13,6 +13,7 @@ from sd2app.background.latest import Emit, LatestRunner
 from sd2app.background.run_command import COMMAND_IN_FOLDER, CommandFolder, commands_in
 from sd2app.dataset_export.run import Exported, ExportRun, user_exports_folder
 from sd2app.session.tasks import Job, TaskList
+from sd2app.widgets.text import about
 from sd2core.datasets.forecast import Counting, Forecast
 from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.recording_sources import Making
@@ -22,6 +23,7 @@ from sd2core.maps import MapKind
 from sd2core.pairs.segments import LENGTH, OVERLAP
 from sd2core.progress import Cancelled
 from sd2core.recording.recording import is_recording, open_recording
+from sd2core.runs.pace import known_pace_s
 from sd2core.sensor import VelocityAxis
 
 ENDINGS = (".zarr", ".h5", ".npz")
@@ -87,6 +89,7 @@ class _Counted(NamedTuple):
     sources: tuple[object, ...]
     counting: Counting
     forecast: Forecast
+    each_s: float | None  # per segment, as this machine has measured such maps
 
 
 class ExportModel(QObject):
@@ -131,6 +134,16 @@ class ExportModel(QObject):
     def forecast(self) -> Forecast | None:
         """Forecast of the data set; None while it is counted, or where it cannot be."""
         return None if self._counted is None or self.counting else self._counted.forecast
+
+    @property
+    def time(self) -> str:
+        """Time of the whole export before it starts, and what is left of it while it runs."""
+        if self._run is not None:
+            left_s = self._run.left_s
+            return "" if left_s is None else f"{about(left_s)} left"
+        if self._counted is None or self._counted.each_s is None:
+            return "the first view tells how long it takes"
+        return about(self._counted.each_s * self._counted.forecast.segments)
 
     @property
     def counting(self) -> bool:
@@ -266,17 +279,15 @@ class ExportModel(QObject):
             options = DatasetOptions(
                 kinds=choice.kinds, length=choice.length, overlap=choice.overlap
             )
+            making = Making(kinds=choice.kinds, placements="planned" if choice.planned else None)
             if known is not None and known.sources == choice.sources:
                 counting = known.counting
             else:
-                sources = gather(
-                    [place],
-                    Making(kinds=choice.kinds, placements="planned" if choice.planned else None),
-                    subjects=choice.subjects or None,
-                )
+                sources = gather([place], making, subjects=choice.subjects or None)
                 counting = Counting.of(sources, lambda done, total: emit(None))
             forecast = counting.forecast(options, VelocityAxis().bins)
-            return _Counted(choice.sources, counting, forecast)
+            each_s = known_pace_s(making.pace_kind)
+            return _Counted(choice.sources, counting, forecast, each_s)
 
         self._runner.submit(count)
         self.changed.emit()

@@ -45,6 +45,7 @@ class ExportRun(RunMonitor[CommandFolder]):
         folder = CommandFolder(path)
         self.about = folder.facts
         self.done = self.total = 0
+        self.left_s: float | None = None
         self.written: Exported | None = None
         self._refused = ""
         super().__init__(folder, parent, process=process)
@@ -71,6 +72,8 @@ class ExportRun(RunMonitor[CommandFolder]):
 
     def _progress(self, event: dict[str, Any]) -> None:
         self.done, self.total = int(event["done"]), int(event["total"])
+        left_s = event.get("left_s")
+        self.left_s = None if left_s is None else float(left_s)
 
     def _done(self, event: dict[str, Any]) -> None:
         self.written = Exported(

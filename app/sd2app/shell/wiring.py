@@ -113,7 +113,6 @@ def build_features(session: Session, shell: Shell, parts: Parts, parent: QObject
         labels.model,
         labels.edits,
         parts.classifiers or core_classifiers(process),
-        training.model.step_times,
         lambda finder: features.suggestions.model.start(finder),
         parent,
     )

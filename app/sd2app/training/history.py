@@ -57,8 +57,6 @@ class TrainingHistory:
         self.error = ""
         self._epoch = 0
         self._stride, self._skipped = 1, 0
-        # Without the pauses, and since it was last begun: what a step takes now.
-        self._first: tuple[int, float] | None = None
 
     # --- what is known --------------------------------------------------------------------
 
@@ -82,15 +80,6 @@ class TrainingHistory:
         if self.minutes and self.elapsed_s is not None:
             return min(self.elapsed_s / (60.0 * self.minutes), 1.0)
         return None
-
-    @property
-    def step_s(self) -> float | None:
-        """Seconds per step, validation included; None until it can be told."""
-        if self._first is None or self.elapsed_s is None:
-            return None
-        steps, since_s = self._first
-        done = self.steps_done - steps
-        return (self.elapsed_s - since_s) / done if done > 0 and self.elapsed_s > since_s else None
 
     # --- taking lines ---------------------------------------------------------------------
 
@@ -118,7 +107,7 @@ class TrainingHistory:
         self.epoch_points = [point for point in self.epoch_points if point.epoch <= at]
         self.steps_done = steps
         self._epoch = math.ceil(at)
-        self.left_s, self._first = None, None
+        self.left_s = None
 
     def _stepped(self, event: dict[str, Any]) -> None:
         # Counted from the start of the run.
@@ -138,8 +127,6 @@ class TrainingHistory:
         self.left_s = left_s if 0 <= left_s < math.inf else None
         if 0 <= elapsed_s < math.inf:
             self.elapsed_s = elapsed_s
-            if self._first is None:
-                self._first = (steps, elapsed_s)
 
     def _epoch_done(self, event: dict[str, Any]) -> None:
         epoch = _count(event["epoch"], 1)

@@ -14,8 +14,6 @@ from PySide6.QtCore import QObject
 
 from sd2app.background.run_command import COMMAND, launch
 from sd2app.background.runs import KnownRun, Runs, Sentences, free_folder
-from sd2app.background.step_times import COMMAND as TIMING_COMMAND
-from sd2app.background.step_times import PatientTiming, StepKey, StepTimes
 from sd2app.settings import Settings
 from sd2app.training.pair_maker import PairMaker
 from sd2app.training.run import TrainingMonitor
@@ -45,8 +43,8 @@ _OPTIONS = {"early_stopping_epochs": "--early-stopping"}
 class TrainingModel(Runs[TrainingMonitor]):
     """Trainings of denoisers, of which the window starts one at a time.
 
-    ``command`` runs ``sd2`` commands, ``timing_command`` times a step. ``folder`` holds the
-    runs; by default as the settings say, or in the user's data directory.
+    ``command`` runs ``sd2`` commands. ``folder`` holds the runs; by default as the settings
+    say, or in the user's data directory.
     """
 
     def __init__(
@@ -54,7 +52,6 @@ class TrainingModel(Runs[TrainingMonitor]):
         settings: Settings,
         parent: QObject | None = None,
         command: Sequence[str] = COMMAND,
-        timing_command: Sequence[str] = TIMING_COMMAND,
         folder: Path | None = None,
     ) -> None:
         super().__init__(TrainingMonitor, settings, "training/run", _SENTENCES, parent)
@@ -62,15 +59,12 @@ class TrainingModel(Runs[TrainingMonitor]):
         chosen = settings.stored("training/folder", "")
         self._folder = folder or (Path(chosen) if chosen else user_runs_folder())
         self._statuses: dict[Path, tuple[object, RunStatus]] = {}
-        self.step_times = StepTimes(settings, self, timing_command)
-        self.setup = TrainingSetupModel(settings, self.step_times, self)
+        self.setup = TrainingSetupModel(settings, self)
         self.setup.changed.connect(self.changed)
         self.pair_maker = PairMaker(self._folder.parent / "pairs", self, command)
         self.pair_maker.changed.connect(self.changed)
         self.pair_maker.made.connect(self.setup.add_store)
         self.pair_maker.failed.connect(self.failed)
-        self._timing = PatientTiming(self.step_times, self._to_be_timed, self)
-        self.setup.changed.connect(self._timing.wait)
 
     # --- what is known --------------------------------------------------------------------
 
@@ -108,15 +102,10 @@ class TrainingModel(Runs[TrainingMonitor]):
         return quoted(train_arguments(config, Path(_new_run(Path(), config).name)))
 
     def set_watched(self, watched: bool) -> None:
-        """Note that the panel is visible or hidden: steps are timed only while it is visible."""
+        """Note that the panel is visible or hidden."""
         super().set_watched(watched)
         if watched:
             self.setup.refresh()
-        self._timing.look()
-
-    def _to_be_timed(self) -> StepKey | None:
-        wanted = self._watched and self.run is None and not self.why_not_start
-        return self.setup.step_key if wanted else None
 
     # --- one run after another ------------------------------------------------------------
 
@@ -130,7 +119,6 @@ class TrainingModel(Runs[TrainingMonitor]):
         if self.why_not_start:
             raise Sd2Error(self.why_not_start)
         config = self.setup.config
-        self.step_times.stop()
         self._folder.mkdir(parents=True, exist_ok=True)
         path = _new_run(self._folder, config)
         self._launch(path, train_arguments(config, path))
@@ -153,19 +141,11 @@ class TrainingModel(Runs[TrainingMonitor]):
 
     def close(self) -> None:
         """Stop polling; a running training goes on."""
-        self._timing.stop()
         self.pair_maker.close()
         self.setup.close()
         super().close()
 
-    # --- following ------------------------------------------------------------------------
-
-    def on_change(self, run: TrainingMonitor) -> None:
-        """Store the measured time of a step as the estimate for the next run."""
-        step_s, config = run.history.step_s, run.config
-        if step_s is not None and config is not None and run.history.epoch_points:
-            key = StepKey.of_denoiser(config.model.name, config.training.batch_size)
-            self.step_times.learn(key, step_s)
+    # --- listing --------------------------------------------------------------------------
 
     def find(self) -> Sequence[KnownRun]:
         """Read the status of every run in the folder."""

@@ -9,11 +9,11 @@ from typing import Any
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.latest import LatestRunner
-from sd2app.background.step_times import StepKey, StepTime, StepTimes
 from sd2app.settings import Settings, StoredChoices
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import plain_path
 from sd2core.pairs.summary import PairFacts, pair_facts
+from sd2core.runs.pace import known_pace_s
 from sd2core.train.config import (
     DataConfig,
     MachineConfig,
@@ -48,12 +48,11 @@ class Store:
 
 @dataclass(frozen=True)
 class Estimate:
-    """Estimated time of a run, and its source."""
+    """Size of a run, and its time as far as this machine has measured such steps."""
 
     segments: int  # training segments per epoch
-    steps_per_epoch: int
-    step: StepTime | None  # None until a step has been timed
-    seconds: float | None
+    steps: int
+    step_s: float | None  # None until a run of the kind has measured it
 
 
 class TrainingSetupModel(QObject):
@@ -61,19 +60,15 @@ class TrainingSetupModel(QObject):
 
     changed = Signal()
 
-    def __init__(
-        self, settings: Settings, step_times: StepTimes, parent: QObject | None = None
-    ) -> None:
+    def __init__(self, settings: Settings, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._settings = settings
-        self._times = step_times
         self._values = StoredChoices(settings, "training", _DEFAULTS, {"model": MODELS})
         self._stores: tuple[Store, ...] = tuple(
             Store(path) for path in settings.paths("training/pairs")
         )
         self._runner = LatestRunner("pairs", self)
         self._runner.finished.connect(self._take)
-        step_times.changed.connect(self.changed)
         self._read()
 
     # --- what is chosen -------------------------------------------------------------------
@@ -163,7 +158,7 @@ class TrainingSetupModel(QObject):
         division = self.division
         if division is not None and division.by_take and not any(one.divisible for one in facts):
             return "All of it is one take. Add another to choose the best model by."
-        if not self.estimate.segments:
+        if not self._segments():
             return "Every take is shorter than one segment of 72 frames."
         return ""
 
@@ -172,12 +167,12 @@ class TrainingSetupModel(QObject):
         """Configuration in the form that the library takes; Sd2Error if it cannot be started."""
         if self.problem:
             raise Sd2Error(self.problem)
+        return self._config(tuple(store.path for store in self._stores))
+
+    def _config(self, pairs: tuple[Path, ...]) -> TrainConfig:
         values = self._values
         return TrainConfig(
-            DataConfig(
-                pairs=tuple(store.path for store in self._stores),
-                range_factor=values["range_factor"],
-            ),
+            DataConfig(pairs=pairs, range_factor=values["range_factor"]),
             ModelConfig(name=values["model"]),
             TrainingConfig(
                 batch_size=values["batch_size"],
@@ -190,20 +185,11 @@ class TrainingSetupModel(QObject):
         )
 
     @property
-    def step_key(self) -> StepKey:
-        """Settings that the time of a step depends on."""
-        return StepKey.of_denoiser(self._values["model"], self._values["batch_size"])
-
-    @property
     def estimate(self) -> Estimate:
-        """Estimated time."""
+        """Size and time of the run."""
         segments = self._segments()
-        steps = -(-segments // self._values["batch_size"])
-        step = self._times.of(self.step_key)
-        seconds = None
-        if step is not None and steps:
-            seconds = step.seconds * steps * self._values["epochs"]
-        return Estimate(segments, steps, step, seconds)
+        steps = -(-segments // self._values["batch_size"]) * self._values["epochs"]
+        return Estimate(segments, steps, known_pace_s(self._config(_DATA.pairs).pace_kind))
 
     @property
     def division(self) -> Split | None:

@@ -193,7 +193,7 @@ class TrainingSetupView(QWidget):
     def _add_start(
         self, layout: QVBoxLayout, start: Callable[[], None], copy_command: Callable[[], None]
     ) -> None:
-        self._estimate = EstimateLines(self._training.step_times, self)
+        self._estimate = EstimateLines(self)
         self._problem = sentence("", "warning")
         self._start = outlined("Start training", "Train in the background", start, self)
         self._start.setObjectName("primary")
@@ -239,13 +239,8 @@ class TrainingSetupView(QWidget):
         setup, why_not = self._setup, self._training.why_not_start
         estimate = setup.estimate
         self._estimate.setVisible(bool(estimate.segments))
-        steps = steps_text(setup.value("epochs") * estimate.steps_per_epoch)
-        self._estimate.show_estimate(
-            estimate.seconds,
-            f"{estimate.segments:,} segments, {steps}",
-            estimate.step,
-            setup.step_key,
-        )
+        count = f"{estimate.segments:,} segments, {steps_text(estimate.steps)}"
+        self._estimate.show_estimate(count, estimate.steps, estimate.step_s)
         # That there are no pairs is said above.
         self._problem.setText(why_not if setup.stores else "")
         self._problem.setVisible(bool(setup.stores) and bool(why_not))

@@ -1,10 +1,9 @@
-"""Estimated time of a training, and its source."""
+"""Estimated time of a training before it starts."""
 
 from __future__ import annotations
 
 from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
-from sd2app.background.step_times import StepKey, StepTime, StepTimes
 from sd2app.widgets.panel import sentence
 from sd2app.widgets.text import about
 
@@ -12,42 +11,27 @@ from sd2app.widgets.text import about
 class EstimateLines(QWidget):
     """Estimated time in large letters, with its steps below."""
 
-    def __init__(self, times: StepTimes, parent: QWidget | None = None) -> None:
+    def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._times = times
         self._time = QLabel(self)
         self._time.setObjectName("title")
         self._time.setWordWrap(True)
         self._time.setAccessibleName("How long it will take")
-        self._source = sentence("")
+        self._basis = sentence("")
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(6)
         layout.addWidget(self._time)
-        layout.addWidget(self._source)
+        layout.addWidget(self._basis)
 
-    def show_estimate(
-        self, seconds: float | None, count: str, step: StepTime | None, key: StepKey
-    ) -> None:
-        """Show an estimate; ``count`` names the data and the number of steps."""
-        self._time.setText(estimate_text(seconds))
-        self._source.setText(estimate_source_text(count, step, key, self._times))
-
-
-def estimate_text(seconds: float | None) -> str:
-    """Estimated time."""
-    return "Time: not known yet" if seconds is None else f"Takes {about(seconds)}"
-
-
-def estimate_source_text(count: str, step: StepTime | None, key: StepKey, times: StepTimes) -> str:
-    """Source of the estimate; ``count`` names the data and ends with the number of steps."""
-    if step is not None:
-        known = "as in the last run here" if step.source == "run" else "timed here"
-        return f"{count} of about {step_text(step.seconds)}, {known}."
-    if times.timing == key:
-        return f"{count}. Timing a few of them…"
-    why_not = times.why_not(key)
-    return f"{count}. They could not be timed: {why_not}" if why_not else f"{count}."
+    def show_estimate(self, count: str, steps: int, step_s: float | None) -> None:
+        """Show the time of so many steps; ``count`` names the data and ends with the steps."""
+        if step_s is None:
+            self._time.setText("Time: not known yet")
+            self._basis.setText(f"{count}. The first ones tell how long it takes.")
+        else:
+            self._time.setText(f"Takes {about(steps * step_s)}")
+            self._basis.setText(f"{count} of about {step_text(step_s)}, as measured here before.")
 
 
 def step_text(seconds: float) -> str:

@@ -95,10 +95,12 @@ def _train(options: argparse.Namespace) -> int:
 
     check_output(options.out, ".safetensors")
     maps = asked_maps(options)
+    from sd2core.classify.defaults import pace_kind
     from sd2core.classify.files import save_classifier
     from sd2core.classify.splitting import split_clips
     from sd2core.classify.training import train
     from sd2core.files.atomic import atomic_write_text
+    from sd2core.runs.pace import Pace
 
     known = clips_of(options.data, maps, denoiser_for(maps, options.denoiser))
     parts = split_clips(
@@ -116,6 +118,11 @@ def _train(options: argparse.Namespace) -> int:
     chosen = _options(options)
     with _watching(options, chosen.steps) as watch:
         made = train(parts.training, parts.validation, known, chosen, about=about, watch=watch)
+    pace = Pace()
+    for event in made.events:
+        if event["event"] == "step":
+            pace.take(event["step"], event["elapsed_s"])
+    pace.keep(pace_kind(options.model, options.features, options.width))
     card = save_classifier(options.out, made.classifier)
     run = {"model": str(options.out), "card": card.to_json(), "events": made.events}
     atomic_write_text(options.out.with_suffix(".json"), json.dumps(finite(run), indent=1) + "\n")

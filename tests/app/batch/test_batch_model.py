@@ -27,6 +27,7 @@ from sd2app.batch.text import (
     unusable_text,
 )
 from sd2app.settings import Settings
+from sd2core.batch.estimate import BatchEstimate, StepEstimate
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.plan import BatchPlan, Recordings, Synthesise
 from sd2core.batch.plan_file import read_plan, write_plan
@@ -199,33 +200,46 @@ def test_a_start_waits_for_the_estimate_of_what_is_set_up(qtbot, made, meshes):
         model.start()
     model.ask_estimate()
     assert "Working out" in model.why_not_start
-    qtbot.waitUntil(lambda: not model.estimate.busy, timeout=20_000)
-    facts = model.estimate.facts
-    assert facts["workers"] == model.setup.workers
-    assert estimate_headline({**facts, "workers": 2}) == (
-        "3 recordings: about 30 min on 2 workers, some 2 MB"
+    qtbot.waitUntil(lambda: not model.why_not_start, timeout=20_000)
+    assert estimate_headline(model.estimate) == (
+        "3 recordings: the first tasks tell how long it takes, at most 4.6 kB"
     )
-    assert estimate_facts(facts) == [
-        ("Look at recordings", "0 to do · 2 there already"),
-        ("Synthesise", "4 to do · 1 there already · about 3 min · some 2 MB"),
-        ("Looked at", "2; the others are taken to be like them"),
+    assert estimate_facts(model.estimate) == [
+        ("Look at recordings", "3 to do"),
+        ("Synthesise", "3 to do · at most 1.2 kB"),
+        ("Denoise", "3 to do · at most 1.2 kB"),
+        ("Export", "1 to do · at most 2.3 kB"),
     ]
-    assert unusable_text(facts) == (
-        "Cannot be used: a.npz: It is damaged. (1 more cannot, either.)"
-    )
-    assert unusable_text({**facts, "unusable": []}) == ""
-    assert model.why_not_start == ""
+    assert unusable_text(model.estimate) == ""
     model.setup.set_value("denoise", False)
     assert "have not been counted" in model.why_not_start
 
 
+def test_an_estimate_in_words():
+    synthesise = StepEstimate(there=1, to_do=4, frames=120, seconds=180.0, bytes=2_000_000)
+    made = BatchEstimate(
+        3, 2, 2, {"inspect": StepEstimate(there=2), "synthesise": synthesise},
+        ["a.npz: It is damaged.", "b.npz: It is not there."],
+    )  # fmt: skip
+    assert estimate_headline(made) == "3 recordings: about 2 min on 2 workers, at most 2 MB"
+    assert estimate_facts(made) == [
+        ("Look at recordings", "0 to do · 2 there already"),
+        ("Synthesise", "4 to do · 1 there already · about 3 min · at most 2 MB"),
+        ("Looked at", "2; the others are taken to be like them"),
+    ]
+    assert unusable_text(made) == "Cannot be used: a.npz: It is damaged. (1 more cannot, either.)"
+    synthesise.to_do = 0
+    assert estimate_headline(made) == "3 recordings: all of it is there already"
+
+
 def test_a_refused_estimate_is_said(qtbot, made, meshes):
-    model = made("--refuse", "the disk is full")
+    model = made()
     model.setup.add(meshes)
+    model.setup.set_value("model", "nobody's")
     looked(qtbot, model.setup)
     model.ask_estimate()
-    qtbot.waitUntil(lambda: not model.estimate.busy, timeout=20_000)
-    assert model.why_not_start == "the disk is full"
+    qtbot.waitUntil(lambda: model.refused, timeout=20_000)
+    assert "There is no model called" in model.why_not_start
 
 
 # Following

@@ -13,19 +13,19 @@ import pytest
 from small_pairs import write_pairs
 
 from sd2app.background.run_command import CommandFolder, last_output
-from sd2app.background.step_times import StepKey, StepTimes
 from sd2app.classify.run_text import facts, headline, note, time_text
 from sd2app.classify.training import ClassTraining
 from sd2app.command_line import main
 from sd2app.settings import Settings
 from sd2app.training.text import division_text
+from sd2core.classify.defaults import WIDTH, pace_kind
 from sd2core.errors import Sd2Error
 from sd2core.files.resources import resource_path
 from sd2core.recording.recording import open_recording
+from sd2core.runs.pace import keep_pace
 from sd2core.runs.progress import ProgressTail
 
 SAMPLE = resource_path("swipes.sd2")
-TIMING = (sys.executable, "-c", "import sys; print('{\"step_s\": 0.5}')")
 FAKE = (sys.executable, "-u", fake_class_command.__file__)
 
 
@@ -37,8 +37,7 @@ def set_up(qtbot, tmp_path):
     def training(*more: str) -> ClassTraining:
         command = (*FAKE, *more)
         folder = tmp_path / "classifiers"
-        times = StepTimes(settings, command=TIMING)
-        made.append(ClassTraining(settings, used.append, None, folder, command, step_times=times))
+        made.append(ClassTraining(settings, used.append, None, folder, command))
         return made[-1]
 
     def ready(model: ClassTraining) -> None:
@@ -176,21 +175,14 @@ def test_what_does_not_go_together_is_named(set_up, tmp_path, qtbot):
     assert not model.why_not_compare
 
 
-def test_how_long_it_takes_is_timed_and_then_learnt(set_up, qtbot):
+def test_how_long_it_takes_is_known_once_it_was_measured(set_up):
     model = set_up.training()
     set_up.ready(model)
-    assert model.estimate_s is None
-    model.set_watched(True)
-    qtbot.waitUntil(lambda: model.estimate_s is not None, timeout=10_000)
-    assert model.step.source == "timed"
-    assert model.estimate_s == pytest.approx(0.5 * 300)
-    model.train()
-    set_up.ended(model)
-    model.select(None)
-    # The command says two seconds a step.
-    assert model.step.source == "run"
-    assert model.estimate_s == pytest.approx(2.0 * 300)
-    assert model.step_times.of(StepKey.of_classifier("s4", "columns", 32)) is None
+    assert model.setup.step_s is None
+    keep_pace(pace_kind("lstm", "columns", WIDTH), 40.0, 20)
+    assert model.setup.step_s == pytest.approx(2.0)
+    model.setup.set_value("model", "s4")
+    assert model.setup.step_s is None
 
 
 def test_what_cannot_be_learnt_from_is_named(set_up, tmp_path, qtbot):

@@ -9,7 +9,6 @@ import sys
 import pytest
 from training_pairs import write_pairs
 
-from sd2app.background.step_times import StepKey, StepTimes
 from sd2app.settings import Settings
 from sd2app.training.model import TrainingModel
 from sd2core.denoise.files import describe_model
@@ -86,15 +85,3 @@ def test_what_sd2_refuses_is_told_in_its_words(model, qtbot, tmp_path) -> None:
     wait_for(qtbot, model, "failed")
     assert "radar is missing" in model.run.text
     assert "Traceback" not in model.run.text
-
-
-def test_a_step_is_timed(qtbot) -> None:
-    times = StepTimes(Settings.forgetful())
-    for key in (StepKey.of_denoiser("gru", 8), StepKey.of_classifier("lstm", "peak", 8)):
-        times.measure(key)
-        qtbot.waitUntil(lambda: times.timing is None, timeout=120_000)
-        assert times.why_not(key) == ""
-        assert 0 < times.of(key).seconds < 60
-    times.measure(StepKey.of_denoiser("no such model", 8))
-    qtbot.waitUntil(lambda: times.timing is None, timeout=120_000)
-    assert "no such model" in times.why_not(StepKey.of_denoiser("no such model", 8))

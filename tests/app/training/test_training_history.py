@@ -41,7 +41,6 @@ def test_what_is_told_stands_in_it() -> None:
     assert (history.model, history.parameters, history.segments) == ("s4", 7, 300)
     assert (history.epoch, history.steps_done, history.share) == (2, 10, 0.5)
     assert history.best.epoch == 1
-    assert history.step_s == pytest.approx(0.5)
     assert [point.at for point in history.step_points] == [0.2, 1.0, 1.2]
     assert metric_rows(history)[0] == ("Best epoch", "1")
 
@@ -56,7 +55,6 @@ def test_what_is_done_again_after_a_kill_counts_once() -> None:
     history = told(START, step(1), epoch(1), step(6), epoch(2), step(11), again)
     assert history.steps_done == 5
     assert [point.epoch for point in history.epoch_points] == [1]
-    assert history.step_s is None
     history.take([step(6), epoch(2), epoch(2)])
     assert [point.epoch for point in history.epoch_points] == [1, 2]
 

@@ -13,7 +13,6 @@ from training_pairs import write_pairs
 
 from sd2app.background import run_monitor
 from sd2app.background.run_command import last_output, launch
-from sd2app.background.step_times import StepKey, StepTimes
 from sd2app.command_line import full_parser
 from sd2app.settings import Settings
 from sd2app.training.model import TrainingModel
@@ -21,11 +20,11 @@ from sd2app.training.text import division_text
 from sd2core.cli.train import _config
 from sd2core.errors import Sd2Error
 from sd2core.runs.control import read_control
+from sd2core.runs.pace import keep_pace
 from sd2core.train.data import prepare, read_mixed
 from sd2core.train.folder import TrainingFolder
 
 FAKE = Path(__file__).resolve().parents[2] / "fake_train.py"
-TIMING = (sys.executable, "-c", "print('{\"step_s\": 0.25}')")
 
 
 @pytest.fixture(autouse=True)
@@ -48,9 +47,7 @@ def made(qtbot, tmp_path, pairs):
 
     def make(*options: object, settings: Settings | None = None, epochs: int = 3) -> TrainingModel:
         command = [sys.executable, "-u", str(FAKE), *map(str, options)]
-        model = TrainingModel(
-            settings or Settings.forgetful(), None, command, TIMING, tmp_path / "runs"
-        )
+        model = TrainingModel(settings or Settings.forgetful(), None, command, tmp_path / "runs")
         models.append(model)
         if not model.setup.stores:
             model.setup.add_store(pairs)
@@ -84,9 +81,6 @@ def test_a_run_from_start_to_end(made, qtbot) -> None:
     assert run.history.best.validation_rmse == pytest.approx(0.4)
     assert run.history.share == 1.0
     assert run.folder.best.exists()
-    # What a step took is what the next estimate is made of: 2 s an epoch of 4 steps.
-    assert model.setup.estimate.step.seconds == pytest.approx(0.5)
-    assert model.setup.estimate.step.source == "run"
     assert run.config.data.pairs == (model.setup.stores[0].path,)
     assert not list(run.folder.path.parent.glob(".*"))
 
@@ -324,27 +318,17 @@ def test_the_command_is_one_that_sd2_takes(made) -> None:
     assert [store.path for store in again.setup.stores] == list(model.setup.config.data.pairs)
 
 
-def test_a_step_is_timed_once_and_remembered(qtbot) -> None:
-    settings = Settings.forgetful()
-    times = StepTimes(settings, None, TIMING)
-    key = StepKey.of_denoiser("s4", 64)
-    with qtbot.waitSignal(times.changed):
-        times.measure(key)
-    qtbot.waitUntil(lambda: times.timing is None, timeout=10_000)
-    assert times.of(key).seconds == 0.25
-    assert StepTimes(settings, None, ("no such program",)).of(key) == times.of(key)
-    # A run knows better.
-    times.learn(key, 0.5)
-    assert (times.of(key).seconds, times.of(key).source) == (0.5, "run")
-
-
-def test_a_step_that_cannot_be_timed_is_not_tried_again(qtbot) -> None:
-    times = StepTimes(Settings.forgetful(), None, ("no such program",))
-    key = StepKey.of_denoiser("s4", 64)
-    times.measure(key)
-    qtbot.waitUntil(lambda: bool(times.why_not(key)), timeout=10_000)
-    times.measure(key)
-    assert times.timing is None
+def test_the_time_is_known_once_a_run_has_measured_its_steps(made) -> None:
+    model = made()
+    estimate = model.setup.estimate
+    assert (estimate.segments, estimate.steps, estimate.step_s) == (20, 3, None)
+    keep_pace(model.setup.config.pace_kind, 10.0, 40)
+    assert model.setup.estimate.step_s == 0.25
+    model.setup.set_value("epochs", 9)
+    assert (model.setup.estimate.steps, model.setup.estimate.step_s) == (9, 0.25)
+    # Other steps are another matter.
+    model.setup.set_value("batch_size", 8)
+    assert (model.setup.estimate.steps, model.setup.estimate.step_s) == (27, None)
 
 
 def test_a_process_outlives_who_started_it_and_is_seen_to_end(qtbot, tmp_path) -> None:

@@ -1,26 +1,19 @@
-"""What a dry run says is measured here, or said to be of another machine."""
+"""A dry run counts tasks, and tells times that this machine has measured."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from moving_spheres import save_spheres
 from numbered_videos import write_video
 
-from sd2core.batch import estimate as module
-from sd2core.batch.estimate import (
-    BatchEstimate,
-    TaskRate,
-    estimate,
-    export_s,
-    known_fit_rate,
-    remember_fit_rate,
-)
+from sd2core.batch.estimate import BatchEstimate, StepEstimate, estimate, pace_kind
 from sd2core.batch.plan import BatchPlan
 from sd2core.batch.plan_file import plan_from_text
+from sd2core.batch.tasks import Task
 from sd2core.cli.batch import print_estimate
+from sd2core.runs.pace import keep_pace
 
 PLAN = """
 out = "made"
@@ -34,18 +27,11 @@ overlap_frames = 0
 """
 
 
-@pytest.fixture(autouse=True)
-def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    folder = tmp_path / "cache"
-    monkeypatch.setattr("platformdirs.user_cache_dir", lambda *_, **__: str(folder))
-    return folder
-
-
 def plan_in(folder: Path) -> BatchPlan:
     return plan_from_text(PLAN, folder)
 
 
-def test_what_nothing_was_measured_for_is_called_assumed(
+def test_times_are_those_of_such_tasks_here_or_not_known(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     save_spheres(tmp_path / "inputs", 2)
@@ -53,71 +39,53 @@ def test_what_nothing_was_measured_for_is_called_assumed(
     plan = plan_in(tmp_path)
     made = estimate(plan, 1)
     fit = made.steps["fit"]
-    assert (fit.to_do, fit.frames, fit.assumed) == (1, 120, True)
-    assert made.assumed_share == pytest.approx(fit.seconds / (made.hours * 3600))
+    assert (fit.to_do, fit.frames, fit.seconds) == (1, 120, None)
+    assert made.seconds is None
+    assert made.to_json()["hours"] is None
     print_estimate(made, plan)
     said = capsys.readouterr().out
-    assert "assumed: nothing was fitted here yet" in said
-    assert f"{made.assumed_share:.0%} of that rests on another machine's figures" in said
-    remember_fit_rate("medium", 50.0, 100)
-    again = estimate(plan, 1)
-    assert again.steps["fit"].seconds == pytest.approx(0.5 * 120, abs=2.0)
-    assert again.assumed_share == 0.0
-    assert again.to_json()["assumed_share"] == 0.0
+    assert "not known" in said
+    assert "the first tasks tell" in said
+    keep_pace(("fit", "medium"), 50.0, 100)
+    for step in ("inspect", "synthesise", "export"):
+        keep_pace(pace_kind(plan, step), 4.0, 4_000_000)
+    again = estimate(plan, 2)
+    assert again.steps["fit"].seconds == pytest.approx(0.5 * 120)
+    assert again.seconds == pytest.approx(0.5 * 120 / 2, abs=3.0)
+    assert again.to_json()["hours"] == pytest.approx(again.seconds / 3600)
     print_estimate(again, plan)
     said = capsys.readouterr().out
-    assert "as fitted here" in said
-    assert "another machine" not in said
-
-
-def test_writing_the_data_set_is_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    save_spheres(tmp_path / "inputs", 2, frames=40)
-    asked: list[tuple[int, tuple[str, ...]]] = []
-
-    def measured(plan: BatchPlan, frames: int, kinds: tuple[str, ...]) -> float:
-        asked.append((frames, kinds))
-        return 3.0
-
-    monkeypatch.setattr(module, "export_s", measured)
-    made = estimate(plan_in(tmp_path), 1)
-    assert asked == [(40, ("synthetic",))]
-    assert made.steps["export"].seconds == 3.0 * 2
-    assert made.steps["export"].basis == "measured on maps of 40 frames"
-    assert not made.steps["export"].assumed
+    assert "as such tasks took here" in said
+    assert "not known" not in said
     assert not (tmp_path / "made").exists()
 
 
-@pytest.mark.parametrize("form", ["zarr", "h5", "npz"])
-def test_a_source_takes_some_time_to_write(tmp_path: Path, form: str) -> None:
+def test_the_work_of_a_map_grows_with_frames_and_vertices(tmp_path: Path) -> None:
+    save_spheres(tmp_path / "inputs", 1, frames=40)
+    made = estimate(plan_in(tmp_path), 1)
+    one = made.steps["synthesise"]
+    assert one.frames == 40
+    assert one.work % 40 == 0
+    assert one.work > 40
+    assert made.steps["export"].work == 1
+    assert Task("inspect", "", None, {}).work == 1
+
+
+def test_options_are_part_of_the_kind_and_names_are_not(tmp_path: Path) -> None:
     plan = plan_in(tmp_path)
+    assert plan.synthesise is not None
     assert plan.export is not None
-    plan = plan.model_copy(update={"export": plan.export.model_copy(update={"format": form})})
-    assert 0 <= export_s(plan, 50, ("synthetic", "denoised")) < 10
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_rates_are_kept_by_resolution(cache: Path) -> None:
-    assert known_fit_rate("medium") is None
-    remember_fit_rate("medium", 1.0, 99)  # too few frames
-    assert known_fit_rate("medium") is None
-    remember_fit_rate("medium", 20.0, 200)
-    remember_fit_rate("high", 50.0, 100)
-    assert (known_fit_rate("medium"), known_fit_rate("high")) == (0.1, 0.5)
-    for damaged in ("", "[1]", '{"medium": "fast"}'):
-        (cache / "fit-rates.json").write_text(damaged)
-        assert known_fit_rate("medium") is None
-    (cache / "fit-rates.json").unlink()
-    cache.rmdir()
-    cache.write_text("a file in the way")
-    remember_fit_rate("medium", 20.0, 200)
-    assert known_fit_rate("medium") is None
+    titled = plan.model_copy(update={"export": plan.export.model_copy(update={"title": "mine"})})
+    assert pace_kind(titled, "export") == pace_kind(plan, "export")
+    loose = plan.synthesise.model_copy(update={"tolerance": 0.02})
+    other = plan.model_copy(update={"synthesise": loose})
+    assert pace_kind(other, "synthesise") != pace_kind(plan, "synthesise")
 
 
 def test_steps_add_up_and_are_shared_by_processes() -> None:
-    one = module.StepEstimate()
-    one.add(TaskRate(1.0, 0.1, 10.0, 2.0), frames=100, tasks=5)
-    assert one.seconds == pytest.approx(15.0, abs=0.1)
-    assert one.bytes == 250
-    made = BatchEstimate(1, 1, 2, {"fit": replace(one, assumed=True), "synthesise": one})
-    assert made.hours == pytest.approx(one.seconds / 3600)
-    assert made.assumed_share == pytest.approx(0.5)
+    steps = {"fit": StepEstimate(seconds=15.0, bytes=250), "synthesise": StepEstimate(seconds=5.0)}
+    made = BatchEstimate(1, 1, 2, steps)
+    assert made.seconds == pytest.approx(10.0)
+    assert made.bytes == 250
+    steps["synthesise"].seconds = None
+    assert made.seconds is None

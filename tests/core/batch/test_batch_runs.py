@@ -361,13 +361,14 @@ def test_what_would_be_done_is_what_is_done(run: Runs) -> None:
     }  # fmt: skip
     assert before.steps["synthesise"].frames == 6 * 40
     assert len(before.unusable) == 1
-    assert before.hours > 0
+    assert before.seconds is None
     run(BOTH)
     after = estimate(plan, 2)
     assert {step: one.there for step, one in after.steps.items()} == {
         "inspect": 3, "synthesise": 6, "denoise": 6, "export": 0
     }  # fmt: skip
     assert after.steps["synthesise"].seconds == after.steps["synthesise"].to_do == 0
-    # Bytes are those of the files, to a third: small archives vary.
-    written = sum(path.stat().st_size for path in run.out.glob("synthetic/*/*.npz"))
-    assert before.steps["synthesise"].bytes == pytest.approx(written, rel=0.34)
+    # The files are no larger than the arrays in them, but for their headings.
+    maps = list(run.out.glob("synthetic/*/*.npz"))
+    written = sum(path.stat().st_size for path in maps)
+    assert written < before.steps["synthesise"].bytes + 4096 * len(maps)

@@ -7,9 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from swinging_recordings import FRAMES, recording
+from swinging_recordings import recording
 
-from sd2core.datasets.forecast import simulation_s
 from sd2core.datasets.recording_sources import Making
 from sd2core.datasets.simulating import Simulation, seed_of, simulated_map
 from sd2core.datasets.source import Source
@@ -132,16 +131,6 @@ def test_points_without_a_surface_have_no_echo() -> None:
     points = replace(_swaying_plate(4), faces=None)
     with pytest.raises(Sd2Error, match="no faces"):
         simulated_map(points, VirtualSensor(), Simulation(), VelocityAxis())
-
-
-def test_what_it_costs_grows_with_frames_and_places(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    folders = [recording(tmp_path / f"{name}.sd2", radar=False).folder for name in ("a", "b")]
-    monkeypatch.setattr("sd2core.datasets.forecast._timed_s", lambda *scene: 0.5)
-    assert simulation_s(folders, SIMULATED) == 0.5 * FRAMES * 3 * 2
-    assert simulation_s(folders, replace(SIMULATED, placements=None)) == 0.5 * FRAMES * 2
-    assert simulation_s(folders, replace(SIMULATED, simulation=None)) == 0.0
 
 
 def _swaying_plate(frames: int) -> MeshSequence:

@@ -20,8 +20,9 @@ from small_pairs import write_pairs
 
 from sd2core.denoise.files import describe_model, load_model
 from sd2core.errors import Sd2Error
+from sd2core.runs import pace
 from sd2core.runs.control import write_control
-from sd2core.runs.progress import Event, ProgressTail, read_events, standing
+from sd2core.runs.progress import Event, ProgressTail, last_of, read_events, standing
 from sd2core.train.config import (
     DataConfig,
     MachineConfig,
@@ -92,7 +93,10 @@ def at(step: int, action: Callable[[], None]) -> Callable[[Event], None]:
 
 
 class TestLearning:
-    def test_it_beats_what_it_is_given(self, pairs: Path, tmp_path: Path) -> None:
+    def test_it_beats_what_it_is_given(
+        self, pairs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(pace, "_SHORTEST_S", 0.0)
         config = settings(pairs, epochs=30, learning_rate=0.03)
         ending = begin(config, tmp_path / "run", command="sd2 train")
         epochs = curve(tmp_path / "run")
@@ -101,6 +105,13 @@ class TestLearning:
         best = min(one[2] for one in epochs)
         assert ending.validation_rmse == pytest.approx(best, rel=1e-6)
         assert best < 0.5 * epochs[0][2]
+        # What a step took is what the next estimate is made of.
+        last = last_of(read_events(tmp_path / "run" / "progress.jsonl"), "epoch")
+        step_s = pace.known_pace_s(config.pace_kind)
+        assert last is not None
+        assert step_s is not None
+        assert 0 < step_s < 2 * last["elapsed_s"] / last["step"]
+        assert last["left_s"] == 0.0
         assert ending.model is not None
         card = describe_model(ending.model)
         assert (card.model, card.trained_on, card.null_bins) == ("gru", "simulated", (3,))

@@ -163,7 +163,7 @@ def test_failures_and_their_reasons_are_shown_and_a_batch_is_stopped(opened, qtb
     batch = models_of(window).batch
     dialog = begin(window)
     ready(qtbot, batch)
-    assert "1 recording: about 30 min on" in words(dialog)
+    assert "1 recording: the first tasks tell how long it takes" in words(dialog)
     click(dialog, "Start")
     qtbot.waitUntil(lambda: batch.batch is not None and bool(batch.batch.failures), timeout=20_000)
     assert "At work" in words(dialog)

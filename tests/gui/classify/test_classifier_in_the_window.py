@@ -28,7 +28,9 @@ from sd2app.labels.timeline import LabelTimeline
 from sd2app.suggestions.bar import SuggestionBar
 from sd2app.widgets.inputs import Choice, TypedLine
 from sd2app.widgets.model_card_dialog import ModelCardDialog
+from sd2core.classify.defaults import WIDTH, pace_kind
 from sd2core.files.resources import resource_path
+from sd2core.runs.pace import keep_pace
 
 
 @pytest.fixture
@@ -313,9 +315,6 @@ def test_a_person_is_typed_and_who_does_what_is_said(trainable, tmp_path, qtbot)
     training, panel = models_of(trainable).class_training, trainable.findChild(ClassPanel)
     setup = training.setup
     shutil.copytree(resource_path("swipes.sd2"), copy := tmp_path / "copy.sd2")
-    # A step takes as long as this says: importing torch under load takes longer than a test may.
-    training.step_times.stop()
-    training.step_times._command = (sys.executable, "-c", "print('{\"step_s\": 0.5}')")
     setup.remove(tmp_path / "campaign.zarr")
     setup.add(resource_path("swipes.sd2"))
     setup.add(copy)
@@ -341,10 +340,11 @@ def test_a_person_is_typed_and_who_does_what_is_said(trainable, tmp_path, qtbot)
     )
     assert [one.person for one in setup.data] == ["", "ben"]
     assert "Learns from 1 person; the best model is chosen by ben." in said()
-    # A step is timed while the page is looked at.
-    qtbot.waitUntil(lambda: training.estimate_s is not None, timeout=60_000)
-    assert "Takes " in said()
-    assert "timed here" in said()
+    assert "300 steps. The first ones tell how long it takes." in said()
+    keep_pace(pace_kind("lstm", "columns", WIDTH), 10.0, 20)
+    setup.changed.emit()
+    assert "Takes about 2 min" in said()
+    assert "300 steps of about 500 ms, as measured here before." in said()
 
 
 def test_stopped_by_a_click(trainable, qtbot):

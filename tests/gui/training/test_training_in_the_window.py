@@ -75,7 +75,6 @@ def test_a_run_outlives_its_window_and_is_found_by_the_next(made, qtbot, tmp_pat
     training.setup.add_store(write_pairs(tmp_path / "campaign.zarr"))
     training.setup.set_value("epochs", 4)
     qtbot.waitUntil(lambda: not training.setup.problem)
-    training.step_times.stop()
     click(window, qtbot, "Start training")
     qtbot.waitUntil(lambda: tabs.tabText(2) == "Train · 25 %", timeout=15_000)
     path = training.run.folder.path

@@ -34,6 +34,7 @@ from sd2app.training.panel import TrainingPanel
 from sd2app.training.result import ModelAdoption
 from sd2app.widgets.inputs import Choice, NumberBox
 from sd2app.widgets.theme import apply_theme
+from sd2core.runs.pace import keep_pace
 
 FAKE = Path(__file__).resolve().parents[2] / "fake_train.py"
 
@@ -79,8 +80,7 @@ class Window:
 
     def __init__(self, folder: Path, options: tuple[object, ...], settings: Settings) -> None:
         command = [sys.executable, "-u", str(FAKE), *map(str, options)]
-        timing = [sys.executable, "-c", "print('{\"step_s\": 0.25}')"]
-        self.training = TrainingModel(settings, None, command, timing, folder / "runs")
+        self.training = TrainingModel(settings, None, command, folder / "runs")
         self.denoise = FakeDenoising()
         self.tracks = [MapModel(name) for name in ("Synthetic", "Before", "Denoised", "Real")]
         self.use = ModelAdoption(
@@ -180,9 +180,12 @@ def test_what_is_set_up_is_what_is_started(made, qtbot, pairs) -> None:
     assert "Learns from 4 people; the best model is chosen by s4; s5 kept for" in texts(window)
     # 300 frames are 5 segments, and four people learn from: 20 in one step of 64.
     assert setup.estimate.segments == 20
-    qtbot.waitUntil(lambda: "timed here" in texts(window), timeout=10_000)
+    assert "Time: not known yet" in texts(window)
+    assert "20 segments, 500 steps. The first ones tell how long it takes." in texts(window)
+    keep_pace(setup.config.pace_kind, 10.0, 40)
+    setup.changed.emit()
     assert "Takes about 2 min" in texts(window)  # 500 × 0.25 s
-    assert "20 segments, 500 steps of about 250 ms" in texts(window)
+    assert "20 segments, 500 steps of about 250 ms, as measured here before." in texts(window)
     type_number(qtbot, box(window, "Passes"), "3")
     type_number(qtbot, box(window, "Segments per step"), "8")
     model = next(c for c in window.panel.findChildren(Choice) if c.toolTip() == "Kind of model")

@@ -1,0 +1,90 @@
+"""Time that long work takes, from the pace of its own items.
+
+Nothing is done only to be timed. A run takes its pace from its items, the first of which warms
+up, and the pace is kept on this machine to estimate the next run of the same kind.
+"""
+
+from __future__ import annotations
+
+import json
+import platform
+from pathlib import Path
+
+from sd2core.files.atomic import atomic_write_text
+
+Kind = tuple[str | int | None, ...]
+"""What is done, with all that the time of an item depends on: ``("fit", "medium")``."""
+
+_SHORTEST_S = 3.0
+"""Shorter work is mostly overhead; its pace is not kept."""
+
+_MOST_KINDS = 200
+
+
+class Pace:
+    """Seconds per item of work under way, counted from its first item on."""
+
+    def __init__(self) -> None:
+        self._first: tuple[float, float] | None = None
+        self._items = self._seconds = 0.0
+
+    def take(self, done: float, elapsed_s: float) -> None:
+        """Note that so many items are done so long after the beginning."""
+        if self._first is None:
+            self._first = done, elapsed_s
+        self._items, self._seconds = done - self._first[0], elapsed_s - self._first[1]
+
+    @property
+    def each_s(self) -> float | None:
+        """Seconds per item; None until a second one is done."""
+        if self._items <= 0 or self._seconds <= 0:
+            return None
+        return self._seconds / self._items
+
+    def left_s(self, items: float) -> float | None:
+        """Seconds that so many more items take; None until that can be told."""
+        return None if self.each_s is None else self.each_s * items
+
+    def keep(self, kind: Kind) -> None:
+        """Keep the pace for the next run of this kind on this machine."""
+        keep_pace(kind, self._seconds, self._items)
+
+
+def known_pace_s(kind: Kind) -> float | None:
+    """Seconds per item of the last run of this kind on this machine; None if there was none."""
+    return _known().get(_name(kind))
+
+
+def keep_pace(kind: Kind, seconds: float, items: float) -> None:
+    """Keep what a run has measured, where the user's cache can be written."""
+    if seconds < _SHORTEST_S or items <= 0:
+        return
+    name, known = _name(kind), _known()
+    known.pop(name, None)
+    known[name] = float(f"{seconds / items:.4g}")
+    path, newest = _path(), list(known.items())[-_MOST_KINDS:]
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        atomic_write_text(path, json.dumps(dict(newest), indent=1) + "\n")
+    except OSError:
+        return
+
+
+def _name(kind: Kind) -> str:
+    return " ".join(map(str, kind))
+
+
+def _known() -> dict[str, float]:
+    try:
+        content = json.loads(_path().read_text(encoding="utf-8"))
+        return {str(name): float(each_s) for name, each_s in content.items()}
+    except (OSError, ValueError, TypeError, AttributeError):  # none yet, or damaged
+        return {}
+
+
+def _path() -> Path:
+    import platformdirs
+
+    # A home folder may be shared by machines of different speed.
+    folder = Path(platformdirs.user_cache_dir("sd2-studio", appauthor=False))
+    return folder / "pace" / f"{platform.node() or 'here'}.json"
