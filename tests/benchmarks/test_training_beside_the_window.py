@@ -51,7 +51,7 @@ def test_playing_while_a_training_runs(benchmark, sample_window, qtbot, tmp_path
     """Target: 95 % of the ticks within 40 ms; S4 on one thread, nice 10, curves in view."""
     window, training = sample_window, models_of(sample_window).training
     alone = intervals_ms(window, qtbot)
-    training.setup.add_store(write_pairs(tmp_path / "campaign.zarr", frames=2000))
+    training.setup.add(write_pairs(tmp_path / "campaign.zarr", frames=2000))
     qtbot.waitUntil(lambda: not training.setup.problem)
     training.start()
     qtbot.waitUntil(lambda: training.run.history.epoch >= 2, timeout=300_000)
@@ -76,15 +76,16 @@ def test_an_update_of_the_panel(benchmark, sample_window, qtbot, tmp_path):
     """
     from PySide6.QtWidgets import QApplication
 
-    from sd2app.training.curves import TrainingCurves
-    from sd2app.training.history import EpochPoint, StepPoint
+    from sd2app.training.panel import TrainingPanel
+    from sd2app.training.run import EpochPoint, StepPoint
+    from sd2app.widgets.chart import ChartView
 
     window, training = sample_window, models_of(sample_window).training
-    training.setup.add_store(write_pairs(tmp_path / "campaign.zarr"))
+    training.setup.add(write_pairs(tmp_path / "campaign.zarr"))
     qtbot.waitUntil(lambda: not training.setup.problem)
     training.start()
     qtbot.waitUntil(lambda: training.run.history.epoch >= 1, timeout=300_000)
-    training.pause()
+    training.tell("pause")
     qtbot.waitUntil(lambda: training.run.phase == "paused", timeout=60_000)
     history, rng = training.run.history, np.random.default_rng(1)
     history.epoch_points = [
@@ -94,7 +95,7 @@ def test_an_update_of_the_panel(benchmark, sample_window, qtbot, tmp_path):
     history.step_points = [
         StepPoint(at, 0.1 + rng.random() / at) for at in np.linspace(0.25, 500, 2000)
     ]
-    curves = window.findChild(TrainingCurves)
+    curves = window.findChild(TrainingPanel).findChild(ChartView)
 
     def update() -> float:
         began_s = time.thread_time()

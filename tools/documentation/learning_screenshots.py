@@ -54,7 +54,7 @@ def training(application: QApplication, campaign: Path) -> None:
     window.resize(1280, 960)
     window.bring_up("Train", "Denoiser")
     model = window.features.training.model
-    model.setup.add_store(campaign)
+    model.setup.add(campaign)
     model.setup.set_value("epochs", 40)
     wait_for(application, lambda: not model.setup.problem)
     model.start()

@@ -103,7 +103,7 @@ class _Found(NamedTuple):
     process: ProcessId | None
     word: Word
     events: list[dict[str, Any]]
-    extra: Any
+    facts: Any
 
 
 class RunMonitor(QObject, Generic[F]):
@@ -119,6 +119,8 @@ class RunMonitor(QObject, Generic[F]):
 
     stop_patience_s: ClassVar[float | None] = None
     """A process that does not stop within this time is killed; None: it may take its time."""
+    facts: Any = None
+    """Newest result of :meth:`inspect`."""
 
     def __init__(
         self,
@@ -135,7 +137,6 @@ class RunMonitor(QObject, Generic[F]):
         self._tail = ProgressTail(folder.progress)
         self._phase: Phase = "starting"
         self._loaded = self._has_begun = False
-        self._extra: Any = None
         self._text = ""
         self._wish: Word | None = None
         self._cancelled_s: float | None = None
@@ -152,11 +153,8 @@ class RunMonitor(QObject, Generic[F]):
         return bool(events)
 
     def inspect(self) -> Any:
-        """Further facts that are read from disk, in the background; see :meth:`on_facts`."""
+        """Read further :attr:`facts` from disk, in the background."""
         return None
-
-    def on_facts(self, facts: Any) -> None:
-        """Take the facts of :meth:`inspect`."""
 
     @property
     def has_started(self) -> bool:
@@ -286,9 +284,8 @@ class RunMonitor(QObject, Generic[F]):
 
     def _take(self, found: _Found) -> None:
         told = self.on_events(found.events)
-        told |= found.extra != self._extra
-        self._extra = found.extra
-        self.on_facts(found.extra)
+        told |= found.facts != self.facts
+        self.facts = found.facts
         if self._launched is None or found.live or _is_begun_by(found.process, self._launched):
             self._has_begun = True
         before, was_loaded = self._phase, self._loaded

@@ -92,8 +92,9 @@ class Runs(QObject, Generic[Run]):
 
     @property
     def live(self) -> KnownRun | None:
-        """The newest run on disk that is under way."""
-        return next((one for one in self._known if one.live), None)
+        """The newest run on disk that is under way, apart from the one in view."""
+        here = None if self._run is None else self._run.path
+        return next((one for one in self._known if one.live and one.path != here), None)
 
     @property
     def under_way(self) -> bool:
@@ -103,9 +104,8 @@ class Runs(QObject, Generic[Run]):
     @property
     def busy(self) -> str:
         """Reason why no other run can be started; empty when one can."""
-        if self._run is not None and self._under_way:
-            return self._sentences.busy.format(self._run.path.name)
-        return self._sentences.busy.format(self.live.path.name) if self.live is not None else ""
+        other = self._run if self._under_way else self.live
+        return self._sentences.busy.format(other.path.name) if other is not None else ""
 
     @property
     def mark(self) -> str:
@@ -212,9 +212,10 @@ class Runs(QObject, Generic[Run]):
         self.listed.emit()
 
     def _take_up(self) -> None:
-        if self.live is not None:
-            self.select(self.live.path)
-            self.noted.emit(self._sentences.found.format(self.live.path.name))
+        live = self.live
+        if live is not None:
+            self.select(live.path)
+            self.noted.emit(self._sentences.found.format(live.path.name))
             return
         last = self._settings.stored(self._remembered, "")
         if last and Path(last).is_dir():  # its disk may be away

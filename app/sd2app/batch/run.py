@@ -45,10 +45,11 @@ def plan_of(folder: Path) -> Path:
 class BatchMonitor(RunMonitor[BatchFolder]):
     """A batch with its counts, its failures and its log; only its last start counts."""
 
+    facts = _Facts({}, "", False)
+
     def __init__(
         self, path: Path, parent: QObject | None = None, *, process: ProcessId | None = None
     ) -> None:
-        self._facts = _Facts({}, "", False)
         self._start_and_last: list[Event] = []
         self._failures: list[Failed] = []
         super().__init__(BatchFolder(path), parent, process=process)
@@ -74,14 +75,10 @@ class BatchMonitor(RunMonitor[BatchFolder]):
             about = {}
         return _Facts(about, last_output(folder.log), folder.plan.exists())
 
-    def on_facts(self, facts: _Facts) -> None:
-        """Store the facts."""
-        self._facts = facts
-
     @property
     def status(self) -> BatchStatus | None:
         """Counts and times of the last start; None before there is a folder."""
-        about = self._facts.about
+        about = self.facts.about
         if not about:
             return None
         if self.under_way:
@@ -109,12 +106,12 @@ class BatchMonitor(RunMonitor[BatchFolder]):
     @property
     def log(self) -> str:
         """End of the log."""
-        return self._facts.log
+        return self.facts.log
 
     @property
     def resumable(self) -> bool:
         """True if the same command would go on with it."""
-        return not self.under_way and self._phase != "gone" and self._facts.has_plan
+        return not self.under_way and self._phase != "gone" and self.facts.has_plan
 
     def _settle(self) -> None:
         super()._settle()

@@ -8,13 +8,13 @@ from pathlib import Path
 from PySide6.QtCore import QObject, SignalInstance
 from PySide6.QtWidgets import QMenu, QWidget
 
-from sd2app.classify.chooser import ClassifierChooser
 from sd2app.classify.dialogs import ClassifyDialogs
 from sd2app.classify.finder import GestureFinder
 from sd2app.classify.library import ClassifierLibrary
 from sd2app.classify.model import ClassifyModel
 from sd2app.classify.panel import ClassPanel
 from sd2app.classify.strip import ClassStrip
+from sd2app.classify.text import learned_text, network_text
 from sd2app.classify.training import ClassTraining
 from sd2app.denoise.validity import MapValidity
 from sd2app.feature import Action, Feature, Shell
@@ -22,7 +22,16 @@ from sd2app.labels.actions import editing
 from sd2app.labels.edits import LabelEdits
 from sd2app.labels.model import LabelsModel
 from sd2app.session.session import Session
-from sd2app.widgets.model_menu import ModelButton, ModelMenu
+from sd2app.widgets.model_menu import ModelButton, ModelMenu, Words
+
+_WORDS = Words(
+    "Classify with",
+    "Classifier",
+    "Say nothing of gestures",
+    "Choose a model that says which gesture a frame shows",
+    network_text,
+    learned_text,
+)
 
 
 class ClassifyFeature(Feature):
@@ -44,10 +53,7 @@ class ClassifyFeature(Feature):
     ) -> None:
         self._session, self._shell, self._suggest = session, shell, suggest
         self._labels, self._edits = labels, edits
-        maps = (session.maps.synthetic, session.maps.denoised, session.maps.real)
-        self.model = ClassifyModel(
-            maps, session.playback, standing, labels, session.settings, library, parent
-        )
+        self.model = ClassifyModel(session, standing, labels, library, parent)
         self.gestures = GestureFinder(self.model)
         self.training = ClassTraining(session.settings, self.model.use, parent)
         self.dialogs = ClassifyDialogs(shell, self.model, self.training, session)
@@ -104,16 +110,14 @@ class ClassifyFeature(Feature):
     def _classifiers(self) -> ModelMenu:
         if self._menu is None:
             below = [self._shell.action(name) for name in ("open_classifier", "classifier_card")]
-            chooser = ClassifierChooser(self.model)
-            self._menu = ModelMenu(chooser, self.dialogs.use, below, self._shell.dialog_parent)
+            parent = self._shell.dialog_parent
+            self._menu = ModelMenu(self.model, _WORDS, self.dialogs.use, below, parent)
         return self._menu
 
     def panels(self) -> Mapping[str, QWidget]:
         """Probabilities below the maps."""
-        s = self._session
-        button = ModelButton(ClassifierChooser(self.model), self._classifiers())
-        strip = ClassStrip(self.model, self._labels, s.span, s.playback, s.display, button)
-        return {"classes": strip}
+        button = ModelButton(self._classifiers())
+        return {"classes": ClassStrip(self._session, self.model, self._labels, button)}
 
     def panel(self) -> QWidget:
         """Page of the Train panel."""

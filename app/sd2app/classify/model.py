@@ -14,8 +14,7 @@ from sd2app.classify.track import ClassReading, ClassTrack
 from sd2app.denoise.validity import MapValidity
 from sd2app.labels.model import LabelsModel
 from sd2app.session.maps import MapModel
-from sd2app.session.playback import PlaybackModel
-from sd2app.settings import Settings
+from sd2app.session.session import Session
 
 if TYPE_CHECKING:
     from sd2core.classify.card import ClassifierCard
@@ -32,10 +31,7 @@ class _Loaded(NamedTuple):
 
 
 class ClassifyModel(QObject):
-    """The chosen classifier, remembered and used for all recordings, and the map that it reads.
-
-    ``maps`` are the synthetic, the denoised and the radar's.
-    """
+    """The chosen classifier, remembered and used for all recordings, and the map that it reads."""
 
     changed = Signal()  # the classifier, the map that it reads, or its visibility
     moved = Signal()  # probabilities of frames, or the frame on screen
@@ -44,23 +40,24 @@ class ClassifyModel(QObject):
 
     def __init__(
         self,
-        maps: Sequence[MapModel],
-        playback: PlaybackModel,
+        session: Session,
         validity: MapValidity,
         labels: LabelsModel,
-        settings: Settings,
         library: ClassifierLibrary,
         parent: QObject | None = None,
     ) -> None:
         super().__init__(parent)
-        self._synthetic, self._denoised, self._real = self._maps = tuple(maps)
-        self._playback, self._labels = playback, labels
-        self._settings, self._library = settings, library
+        maps = session.maps
+        self._real, self._playback, self._settings = maps.real, session.playback, session.settings
+        # The denoised one first: it follows the sensor and looks like a radar's.
+        self._in_favour = (maps.denoised, maps.real, maps.synthetic)
+        self._maps = (maps.synthetic, maps.denoised, maps.real)
+        self._labels, self._library = labels, library
         self.track = ClassTrack(validity.is_current, self)
-        self._path: Path | None = next(iter(settings.paths(_MODEL)), None)
+        self._path: Path | None = next(iter(self._settings.paths(_MODEL)), None)
         self._card: ClassifierCard | None = None
         self._problem = ""
-        self._shown = settings.flag(_SHOWN, True)
+        self._shown = self._settings.flag(_SHOWN, True)
         self._chosen: MapModel | None = None
         self._runner = LatestRunner("classifier", self)
         self._runner.finished.connect(self._set_loaded)
@@ -72,7 +69,7 @@ class ClassifyModel(QObject):
         self.track.changed.connect(self.moved)
         for track in self._maps:
             track.changed.connect(self._follow)
-        playback.frame_changed.connect(lambda _: self.moved.emit())
+        self._playback.frame_changed.connect(lambda _: self.moved.emit())
         validity.changed.connect(self.counts_changed)
         self.counts_changed.connect(self.moved)
 
@@ -114,8 +111,7 @@ class ClassifyModel(QObject):
         there = self.sources
         if self._chosen in there:
             return self._chosen
-        # The denoised one first: it follows the sensor and looks like a radar's.
-        ordered = [one for one in (self._denoised, self._real, self._synthetic) if one in there]
+        ordered = [one for one in self._in_favour if one in there]
         known = [one for one in ordered if self._knows(one)]
         return next(iter(known or ordered), None)
 

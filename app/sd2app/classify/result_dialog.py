@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import (
@@ -14,9 +16,9 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from sd2app.classify.learning_curve import LearningCurve
 from sd2app.classify.result import ClassResult, Matrix
 from sd2app.session.display import DisplayModel
+from sd2app.widgets.chart import Chart, ChartView, Curve, Mark, Scale
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.panel import sentence, title
 
@@ -25,6 +27,10 @@ _STRONGEST = 120
 """Tint of a cell that holds all; text on it stays legible in both themes."""
 _CELL_PX = (92, 40)
 _GAP_PX = 6
+_COLOURS = ("real", "synthetic", "denoised", "before")
+_ASIDE_PX = 8
+"""Shift between learning curves, so that their bars do not cover each other."""
+_PAD = 1.15
 
 
 class ConfusionView(QWidget):
@@ -149,7 +155,9 @@ class ClassResultDialog(QDialog):
         layout.addLayout(row)
         if any(len(curve) > 1 for curve in result.curves):
             layout.addSpacing(8)
-            layout.addWidget(LearningCurve(result, display, self), 1)
+            layout.addWidget(
+                _LearningCurves(display, "Learning curve", learning_chart(result), self), 1
+            )
         buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close, self)
         buttons.rejected.connect(self.reject)
         layout.addWidget(buttons)
@@ -198,3 +206,43 @@ def _usual(matrices: tuple[Matrix, ...]) -> int:
     """Default choice: denoised synthetic maps of the radar's own place, if present."""
     titles = [matrix.title for matrix in matrices]
     return titles.index("+ denoised synthetic") if "+ denoised synthetic" in titles else 0
+
+
+class _LearningCurves(ChartView):
+    HEIGHTS_PX = (180, 240, 420)
+
+
+def learning_chart(result: ClassResult) -> Chart:
+    """Mean recall with bars of one standard deviation over the share of real data."""
+    points = [point for curve in result.curves for point in curve]
+    low = min(point.recall.mean - point.recall.sd for point in points)
+    high = max(point.recall.mean + point.recall.sd for point in points)
+    least = max(math.floor(10 * low) / 10, 0.0)
+    shares = sorted({100 * point.share for point in points})
+    curves, marks = [], []
+    for number, (curve, colour) in enumerate(zip(result.curves, _COLOURS, strict=False)):
+        aside_px = _ASIDE_PX * (number - (len(result.curves) - 1) / 2)
+        places = [(100 * point.share, 100 * point.recall.mean) for point in curve]
+        bars = [100 * point.recall.sd for point in curve]
+        curves.append(
+            Curve(curve[0].title, colour, places, dot_px=3.0, bars=bars, aside_px=aside_px)
+        )
+        marks += [
+            Mark(
+                x,
+                y,
+                f"{point.title}, {x:g} % of the {result.kind} radar's data\n"
+                f"Mean recall {point.recall.text()} %",
+                aside_px,
+            )
+            for (x, y), point in zip(places, curve, strict=True)
+        ]
+    return Chart(
+        Scale(shares[0] / _PAD, 100 * _PAD, log=True, values=tuple(shares), text="{:g} %".format),
+        Scale(100 * least, 100 * max(min(math.ceil(10 * high) / 10, 1.0), least + 0.1)),
+        f"share of the {result.kind} radar's data that is learnt from",
+        "mean recall, %",
+        curves,
+        marks,
+        scattered=True,
+    )

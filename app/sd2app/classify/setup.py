@@ -3,18 +3,27 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QObject
 
-from sd2app.background.latest import LatestRunner
-from sd2app.classify.data import DataSource, division_of, looked_into, why_not_together
 from sd2app.settings import Settings, StoredChoices
+from sd2app.training.setup import LearningSetup
+from sd2app.widgets.text import counted, duration_text
 from sd2core.classify.defaults import DELAY_S, LONGEST_DELAY_S, MODELS, WIDTH, pace_kind
-from sd2core.files.paths import plain_path
+from sd2core.datasets.labelled import (
+    LabelledFacts,
+    LabelledSource,
+    labelled_facts,
+    people_of,
+    unfolded,
+)
+from sd2core.errors import Sd2Error
 from sd2core.runs.pace import known_pace_s
-from sd2core.train.data import Split
+from sd2core.train.data import Split, split_subjects
 
 MAPS = ("radar", "synthetic", "denoised")
 FEATURES = ("columns", "peak")
@@ -33,31 +42,76 @@ _DATA, _PEOPLE = "classify/train/data", "classify/train/people"
 _CHOICES = {"model": MODELS, "features": FEATURES, "quick": ("yes", "no")}
 
 
-class ClassSetup(QObject):
-    """Choices for a classifier's training, kept from one start to the next."""
+@dataclass(frozen=True)
+class DataSource:
+    """A labelled recording, radar file, data set or folder that was chosen."""
 
-    changed = Signal()
-
-    def __init__(self, settings: Settings, parent: QObject | None = None) -> None:
-        super().__init__(parent)
-        self._settings = settings
-        self._values = StoredChoices(settings, "classify/train", _DEFAULTS, _CHOICES)
-        if not 0 <= self._values["delay_s"] <= LONGEST_DELAY_S:
-            self._values.set("delay_s", DELAY_S)
-        people = _people(settings.stored(_PEOPLE, "{}"))
-        self._data = tuple(
-            DataSource(path, people.get(str(path), "")) for path in settings.paths(_DATA)
-        )
-        self._runner = LatestRunner("labelled data", self)
-        self._runner.finished.connect(self._take)
-        self.refresh()
-
-    # --- what is chosen -------------------------------------------------------------------
+    path: Path
+    person: str = ""  # empty where the user has named no one
+    facts: tuple[LabelledFacts, ...] = ()  # of all that a folder holds; empty until read
+    problem: str = ""  # why it cannot be used
 
     @property
-    def data(self) -> tuple[DataSource, ...]:
-        """Data to learn from."""
-        return self._data
+    def nameable(self) -> bool:
+        """True if the user can name its person: pairs and data sets name theirs."""
+        return any(one.kind in ("recording", "radar file") for one in self.facts)
+
+    @property
+    def people(self) -> tuple[str, ...]:
+        """People in it."""
+        return people_of(self.facts)
+
+    @property
+    def text(self) -> str:
+        """Content in words; an ellipsis while that is not known."""
+        if not self.facts:
+            return "…"
+        parts = [_what(self.facts)]
+        if not self.nameable or len(self.people) > 1:
+            parts.append(counted(len(self.people), "person", "people"))
+        spans = sum(one.spans for one in self.facts)
+        if spans:
+            parts.append(counted(spans, "label"))
+        known_s = [one.duration_s for one in self.facts if one.duration_s is not None]
+        if len(known_s) == len(self.facts):
+            parts.append(duration_text(sum(known_s)))
+        placements = max(one.placements for one in self.facts)
+        if placements > 1:
+            parts.append(f"{placements} placements")
+        maps = [name for name in ("synthetic", "denoised", "radar") if self.has(name)]
+        if len(maps) < 3:
+            parts.append(f"{' and '.join(maps) or 'no'} maps")
+        return " · ".join(parts)
+
+    def has(self, name: str) -> bool:
+        """True if all of it has maps of a kind, or they can be computed."""
+        return all(name in one.maps for one in self.facts)
+
+
+class ClassSetup(LearningSetup[DataSource]):
+    """Labelled data and settings for a classifier."""
+
+    def __init__(self, settings: Settings, parent: QObject | None = None) -> None:
+        values = StoredChoices(settings, "classify/train", _DEFAULTS, _CHOICES)
+        if not 0 <= values["delay_s"] <= LONGEST_DELAY_S:
+            values.set("delay_s", DELAY_S)
+        people = _people(settings.stored(_PEOPLE, "{}"))
+        data = [DataSource(path, people.get(str(path), "")) for path in settings.paths(_DATA)]
+        super().__init__(settings, values, _DATA, data, parent)
+
+    def unread(self, path: Path) -> DataSource:
+        """A source of data that has not been read."""
+        return DataSource(path)
+
+    def look_into(self, source: DataSource) -> DataSource:
+        """Read the content of a source of data."""
+        return looked_into(source.path, source.person)
+
+    def keep(self, data: tuple[DataSource, ...]) -> None:
+        """Learn from this data, and remember it with its people."""
+        people = {str(one.path): one.person for one in data if one.person}
+        self._settings.set_value(_PEOPLE, json.dumps(people))
+        super().keep(data)
 
     @property
     def maps(self) -> tuple[str, ...]:
@@ -65,33 +119,10 @@ class ClassSetup(QObject):
         chosen = str(self._values["maps"]).split(",")
         return tuple(name for name in MAPS if name in chosen)
 
-    def value(self, name: str) -> Any:
-        """One of the settings."""
-        return self._values[name]
-
-    def set_value(self, name: str, value: Any) -> None:
-        """Choose a setting; KeyError if there is no such setting."""
-        if self._values.set(name, value):
-            self.changed.emit()
-
     def set_map(self, name: str, wanted: bool) -> None:
         """Add or remove a kind of maps to learn from."""
         chosen = {*self.maps, name} if wanted else set(self.maps) - {name}
         self.set_value("maps", ",".join(one for one in MAPS if one in chosen))
-
-    def add(self, path: Path) -> None:
-        """Add a source of data."""
-        path = plain_path(path)
-        if path.name in ("zarr.json", "recording.json"):
-            path = path.parent
-        if path not in [one.path for one in self._data]:
-            self._keep((*self._data, DataSource(path)))
-            self.refresh()
-
-    def remove(self, path: Path) -> None:
-        """Remove a source of data."""
-        self._keep(tuple(one for one in self._data if one.path != path))
-        self.refresh()
 
     def name_person(self, path: Path, name: str) -> None:
         """Name the person of a source's recordings or radar files; empty: the stored name."""
@@ -100,30 +131,7 @@ class ClassSetup(QObject):
         known = {one.path: one.person for one in self._data}
         if known.get(path, name) != name:
             named = DataSource(path, name)
-            self._keep(tuple(named if one.path == path else one for one in self._data))
-            self.refresh()
-
-    def refresh(self) -> None:
-        """Read the data again."""
-        chosen = [(one.path, one.person) for one in self._data]
-        if chosen:
-            self._runner.submit(lambda emit: tuple(looked_into(*one) for one in chosen))
-
-    def close(self) -> None:
-        """Stop reading."""
-        self._runner.close()
-
-    def _keep(self, data: tuple[DataSource, ...]) -> None:
-        self._runner.cancel()
-        self._data = data
-        self._settings.set_paths(_DATA, [one.path for one in data])
-        people = {str(one.path): one.person for one in data if one.person}
-        self._settings.set_value(_PEOPLE, json.dumps(people))
-        self.changed.emit()
-
-    def _take(self, data: tuple[DataSource, ...]) -> None:
-        self._data = data
-        self.changed.emit()
+            self.keep(tuple(named if one.path == path else one for one in self._data))
 
     # --- what follows ---------------------------------------------------------------------
 
@@ -198,3 +206,70 @@ def _people(text: str) -> dict[str, str]:
         return {str(path): str(name) for path, name in json.loads(text).items()}
     except (ValueError, AttributeError):
         return {}
+
+
+def looked_into(path: Path, person: str) -> DataSource:
+    """Read the content of a source of data; may wait for the disk."""
+    try:
+        sources = unfolded([LabelledSource(path, person)])
+        facts = tuple(labelled_facts(one) for one in sources)
+        of_itself = [one.path for one in facts if one.kind in ("pairs", "data set")]
+        # A name that was given before is no reason to refuse them.
+        return DataSource(path, "" if len(of_itself) == len(facts) else person, facts)
+    except (Sd2Error, OSError) as error:
+        return DataSource(path, person, problem=str(error))
+
+
+def division_of(data: Sequence[DataSource]) -> Split | None:
+    """Division of people into training, validation and test; None where there are no people.
+
+    Like ``sd2 classify train``: where there is nothing but data sets, they state it themselves.
+    Raises Sd2Error if data sets contradict each other.
+    """
+    facts = [one for source in data for one in source.facts]
+    people = people_of(facts)
+    if not people:
+        return None
+    validation: list[str] = []
+    test: list[str] = []
+    if all(one.kind == "data set" for one in facts):
+        for one in facts:
+            validation += one.splits.get("validation", ())
+            test += one.splits.get("test", ())
+    return split_subjects(people, validation or None, test or None)
+
+
+def why_not_together(data: Sequence[DataSource], maps: Sequence[str] = ()) -> str:
+    """Reason why these sources cannot be mixed with these maps; empty when they can."""
+    for source in data:
+        for name in maps:
+            if not source.has(name):
+                return f"{source.path.name} has no {name} maps: choose others, or leave it out."
+    grids = {one.grid for source in data for one in source.facts if one.grid is not None}
+    if len(grids) > 1:
+        return (
+            "These differ in their velocity axis or frame rate: "
+            + "; ".join(
+                f"{grid.bins} bins up to ±{grid.v_max_mps:g} m/s at {grid.frame_rate_hz:.4g}"
+                " frames/s"
+                for grid in sorted(grids)
+            )
+            + ". Choose data of one kind."
+        )
+    try:
+        division_of(data)
+    except Sd2Error as error:
+        return str(error)
+    return ""
+
+
+def _what(facts: Sequence[LabelledFacts]) -> str:
+    """Short text such as ``simulated pairs`` or ``3 recordings``."""
+    kinds = {one.kind for one in facts}
+    if len(facts) > 1:
+        words = {"recording": "recordings", "radar file": "radar files", "data set": "data sets"}
+        kind = next(iter(kinds)) if len(kinds) == 1 else ""
+        what = f"{len(facts)} {words.get(kind, 'recordings and radar files')}"
+    else:
+        what = facts[0].kind
+    return f"{what} (simulated)" if any(one.simulated for one in facts) else what

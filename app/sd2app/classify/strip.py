@@ -23,8 +23,7 @@ from sd2app.classify.text import ago_text, delay_text, reading_text
 from sd2app.classify.track import ClassReading
 from sd2app.labels.model import LabelsModel
 from sd2app.session.display import DisplayModel
-from sd2app.session.playback import PlaybackModel
-from sd2app.session.time_window import TimeWindow
+from sd2app.session.session import Session
 from sd2app.widgets.cached_paint import CachedPaint
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.model_menu import ModelButton
@@ -52,11 +51,9 @@ class ClassStrip(QWidget):
 
     def __init__(
         self,
+        session: Session,
         classify: ClassifyModel,
         labels: LabelsModel,
-        span: TimeWindow,
-        playback: PlaybackModel,
-        display: DisplayModel,
         button: ModelButton,
         parent: QWidget | None = None,
     ) -> None:
@@ -68,7 +65,7 @@ class ClassStrip(QWidget):
         self._source.activated.connect(lambda at: classify.set_source(classify.sources[at]))
         self._status = ElidedLabel(self)
         self._status.setObjectName("muted")
-        self.readout = ClassReadout(classify, labels, display, self)
+        self.readout = ClassReadout(session.display, classify, labels, self)
         row = QHBoxLayout()
         row.setContentsMargins(8, 2, MARGIN_PX, 2)
         row.setSpacing(8)
@@ -80,7 +77,7 @@ class ClassStrip(QWidget):
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
         column.addLayout(row)
-        column.addWidget(ClassPlot(classify, labels, span, playback, display, self))
+        column.addWidget(ClassPlot(session, classify, labels, self))
         classify.changed.connect(self._refresh)
         classify.moved.connect(self._say)
         self._refresh()
@@ -122,9 +119,9 @@ class ClassReadout(QWidget):
 
     def __init__(
         self,
+        display: DisplayModel,
         classify: ClassifyModel,
         labels: LabelsModel,
-        display: DisplayModel,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
@@ -212,16 +209,15 @@ class ClassPlot(QWidget):
 
     def __init__(
         self,
+        session: Session,
         classify: ClassifyModel,
         labels: LabelsModel,
-        span: TimeWindow,
-        playback: PlaybackModel,
-        display: DisplayModel,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
         self._classify, self._labels = classify, labels
-        self._span, self._playback, self._display = span, playback, display
+        self._span, self._playback = session.span, session.playback
+        self._display = session.display
         self._still = CachedPaint(self)
         self.setFixedHeight(_PLOT_PX)
         self.setAccessibleName("Probability of each gesture over time")
@@ -230,11 +226,11 @@ class ClassPlot(QWidget):
             classify.counts_changed,
             classify.changed,
             labels.changed,
-            span.changed,
-            display.theme_changed,
+            self._span.changed,
+            self._display.theme_changed,
         ):
             signal.connect(self._redraw)
-        playback.frame_changed.connect(self.update)
+        self._playback.frame_changed.connect(self.update)
 
     @property
     def scale(self) -> TimeScale:

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from sd2app.widgets.model_page import ModelPage, about_sections, map_and_file_rows
+from sd2app.widgets.model_page import ModelPage, about_sections, map_and_file_rows, model_title
+from sd2app.widgets.text import about, exact_text
 
 if TYPE_CHECKING:
+    from sd2app.classify.run import ClassRun
     from sd2app.classify.track import ClassReading
     from sd2core.classify.card import ClassifierCard
 
@@ -21,9 +23,16 @@ _KINDS = {
 }
 
 
-def classifier_title(card: ClassifierCard) -> str:
-    """Title of a classifier in lists."""
-    return card.title or card.name
+_PHASES = {
+    "starting": "Starting…",
+    "stopping": "Stopping…",
+    "cancelling": "Cancelling…",
+    "finished": "Finished",
+    "stopped": "Stopped",
+    "failed": "It failed",
+    "died": "Its process is gone",
+    "gone": "",
+}
 
 
 def kinds_text(kinds: Iterable[str]) -> str:
@@ -52,7 +61,7 @@ def classifier_page(card: ClassifierCard) -> ModelPage:
         *map_and_file_rows(card.axis, card.frame_rate_hz, card.path),
     ]
     simulated = "real" not in card.trained_on
-    return ModelPage(classifier_title(card), simulated, rows, list(about_sections(card.about)))
+    return ModelPage(model_title(card), simulated, rows, list(about_sections(card.about)))
 
 
 def reading_text(reading: ClassReading | None) -> str:
@@ -74,3 +83,37 @@ def ago_text(seconds: float) -> str:
 def delay_text(card: ClassifierCard) -> str:
     """Delay of the classifier's answers."""
     return f"{card.delay_s:.2g} s late" if card.delay_frames else "at once"
+
+
+def run_headline(run: ClassRun) -> str:
+    """Current phase of the run in words."""
+    history = run.history
+    if run.phase != "running":
+        return _PHASES[run.phase]
+    if run.compares:
+        return (
+            f"Comparing: training {min(history.steps_done + 1, history.total)} of {history.total}"
+        )
+    return f"Training: step {history.steps_done} of {history.total}"
+
+
+def run_time_text(run: ClassRun) -> str:
+    """Elapsed time and time left."""
+    history, parts = run.history, []
+    if run.phase == "running" and history.left_s is not None:
+        parts.append(f"{about(history.left_s)} left")
+    if history.elapsed_s is not None:
+        passed = exact_text(history.elapsed_s)
+        parts.append(f"{passed} so far" if run.under_way else f"took {passed}")
+    return " · ".join(parts)
+
+
+def note(run: ClassRun) -> str:
+    """Advice for a run that was stopped or did not reach its end."""
+    if run.phase == "died":
+        return "It was killed, or the machine was switched off."
+    if run.phase == "stopped" and run.compares:
+        return "What it has trained is kept: Resume trains what is missing."
+    if run.phase == "stopped":
+        return "The best so far is kept." if run.result else "There was nothing to keep yet."
+    return ""

@@ -8,19 +8,26 @@ from pathlib import Path
 from PySide6.QtCore import QObject, SignalInstance
 from PySide6.QtWidgets import QFileDialog, QMenu
 
-from sd2app.denoise.chooser import DenoiserChooser
 from sd2app.denoise.library import DenoiserLibrary
 from sd2app.denoise.live import LiveDenoiseModel
 from sd2app.denoise.model import DenoiseModel
-from sd2app.denoise.text import denoiser_page
+from sd2app.denoise.text import denoiser_page, kind_words, origin_words
 from sd2app.feature import Action, Feature, Shell
 from sd2app.maps.model import SynthesisModel
 from sd2app.maps.stack import MapStack
 from sd2app.session.session import Session
 from sd2app.widgets.model_card_dialog import ModelCardDialog
-from sd2app.widgets.model_menu import ModelButton, ModelMenu
+from sd2app.widgets.model_menu import ModelButton, ModelMenu, Words
 
 _MODELS = "Model (*.safetensors);;All files (*)"
+_WORDS = Words(
+    "Denoise with",
+    "Denoiser",
+    "Show no denoised map for this recording",
+    "Choose a model that denoises this map",
+    kind_words,
+    origin_words,
+)
 
 
 class DenoiseFeature(Feature):
@@ -100,14 +107,13 @@ class DenoiseFeature(Feature):
     def _models(self) -> ModelMenu:
         if self._menu is None:
             below = [self._shell.action(name) for name in ("open_model", "model_card")]
-            chooser = DenoiserChooser(self.model)
-            self._menu = ModelMenu(chooser, self.use, below, self._shell.dialog_parent)
+            parent = self._shell.dialog_parent
+            self._menu = ModelMenu(self.model, _WORDS, self.use, below, parent)
         return self._menu
 
     def put_buttons(self, stack: MapStack) -> None:
         """Offer the models on the maps too."""
-        chooser, menu = DenoiserChooser(self.model), self._models()
-        stack.set_denoiser_buttons(ModelButton(chooser, menu), ModelButton(chooser, menu))
+        stack.set_denoiser_buttons(ModelButton(self._models()), ModelButton(self._models()))
 
     def use(self, path: Path | None) -> None:
         """Denoise with a model file, or with none."""

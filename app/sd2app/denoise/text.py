@@ -9,6 +9,7 @@ from sd2app.widgets.model_page import (
     ModelPage,
     about_sections,
     map_and_file_rows,
+    model_title,
 )
 
 if TYPE_CHECKING:
@@ -25,11 +26,6 @@ _KINDS = {
     "median": "Median filter",
     "wiener": "Wiener filter",
 }
-
-
-def model_title(card: ModelCard) -> str:
-    """Title of a model in a list."""
-    return card.title or card.name
 
 
 def kind_words(card: ModelCard) -> str:

@@ -166,11 +166,11 @@ class LabelsPanel(QWidget):
     def turn_to(self, page: str) -> None:
         """Show a page, or the search in the spans, with the keyboard there."""
         if page == "Search":
-            self._pages.turn_to(0)
+            self._pages.turn_to(_PAGES[0][0])
             self.spans.find()
             return
         tables = {"Spans": self.spans.table, "Label set": self._label_set.table}
-        self._pages.turn_to([name for name, _ in _PAGES].index(page))
+        self._pages.turn_to(page)
         tables[page].setFocus(Qt.FocusReason.ShortcutFocusReason)
 
     def _show_count(self) -> None:

@@ -10,11 +10,12 @@ from PySide6.QtWidgets import QWidget
 from sd2app.accuracy.model import AccuracyModel
 from sd2app.feature import Action, Feature, Shell
 from sd2app.maps.model import SynthesisModel
-from sd2app.sensor.panel import SensorPages, SensorPanel
+from sd2app.sensor.panel import SensorPanel
 from sd2app.sensor.placement_dialogs import PlacementDialogs
 from sd2app.sensor.placements import PlacementsModel
 from sd2app.sensor.placements_page import PlacementsPage
 from sd2app.session.session import Session
+from sd2app.widgets.pages import InnerPage, paged_panel
 
 
 class SensorFeature(Feature):
@@ -80,12 +81,14 @@ class SensorFeature(Feature):
         s, shell = self._session, self._shell
         asks = PlacementDialogs(shell, self.placements)
         to_camera, aim = shell.action("sensor_to_camera"), shell.action("aim_sensor")
+        sensor = SensorPanel(s.sensor, s.document, self._synthesis, s.edits, to_camera, aim)
+        placements = PlacementsPage(
+            self.placements, self._accuracy, asks.take, asks.export, self._make_batch
+        )
         return {
-            "Sensor": SensorPages(
-                SensorPanel(s.sensor, s.document, self._synthesis, s.edits, to_camera, aim),
-                PlacementsPage(
-                    self.placements, self._accuracy, asks.take, asks.export, self._make_batch
-                ),
+            "Sensor": paged_panel(
+                InnerPage("Sensor", "Where the sensor is and what it sees", sensor),
+                InnerPage("Placements", "Many places around the body, for a map each", placements),
             )
         }
 

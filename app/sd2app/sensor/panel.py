@@ -23,7 +23,6 @@ from sd2app.session.document import DocumentModel
 from sd2app.session.sensor import SensorModel
 from sd2app.session.undo import Edits
 from sd2app.widgets.inputs import Choice, NumberBox
-from sd2app.widgets.pages import InnerPage, InnerPages
 from sd2app.widgets.panel import rule, title
 from sd2core.sensor import aimed_at, position_from_spherical, spherical_from_position
 
@@ -283,25 +282,3 @@ def _value(parent: QWidget, tip: str) -> QLabel:
     label.setToolTip(tip)
     label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
     return label
-
-
-class SensorPages(QWidget):
-    """Pages of the sensor and of the placements."""
-
-    def __init__(self, sensor: QWidget, placements: QWidget, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self.setObjectName("page")
-        self._pages = InnerPages(
-            (
-                InnerPage("Sensor", "Where the sensor is and what it sees", sensor),
-                InnerPage("Placements", "Many places around the body, for a map each", placements),
-            ),
-            parent=self,
-        )
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 6, 0, 0)
-        layout.addWidget(self._pages)
-
-    def turn_to(self, page: str) -> None:
-        """Show a page by its name."""
-        self._pages.turn_to({"Sensor": 0, "Placements": 1}[page])

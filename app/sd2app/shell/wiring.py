@@ -36,8 +36,8 @@ from sd2app.shell.parts import Parts
 from sd2app.shell.program import ProgramFeature
 from sd2app.suggestions.feature import SuggestionsFeature
 from sd2app.training.feature import TrainingFeature
-from sd2app.training.page import TrainPage
 from sd2app.video.feature import VideoFeature
+from sd2app.widgets.pages import InnerPage, paged_panel
 from sd2core.labels.recovery import recovery_folder
 
 
@@ -186,7 +186,11 @@ def _take_over(session: Session, features: Features) -> None:
 
 def side_pages(features: Features, views: Mapping[str, QWidget]) -> dict[str, QWidget]:
     """Pages of the panel at the side, by their titles."""
-    train = TrainPage(features.training.panel(), features.classify.panel())
+    denoisers, classifiers = features.training.panel(), features.classify.panel()
+    train = paged_panel(
+        InnerPage("Denoiser", "Train what makes synthetic maps a radar's", denoisers),
+        InnerPage("Classifier", "Train what tells gestures apart", classifiers),
+    )
     return {
         "Sensor": views["Sensor"],
         "Accuracy": views["Accuracy"],

@@ -8,22 +8,21 @@ from PySide6.QtWidgets import QApplication, QCheckBox, QFileDialog, QMessageBox
 
 from sd2app.feature import Shell
 from sd2app.training.model import TrainingModel
-from sd2app.training.result import ModelAdoption
 from sd2app.widgets.dialogs import may_delete
 
 
 class TrainingDialogs:
-    """Dialogs, followed by calls of the models; ``report`` shows the sentence of a failure."""
+    """Dialogs and what may be refused, followed by calls of the model."""
 
-    def __init__(self, shell: Shell, training: TrainingModel, use: ModelAdoption) -> None:
-        self._shell, self._training, self._use = shell, training, use
+    def __init__(self, shell: Shell, training: TrainingModel) -> None:
+        self._shell, self._training = shell, training
         self._parent = shell.dialog_parent
 
     def ask_store(self) -> None:
         """Let the user choose a store of pairs."""
         name = QFileDialog.getExistingDirectory(self._parent, "Folder of pairs to learn from")
         if name:
-            self._training.setup.add_store(Path(name))
+            self._training.setup.add(Path(name))
 
     def ask_recordings(self) -> None:
         """Let the user choose recordings to make pairs of."""
@@ -44,10 +43,6 @@ class TrainingDialogs:
         name = QFileDialog.getExistingDirectory(self._parent, "Folder of a run")
         if name:
             self._shell.attempt(lambda: self._training.open_run(Path(name)))
-
-    def use(self) -> None:
-        """Use the model of the run in view."""
-        self._use.use()
 
     def copy_command(self) -> None:
         """Put the command on the clipboard."""

@@ -27,19 +27,10 @@ class TrainingFeature(Feature):
         command: Sequence[str] | None,
         parent: QObject,
     ) -> None:
-        self._session, self._shell, maps = session, shell, session.maps
+        self._session, self._shell = session, shell
         self.model = TrainingModel(session.settings, parent, command or COMMAND)
-        self.adoption = ModelAdoption(
-            self.model,
-            denoise,
-            maps.synthetic,
-            maps.before,
-            maps.denoised,
-            maps.real,
-            user_models_folder,
-            parent,
-        )
-        self._dialogs = TrainingDialogs(shell, self.model, self.adoption)
+        self.adoption = ModelAdoption(self.model, denoise, session.maps, user_models_folder, parent)
+        self._dialogs = TrainingDialogs(shell, self.model)
 
     def actions(self) -> Sequence[Action]:
         """The panel."""

@@ -63,7 +63,7 @@ class TrainingModel(Runs[TrainingMonitor]):
         self.setup.changed.connect(self.changed)
         self.pair_maker = PairMaker(self._folder.parent / "pairs", self, command)
         self.pair_maker.changed.connect(self.changed)
-        self.pair_maker.made.connect(self.setup.add_store)
+        self.pair_maker.made.connect(self.setup.add)
         self.pair_maker.failed.connect(self.failed)
 
     # --- what is known --------------------------------------------------------------------
@@ -128,10 +128,8 @@ class TrainingModel(Runs[TrainingMonitor]):
         run = self.run
         if run is None or run.under_way:
             return
-        # The folders are asked: what was listed may be over by now.
-        for other in self.known:
-            if other.live and TrainingFolder(other.path).live:
-                raise Sd2Error(_SENTENCES.busy.format(other.path.name))
+        if self.busy:
+            raise Sd2Error(self.busy)
         self._launch(run.path, ["train", "--resume", str(run.path)])
 
     def _launch(self, path: Path, arguments: list[str]) -> None:

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.line_process import Ending, LineProcess
+from sd2app.background.run_command import COMMAND
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import remove
 from sd2core.recording.recording import is_recording, open_recording
-
-COMMAND = (sys.executable, "-u", "-m", "sd2app.background.run_command")
 
 
 class PairMaker(QObject):

@@ -1,56 +1,151 @@
-"""The Train panel: a new run to be set up, or one that is under way or has ended."""
+"""Panel of the trainings of denoisers: a new one, or one in view with the use of its model."""
 
 from __future__ import annotations
 
-from typing import Protocol
+import math
+from collections.abc import Collection
+from functools import partial
 
 from PySide6.QtCore import QSignalBlocker
-from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
+from sd2app.background.run_monitor import UNDER_WAY
 from sd2app.session.display import DisplayModel
-from sd2app.training.model import TrainingModel
-from sd2app.training.result import ModelAdoption
-from sd2app.training.run_view import TrainingRunView
+from sd2app.training.dialogs import TrainingDialogs
+from sd2app.training.model import CLOSING, TrainingModel
+from sd2app.training.result import ModelAdoption, gain_rows, gain_summary
+from sd2app.training.run import TrainingHistory, TrainingMonitor
 from sd2app.training.setup_view import TrainingSetupView
-from sd2app.training.text import gain_rows, gain_summary
+from sd2app.training.text import (
+    about_text,
+    headline,
+    metric_rows,
+    point_text,
+    remedy_text,
+    time_text,
+)
+from sd2app.widgets.chart import Chart, ChartView, Curve, Mark, Scale
+from sd2app.widgets.inputs import Choice
 from sd2app.widgets.panel import FactRows, outlined, sentence, title
-from sd2app.widgets.run_list import RunPanel
+from sd2app.widgets.plot import tick_text
+from sd2app.widgets.run_panel import Button, RunPanel, RunView
+
+_CLOSING_TEXT = {"ask": "ask", "keep": "keep training", "stop": "stop, keep the best"}
+_PAD = 1.12
+_LEAST_RATIO = 1.6
 
 
-class Asks(Protocol):
-    """Actions of the panel that need dialogs."""
+class TrainingPanel(RunPanel):
+    """Panel of the trainings of denoisers."""
 
-    def ask_store(self) -> None:
-        """Let the user choose a store of pairs."""
+    def __init__(
+        self,
+        training: TrainingModel,
+        adoption: ModelAdoption,
+        display: DisplayModel,
+        dialogs: TrainingDialogs,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(
+            training,
+            TrainingSetupView(training, dialogs),
+            TrainingRunView(training, adoption, display, dialogs),
+            "Runs: those under way, and those that have ended",
+            dialogs.open_run,
+            parent,
+        )
 
-    def ask_recordings(self) -> None:
-        """Let the user choose recordings to make pairs of."""
 
-    def start(self) -> None:
-        """Start what is set up."""
+class TrainingRunView(RunView[TrainingMonitor]):
+    """Curves and figures of a training, and what its model gains while it is in use."""
 
-    def copy_command(self) -> None:
-        """Put the command on the clipboard."""
+    def __init__(
+        self,
+        training: TrainingModel,
+        adoption: ModelAdoption,
+        display: DisplayModel,
+        dialogs: TrainingDialogs,
+        parent: QWidget | None = None,
+    ) -> None:
+        tell = partial(partial, training.tell)
+        buttons = (
+            Button(
+                "use", "Use this model", "Denoise with it, and compare with what was there before",
+                adoption.use, primary=True,
+            ),
+            Button("pause", "Pause", "Rest, and give the processor back", tell("pause")),
+            Button("go_on", "Continue", "Go on training", tell("run")),
+            Button("stop", "Stop", "End it now and keep the best model", tell("stop")),
+            Button("cancel", "Cancel", "End it now and delete what it made", tell("cancel")),
+            Button("resume", "Resume", "Go on where it ended", dialogs.resume),
+            Button("delete", "Delete…", "Delete this run with its model", dialogs.delete),
+        )  # fmt: skip
+        super().__init__(training, buttons, parent)
+        self._training, self._adoption = training, adoption
+        self._gain = TrainingGainView(adoption, self)
+        self._curves = ChartView(
+            display, "Errors over the epochs", training_chart(TrainingHistory()), self
+        )
+        self._metrics = FactRows(3, at_the_edge=False, parent=self)
+        self._about = sentence("")
+        for part in (self._gain, self._curves, self._metrics, self._about, self._closing_part()):
+            self.column.addWidget(part)
+        adoption.changed.connect(self.refresh)
+        self.refresh()
 
-    def use(self) -> None:
-        """Use the model of the run in view."""
+    def _closing_part(self) -> QWidget:
+        self._closing = QWidget(self)
+        self._choice = Choice("What happens to the training when the window is closed", self)
+        for name in CLOSING:
+            self._choice.addItem(_CLOSING_TEXT[name], name)
+        self._choice.currentIndexChanged.connect(
+            lambda index: self._training.set_closing(CLOSING[index])
+        )
+        row = QHBoxLayout(self._closing)
+        row.setContentsMargins(0, 0, 0, 0)
+        label = QLabel("When closing:", self)
+        label.setObjectName("muted")
+        row.addWidget(label)
+        row.addWidget(self._choice, 1)
+        return self._closing
 
-    def open_run(self) -> None:
-        """Let the user choose a run in another folder."""
+    def texts(self, run: TrainingMonitor) -> tuple[str, str, str]:
+        """Headline, time, and advice for a run that has ended."""
+        return headline(run), time_text(run), remedy_text(run)
 
-    def resume(self) -> None:
-        """Resume the run in view."""
+    def shown(self, run: TrainingMonitor) -> Collection[str]:
+        """Names of the buttons that are of use now."""
+        if run.phase == "starting":
+            return ("cancel",)
+        if run.phase in UNDER_WAY:
+            paused = run.phase in ("pausing", "paused")
+            return ("go_on" if paused else "pause", "stop", "cancel")
+        useful = {
+            "use": run.has_model and self._adoption.run != run.path,
+            "resume": run.resumable,
+            "delete": True,
+        }
+        return [name for name, is_useful in useful.items() if is_useful]
 
-    def delete(self) -> None:
-        """Ask, then delete the run in view."""
+    def show_made(self, run: TrainingMonitor) -> None:
+        """Follow curves and figures."""
+        history = run.history
+        self._gain.setVisible(self._adoption.run == run.path)
+        self._curves.show_chart(training_chart(history))
+        self._curves.setVisible(bool(history.epoch_points or history.step_points))
+        self._metrics.show_facts(metric_rows(history))
+        self._about.setText(about_text(run))
+        self._closing.setVisible(run.phase in UNDER_WAY)
+        with QSignalBlocker(self._choice):
+            self._choice.setCurrentIndex(CLOSING.index(self._training.closing))
 
 
 class TrainingGainView(QWidget):
     """A view of :class:`ModelAdoption`."""
 
-    def __init__(self, use: ModelAdoption, parent: QWidget | None = None) -> None:
+    def __init__(self, adoption: ModelAdoption, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._use = use
+        self._adoption = adoption
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(4)
@@ -61,18 +156,18 @@ class TrainingGainView(QWidget):
         layout.addWidget(self._table)
         self._both = QCheckBox("Show the map from before", self)
         self._both.setToolTip("Draw the map of the model before under that of this one")
-        self._both.toggled.connect(use.set_comparing)
-        self._back = outlined("Go back", "Denoise with what was in use before", use.go_back, self)
+        self._both.toggled.connect(adoption.set_comparing)
+        back = outlined("Go back", "Denoise with what was in use before", adoption.go_back, self)
         row = QHBoxLayout()
         row.addWidget(self._both)
         row.addStretch(1)
-        row.addWidget(self._back)
+        row.addWidget(back)
         layout.addLayout(row)
-        use.changed.connect(self._refresh)
+        adoption.changed.connect(self._refresh)
         self._refresh()
 
     def _refresh(self) -> None:
-        use = self._use
+        use = self._adoption
         self._summary.setText(gain_summary(use.gain, use.has_radar))
         self._table.show_facts(gain_rows(use.gain) if use.gain is not None else [])
         with QSignalBlocker(self._both):
@@ -80,38 +175,37 @@ class TrainingGainView(QWidget):
         self._both.setVisible(use.can_compare)
 
 
-class TrainingPanel(RunPanel):
-    """Panel of the trainings of denoisers, with the gain of the model in use."""
+def training_chart(history: TrainingHistory) -> Chart:
+    """Errors over the epochs, on a logarithmic axis; the best epoch is marked."""
+    epochs = history.epoch_points
+    trained = [(one.epoch, one.train_rmse) for one in epochs]
+    validated = [(one.epoch, one.validation_rmse) for one in epochs]
+    curves = [
+        Curve("", "synthetic", _drawable(history.step_points), width_px=1, alpha=80),
+        Curve("training", "synthetic", _drawable(trained)),
+        Curve("validation", "real", _drawable(validated)),
+    ]
+    # Steps scatter: they set the range only while there is little else.
+    shown = [y for curve in curves[len(epochs) >= 2 :] for _, y in curve.points] or [0.1, 1.0]
+    low, high = min(shown) / _PAD, max(shown) * _PAD
+    if high < _LEAST_RATIO * low:
+        middle = math.sqrt(low * high)
+        low, high = middle / math.sqrt(_LEAST_RATIO), middle * math.sqrt(_LEAST_RATIO)
+    last = max((at for at, _ in [*trained[-1:], *history.step_points[-1:]]), default=0.0)
+    marks = [Mark(one.epoch, one.validation_rmse, point_text(one)) for one in epochs]
+    best = next(
+        (mark for mark, one in zip(marks, epochs, strict=True) if one is history.best), None
+    )
+    return Chart(
+        Scale(0.0, last or 1.0, whole=last >= 2),
+        Scale(low, high, log=True, text=tick_text),
+        "epochs",
+        "RMSE",
+        curves,
+        marks,
+        best,
+    )
 
-    def __init__(
-        self,
-        training: TrainingModel,
-        use: ModelAdoption,
-        display: DisplayModel,
-        asks: Asks,
-        parent: QWidget | None = None,
-    ) -> None:
-        super().__init__(
-            training,
-            "Runs: those under way, and those that have ended",
-            asks.open_run,
-            parent,
-        )
-        self._training, self._use = training, use
-        self._gain = TrainingGainView(use, self)
-        self._run_view = TrainingRunView(
-            training, display, asks.use, asks.resume, asks.delete, self._gain, self
-        )
-        setup = TrainingSetupView(
-            training, asks.ask_store, asks.ask_recordings, asks.start, asks.copy_command, self
-        )
-        self.fill(setup, self._run_view)
-        use.changed.connect(self.refresh)
 
-    def refresh(self) -> None:
-        """Follow the models."""
-        super().refresh()
-        run = self._training.run
-        in_use = run is not None and self._use.run == run.folder.path
-        self._gain.setVisible(in_use)
-        self._run_view.set_in_use(in_use)
+def _drawable(points: Collection[tuple[float, float]]) -> list[tuple[float, float]]:
+    return [(x, y) for x, y in points if math.isfinite(y) and y > 0]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
@@ -10,14 +11,29 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, QTimer, Signal, SignalInstance
 
-from sd2app.session.maps import MapModel
-from sd2app.training.history import Improvement
+from sd2app.session.session import Maps
 from sd2app.training.model import TrainingModel
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
 from sd2core.maps import DopplerMap
 
 CALM_MS = 150
+
+
+@dataclass(frozen=True)
+class Improvement:
+    """Mean error of the peak velocity per frame, against the radar's map of the recording.
+
+    ``plain_mps`` is that of the synthetic map, ``before_mps`` of the model that was in use before,
+    if there was one; ``frames`` is the number of frames with both maps.
+    """
+
+    plain_mps: float
+    before_mps: float | None
+    now_mps: float
+    before_title: str
+    frames: int
+    simulated: bool
 
 
 class Denoising(Protocol):
@@ -47,8 +63,7 @@ class Denoising(Protocol):
 class ModelAdoption(QObject):
     """Keeps the best model of a run among the user's models, and denoises with it.
 
-    ``plain`` is the synthetic map, ``before`` and ``now`` are that map denoised by the previous
-    model and by the model in use. ``models`` gives the folder of the user's models.
+    ``models`` gives the folder of the user's models.
     """
 
     changed = Signal()  # the model in use, or its gain
@@ -59,17 +74,12 @@ class ModelAdoption(QObject):
         self,
         training: TrainingModel,
         denoise: Denoising,
-        plain: MapModel,
-        before: MapModel,
-        now: MapModel,
-        radar: MapModel,
+        maps: Maps,
         models: Callable[[], Path],
         parent: QObject | None = None,
     ) -> None:
         super().__init__(parent)
-        self._training = training
-        self._denoise = denoise
-        self._plain, self._before, self._now, self._radar = plain, before, now, radar
+        self._training, self._denoise, self._maps = training, denoise, maps
         self._models = models
         self._kept: Path | None = None
         self._run: Path | None = None
@@ -81,8 +91,8 @@ class ModelAdoption(QObject):
         self._calm.setSingleShot(True)
         self._calm.setInterval(CALM_MS)
         self._calm.timeout.connect(self._compare)
-        for signal in (denoise.changed, now.changed, before.changed, radar.changed):
-            signal.connect(self._wait)
+        for one in (denoise, maps.denoised, maps.before, maps.real):
+            one.changed.connect(self._wait)
 
     # --- what is known --------------------------------------------------------------------
 
@@ -99,7 +109,7 @@ class ModelAdoption(QObject):
     @property
     def has_radar(self) -> bool:
         """True if there is a radar's map to compare with."""
-        return self._radar.map is not None
+        return self._maps.real.map is not None
 
     @property
     def comparing(self) -> bool:
@@ -170,11 +180,12 @@ class ModelAdoption(QObject):
             self._calm.start()
 
     def _compare(self) -> None:
-        plain, now, radar = self._plain.map, self._now.map, self._radar.map
+        maps = self._maps
+        plain, now, radar = maps.synthetic.map, maps.denoised.map, maps.real.map
         ready = self.run is not None and not self._denoise.busy
         if ready and plain is not None and now is not None and radar is not None:
-            target = _radar_at(plain, radar, self._radar.offset_s)
-            before = self._before.map
+            target = _radar_at(plain, radar, maps.real.offset_s)
+            before = maps.before.map
             if before is not None:
                 self._before_mps = _peak_error(before, *target)[0]
             plain_mps, frames = _peak_error(plain, *target)
@@ -194,16 +205,43 @@ class ModelAdoption(QObject):
         self.changed.emit()
 
 
+def gain_summary(gain: Improvement | None, has_radar: bool) -> str:
+    """Caption of the figures below, or the reason why there are none."""
+    if gain is not None:
+        radar = "the simulated radar's" if gain.simulated else "the radar's"
+        worse = " Here it is worse than no denoising." if gain.now_mps > gain.plain_mps else ""
+        return (
+            f"Peak velocity off {radar}, on average over {gain.frames:,} frames of this"
+            f" recording.{worse}"
+        )
+    if not has_radar:
+        return "Open a recording with a radar capture to see how much nearer it comes to that."
+    return "Denoising this recording…"
+
+
+def gain_rows(gain: Improvement) -> list[tuple[str, str]]:
+    """Errors before and after."""
+
+    def row(name: str, value_mps: float) -> tuple[str, str]:
+        text = f"{value_mps:.3f} m/s"
+        if name != "not denoised" and gain.plain_mps > 0:
+            change = round(100 * (value_mps / gain.plain_mps - 1))
+            text += f" ({change:+d} %)".replace("-", "−")
+        return name, text
+
+    rows = [row("not denoised", gain.plain_mps)]
+    if gain.before_mps is not None:
+        rows.append(row(f"before, {gain.before_title}", gain.before_mps))
+    return [*rows, row("this model", gain.now_mps)]
+
+
 def _radar_at(
     doppler: DopplerMap, radar: DopplerMap, offset_s: float
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
     """Values of the radar at the frames of a map, and a mask of those it covers."""
     times_s = doppler.timebase.times_s
     there_s = radar.timebase.times_s + offset_s
-    right = np.clip(np.searchsorted(there_s, times_s), 1, max(len(there_s) - 1, 1))
-    left = right - 1
-    right = np.minimum(right, len(there_s) - 1)
-    nearest = np.where(times_s - there_s[left] < there_s[right] - times_s, left, right)
+    nearest = np.rint(np.interp(times_s, there_s, np.arange(len(there_s)))).astype(np.int64)
     spacing_s = np.median(np.diff(there_s)) if len(there_s) > 1 else 1.0
     inside = np.abs(there_s[nearest] - times_s) <= 0.51 * spacing_s
     return radar.values.T[nearest], inside

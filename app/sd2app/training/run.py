@@ -1,20 +1,187 @@
-"""Monitor of one training run."""
+"""Training run of a denoiser: its monitor, and what it told."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple, TypeVar, get_args
 
 from PySide6.QtCore import QObject
 
-from sd2app.background.run_monitor import RunMonitor
-from sd2app.training.history import TrainingHistory
+from sd2app.background.run_monitor import RunMonitor, take_lines
 from sd2core.errors import Sd2Error
 from sd2core.processes import ProcessId
 from sd2core.train.config import TrainConfig, read_config
 from sd2core.train.folder import TrainingFolder
+
+Outcome = Literal["finished", "stopped", "cancelled", "failed"]
+T = TypeVar("T")
+
+_MOST_POINTS = 2000
+"""Limit of kept steps; beyond it, every second one is dropped."""
+
+
+class LearningHistory:
+    """Steps of a training, read from its lines; damaged lines are left out."""
+
+    readers: ClassVar[Mapping[str, Callable[[Any, dict[str, Any]], None]]]
+    """Method that takes a line, by the name of the line's event."""
+
+    def __init__(self) -> None:
+        self.begun = False
+        self.steps_done = 0
+        self.elapsed_s: float | None = None
+        self._stride, self._skipped = 1, 0
+
+    def take(self, events: Iterable[dict[str, Any]]) -> bool:
+        """Take lines; True if any of them was of use."""
+        return take_lines(self, self.readers, events)
+
+    def _advance(self, steps: int, elapsed_s: float) -> None:
+        self.steps_done = steps
+        if 0 <= elapsed_s < math.inf:
+            self.elapsed_s = elapsed_s
+
+    def _note(self, points: list[T], point: T) -> None:
+        """Keep a point of every step, or of every so many where there are too many."""
+        self._skipped += 1
+        if self._skipped >= self._stride:
+            self._skipped = 0
+            points.append(point)
+            if len(points) > _MOST_POINTS:
+                del points[1::2]
+                self._stride *= 2
+
+
+class StepPoint(NamedTuple):
+    """Error on the batches up to a step."""
+
+    at: float  # in epochs: 1.5 is the middle of the second
+    train_rmse: float
+
+
+@dataclass(frozen=True)
+class EpochPoint:
+    """Errors after an epoch; NaN if not reported."""
+
+    epoch: int  # from 1
+    train_rmse: float
+    validation_rmse: float
+    validation_mae_mps: float  # of the peak velocity per frame
+    best: bool  # better than all before
+
+
+class TrainingHistory(LearningHistory):
+    """Steps and epochs of the training of a denoiser."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.model = ""
+        self.device = ""
+        self.parameters = 0
+        self.epochs = 0
+        self.minutes = 0.0
+        self.steps_per_epoch = 0
+        self.segments = 0
+        self.paused = False
+        self.left_s: float | None = None
+        self.step_points: list[StepPoint] = []
+        self.epoch_points: list[EpochPoint] = []
+        self.epoch = 0  # under way, from 1; zero before the first
+        self.outcome: Outcome | None = None
+        self.error = ""
+
+    @property
+    def best(self) -> EpochPoint | None:
+        """The best epoch so far."""
+        return next((point for point in reversed(self.epoch_points) if point.best), None)
+
+    @property
+    def share(self) -> float | None:
+        """Share of the whole that is done; None while that is not known."""
+        total = self.epochs * self.steps_per_epoch
+        if total:
+            return min(self.steps_done / total, 1.0)
+        if self.minutes and self.elapsed_s is not None:
+            return min(self.elapsed_s / (60.0 * self.minutes), 1.0)
+        return None
+
+    def _start(self, event: dict[str, Any]) -> None:
+        steps_per_epoch, epochs = _count(event["steps_per_epoch"], 1), _count(event.get("epochs"))
+        minutes, done = _number(event.get("minutes")), _count(event.get("steps_done"))
+        parameters = _count(event.get("parameters"))
+        segments = _count(event.get("train_segments"))
+        self.model, self.device = str(event["model"]), str(event.get("device", ""))
+        self.epochs, self.steps_per_epoch = epochs, steps_per_epoch
+        self.minutes = minutes if minutes > 0 else 0.0
+        self.parameters, self.segments = parameters, segments
+        # What was done after the checkpoint is done again.
+        self._go_back(done if event.get("resumed") else 0)
+        self.begun, self.paused = True, False
+        self.outcome, self.error = None, ""
+
+    def _go_back(self, steps: int) -> None:
+        at = steps / self.steps_per_epoch if self.steps_per_epoch else 0.0
+        self.step_points = [point for point in self.step_points if point.at <= at]
+        self.epoch_points = [point for point in self.epoch_points if point.epoch <= at]
+        self.steps_done = steps
+        self.epoch = math.ceil(at)
+        self.left_s = None
+
+    def _stepped(self, event: dict[str, Any]) -> None:
+        # Counted from the start of the run.
+        step, rmse = _count(event["step"]), _number(event.get("train_rmse"))
+        self._go_to(_count(event["epoch"], 1), step, event)
+        if math.isfinite(rmse) and rmse > 0:
+            self._note(self.step_points, StepPoint(step / max(self.steps_per_epoch, 1), rmse))
+
+    def _go_to(self, epoch: int, steps: int, event: dict[str, Any]) -> None:
+        elapsed_s, left_s = _number(event.get("elapsed_s")), _number(event.get("left_s"))
+        self.epoch = epoch
+        self.left_s = left_s if 0 <= left_s < math.inf else None
+        self._advance(steps, elapsed_s)
+
+    def _epoch_done(self, event: dict[str, Any]) -> None:
+        epoch = _count(event["epoch"], 1)
+        point = EpochPoint(
+            epoch,
+            _number(event.get("train_rmse")),
+            _number(event.get("validation_rmse")),
+            _number(event.get("validation_mae_mps")),
+            bool(event.get("best")),
+        )
+        self._go_to(epoch, epoch * self.steps_per_epoch, event)
+        # Told twice when it was done twice.
+        self.epoch_points = [one for one in self.epoch_points if one.epoch < epoch]
+        self.epoch_points.append(point)
+
+    def _ended(self, event: dict[str, Any]) -> None:
+        outcome = event["outcome"]
+        if outcome not in get_args(Outcome):
+            raise ValueError(f"outcome {outcome!r}")
+        self.outcome, self.paused, self.left_s = outcome, False, None
+        error = event.get("error")
+        if isinstance(error, dict):
+            parts = (str(error.get(key) or "") for key in ("found", "expected", "remedy"))
+            self.error = str(Sd2Error(*parts))
+
+    def _pause(self, event: dict[str, Any]) -> None:
+        self.paused = True
+
+    def _go_on(self, event: dict[str, Any]) -> None:
+        self.paused = False
+
+    readers: ClassVar = {
+        "start": _start,
+        "step": _stepped,
+        "epoch": _epoch_done,
+        "paused": _pause,
+        "resumed": _go_on,
+        "end": _ended,
+    }
 
 
 class _Facts(NamedTuple):
@@ -26,11 +193,12 @@ class _Facts(NamedTuple):
 class TrainingMonitor(RunMonitor[TrainingFolder]):
     """A training run with its settings and its history of epochs."""
 
+    facts = _Facts(None, False, False)
+
     def __init__(
         self, path: Path, parent: QObject | None = None, *, process: ProcessId | None = None
     ) -> None:
         self.history = TrainingHistory()
-        self._facts = _Facts(None, False, False)
         super().__init__(TrainingFolder(path), parent, process=process)
 
     def on_events(self, events: Sequence[dict[str, Any]]) -> bool:
@@ -39,15 +207,11 @@ class TrainingMonitor(RunMonitor[TrainingFolder]):
 
     def inspect(self) -> _Facts:
         """Read the settings, and look which models are there."""
-        folder, config = self.folder, self._facts.config
+        folder, config = self.folder, self.facts.config
         if config is None and folder.exists:
             with suppress(Sd2Error):  # not written yet
                 config = read_config(folder.config)
         return _Facts(config, folder.best.exists(), folder.last.exists())
-
-    def on_facts(self, facts: _Facts) -> None:
-        """Store the facts."""
-        self._facts = facts
 
     @property
     def has_started(self) -> bool:
@@ -72,14 +236,27 @@ class TrainingMonitor(RunMonitor[TrainingFolder]):
     @property
     def config(self) -> TrainConfig | None:
         """Its settings; None until they can be read."""
-        return self._facts.config
+        return self.facts.config
 
     @property
     def has_model(self) -> bool:
         """True if there is a model to use."""
-        return self._facts.has_model
+        return self.facts.has_model
 
     @property
     def resumable(self) -> bool:
         """True if it can be resumed."""
-        return self._facts.has_checkpoint and self.phase in ("stopped", "failed", "died")
+        return self.facts.has_checkpoint and self.phase in ("stopped", "failed", "died")
+
+
+def _count(value: Any, least: int = 0) -> int:
+    """Whole number; zero if not reported."""
+    count = 0 if value is None else int(value)
+    if count < least:
+        raise ValueError(f"{value!r}")
+    return count
+
+
+def _number(value: Any) -> float:
+    """Number; NaN if not reported."""
+    return math.nan if value is None else float(value)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, Protocol, TypeVar
 
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.latest import LatestRunner
 from sd2app.settings import Settings, StoredChoices
+from sd2app.widgets.text import counted, duration_text
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import plain_path
 from sd2core.pairs.summary import PairFacts, pair_facts
@@ -25,6 +27,8 @@ from sd2core.train.data import Split, split_subjects
 
 MODELS = ("s4", "s4d", "gru", "unet", "swin", "s4-serial")
 _DATA = DataConfig(pairs=(Path(),))
+_PAIRS, _KNOWN = "training/pairs", "training/known_pairs"
+_MOST_KNOWN = 10
 _DEFAULTS: dict[str, str | int | float] = {
     "model": "s4",
     "epochs": TrainingConfig().epochs,
@@ -37,6 +41,105 @@ _DEFAULTS: dict[str, str | int | float] = {
 """Defaults, from the paper where it has them; 0 epochs of patience: no early stopping."""
 
 
+class Source(Protocol):
+    """Something to learn from."""
+
+    @property
+    def path(self) -> Path:
+        """Its file or folder."""
+
+    @property
+    def problem(self) -> str:
+        """Reason why it cannot be used; empty where it can."""
+
+
+D = TypeVar("D", bound=Source)
+
+
+class LearningSetup(QObject, Generic[D]):
+    """Choices for a training and the data to learn from, kept from one start to the next.
+
+    The paths of the data are kept in the settings under ``stored``.
+    """
+
+    changed = Signal()
+
+    def __init__(
+        self,
+        settings: Settings,
+        values: StoredChoices,
+        stored: str,
+        data: Sequence[D],
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._settings, self._values, self._stored = settings, values, stored
+        self._data = tuple(data)
+        self._runner = LatestRunner("training data", self)
+        self._runner.finished.connect(self._take)
+        self.refresh()
+
+    # --- what subclasses say ----------------------------------------------------------------
+
+    def unread(self, path: Path) -> D:
+        """Data that has not been looked into."""
+        raise NotImplementedError
+
+    def look_into(self, source: D) -> D:
+        """Read the content of data from disk, in the background."""
+        raise NotImplementedError
+
+    # --- what is chosen ---------------------------------------------------------------------
+
+    @property
+    def data(self) -> tuple[D, ...]:
+        """Data to learn from."""
+        return self._data
+
+    def value(self, name: str) -> Any:
+        """One of the settings."""
+        return self._values[name]
+
+    def set_value(self, name: str, value: Any) -> None:
+        """Choose a setting; KeyError if there is no such setting."""
+        if self._values.set(name, value):
+            self.changed.emit()
+
+    def add(self, path: Path) -> None:
+        """Add data."""
+        path = plain_path(path)
+        if path.name in ("zarr.json", "recording.json"):
+            path = path.parent
+        if path not in [one.path for one in self._data]:
+            self.keep((*self._data, self.unread(path)))
+
+    def remove(self, path: Path) -> None:
+        """Remove data."""
+        self.keep(tuple(one for one in self._data if one.path != path))
+
+    def keep(self, data: tuple[D, ...]) -> None:
+        """Learn from this data, and remember it."""
+        self._runner.cancel()
+        self._data = data
+        self._settings.set_paths(self._stored, [one.path for one in data])
+        self.refresh()
+        self.changed.emit()
+
+    def refresh(self) -> None:
+        """Read the data again: a campaign grows while it is being made."""
+        chosen = self._data
+        if chosen:
+            self._runner.submit(lambda emit: tuple(map(self.look_into, chosen)))
+
+    def close(self) -> None:
+        """Stop reading."""
+        self._runner.close()
+
+    def _take(self, data: tuple[D, ...]) -> None:
+        self._data = data
+        self.changed.emit()
+
+
 @dataclass(frozen=True)
 class Store:
     """A chosen store of pairs."""
@@ -44,6 +147,21 @@ class Store:
     path: Path
     facts: PairFacts | None = None  # None until it has been read, and if it cannot be
     problem: str = ""  # why it cannot be used
+
+    @property
+    def text(self) -> str:
+        """Content in words; an ellipsis while that is not known."""
+        facts = self.facts
+        if facts is None:
+            return "…"
+        parts = [
+            facts.kind,
+            counted(len(facts.subjects), "person", "people"),
+            duration_text(facts.duration_s),
+        ]
+        if facts.placements > 1:
+            parts.append(f"{facts.placements} placements")
+        return " · ".join(parts)
 
 
 @dataclass(frozen=True)
@@ -55,53 +173,41 @@ class Estimate:
     step_s: float | None  # None until a run of the kind has measured it
 
 
-class TrainingSetupModel(QObject):
-    """Choices for a training, kept from one start to the next."""
-
-    changed = Signal()
+class TrainingSetupModel(LearningSetup[Store]):
+    """Pairs and settings for a denoiser."""
 
     def __init__(self, settings: Settings, parent: QObject | None = None) -> None:
-        super().__init__(parent)
-        self._settings = settings
-        self._values = StoredChoices(settings, "training", _DEFAULTS, {"model": MODELS})
-        self._stores: tuple[Store, ...] = tuple(
-            Store(path) for path in settings.paths("training/pairs")
-        )
-        self._runner = LatestRunner("pairs", self)
-        self._runner.finished.connect(self._take)
-        self._read()
+        values = StoredChoices(settings, "training", _DEFAULTS, {"model": MODELS})
+        stores = [Store(path) for path in settings.paths(_PAIRS)]
+        super().__init__(settings, values, _PAIRS, stores, parent)
 
-    # --- what is chosen -------------------------------------------------------------------
+    def unread(self, path: Path) -> Store:
+        """A store of pairs that has not been read."""
+        return Store(path)
+
+    def look_into(self, source: Store) -> Store:
+        """Read what a store of pairs holds."""
+        try:
+            return Store(source.path, pair_facts(source.path))
+        except (Sd2Error, OSError) as error:
+            return Store(source.path, problem=str(error))
+
+    def keep(self, data: tuple[Store, ...]) -> None:
+        """Learn from these pairs, and remember them, also after they are removed."""
+        known = [*(store.path for store in reversed(data)), *self._settings.paths(_KNOWN)]
+        self._settings.set_paths(_KNOWN, list(dict.fromkeys(known))[:_MOST_KNOWN])
+        super().keep(data)
 
     @property
-    def stores(self) -> tuple[Store, ...]:
-        """Stores of pairs to learn from."""
-        return self._stores
-
-    @property
-    def reading(self) -> bool:
-        """True while a store has not been read."""
-        return self._runner.busy
-
-    @property
-    def known_stores(self) -> list[Path]:
-        """Stores that were chosen before."""
-        chosen = {store.path for store in self._stores}
-        return [path for path in self._settings.paths("training/known_pairs") if path not in chosen]
-
-    def value(self, name: str) -> Any:
-        """One of the settings."""
-        return self._values[name]
+    def known(self) -> list[Path]:
+        """Pairs that were chosen before."""
+        chosen = {store.path for store in self._data}
+        return [path for path in self._settings.paths(_KNOWN) if path not in chosen]
 
     @property
     def differs(self) -> bool:
         """True if a setting, the kind of model apart, differs from the paper's."""
         return bool(self._values.others.keys() - {"model"})
-
-    def set_value(self, name: str, value: Any) -> None:
-        """Choose a setting; KeyError if there is no such setting."""
-        if self._values.set(name, value):
-            self.changed.emit()
 
     def reset(self) -> None:
         """Restore the defaults of all settings but the kind of model."""
@@ -109,47 +215,18 @@ class TrainingSetupModel(QObject):
             if name != "model":
                 self.set_value(name, default)
 
-    def add_store(self, path: Path) -> None:
-        """Add a store of pairs."""
-        path = plain_path(path)
-        if path.name == "zarr.json":
-            path = path.parent
-        if path not in [store.path for store in self._stores]:
-            self._stores = (*self._stores, Store(path))
-            known = [path, *(one for one in self._settings.paths("training/known_pairs"))]
-            self._settings.set_paths("training/known_pairs", list(dict.fromkeys(known))[:10])
-            self._keep_stores()
-
-    def remove_store(self, path: Path) -> None:
-        """Remove a store of pairs."""
-        self._stores = tuple(store for store in self._stores if store.path != path)
-        self._keep_stores()
-
-    def _keep_stores(self) -> None:
-        self._settings.set_paths("training/pairs", [store.path for store in self._stores])
-        self._read()
-        self.changed.emit()
-
-    def refresh(self) -> None:
-        """Read the stores again: a campaign grows while it is being made."""
-        self._read()
-
-    def close(self) -> None:
-        """Stop reading."""
-        self._runner.close()
-
     # --- what follows ---------------------------------------------------------------------
 
     @property
     def problem(self) -> str:
         """Reason why it cannot be started; empty when it can."""
-        if not self._stores:
+        if not self._data:
             return "Add pairs to learn from."
-        problems = [store.problem for store in self._stores if store.problem]
+        problems = [store.problem for store in self._data if store.problem]
         if problems:
             return problems[0]
-        facts = [store.facts for store in self._stores if store.facts is not None]
-        if len(facts) < len(self._stores):
+        facts = [store.facts for store in self._data if store.facts is not None]
+        if len(facts) < len(self._data):
             return "Reading the pairs…"
         if len({(one.bins, one.v_max_mps, one.frame_rate_hz) for one in facts}) > 1:
             return (
@@ -167,7 +244,7 @@ class TrainingSetupModel(QObject):
         """Configuration in the form that the library takes; Sd2Error if it cannot be started."""
         if self.problem:
             raise Sd2Error(self.problem)
-        return self._config(tuple(store.path for store in self._stores))
+        return self._config(tuple(store.path for store in self._data))
 
     def _config(self, pairs: tuple[Path, ...]) -> TrainConfig:
         values = self._values
@@ -199,7 +276,7 @@ class TrainingSetupModel(QObject):
 
     def _people(self) -> list[tuple[str, PairFacts, str]]:
         """All people as the library names them, with store and name in it."""
-        found = [store.facts for store in self._stores if store.facts is not None]
+        found = [store.facts for store in self._data if store.facts is not None]
         names = [subject for facts in found for subject in facts.subjects]
         return [
             (
@@ -222,21 +299,3 @@ class TrainingSetupModel(QObject):
             if name in division.training
         )
         return round(0.8 * count) if division.by_take else count
-
-    # --- reading --------------------------------------------------------------------------
-
-    def _read(self) -> None:
-        paths = [store.path for store in self._stores]
-        if paths:
-            self._runner.submit(lambda emit: [_looked_into(path) for path in paths])
-
-    def _take(self, stores: list[Store]) -> None:
-        self._stores = tuple(stores)
-        self.changed.emit()
-
-
-def _looked_into(path: Path) -> Store:
-    try:
-        return Store(path, pair_facts(path))
-    except (Sd2Error, OSError) as error:
-        return Store(path, problem=str(error))

@@ -6,23 +6,20 @@ import math
 from typing import TYPE_CHECKING
 
 from sd2app.background.run_monitor import Phase
-from sd2app.training.history import EpochPoint
-from sd2app.widgets.text import about, duration_text, error_text, exact_text
+from sd2app.training.run import EpochPoint, TrainingHistory, TrainingMonitor
+from sd2app.widgets.text import about, counted, error_text, exact_text
 
 if TYPE_CHECKING:
-    from sd2app.training.history import Improvement, TrainingHistory
-    from sd2app.training.run import TrainingMonitor
-    from sd2core.pairs.summary import PairFacts
     from sd2core.runs.folder import State
     from sd2core.train.data import Split
 
 MODEL_WORDS = {
     "s4": ("S4", "The paper's: a structured state space. It also runs frame by frame."),
     "s4d": ("S4, diagonal", "S4 with a diagonal state matrix: faster, often as good."),
-    "s4-serial": ("S4, serialised", "All cells as one long channel; slow, kept for comparison."),
     "gru": ("GRU", "A recurrent network of the same size. It also runs frame by frame."),
     "unet": ("U-Net", "Convolutions over windows of 72 frames."),
     "swin": ("Swin transformer", "Attention over windows of 72 frames."),
+    "s4-serial": ("S4, serialised", "All cells as one long channel; slow, kept for comparison."),
 }
 
 _PHASES: dict[Phase, str] = {
@@ -39,16 +36,12 @@ _PHASES: dict[Phase, str] = {
     "died": "Ended unexpectedly",
     "gone": "Cancelled",
 }
+_AT_WORK: tuple[Phase, ...] = ("running", "pausing", "paused", "resuming")
 
 
 def model_name(model: str) -> str:
     """Name of a kind of model."""
     return MODEL_WORDS.get(model, (model, ""))[0]
-
-
-def phase_text(phase: Phase) -> str:
-    """Current state of a run."""
-    return _PHASES[phase]
 
 
 def state_text(state: State) -> str:
@@ -69,21 +62,6 @@ def point_text(point: EpochPoint) -> str:
     return "\n".join(lines)
 
 
-def store_text(facts: PairFacts | None) -> str:
-    """Content of a store of pairs in words."""
-    if facts is None:
-        return "…"
-    people = len(facts.subjects)
-    parts = [
-        facts.kind,
-        f"{people} {'person' if people == 1 else 'people'}",
-        duration_text(facts.duration_s),
-    ]
-    if facts.placements > 1:
-        parts.append(f"{facts.placements} placements")
-    return " · ".join(parts)
-
-
 def division_text(
     division: Split, judged_by: str = "sd2 eval", kept_takes: str = "the last takes"
 ) -> str:
@@ -93,8 +71,7 @@ def division_text(
             f"All of it is of one person: {kept_takes} choose the best model, and how good it is"
             " with other people stays unknown."
         )
-    count = len(division.training)
-    text = f"Learns from {count} {'person' if count == 1 else 'people'}"
+    text = f"Learns from {counted(len(division.training), 'person', 'people')}"
     text += f"; the best model is chosen by {_listed(division.validation)}"
     if division.test:
         text += f"; {_listed(division.test)} kept for {judged_by}"
@@ -107,34 +84,28 @@ def _listed(names: tuple[str, ...]) -> str:
     return " and ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
 
 
-def steps_text(steps: int) -> str:
-    """Number of steps, such as ``160 steps``."""
-    return f"{steps:,} {'step' if steps == 1 else 'steps'}"
-
-
 def headline(run: TrainingMonitor) -> str:
     """Phase and progress of a run."""
     phase, history = run.phase, run.history
     if not run.loaded:
         return "Looking…"
-    text = phase_text(phase)
-    if phase in ("running", "pausing", "paused", "resuming") and history.epoch:
+    text = _PHASES[phase]
+    if phase in _AT_WORK and history.epoch:
         of = f" of {history.epochs:,}" if history.epochs else ""
         return f"{text} · epoch {history.epoch:,}{of}"
     if phase in ("finished", "stopped", "failed", "died") and history.epoch_points:
-        done = history.epoch_points[-1].epoch
-        return f"{text} after {done:,} {'epoch' if done == 1 else 'epochs'}"
+        return f"{text} after {counted(history.epoch_points[-1].epoch, 'epoch')}"
     return text
 
 
 def time_text(run: TrainingMonitor) -> str:
     """Elapsed time and time left."""
     history, parts = run.history, []
-    if run.phase in ("running", "pausing", "paused", "resuming") and history.left_s is not None:
+    if run.phase in _AT_WORK and history.left_s is not None:
         parts.append(f"{about(history.left_s)} left")
     if history.elapsed_s is not None:
-        parts.append(f"{exact_text(history.elapsed_s)} so far" if parts else "")
-        parts[-1] = parts[-1] or f"trained for {exact_text(history.elapsed_s)}"
+        passed = exact_text(history.elapsed_s)
+        parts.append(f"{passed} so far" if parts else f"trained for {passed}")
     return " · ".join(parts)
 
 
@@ -179,33 +150,3 @@ def about_text(run: TrainingMonitor) -> str:
     if history.device:
         parts.append("GPU" if history.device.startswith("cuda") else history.device.upper())
     return " · ".join(parts)
-
-
-def gain_summary(gain: Improvement | None, has_radar: bool) -> str:
-    """Caption of the figures below, or the reason why there are none."""
-    if gain is not None:
-        radar = "the simulated radar's" if gain.simulated else "the radar's"
-        worse = " Here it is worse than no denoising." if gain.now_mps > gain.plain_mps else ""
-        return (
-            f"Peak velocity off {radar}, on average over {gain.frames:,} frames of this"
-            f" recording.{worse}"
-        )
-    if not has_radar:
-        return "Open a recording with a radar capture to see how much nearer it comes to that."
-    return "Denoising this recording…"
-
-
-def gain_rows(gain: Improvement) -> list[tuple[str, str]]:
-    """Errors before and after."""
-
-    def row(name: str, value_mps: float) -> tuple[str, str]:
-        text = f"{value_mps:.3f} m/s"
-        if name != "not denoised" and gain.plain_mps > 0:
-            change = round(100 * (value_mps / gain.plain_mps - 1))
-            text += f" ({change:+d} %)".replace("-", "−")
-        return name, text
-
-    rows = [row("not denoised", gain.plain_mps)]
-    if gain.before_mps is not None:
-        rows.append(row(f"before, {gain.before_title}", gain.before_mps))
-    return [*rows, row("this model", gain.now_mps)]

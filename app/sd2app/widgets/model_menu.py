@@ -4,62 +4,70 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from PySide6.QtCore import Qt, SignalInstance
 from PySide6.QtGui import QAction, QActionGroup
 from PySide6.QtWidgets import QMenu, QToolButton, QWidget
+
+from sd2app.widgets.model_page import model_title
 
 Use = Callable[[Path | None], None]
 
 _LONGEST = 14
 
 
-class Entry(NamedTuple):
-    """A model in the menu."""
-
-    text: str
-    tip: str
-    path: Path | None
-
-
-class Face(NamedTuple):
-    """Text and tooltip of the button."""
-
-    text: str
-    tip: str
-
-
-class Chooser(Protocol):
-    """Models to choose from, as texts."""
-
-    title: str  # of the menu
-    role: str  # purpose of a model, for screen readers
-    none_tip: str  # effect of using no model
+class Chosen(Protocol):
+    """The model in use, and what else there is."""
 
     @property
     def changed(self) -> SignalInstance:
-        """Signal that texts or models may have changed."""
+        """Signal that another model is in use, or the same one differently."""
 
     @property
     def path(self) -> Path | None:
-        """The model in use."""
+        """File of the model that is in use or being loaded."""
 
-    def entries(self) -> Sequence[Entry]:
-        """The models as they are on disk now."""
+    @property
+    def card(self) -> Any:
+        """Card of the model in use; None until it is loaded."""
 
-    def face(self) -> Face:
-        """Text and tooltip for the model in use."""
+    @property
+    def problem(self) -> str:
+        """Reason why it cannot be used; empty where it can."""
+
+    @property
+    def busy(self) -> bool:
+        """True while it is being loaded or at work."""
+
+    def available(self) -> Sequence[Any]:
+        """Cards of the models that can be chosen, as they are on disk now."""
+
+
+class Words(NamedTuple):
+    """Texts on models of one kind."""
+
+    title: str  # of the menu
+    role: str  # purpose of a model
+    none_tip: str  # effect of using no model
+    hint: str  # what to choose a model for
+    kind: Callable[[Any], str]  # kind of network, by a model's card
+    origin: Callable[[Any], str]  # what it learned from, by its card
 
 
 class ModelMenu(QMenu):
     """Menu of all known models, and of actions on them."""
 
     def __init__(
-        self, chooser: Chooser, use: Use, below: list[QAction], parent: QWidget | None = None
+        self,
+        chosen: Chosen,
+        words: Words,
+        use: Use,
+        below: list[QAction],
+        parent: QWidget | None = None,
     ) -> None:
-        super().__init__(chooser.title, parent)
-        self._chooser = chooser
+        super().__init__(words.title, parent)
+        self.chosen, self.words = chosen, words
         self._use = use
         self._below = below
         self._group = QActionGroup(self)
@@ -69,50 +77,63 @@ class ModelMenu(QMenu):
     def fill(self) -> None:
         """List the models as they are on disk now."""
         self.clear()
-        path = self._chooser.path
-        none = self.addAction("No model")
-        none.setToolTip(self._chooser.none_tip)
-        none.triggered.connect(lambda: self._use(None))
-        chosen = [(none, path is None)]
-        entries = self._chooser.entries()
-        if entries:
+        words = self.words
+        self._add("No model", words.none_tip, None)
+        cards = self.chosen.available()
+        if cards:
             self.addSeparator()
-        for entry in entries:
-            action = self.addAction(entry.text)
-            action.setToolTip(entry.tip)
-            action.triggered.connect(lambda _=False, path=entry.path: self._use(path))
-            chosen.append((action, entry.path == path))
-        for action, checked in chosen:
-            action.setCheckable(True)
-            action.setActionGroup(self._group)
-            action.setChecked(checked)
+        for card in cards:
+            kind = words.kind(card)
+            tip = f"{kind}, {words.origin(card)}\n{card.path}"
+            self._add(f"{model_title(card)}\t{kind}", tip, card.path)
         self.addSeparator()
         self.addActions(self._below)
+
+    def _add(self, text: str, tip: str, path: Path | None) -> None:
+        action = self.addAction(text)
+        action.setToolTip(tip)
+        action.triggered.connect(lambda: self._use(path))
+        action.setCheckable(True)
+        action.setActionGroup(self._group)
+        action.setChecked(self.chosen.path == path)
 
 
 class ModelButton(QToolButton):
     """Button that names the model in use and opens the menu of models."""
 
-    def __init__(self, chooser: Chooser, menu: ModelMenu, parent: QWidget | None = None) -> None:
+    def __init__(self, menu: ModelMenu, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._chooser = chooser
+        self._chosen, self._words = menu.chosen, menu.words
         self.setObjectName("model")
         self.setMenu(menu)
         self.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         self.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextOnly)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.setCursor(Qt.CursorShape.ArrowCursor)
-        chooser.changed.connect(self._refresh)
+        menu.chosen.changed.connect(self._refresh)
         self._refresh()
 
     def _refresh(self) -> None:
-        text, tip = self._chooser.face()
+        text, tip = self._face()
         if len(text) > _LONGEST:
             text = f"{text[: _LONGEST - 1]}…"
         self.setText(text)
         self.setToolTip(tip)
-        self.setAccessibleName(f"{self._chooser.role}: {text}")
+        self.setAccessibleName(f"{self._words.role}: {text}")
         self.updateGeometry()
         parent = self.parentWidget()
         if parent is not None:
             parent.update()
+
+    def _face(self) -> tuple[str, str]:
+        """Text and tooltip for the model in use."""
+        chosen, words = self._chosen, self._words
+        card, path = chosen.card, chosen.path
+        if chosen.problem:
+            return f"{words.role} not usable", chosen.problem
+        if card is not None:
+            title = model_title(card)
+            return title, f"{title}: {words.kind(card)}, {words.origin(card)}"
+        if path is not None and chosen.busy:
+            return f"Loading {path.stem}…", str(path)
+        return f"No {words.role.lower()}", words.hint

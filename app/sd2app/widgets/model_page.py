@@ -22,6 +22,11 @@ class ModelPage(NamedTuple):
     sections: list[tuple[str, list[tuple[str, str]]]]  # what its makers say, by heading
 
 
+def model_title(card: Any) -> str:
+    """Title of a model in a list, by its card."""
+    return str(card.title or card.name)
+
+
 def map_and_file_rows(
     axis: VelocityAxis, frame_rate_hz: float, path: Path | None
 ) -> Iterator[tuple[str, str]]:

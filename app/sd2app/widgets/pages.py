@@ -37,6 +37,7 @@ class InnerPages(QWidget):
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
+        self._names = [page.name for page in pages]
         self._pages = QStackedWidget(self)
         self._pages.currentChanged.connect(self.turned)
         self._buttons = QButtonGroup(self)
@@ -66,8 +67,9 @@ class InnerPages(QWidget):
         """Number of the page that is shown."""
         return self._pages.currentIndex()
 
-    def turn_to(self, place: int) -> None:
-        """Show a page."""
+    def turn_to(self, page: str) -> None:
+        """Show a page by its first name."""
+        place = self._names.index(page)
         self._buttons.button(place).setChecked(True)
         self._pages.setCurrentIndex(place)
 
@@ -95,3 +97,11 @@ class InnerPages(QWidget):
         button.setCheckable(True)
         button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         return button
+
+
+def paged_panel(*pages: InnerPage) -> InnerPages:
+    """A panel at the side that has pages of its own."""
+    panel = InnerPages(pages)
+    panel.setObjectName("page")
+    panel.setContentsMargins(0, 6, 0, 0)
+    return panel

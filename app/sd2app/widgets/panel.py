@@ -67,39 +67,6 @@ def outlined(text: str, tip: str, run: Callable[[], object] | None, parent: QWid
     return button
 
 
-def data_row(
-    name: str,
-    path: str,
-    about: str,
-    problem: str,
-    remove: Callable[[], None],
-    parent: QWidget,
-    below: QWidget | None = None,
-) -> QWidget:
-    """Row of training data: its name, its facts, and a button to remove it."""
-    row = QWidget(parent)
-    heading = ElidedLabel(row)
-    heading.setText(name)
-    heading.setToolTip(path)
-    facts = sentence(problem or about, "warning" if problem else "muted")
-    button = QToolButton(row)
-    button.setText("✕")
-    button.setToolTip(f"Do not learn from {name}")
-    button.setAccessibleName(button.toolTip())
-    button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-    button.clicked.connect(lambda: remove())
-    grid = QGridLayout(row)
-    grid.setContentsMargins(0, 0, 0, 0)
-    grid.setSpacing(0)
-    grid.addWidget(heading, 0, 0)
-    grid.addWidget(button, 0, 1, 2, 1, Qt.AlignmentFlag.AlignTop)
-    grid.addWidget(facts, 1, 0)
-    if below is not None:
-        grid.addWidget(below, 2, 0)
-    grid.setColumnStretch(0, 1)
-    return row
-
-
 def side_by_side(*widgets: QWidget, spacing_px: int = 8) -> QHBoxLayout:
     """Widgets in a row that begins at the left and leaves the rest empty."""
     row = QHBoxLayout()

@@ -69,9 +69,9 @@ def seconds(value_s: float) -> str:
     return milliseconds(1e3 * value_s) if value_s < 1 else f"{number(value_s)} s"
 
 
-def counted(number: int, what: str) -> str:
-    """``1 map``, ``2,000 maps``."""
-    return f"{number:,} {what}" + ("" if number == 1 else "s")
+def counted(number: int, what: str, several: str = "") -> str:
+    """``1 map``, ``2,000 maps``; ``several`` is a plural without a plain ``s``."""
+    return f"{number:,} {what if number == 1 else several or what + 's'}"
 
 
 def bytes_text(count: int) -> str:

@@ -13,7 +13,8 @@ import pytest
 from small_pairs import write_pairs
 
 from sd2app.background.run_command import CommandFolder, last_output
-from sd2app.classify.run_text import facts, headline, note, time_text
+from sd2app.classify.panel import recall_text
+from sd2app.classify.text import note, run_headline, run_time_text
 from sd2app.classify.training import ClassTraining
 from sd2app.command_line import main
 from sd2app.settings import Settings
@@ -205,13 +206,13 @@ def test_a_training_is_followed_to_its_end_and_its_model_is_used(set_up, qtbot):
     set_up.ended(model)
     run = model.run
     assert run.phase == "finished"
-    assert headline(run) == "Finished"
+    assert run_headline(run) == "Finished"
     assert [point.step for point in run.history.losses] == list(range(1, 7))
     assert [(one.recall, one.best) for one in run.history.checks] == [
         (0.5, True), (0.8, True), (0.7, False),
     ]  # fmt: skip
-    assert facts(run) == [("Best recall", "80.0 %, at step 4")]
-    assert time_text(run) == "took 0:12"
+    assert recall_text(run.history.best) == "80.0 %, at step 4"
+    assert run_time_text(run) == "took 0:12"
     assert not model.in_use
     model.use_model()
     (kept,) = set_up.used
@@ -229,24 +230,24 @@ def test_time_left_is_told_from_what_it_took(set_up, qtbot):
     model = set_up.training("--step-s", "0.5")
     set_up.ready(model)
     model.train()
-    qtbot.waitUntil(lambda: model.run.history.done >= 3, timeout=20_000)
+    qtbot.waitUntil(lambda: model.run.history.steps_done >= 3, timeout=20_000)
     history = model.run.history
     # Two seconds a step, as it says.
-    assert history.left_s == pytest.approx(2.0 * (fake_class_command.STEPS - history.done))
-    assert model.mark == f"{100 * history.done / fake_class_command.STEPS:.0f} %"
-    assert headline(model.run) == f"Training: step {history.done} of 6"
+    assert history.left_s == pytest.approx(2.0 * (fake_class_command.STEPS - history.steps_done))
+    assert model.mark == f"{100 * history.steps_done / fake_class_command.STEPS:.0f} %"
+    assert run_headline(model.run) == f"Training: step {history.steps_done} of 6"
 
 
 def test_stop_keeps_the_best(set_up, qtbot):
     model = set_up.training("--step-s", "0.5")
     set_up.ready(model)
     model.train()
-    qtbot.waitUntil(lambda: model.run.history.done >= 1, timeout=20_000)
+    qtbot.waitUntil(lambda: model.run.history.steps_done >= 1, timeout=20_000)
     model.run.stop()
     assert model.run.phase == "stopping"
     set_up.ended(model)
     assert model.run.phase == "stopped"
-    assert model.run.history.done < fake_class_command.STEPS
+    assert model.run.history.steps_done < fake_class_command.STEPS
     assert note(model.run) == "The best so far is kept."
     assert model.run.result.is_file()
 
@@ -299,8 +300,8 @@ def test_a_comparison_that_was_stopped_goes_on_in_its_folder(set_up, qtbot):
     model = set_up.training("--step-s", "0.5")
     set_up.ready(model)
     model.compare()
-    qtbot.waitUntil(lambda: model.run.history.done >= 1, timeout=20_000)
-    assert headline(model.run).startswith("Comparing: training")
+    qtbot.waitUntil(lambda: model.run.history.steps_done >= 1, timeout=20_000)
+    assert run_headline(model.run).startswith("Comparing: training")
     model.run.stop()
     set_up.ended(model)
     assert model.run.result is None

@@ -12,8 +12,7 @@ from PySide6.QtCore import QObject, Signal
 from sd2app.classify.model import ClassifyModel
 from sd2app.classify.text import classifier_page, reading_text
 from sd2app.labels.model import LabelsModel
-from sd2app.session.maps import MapModel
-from sd2app.session.playback import PlaybackModel
+from sd2app.session.session import build_session
 from sd2app.settings import Settings
 from sd2core.errors import Sd2Error
 from sd2core.labels.label_set import Label, LabelSet
@@ -43,14 +42,16 @@ def a_map(kind, seed=0):
 
 @pytest.fixture
 def set_up(qtbot):
-    fake, settings, labels = FakeClassifiers("a"), Settings.forgetful(), LabelsModel()
-    tracks = [MapModel(name) for name in ("Synthetic", "Denoised", "Radar (simulated)")]
-    playback, validity = PlaybackModel(), MapValidity()
+    fake, labels, validity = FakeClassifiers("a"), LabelsModel(), MapValidity()
+    session = build_session(owner := QObject(), Settings.forgetful())
+    tracks = [session.maps.synthetic, session.maps.denoised, session.maps.real]
+    tracks[2].title = "Radar (simulated)"
+    playback = session.playback
     playback.set_timebase(Timebase.regular(60, 30.0))
     made = []
 
     def model():
-        made.append(ClassifyModel(tracks, playback, validity, labels, settings, fake.library))
+        made.append(ClassifyModel(session, validity, labels, fake.library, owner))
         return made[-1]
 
     def settle():

@@ -19,7 +19,7 @@ pytestmark = pytest.mark.slow
 @pytest.fixture
 def model(qtbot, tmp_path):
     model = TrainingModel(Settings.forgetful(), folder=tmp_path / "runs")
-    model.setup.add_store(write_pairs(tmp_path / "campaign.zarr"))
+    model.setup.add(write_pairs(tmp_path / "campaign.zarr"))
     for name, value in (("model", "gru"), ("epochs", 4), ("batch_size", 8)):
         model.setup.set_value(name, value)
     qtbot.waitUntil(lambda: not model.setup.problem, timeout=20_000)

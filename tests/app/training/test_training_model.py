@@ -49,8 +49,8 @@ def made(qtbot, tmp_path, pairs):
         command = [sys.executable, "-u", str(FAKE), *map(str, options)]
         model = TrainingModel(settings or Settings.forgetful(), None, command, tmp_path / "runs")
         models.append(model)
-        if not model.setup.stores:
-            model.setup.add_store(pairs)
+        if not model.setup.data:
+            model.setup.add(pairs)
             model.setup.set_value("epochs", epochs)
         qtbot.waitUntil(lambda: not model.setup.problem, timeout=5_000)
         return model
@@ -81,7 +81,7 @@ def test_a_run_from_start_to_end(made, qtbot) -> None:
     assert run.history.best.validation_rmse == pytest.approx(0.4)
     assert run.history.share == 1.0
     assert run.folder.best.exists()
-    assert run.config.data.pairs == (model.setup.stores[0].path,)
+    assert run.config.data.pairs == (model.setup.data[0].path,)
     assert not list(run.folder.path.parent.glob(".*"))
 
 
@@ -89,7 +89,7 @@ def test_one_at_a_time(made, qtbot) -> None:
     model = made("--rest-at", 1)
     model.start()
     wait_for(qtbot, model, "running")
-    qtbot.waitUntil(lambda: model.live is not None)
+    qtbot.waitUntil(lambda: any(one.live for one in model.known))
     assert "is being trained" in model.why_not_start
     with pytest.raises(Sd2Error, match="is being trained"):
         model.start()
@@ -270,14 +270,14 @@ def test_stores_are_learnt_from_as_the_library_does(made, qtbot, pairs, tmp_path
     """Who is learnt from, and how many segments that gives, is what the library finds."""
     model = made()
     write_pairs(tmp_path / "more.zarr", subjects=3, frames=200)
-    model.setup.add_store(tmp_path / "more.zarr" / "zarr.json")
+    model.setup.add(tmp_path / "more.zarr" / "zarr.json")
     qtbot.waitUntil(lambda: not model.setup.problem)
     config = model.setup.config
     data = prepare(read_mixed(config.data.pairs), config.data)
     assert model.setup.division == data.split
     assert model.setup.estimate.segments == len(data.training)
     write_pairs(tmp_path / "other.zarr", subjects=3, bins=16)
-    model.setup.add_store(tmp_path / "other.zarr")
+    model.setup.add(tmp_path / "other.zarr")
     qtbot.waitUntil(lambda: "differ in their velocity axis" in model.setup.problem)
     with pytest.raises(Sd2Error, match="differ in their velocity axis"):
         model.start()
@@ -285,12 +285,12 @@ def test_stores_are_learnt_from_as_the_library_does(made, qtbot, pairs, tmp_path
 
 def test_one_person_is_divided_by_takes_and_that_is_said(made, qtbot, tmp_path) -> None:
     model = made()
-    model.setup.remove_store(model.setup.stores[0].path)
+    model.setup.remove(model.setup.data[0].path)
     assert model.setup.problem == "Add pairs to learn from."
-    model.setup.add_store(write_pairs(tmp_path / "take.zarr", subjects=1))
+    model.setup.add(write_pairs(tmp_path / "take.zarr", subjects=1))
     qtbot.waitUntil(lambda: "one take" in model.setup.problem)
-    model.setup.remove_store(tmp_path / "take.zarr")
-    model.setup.add_store(write_pairs(tmp_path / "one.zarr", subjects=1, takes=5))
+    model.setup.remove(tmp_path / "take.zarr")
+    model.setup.add(write_pairs(tmp_path / "one.zarr", subjects=1, takes=5))
     qtbot.waitUntil(lambda: not model.setup.problem)
     assert model.setup.division.by_take
     assert "stays unknown" in division_text(model.setup.division)
@@ -315,7 +315,7 @@ def test_the_command_is_one_that_sd2_takes(made) -> None:
     # And what is kept is there at the next start.
     again = made(settings=model._settings)
     assert {name: again.setup.value(name) for name in chosen} == chosen
-    assert [store.path for store in again.setup.stores] == list(model.setup.config.data.pairs)
+    assert [store.path for store in again.setup.data] == list(model.setup.config.data.pairs)
 
 
 def test_the_time_is_known_once_a_run_has_measured_its_steps(made) -> None:

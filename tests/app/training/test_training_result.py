@@ -9,9 +9,9 @@ import pytest
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.session.maps import MapModel
+from sd2app.session.session import Maps
 from sd2app.training import result as training_use
-from sd2app.training.result import ModelAdoption
-from sd2app.training.text import gain_rows, gain_summary
+from sd2app.training.result import ModelAdoption, gain_rows, gain_summary
 from sd2core.maps import DopplerMap
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
@@ -76,9 +76,8 @@ def made(qtbot, run, tmp_path, monkeypatch):
 
     def make(denoise: FakeDenoising) -> tuple[ModelAdoption, dict[str, MapModel]]:
         tracks = {name: MapModel(name) for name in ("plain", "before", "now", "radar")}
-        use = ModelAdoption(
-            FakeTraining(run), denoise, *tracks.values(), lambda: tmp_path / "models"
-        )
+        maps = Maps(*(tracks[name] for name in ("plain", "now", "before", "radar")))
+        use = ModelAdoption(FakeTraining(run), denoise, maps, lambda: tmp_path / "models")
         return use, tracks
 
     return make

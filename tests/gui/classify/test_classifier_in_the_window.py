@@ -20,12 +20,12 @@ from PySide6.QtWidgets import QFileDialog, QLabel, QToolButton
 from small_pairs import write_pairs
 from window_models import models_of
 
-from sd2app.classify.curve import ClassCurve
 from sd2app.classify.panel import ClassPanel
 from sd2app.classify.result_dialog import ClassResultDialog, ConfusionView
 from sd2app.classify.strip import ClassPlot, ClassReadout, ClassStrip, stacked_image
 from sd2app.labels.timeline import LabelTimeline
 from sd2app.suggestions.bar import SuggestionBar
+from sd2app.widgets.chart import ChartView
 from sd2app.widgets.inputs import Choice, TypedLine
 from sd2app.widgets.model_card_dialog import ModelCardDialog
 from sd2core.classify.defaults import WIDTH, pace_kind
@@ -294,12 +294,12 @@ def test_trained_by_clicks_watched_and_used(trainable, fake_classes, qtbot):
     training.select(None)
     press(panel, "Start training", qtbot)
     qtbot.waitUntil(lambda: training.run is not None and not training.run.under_way, timeout=20_000)
-    curve = panel.findChild(ClassCurve)
+    curve = panel.findChild(ChartView)
     assert curve.isVisible()
     curve.setFocus(Qt.FocusReason.TabFocusReason)
-    assert curve.pointed.recall == 0.8
+    assert curve.pointed.y == 80
     qtbot.keyClick(curve, Qt.Key.Key_Right)
-    assert curve.pointed.recall == 0.7
+    assert curve.pointed.y == 70
     assert "Recall 70.0 %" in curve.accessibleDescription()
     kept = training._folder / f"{training.run.folder.path.name}.safetensors"
     fake_classes.add(kept)
@@ -351,7 +351,7 @@ def test_stopped_by_a_click(trainable, qtbot):
     training, panel = models_of(trainable).class_training, trainable.findChild(ClassPanel)
     training._command = (*training._command, "--step-s", "0.5")
     press(panel, "Start training", qtbot)
-    qtbot.waitUntil(lambda: training.run.history.done >= 1, timeout=20_000)
+    qtbot.waitUntil(lambda: training.run.history.steps_done >= 1, timeout=20_000)
     assert trainable.side.tabText(2).startswith("Train · ")
     press(panel, "Stop", qtbot)
     qtbot.waitUntil(lambda: not training.run.under_way, timeout=20_000)

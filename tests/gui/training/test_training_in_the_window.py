@@ -72,7 +72,7 @@ def test_a_run_outlives_its_window_and_is_found_by_the_next(made, qtbot, tmp_pat
     qtbot.keyClick(window, Qt.Key.Key_T, Qt.KeyboardModifier.ShiftModifier)
     assert window.side.shown == "Train"
     training = models_of(window).training
-    training.setup.add_store(write_pairs(tmp_path / "campaign.zarr"))
+    training.setup.add(write_pairs(tmp_path / "campaign.zarr"))
     training.setup.set_value("epochs", 4)
     qtbot.waitUntil(lambda: not training.setup.problem)
     click(window, qtbot, "Start training")
@@ -106,7 +106,7 @@ def test_a_trained_model_denoises_the_recording(
     c = models_of(window)
     window.open_paths([small_recording])
     qtbot.waitUntil(lambda: window.settled and c.synthesis.complete, timeout=20_000)
-    c.training.setup.add_store(write_pairs(tmp_path / "campaign.zarr"))
+    c.training.setup.add(write_pairs(tmp_path / "campaign.zarr"))
     qtbot.waitUntil(lambda: not c.training.setup.problem)
     c.training.start()
     qtbot.waitUntil(lambda: c.training.run.history.epoch == 1, timeout=15_000)

@@ -25,13 +25,14 @@ from window_models import NoShell
 from sd2app.background import run_monitor
 from sd2app.session.display import DisplayModel
 from sd2app.session.maps import MapModel
+from sd2app.session.session import Maps
 from sd2app.settings import Settings
 from sd2app.shell.side_panel import SidePanel
-from sd2app.training.curves import TrainingCurves
 from sd2app.training.dialogs import TrainingDialogs
 from sd2app.training.model import TrainingModel
 from sd2app.training.panel import TrainingPanel
 from sd2app.training.result import ModelAdoption
+from sd2app.widgets.chart import ChartView
 from sd2app.widgets.inputs import Choice, NumberBox
 from sd2app.widgets.theme import apply_theme
 from sd2core.runs.pace import keep_pace
@@ -82,13 +83,11 @@ class Window:
         command = [sys.executable, "-u", str(FAKE), *map(str, options)]
         self.training = TrainingModel(settings, None, command, folder / "runs")
         self.denoise = FakeDenoising()
-        self.tracks = [MapModel(name) for name in ("Synthetic", "Before", "Denoised", "Real")]
-        self.use = ModelAdoption(
-            self.training, self.denoise, *self.tracks, lambda: folder / "models"
-        )
+        maps = Maps(*map(MapModel, ("Synthetic", "Denoised", "Before", "Real")))
+        self.use = ModelAdoption(self.training, self.denoise, maps, lambda: folder / "models")
         self.said: list[str] = []
         self.display = DisplayModel()
-        self.dialogs = TrainingDialogs(SayingShell(self.said), self.training, self.use)
+        self.dialogs = TrainingDialogs(SayingShell(self.said), self.training)
         self.panel = TrainingPanel(self.training, self.use, self.display, self.dialogs)
         self.side = SidePanel({"Train": self.panel})
         self.side.resize(300, 520)
@@ -154,7 +153,7 @@ def type_number(qtbot, number_box: NumberBox, text: str) -> None:
 
 
 def ready(window, qtbot, pairs, epochs: int = 3) -> None:
-    window.training.setup.add_store(pairs)
+    window.training.setup.add(pairs)
     window.training.setup.set_value("epochs", epochs)
     qtbot.waitUntil(lambda: not window.training.setup.problem)
 
@@ -175,7 +174,7 @@ def test_without_pairs_the_panel_says_where_they_come_from(made) -> None:
 def test_what_is_set_up_is_what_is_started(made, qtbot, pairs) -> None:
     window = made()
     setup = window.training.setup
-    setup.add_store(pairs)
+    setup.add(pairs)
     qtbot.waitUntil(lambda: "6 people" in texts(window))
     assert "Learns from 4 people; the best model is chosen by s4; s5 kept for" in texts(window)
     # 300 frames are 5 segments, and four people learn from: 20 in one step of 64.
@@ -208,12 +207,12 @@ def test_what_is_set_up_is_what_is_started(made, qtbot, pairs) -> None:
 def test_a_store_that_is_none_is_named_and_can_be_taken_out(made, qtbot, tmp_path) -> None:
     window = made()
     (tmp_path / "empty").mkdir()
-    window.training.setup.add_store(tmp_path / "empty")
+    window.training.setup.add(tmp_path / "empty")
     qtbot.waitUntil(lambda: "holds no pairs" in texts(window))
     assert not button(window, "Start training").isEnabled()
     click(window, qtbot, "✕")
-    assert window.training.setup.stores == ()
-    assert window.training.setup.known_stores == [tmp_path / "empty"]
+    assert window.training.setup.data == ()
+    assert window.training.setup.known == [tmp_path / "empty"]
 
 
 def test_a_run_that_lies_elsewhere_is_opened(made, qtbot, pairs, tmp_path, monkeypatch) -> None:
@@ -286,7 +285,7 @@ def test_a_run_is_watched_paused_and_stopped(made, qtbot, pairs) -> None:
     assert "about" in texts(window)
     assert "Peak velocity, MAE" in texts(window)
     assert "123,456 parameters" in texts(window)
-    assert window.panel.findChild(TrainingCurves).isVisible()
+    assert window.panel.findChild(ChartView).isVisible()
     assert any(bar.isVisible() for bar in window.panel.findChildren(QProgressBar))
     click(window, qtbot, "Pause")
     assert "Pausing…" in texts(window)
@@ -358,7 +357,7 @@ def test_one_click_uses_the_model_and_one_goes_back(made, qtbot, pairs, tmp_path
 def test_curves_are_read_by_mouse_and_keys(made, qtbot, pairs) -> None:
     window = made()
     begun(window, qtbot, pairs, "finished")
-    curves = window.panel.findChild(TrainingCurves)
+    curves = window.panel.findChild(ChartView)
     points = window.training.run.history.epoch_points
     places = [curves.place_of(point.epoch, point.validation_rmse) for point in points]
     # Later is further right, and better is lower.
@@ -366,18 +365,18 @@ def test_curves_are_read_by_mouse_and_keys(made, qtbot, pairs) -> None:
     assert [place.y() for place in places] == sorted(place.y() for place in places)
     assert all(curves.plot_rect().adjusted(-1, -1, 1, 1).contains(place) for place in places)
     qtbot.mouseMove(curves, places[1].toPoint())
-    assert curves.pointed.epoch == 2
+    assert curves.pointed.x == 2
     assert "Epoch 2, better than all before" in QToolTip.text()
     assert "Peak velocity off by 0.2 m/s on average" in QToolTip.text()
     curves.setFocus(Qt.FocusReason.TabFocusReason)
-    assert curves.pointed.epoch == 3
+    assert curves.pointed.x == 3
     qtbot.keyClick(curves, Qt.Key.Key_Left)
     qtbot.keyClick(curves, Qt.Key.Key_Left)
     qtbot.keyClick(curves, Qt.Key.Key_Left)
-    assert curves.pointed.epoch == 1
+    assert curves.pointed.x == 1
     assert "Training RMSE 1" in curves.accessibleDescription()
     qtbot.keyClick(curves, Qt.Key.Key_End)
-    assert curves.pointed.epoch == 3
+    assert curves.pointed.x == 3
     qtbot.keyClick(curves, Qt.Key.Key_Escape)
     assert not curves.hasFocus()
 
@@ -391,7 +390,7 @@ def test_everything_is_painted_in_both_themes(made, qtbot, pairs) -> None:
     for dark in (False, True):
         window.display.set_dark(dark)
         apply_theme(application, dark)
-        curves = window.panel.findChild(TrainingCurves)
+        curves = window.panel.findChild(ChartView)
         picture = curves.grab().toImage()
         pictures.add(picture.pixelColor(1, picture.height() - 1).name())
         window.side.grab()

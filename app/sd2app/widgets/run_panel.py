@@ -1,0 +1,203 @@
+"""Runs of one kind: something new to be set up, or one that is under way or has ended."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from pathlib import Path
+from typing import Any, Generic, NamedTuple
+
+from PySide6.QtCore import QSignalBlocker
+from PySide6.QtGui import QHideEvent, QShowEvent
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QSizePolicy, QVBoxLayout, QWidget
+
+from sd2app.background.run_monitor import UNDER_WAY
+from sd2app.background.runs import KnownRun, Run, Runs
+from sd2app.widgets.inputs import Choice
+from sd2app.widgets.panel import outlined, sentence, side_by_side
+
+_NEW = "New training"
+_PARTS = 1000
+
+
+class RunPanel(QWidget):
+    """The list of runs on top; below it the run in view, or the setup of a new one.
+
+    ``tip`` describes the list. ``open_other`` lets the user choose a run of another folder.
+    """
+
+    def __init__(
+        self,
+        runs: Runs[Any],
+        setup: QWidget,
+        run: QWidget,
+        tip: str,
+        open_other: Callable[[], object] | None = None,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self.setObjectName("page")
+        self._runs, self._setup, self._run = runs, setup, run
+        self._list = RunChoice(tip, runs.select, open_other, self)
+        self._new = outlined("New", "Set up another training", lambda: runs.select(None), self)
+        row = QHBoxLayout()
+        row.setSpacing(6)
+        row.addWidget(self._list, 1)
+        row.addWidget(self._new)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(8, 4, 8, 6)
+        column.setSpacing(8)
+        column.addLayout(row)
+        column.addWidget(setup)
+        column.addWidget(run)
+        column.addStretch(1)
+        runs.changed.connect(self._refresh)
+        self._refresh()
+
+    def _refresh(self) -> None:
+        here = self._runs.run.path if self._runs.run is not None else None
+        self._setup.setVisible(here is None)
+        self._run.setVisible(here is not None)
+        self._new.setVisible(here is not None)
+        self._list.show_runs(self._runs.known, here)
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Read the runs again, and time a step where that is unknown."""
+        super().showEvent(event)
+        self._runs.set_watched(True)
+
+    def hideEvent(self, event: QHideEvent) -> None:
+        """Note that the panel is hidden."""
+        super().hideEvent(event)
+        self._runs.set_watched(False)
+
+
+class Button(NamedTuple):
+    """Action on a run: its name for :meth:`RunView.shown`, and what the button says."""
+
+    name: str
+    text: str
+    tip: str
+    run: Callable[[], object]
+    primary: bool = False
+
+
+class RunView(QWidget, Generic[Run]):
+    """Progress and actions of the run in view, and why it ended; subclasses add what it made."""
+
+    def __init__(
+        self, runs: Runs[Run], buttons: Sequence[Button], parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self._runs = runs
+        self._headline = QLabel(self)
+        self._headline.setObjectName("title")
+        self._headline.setWordWrap(True)
+        self._headline.setAccessibleName("How the training stands")
+        self._bar = QProgressBar(self)
+        self._bar.setMaximumHeight(14)
+        self._bar.setTextVisible(False)
+        self._bar.setAccessibleName("Progress of the training")
+        self._time, self._reason = sentence(""), sentence("", "warning")
+        self._note = sentence("")
+        self._buttons = {one.name: outlined(*one[1:4], self) for one in buttons}
+        for one in buttons:
+            if one.primary:
+                self._buttons[one.name].setObjectName("primary")
+        self.column = QVBoxLayout(self)
+        self.column.setContentsMargins(0, 0, 0, 0)
+        self.column.setSpacing(6)
+        for widget in (self._headline, self._bar, self._time):
+            self.column.addWidget(widget)
+        # Above what subclasses add: they are to be at hand in a low window, too.
+        self.column.addLayout(side_by_side(*self._buttons.values(), spacing_px=6))
+        self.column.addWidget(self._reason)
+        self.column.addWidget(self._note)
+        runs.changed.connect(self.refresh)
+
+    # --- what subclasses say ----------------------------------------------------------------
+
+    def texts(self, run: Run) -> tuple[str, str, str]:
+        """Headline, time, and advice for a run that has ended."""
+        raise NotImplementedError
+
+    def shown(self, run: Run) -> Collection[str]:
+        """Names of the buttons that are of use now."""
+        raise NotImplementedError
+
+    def show_made(self, run: Run) -> None:
+        """Follow what the run has told and made."""
+        raise NotImplementedError
+
+    # --- showing ----------------------------------------------------------------------------
+
+    def refresh(self) -> None:
+        """Follow the run in view."""
+        run = self._runs.run
+        if run is None:
+            return
+        headline, time, note = self.texts(run)
+        self._headline.setText(headline)
+        for label, text in ((self._time, time), (self._reason, run.text), (self._note, note)):
+            label.setText(text)
+            label.setVisible(bool(text))
+        self._bar.setVisible(run.phase in UNDER_WAY)
+        # Without a maximum the bar says that it is busy.
+        self._bar.setRange(0, 0 if run.share is None else _PARTS)
+        if run.share is not None:
+            self._bar.setValue(round(run.share * _PARTS))
+        shown, ending = self.shown(run), run.phase in ("stopping", "cancelling")
+        for name, button in self._buttons.items():
+            button.setVisible(name in shown)
+            if name == "cancel":
+                button.setEnabled(run.phase != "cancelling")
+            elif name in ("pause", "go_on", "stop"):
+                button.setEnabled(not ending and not run.is_saving)
+        self.show_made(run)
+
+
+class RunChoice(Choice):
+    """List of runs by their titles, described by ``tip``.
+
+    ``select`` shows a run, or None for a new one; ``open_other`` lets the user choose a run of
+    another folder.
+    """
+
+    def __init__(
+        self,
+        tip: str,
+        select: Callable[[Path | None], object],
+        open_other: Callable[[], object] | None = None,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(tip, parent)
+        self._tip, self._select, self._open = tip, select, open_other
+        self._paths: list[Path | None] = [None]
+        self._here: Path | None = None
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        self.activated.connect(self._choose)
+
+    def show_runs(self, runs: Sequence[KnownRun], here: Path | None) -> None:
+        """List them; ``here`` is in view."""
+        paths: list[Path | None] = [None, *(one.path for one in runs)]
+        texts = [_NEW, *(one.title for one in runs)]
+        if here is not None and here not in paths:
+            # Just begun: it is not in the list yet.
+            paths.insert(1, here)
+            texts.insert(1, here.name)
+        if self._open is not None:
+            texts.append("Open a run…")
+        self.setToolTip(str(here) if here is not None else self._tip)
+        with QSignalBlocker(self):
+            if texts != [self.itemText(at) for at in range(self.count())]:
+                self.clear()
+                self.addItems(texts)
+            self.setCurrentIndex(paths.index(here))
+        self._paths, self._here = paths, here
+
+    def _choose(self, at: int) -> None:
+        if at < len(self._paths):
+            self._select(self._paths[at])
+        elif self._open is not None:
+            self._open()
+            with QSignalBlocker(self):
+                self.setCurrentIndex(self._paths.index(self._here))

@@ -1,0 +1,200 @@
+"""Base of the pages on which a training is set up: data, settings, estimate, start."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+from PySide6.QtCore import QSignalBlocker, Qt
+from PySide6.QtWidgets import (
+    QGridLayout,
+    QHBoxLayout,
+    QLabel,
+    QMenu,
+    QSizePolicy,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from sd2app.widgets.estimate import EstimateLines
+from sd2app.widgets.inputs import Choice, NumberBox
+from sd2app.widgets.panel import ElidedLabel, outlined, sentence, side_by_side, title
+
+
+class Setup(Protocol):
+    """Model of a page: data, each with path, text and problem, and settings by their names."""
+
+    @property
+    def data(self) -> Sequence[Any]:
+        """Data to learn from."""
+
+    def value(self, name: str) -> Any:
+        """One of the settings."""
+
+    def set_value(self, name: str, value: Any) -> None:
+        """Choose a setting."""
+
+    def remove(self, path: Path) -> None:
+        """Remove data."""
+
+
+class Field(NamedTuple):
+    """Setting that is a number."""
+
+    name: str
+    text: str
+    low: float
+    high: float
+    step: float
+    tip: str
+    decimals: int = 0
+    suffix: str = ""
+
+
+class TrainingForm(QWidget):
+    """Page over a :class:`Setup`; subclasses put its parts together."""
+
+    def __init__(self, setup: Setup, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._setup = setup
+        self._shown_data: Sequence[Any] | None = None
+        self._numbers: dict[str, NumberBox] = {}
+        self._choices: dict[str, Choice] = {}
+        self.column = QVBoxLayout(self)
+        self.column.setContentsMargins(0, 0, 0, 0)
+        self.column.setSpacing(6)
+
+    # --- building -------------------------------------------------------------------------
+
+    def add_data(self, heading: str, add: str, tip: str, nothing: str) -> QMenu:
+        """Add the list of data and who is learnt from; returns the menu for more."""
+        button = outlined(add, tip, None, self)
+        button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        menu = QMenu(button)
+        menu.setToolTipsVisible(True)
+        button.setMenu(menu)
+        head = QHBoxLayout()
+        head.addWidget(title(heading))
+        head.addStretch(1)
+        head.addWidget(button)
+        self.nothing = sentence(nothing)
+        self._rows = QVBoxLayout()
+        self._rows.setSpacing(6)
+        self.column.addLayout(head)
+        self.column.addWidget(self.nothing)
+        self._division = sentence("")
+        self.column.addLayout(self._rows)
+        self.column.addWidget(self._division)
+        return menu
+
+    def number(self, field: Field) -> NumberBox:
+        """Make the box of a setting."""
+        box = NumberBox(
+            field.low, field.high, field.suffix, field.tip,
+            decimals=field.decimals, step=field.step, parent=self,
+        )  # fmt: skip
+        box.setMinimumWidth(64)
+        box.setGroupSeparatorShown(field.decimals == 0 and field.name != "seed")
+        box.valueChanged.connect(lambda value: self._setup.set_value(field.name, value))
+        self._numbers[field.name] = box
+        return box
+
+    def choice(self, name: str, tip: str, words: Mapping[str, str]) -> Choice:
+        """Make the list of a setting; ``words`` are the texts of its values."""
+        choice = Choice(tip, self)
+        for value, text in words.items():
+            choice.addItem(text, value)
+        choice.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        choice.currentIndexChanged.connect(
+            lambda at: self._setup.set_value(name, choice.itemData(at))
+        )
+        self._choices[name] = choice
+        return choice
+
+    def add_start(self, start: Callable[[], None], copy_command: Callable[[], None]) -> None:
+        """Add the estimate, why it cannot start, and the buttons."""
+        self.estimate = EstimateLines(self)
+        self._problem = sentence("", "warning")
+        self._start = outlined("Start training", "Train in a background process", start, self)
+        self._start.setObjectName("primary")
+        tip = "The same as a command for a terminal"
+        self._copy = outlined("Copy command", tip, copy_command, self)
+        self.column.addWidget(self.estimate)
+        self.column.addWidget(self._problem)
+        self.column.addLayout(side_by_side(self._start, self._copy, spacing_px=6))
+
+    # --- showing --------------------------------------------------------------------------
+
+    def below_row(self, one: Any) -> QWidget | None:
+        """Make what stands below the row of some data."""
+        return None
+
+    def show_setup(self, division: str) -> None:
+        """Show data and settings; ``division`` says who is learnt from, or nothing."""
+        if self._setup.data != self._shown_data:
+            self._list_data()
+        self.nothing.setVisible(not self._setup.data)
+        self._division.setText(division)
+        self._division.setVisible(bool(division))
+        for name, choice in self._choices.items():
+            with QSignalBlocker(choice):
+                choice.setCurrentIndex(choice.findData(self._setup.value(name)))
+        for name, box in self._numbers.items():
+            box.show_value(self._setup.value(name))
+
+    def show_start(self, why_not: str, can_copy: bool) -> None:
+        """Show whether a training can be started."""
+        data = self._setup.data
+        # What is wrong with the data, or that there is none, is said above.
+        said = not data or any(one.problem for one in data)
+        self._problem.setText("" if said else why_not)
+        self._problem.setVisible(bool(self._problem.text()))
+        self._start.setEnabled(not why_not)
+        self._start.setToolTip(why_not or "Train in a background process")
+        self._copy.setEnabled(can_copy)
+
+    def _list_data(self) -> None:
+        self._shown_data = self._setup.data
+        while (item := self._rows.takeAt(0)) is not None:
+            if (widget := item.widget()) is not None:
+                widget.hide()
+                widget.deleteLater()
+        for one in self._setup.data:
+            row = self._row(one)
+            self._rows.addWidget(row)
+            row.show()
+
+    def _row(self, one: Any) -> QWidget:
+        """Row of data: its name, its facts, and a button to remove it."""
+        row = QWidget(self)
+        heading = ElidedLabel(row)
+        heading.setText(one.path.name)
+        heading.setToolTip(str(one.path))
+        facts = sentence(one.problem or one.text, "warning" if one.problem else "muted")
+        button = QToolButton(row)
+        button.setText("✕")
+        button.setToolTip(f"Do not learn from {one.path.name}")
+        button.setAccessibleName(button.toolTip())
+        button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+        button.clicked.connect(lambda: self._setup.remove(one.path))
+        grid = QGridLayout(row)
+        grid.setContentsMargins(0, 0, 0, 0)
+        grid.setSpacing(0)
+        grid.addWidget(heading, 0, 0)
+        grid.addWidget(button, 0, 1, 2, 1, Qt.AlignmentFlag.AlignTop)
+        grid.addWidget(facts, 1, 0)
+        below = self.below_row(one)
+        if below is not None:
+            grid.addWidget(below, 2, 0)
+        grid.setColumnStretch(0, 1)
+        return row
+
+
+def labelled(grid: QGridLayout, place: tuple[int, int], field: Field, box: NumberBox) -> None:
+    """Put a box with its label into a grid, at a row and a column."""
+    label = QLabel(field.text)
+    label.setToolTip(field.tip)
+    grid.addWidget(label, *place)
+    grid.addWidget(box, place[0], place[1] + 1)
