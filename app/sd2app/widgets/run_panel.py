@@ -11,7 +11,7 @@ from PySide6.QtGui import QHideEvent, QShowEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QSizePolicy, QVBoxLayout, QWidget
 
 from sd2app.background.run_monitor import UNDER_WAY
-from sd2app.background.runs import KnownRun, Run, Runs
+from sd2app.background.runs import Run, Runs
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.panel import outlined, sentence, side_by_side
 
@@ -37,7 +37,11 @@ class RunPanel(QWidget):
         super().__init__(parent)
         self.setObjectName("page")
         self._runs, self._setup, self._run = runs, setup, run
-        self._list = RunChoice(tip, runs.select, open_other, self)
+        self._tip, self._open = tip, open_other
+        self._paths: list[Path | None] = [None]
+        self._list = Choice(tip, self)
+        self._list.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        self._list.activated.connect(self._choose)
         self._new = outlined("New", "Set up another training", lambda: runs.select(None), self)
         row = QHBoxLayout()
         row.setSpacing(6)
@@ -54,11 +58,36 @@ class RunPanel(QWidget):
         self._refresh()
 
     def _refresh(self) -> None:
-        here = self._runs.run.path if self._runs.run is not None else None
+        here = self._here
         self._setup.setVisible(here is None)
         self._run.setVisible(here is not None)
         self._new.setVisible(here is not None)
-        self._list.show_runs(self._runs.known, here)
+        self._paths = [None, *(one.path for one in self._runs.known)]
+        texts = [_NEW, *(one.title for one in self._runs.known)]
+        if here is not None and here not in self._paths:
+            # Just begun: it is not in the list yet.
+            self._paths.insert(1, here)
+            texts.insert(1, here.name)
+        if self._open is not None:
+            texts.append("Open a run…")
+        self._list.setToolTip(str(here) if here is not None else self._tip)
+        with QSignalBlocker(self._list):
+            if texts != [self._list.itemText(at) for at in range(self._list.count())]:
+                self._list.clear()
+                self._list.addItems(texts)
+            self._list.setCurrentIndex(self._paths.index(here))
+
+    @property
+    def _here(self) -> Path | None:
+        return self._runs.run.path if self._runs.run is not None else None
+
+    def _choose(self, at: int) -> None:
+        if at < len(self._paths):
+            self._runs.select(self._paths[at])
+        elif self._open is not None:
+            self._open()
+            with QSignalBlocker(self._list):
+                self._list.setCurrentIndex(self._paths.index(self._here))
 
     def showEvent(self, event: QShowEvent) -> None:
         """Read the runs again, and time a step where that is unknown."""
@@ -153,51 +182,3 @@ class RunView(QWidget, Generic[Run]):
             elif name in ("pause", "go_on", "stop"):
                 button.setEnabled(not ending and not run.is_saving)
         self.show_made(run)
-
-
-class RunChoice(Choice):
-    """List of runs by their titles, described by ``tip``.
-
-    ``select`` shows a run, or None for a new one; ``open_other`` lets the user choose a run of
-    another folder.
-    """
-
-    def __init__(
-        self,
-        tip: str,
-        select: Callable[[Path | None], object],
-        open_other: Callable[[], object] | None = None,
-        parent: QWidget | None = None,
-    ) -> None:
-        super().__init__(tip, parent)
-        self._tip, self._select, self._open = tip, select, open_other
-        self._paths: list[Path | None] = [None]
-        self._here: Path | None = None
-        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
-        self.activated.connect(self._choose)
-
-    def show_runs(self, runs: Sequence[KnownRun], here: Path | None) -> None:
-        """List them; ``here`` is in view."""
-        paths: list[Path | None] = [None, *(one.path for one in runs)]
-        texts = [_NEW, *(one.title for one in runs)]
-        if here is not None and here not in paths:
-            # Just begun: it is not in the list yet.
-            paths.insert(1, here)
-            texts.insert(1, here.name)
-        if self._open is not None:
-            texts.append("Open a run…")
-        self.setToolTip(str(here) if here is not None else self._tip)
-        with QSignalBlocker(self):
-            if texts != [self.itemText(at) for at in range(self.count())]:
-                self.clear()
-                self.addItems(texts)
-            self.setCurrentIndex(paths.index(here))
-        self._paths, self._here = paths, here
-
-    def _choose(self, at: int) -> None:
-        if at < len(self._paths):
-            self._select(self._paths[at])
-        elif self._open is not None:
-            self._open()
-            with QSignalBlocker(self):
-                self.setCurrentIndex(self._paths.index(self._here))
