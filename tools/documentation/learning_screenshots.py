@@ -116,7 +116,7 @@ def batch(application: QApplication, sample: Path) -> None:
     grid = PlacementGrid((1.5, 2.2, 3.0), (-30.0, 0.0, 30.0))
     model.setup.add([sample])
     model.setup.set_placements(grid, "grid.json")
-    window.features.batch.dialogs.show()
+    window.features.batch.show()
     wait_for(application, lambda: not model.why_not_start)
     model.start()
     wait_for(application, lambda: model.batch is not None and model.batch.phase == "finished")

@@ -138,13 +138,13 @@ class Runs(QObject, Generic[Run]):
     def select(self, path: Path | None) -> None:
         """Show a run; None is a new one, to be set up."""
         if path is None:
-            self._follow(None)
+            self.follow(None)
         elif self._run is None or self._run.path != path:
-            self._follow(self._monitor_of(path, self))
+            self.follow(self._monitor_of(path, self))
 
     def follow_new(self, path: Path, process: ProcessId) -> None:
         """Show a run whose process was just started."""
-        self._follow(self._monitor_of(path, self, process=process), under_way=True)
+        self.follow(self._monitor_of(path, self, process=process), under_way=True)
         self.refresh()
 
     def tell(self, word: Word) -> None:
@@ -170,7 +170,8 @@ class Runs(QObject, Generic[Run]):
 
     # --- following --------------------------------------------------------------------------
 
-    def _follow(self, run: Run | None, under_way: bool = False) -> None:
+    def follow(self, run: Run | None, under_way: bool = False) -> None:
+        """Show a run that is being followed; None is a new one, to be set up."""
         if self._run is not None:
             self._run.close()
             self._run.deleteLater()

@@ -1,253 +1,27 @@
-"""The window of a batch, and its dialogs for files, folders and placements."""
+"""Window of a batch: a new one that is set up, or the one in view."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import lru_cache
-from pathlib import Path
-
-from PySide6.QtCore import QTimer, QUrl
-from PySide6.QtGui import QDesktopServices, QHideEvent, QShowEvent
-from PySide6.QtWidgets import (
-    QDialog,
-    QFileDialog,
-    QHBoxLayout,
-    QStackedWidget,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtCore import QTimer
+from PySide6.QtGui import QHideEvent, QShowEvent
+from PySide6.QtWidgets import QDialog, QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
 
 from sd2app.batch.model import BatchModel
-from sd2app.batch.results import Result
+from sd2app.batch.questions import BatchQuestions
 from sd2app.batch.run_view import BatchRunView
 from sd2app.batch.setup_view import BatchSetupView
-from sd2app.feature import Shell
-from sd2app.sensor.placements import PlacementsModel
-from sd2app.session.session import Session
 from sd2app.widgets.panel import outlined, sentence, title
-from sd2app.widgets.text import counted
-from sd2core.batch.plan_file import write_plan
-from sd2core.errors import Sd2Error
-from sd2core.files.paths import plain_path
-from sd2core.io.kinds import VIDEO_SUFFIXES
-from sd2core.placements.placements import Placements, read_placements
-from sd2core.recording.recording import is_recording, open_recording
 
-_FILES = (
-    "Recordings, videos, meshes (*.mp4 *.mkv *.mov *.avi *.webm *.npz *.zip *.obj *.ply *.glb"
-    " *.pkl recording.json zarr.json);;All files (*)"
-)
-_PLACEMENTS = "Placements (*.json *.toml);;All files (*)"
 _ESTIMATE_MS = 600
-_OWN, _PLANNED, _FILE = range(3)
-
-
-class BatchDialogs:
-    """Dialogs, followed by calls of the models; ``installed`` names the denoisers."""
-
-    def __init__(
-        self,
-        batch: BatchModel,
-        session: Session,
-        shell: Shell,
-        placements: PlacementsModel,
-        installed: Callable[[], Sequence[str]],
-    ) -> None:
-        self._batch, self._session, self._shell = batch, session, shell
-        self._placements, self._installed = placements, installed
-        self._window: BatchWindow | None = None
-        self._opening: tuple[Result, set[Path]] | None = None
-        placements.changed.connect(self._follow_plan)
-        session.document.opened.connect(self._place_sensor)
-        session.document.failed.connect(lambda _: self._forget_result())
-
-    # --- the window -----------------------------------------------------------------------
-
-    def show(self) -> None:
-        """Bring up the batch in view, or set up another."""
-        if self._window is None:
-            self._window = BatchWindow(self._batch, self, self._shell.dialog_parent)
-        if self._batch.batch is None and not self._batch.setup.entries:
-            self._add_what_is_open()
-        self._window.show()
-        self._window.raise_()
-        self._window.activateWindow()
-
-    def show_with_placements(self) -> None:
-        """Set up a batch with the places that are planned in the open recording."""
-        placements = self._placements.plan
-        if placements is not None and self._batch.batch is None:
-            self._batch.setup.set_placements(placements, _PLAN_HERE)
-        self.show()
-
-    def close(self) -> None:
-        """Close the window; what is at work goes on."""
-        if self._window is not None:
-            self._window.close()
-
-    def _add_what_is_open(self) -> None:
-        content = self._session.document.content
-        if content is not None and content.saved:
-            self._batch.setup.add([content.recording.folder])
-
-    # --- setting up -----------------------------------------------------------------------
-
-    def add_files(self) -> None:
-        """Let the user choose recordings, videos or meshes."""
-        names, _ = QFileDialog.getOpenFileNames(self._over, "Recordings to work on", "", _FILES)
-        self._batch.setup.add([_meant(Path(name)) for name in names])
-
-    def add_folder(self) -> None:
-        """Let the user choose a folder of recordings, videos or meshes."""
-        name = QFileDialog.getExistingDirectory(self._over, "A recording, or a folder of some")
-        if name:
-            self._batch.setup.add([Path(name)])
-
-    def placement_choices(self) -> Sequence[str]:
-        """Choices of sensor placements in words."""
-        placements, setup = self._placements.plan, self._batch.setup
-        here = "As planned in the open recording"
-        if placements is not None:
-            here += f" ({_count_text(placements)})"
-        chosen = setup.placements
-        file = "Of a file…"
-        if chosen is not None and setup.placed != _PLAN_HERE:
-            file = f"Of {setup.placed} ({_count_text(chosen)})"
-        return ("Where each recording has its own", here, file)
-
-    def placement_index(self) -> int:
-        """Index of the current choice."""
-        if self._batch.setup.placements is None:
-            return _OWN
-        return _PLANNED if self._batch.setup.placed == _PLAN_HERE else _FILE
-
-    def choose_placements(self, index: int) -> None:
-        """Put sensors where one of the choices says."""
-        setup = self._batch.setup
-        if index == _OWN:
-            setup.set_placements(None)
-        elif index == _PLANNED:
-            placements = self._placements.plan
-            if placements is None:
-                self._say("The open recording plans no placements: Edit → Placements… does.")
-            setup.set_placements(placements, _PLAN_HERE)
-        else:
-            self._ask_placements()
-        self._batch.changed.emit()  # the choice goes back where nothing was chosen
-
-    def _ask_placements(self) -> None:
-        name, _ = QFileDialog.getOpenFileName(self._over, "Placements", "", _PLACEMENTS)
-        if name:
-            found: list[Placements] = []
-            self._attempt(lambda: found.append(read_placements(Path(name))))
-            if found:
-                self._batch.setup.set_placements(found[0], Path(name).name)
-
-    def _follow_plan(self) -> None:
-        """Follow the plan of the open recording, if that was chosen."""
-        setup, placements = self._batch.setup, self._placements.plan
-        if setup.placements is None or setup.placed != _PLAN_HERE:
-            return
-        if placements is None:
-            setup.set_placements(setup.placements, _PLAN_BEFORE)
-        elif placements != setup.placements:
-            setup.set_placements(placements, _PLAN_HERE)
-
-    def model_names(self) -> Sequence[str]:
-        """Models that are installed."""
-        return self._installed()
-
-    def choose_out(self) -> None:
-        """Let the user choose the folder of the results."""
-        start = str(self._batch.setup.out or "")
-        name, _ = QFileDialog.getSaveFileName(self._over, "Folder of the results", start)
-        if name:
-            self._batch.setup.set_out(Path(name))
-
-    def save_plan(self) -> None:
-        """Let the user choose a file for the plan."""
-        name, _ = QFileDialog.getSaveFileName(
-            self._over, "Save plan", "plan.toml", "Plan of a batch (*.toml)"
-        )
-        if name:
-            path = Path(name)
-            path = path if path.suffix == ".toml" else path.with_name(path.name + ".toml")
-            self._attempt(lambda: write_plan(path, self._batch.setup.plan()))
-
-    def start(self) -> None:
-        """Start what is set up."""
-        self._attempt(self._batch.start)
-
-    # --- a batch that is there ------------------------------------------------------------
-
-    def open_batch(self) -> None:
-        """Let the user choose a batch in another folder, such as one started in a terminal."""
-        name = QFileDialog.getExistingDirectory(self._over, "Folder of a batch")
-        if name:
-            self._attempt(lambda: self._batch.open_batch(Path(name)))
-
-    def resume(self) -> None:
-        """Resume the batch in view."""
-        self._attempt(self._batch.resume)
-
-    def open_folder(self) -> None:
-        """Show the folder of the results."""
-        if self._batch.batch is not None:
-            _show_in_files(self._batch.batch.folder.path)
-
-    def open_result(self, row: int) -> None:
-        """Open a recording in the window, with the sensor where a result says."""
-        result = self._batch.results.rows[row]
-        found: list[list[Path]] = []
-        self._attempt(lambda: found.append(paths_of(result)))
-        if found and self._shell.may_discard():
-            self._shell.open_paths(found[0])
-            self._opening = (result, set(map(plain_path, found[0])))
-
-    def _place_sensor(self) -> None:
-        recording, opening = self._session.document.recording, self._opening
-        self._opening = None
-        if recording is None or opening is None:
-            return
-        result, paths = opening
-        # Something else may have been opened meanwhile.
-        if paths & {recording.folder, recording.video, recording.mesh}:
-            self._session.edits.place_sensor(result.sensor, "Sensor to placement")
-
-    def _forget_result(self) -> None:
-        self._opening = None
-
-    @property
-    def _over(self) -> QWidget:
-        """Parent of the file choosers."""
-        return self._window or self._shell.dialog_parent
-
-    def _attempt(self, work: Callable[[], object]) -> None:
-        self._say("")
-        try:
-            work()
-        except (Sd2Error, OSError) as error:
-            self._say(str(error))
-
-    def _say(self, text: str) -> None:
-        """Show a sentence in the batch window if it is open, else in the main window."""
-        if self._window is not None and self._window.isVisible():
-            self._window.warn(text)
-        elif text:
-            self._shell.warn(text)
-
-
-_PLAN_HERE = "the open recording"
-_PLAN_BEFORE = "what was planned before"
 
 
 class BatchWindow(QDialog):
     """A new batch, or the one in view; the rest of the program can be used meanwhile."""
 
-    def __init__(self, batch: BatchModel, asks: BatchDialogs, parent: QWidget) -> None:
+    def __init__(self, batch: BatchModel, asks: BatchQuestions, parent: QWidget) -> None:
         super().__init__(parent)
         self.setWindowTitle("Batch")
-        self._batch, self._asks = batch, asks
+        self._batch = batch
         self._title = title("New batch")
         another = outlined("Open batch…", "One that lies elsewhere", asks.open_batch, self)
         head = QHBoxLayout()
@@ -294,7 +68,7 @@ class BatchWindow(QDialog):
         self._batch.set_watched(False)
 
     def _refresh(self) -> None:
-        run = self._batch.batch
+        run = self._batch.run
         self._title.setText("New batch" if run is None else run.folder.path.name)
         page = self._setup if run is None else self._run
         if self._pages.currentWidget() is not page:
@@ -302,33 +76,5 @@ class BatchWindow(QDialog):
             self._patience.start()
 
     def _estimate(self) -> None:
-        if self.isVisible() and self._batch.batch is None:
+        if self.isVisible() and self._batch.run is None:
             self._batch.ask_estimate()
-
-
-def paths_of(result: Result) -> list[Path]:
-    """Files to open for a result: the recording, or a video with its mesh.
-
-    Raises Sd2Error if the recording is damaged.
-    """
-    source = Path(result.source)
-    video = source if source.suffix.lower() in VIDEO_SUFFIXES else None
-    if is_recording(source):
-        recording = open_recording(source)
-        video = recording.video if recording.mesh is None else None
-    return [source] if video is None else [video, Path(result.mesh)]
-
-
-@lru_cache(maxsize=8)
-def _count_text(placements: Placements) -> str:
-    # There may be ten thousand, and this is asked for whenever something changes.
-    return counted(len(placements.places()), "placement")
-
-
-def _meant(path: Path) -> Path:
-    """The folder that a file inside of a recording or of a Zarr group stands for."""
-    return path.parent if path.name in ("recording.json", "zarr.json") else path
-
-
-def _show_in_files(folder: Path) -> None:
-    QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder)))

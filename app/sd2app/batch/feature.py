@@ -7,8 +7,9 @@ from collections.abc import Callable, Sequence
 from PySide6.QtCore import QObject, SignalInstance
 
 from sd2app.background.run_command import COMMAND
-from sd2app.batch.dialog import BatchDialogs
+from sd2app.batch.dialog import BatchWindow
 from sd2app.batch.model import BatchModel
+from sd2app.batch.questions import BatchQuestions
 from sd2app.feature import Action, Feature, Shell
 from sd2app.sensor.placements import PlacementsModel
 from sd2app.session.session import Session
@@ -27,7 +28,31 @@ class BatchFeature(Feature):
         parent: QObject,
     ) -> None:
         self.model = BatchModel(session.settings, parent, command or COMMAND)
-        self.dialogs = BatchDialogs(self.model, session, shell, placements, installed)
+        self._shell = shell
+        self._questions = BatchQuestions(self.model, session, shell, placements, installed)
+        self._questions.said.connect(self._say)
+        self._window: BatchWindow | None = None
+
+    def show(self) -> None:
+        """Bring up the batch in view, or set up another."""
+        if self._window is None:
+            self._window = BatchWindow(self.model, self._questions, self._shell.dialog_parent)
+        self._questions.add_what_is_open()
+        self._window.show()
+        self._window.raise_()
+        self._window.activateWindow()
+
+    def show_with_placements(self) -> None:
+        """Set up a batch with the places that are planned in the open recording."""
+        self._questions.place_as_planned()
+        self.show()
+
+    def _say(self, text: str) -> None:
+        """Show a sentence in the batch window if it is open, else in the main window."""
+        if self._window is not None and self._window.isVisible():
+            self._window.warn(text)
+        elif text:
+            self._shell.warn(text)
 
     def actions(self) -> Sequence[Action]:
         """The window of the batch."""
@@ -36,7 +61,7 @@ class BatchFeature(Feature):
                 "batch", "File", "Batch…", ("Ctrl+B",),
                 "Fit, synthesise, denoise and export many recordings from many places, in the"
                 " background",
-                self.dialogs.show,
+                self.show,
             ),
         )  # fmt: skip
 
@@ -50,9 +75,10 @@ class BatchFeature(Feature):
 
     def look_for_unfinished(self) -> None:
         """Find a batch that outlived its window."""
-        self.model.look_for_batch()
+        self.model.look_for_runs()
 
     def close(self) -> None:
         """Close the window of the batch, which goes on."""
-        self.dialogs.close()
+        if self._window is not None:
+            self._window.close()
         self.model.close()

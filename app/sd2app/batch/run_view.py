@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
@@ -21,6 +20,7 @@ from PySide6.QtWidgets import (
 )
 
 from sd2app.batch.model import BatchModel
+from sd2app.batch.questions import BatchQuestions
 from sd2app.batch.text import failure_text, headline, step_facts, time_text
 from sd2app.widgets.pages import InnerPage, InnerPages
 from sd2app.widgets.panel import ElidedLabel, outlined, sentence, side_by_side
@@ -28,28 +28,15 @@ from sd2app.widgets.table import ROW_PX
 
 _MOST_STEPS = 6
 _NO_DATASET = "No data set has been exported here yet."
-
-
-class Asks(Protocol):
-    """Actions of the view that need dialogs."""
-
-    def resume(self) -> None:
-        """Resume the batch in view."""
-
-    def open_folder(self) -> None:
-        """Show the folder of the results."""
-
-    def open_result(self, row: int) -> None:
-        """Open a recording in the window, with the sensor where a result says."""
-
-
 _FAILURES, _FAILURES_PAGE = "Failures", 2
 
 
 class BatchRunView(QWidget):
     """A view of :class:`BatchMonitor` and of its results."""
 
-    def __init__(self, batch: BatchModel, asks: Asks, parent: QWidget | None = None) -> None:
+    def __init__(
+        self, batch: BatchModel, asks: BatchQuestions, parent: QWidget | None = None
+    ) -> None:
         super().__init__(parent)
         self._batch, self._asks = batch, asks
         self._shown_card: str | None = None
@@ -92,7 +79,9 @@ class BatchRunView(QWidget):
 
     def _button_row(self) -> QHBoxLayout:
         asks, batch = self._asks, self._batch
-        self._stop = outlined("Stop", "End it now; what is done stays", batch.stop, self)
+        self._stop = outlined(
+            "Stop", "End it now; what is done stays", lambda: batch.tell("stop"), self
+        )
         self._resume = outlined("Go on", "Do what is missing or new", asks.resume, self)
         self._folder = outlined("Open folder", "Show the results as files", asks.open_folder, self)
         self._new = outlined("New batch", "Set up another", lambda: batch.select(None), self)
@@ -134,7 +123,7 @@ class BatchRunView(QWidget):
     # --- showing --------------------------------------------------------------------------
 
     def _refresh(self) -> None:
-        run, results = self._batch.batch, self._batch.results
+        run, results = self._batch.run, self._batch.results
         if run is None:
             return
         self._name.setText(str(run.folder.path))
@@ -161,7 +150,7 @@ class BatchRunView(QWidget):
         self._open_result.setVisible(bool(results.rows))
 
     def _show_steps(self) -> None:
-        run = self._batch.batch
+        run = self._batch.run
         facts = step_facts(run) if run is not None else []
         for row, (name, bar, words) in enumerate(self._steps):
             shown = row < len(facts)

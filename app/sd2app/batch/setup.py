@@ -23,7 +23,7 @@ OptionalStep = Literal["fit", "denoise", "export"]
 OPTIONAL_STEPS: tuple[OptionalStep, ...] = get_args(OptionalStep)
 Accuracy = Literal["exact", "tolerance"]
 ACCURACIES: tuple[Accuracy, ...] = get_args(Accuracy)
-FORMATS: tuple[Literal["zarr", "hdf5", "npz"], ...] = ("zarr", "hdf5", "npz")
+FORMATS: tuple[Literal["zarr", "h5", "npz"], ...] = ("zarr", "h5", "npz")
 SUBJECTS: tuple[Literal["recording", "folder"], ...] = ("recording", "folder")
 
 _USABLE = ("recording", "video", "mesh")
@@ -35,6 +35,7 @@ _DEFAULTS: dict[str, Any] = {
     "model": "denoiser",
     "format": "zarr",
     "subjects": "recording",
+    "workers": worker_count(),
 }
 
 
@@ -58,9 +59,6 @@ class BatchSetupModel(QObject):
         self._settings = settings
         known = {"accuracy": ACCURACIES, "format": FORMATS, "subjects": SUBJECTS}
         self._values = StoredChoices(settings, "batch", _DEFAULTS, known)
-        self._workers = min(
-            max(settings.stored("batch/workers", worker_count()), 1), most_workers()
-        )
         self._entries = tuple(Entry(path) for path in settings.paths("batch/recordings"))
         out = settings.stored("batch/out", "")
         self._out = Path(out) if out else None
@@ -105,7 +103,7 @@ class BatchSetupModel(QObject):
     @property
     def workers(self) -> int:
         """Processes that share the work."""
-        return self._workers
+        return min(max(self._values["workers"], 1), most_workers())
 
     def value(self, name: str) -> Any:
         """One of the other choices."""
@@ -114,14 +112,6 @@ class BatchSetupModel(QObject):
     def set_value(self, name: str, value: Any) -> None:
         """Choose something; KeyError if there is no such choice."""
         if self._values.set(name, value):
-            self.changed.emit()
-
-    def set_workers(self, workers: int) -> None:
-        """Share the work among so many processes."""
-        workers = min(max(int(workers), 1), most_workers())
-        if workers != self._workers:
-            self._workers = workers
-            self._settings.set_value("batch/workers", workers)
             self.changed.emit()
 
     def set_out(self, folder: Path) -> None:

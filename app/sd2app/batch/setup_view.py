@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Protocol
 
 from PySide6.QtCore import QSignalBlocker, QSize, Qt
 from PySide6.QtGui import QKeyEvent
@@ -20,6 +19,7 @@ from PySide6.QtWidgets import (
 )
 
 from sd2app.batch.model import BatchModel
+from sd2app.batch.questions import BatchQuestions
 from sd2app.batch.setup import (
     ACCURACIES,
     FORMATS,
@@ -54,45 +54,16 @@ _STEP_TEXT: dict[OptionalStep, tuple[str, str]] = {
     "denoise": ("Denoise with", "What a radar would show in place of every synthetic map"),
     "export": ("Export as", "Segments of all maps with their labels, to learn from"),
 }
-_FORMAT_TEXT = {"zarr": "Zarr", "hdf5": "HDF5", "npz": "NPZ"}
+_FORMAT_TEXT = {"zarr": "Zarr", "h5": "HDF5", "npz": "NPZ"}
 _MOST_FACTS = 8
-
-
-class Asks(Protocol):
-    """Actions of the view that need dialogs."""
-
-    def add_files(self) -> None:
-        """Let the user choose recordings, videos or meshes."""
-
-    def add_folder(self) -> None:
-        """Let the user choose a folder of recordings, videos or meshes."""
-
-    def choose_placements(self, index: int) -> None:
-        """Put sensors where one of :meth:`placement_choices` says; it may ask for a file."""
-
-    def placement_choices(self) -> Sequence[str]:
-        """Choices of sensor placements in words."""
-
-    def placement_index(self) -> int:
-        """Index of the current choice."""
-
-    def model_names(self) -> Sequence[str]:
-        """Models that are installed."""
-
-    def choose_out(self) -> None:
-        """Let the user choose the folder of the results."""
-
-    def save_plan(self) -> None:
-        """Let the user choose a file for the plan."""
-
-    def start(self) -> None:
-        """Start what is set up."""
 
 
 class BatchSetupView(QWidget):
     """A view of :class:`BatchSetupModel` and of its estimate."""
 
-    def __init__(self, batch: BatchModel, asks: Asks, parent: QWidget | None = None) -> None:
+    def __init__(
+        self, batch: BatchModel, asks: BatchQuestions, parent: QWidget | None = None
+    ) -> None:
         super().__init__(parent)
         self._batch, self._setup, self._asks = batch, batch.setup, asks
         layout = QVBoxLayout(self)
@@ -161,7 +132,7 @@ class BatchSetupView(QWidget):
         self._workers = NumberBox(
             1, most_workers(), "", "Processes that share the work", decimals=0, step=1.0
         )
-        self._workers.valueChanged.connect(lambda value: self._setup.set_workers(int(value)))
+        self._workers.valueChanged.connect(lambda value: self._setup.set_value("workers", value))
         form.addRow("Workers", side_by_side(self._workers))
         return form
 
@@ -203,7 +174,7 @@ class BatchSetupView(QWidget):
 
     def refresh(self) -> None:
         """Follow the models, and the choices that the open recording offers."""
-        if self._batch.batch is not None:
+        if self._batch.run is not None:
             return
         setup = self._setup
         self._list.show_entries([(e.path, entry_text(e), bool(e.problem)) for e in setup.entries])

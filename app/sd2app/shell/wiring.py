@@ -96,7 +96,7 @@ def build_features(session: Session, shell: Shell, parts: Parts, parent: QObject
         shell,
         accuracy.model,
         maps.synthesis,
-        lambda: features.batch.dialogs.show_with_placements(),
+        lambda: features.batch.show_with_placements(),
         parent,
     )
     classify = ClassifyFeature(

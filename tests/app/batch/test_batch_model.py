@@ -16,7 +16,7 @@ import pytest
 from sd2app.background import run_monitor
 from sd2app.batch.model import BatchModel
 from sd2app.batch.run import BatchMonitor, plan_of
-from sd2app.batch.setup import BatchSetupModel
+from sd2app.batch.setup import FORMATS, BatchSetupModel
 from sd2app.batch.text import (
     estimate_facts,
     estimate_headline,
@@ -70,7 +70,7 @@ def made(qtbot):
 
     yield make
     for model in models:
-        run = model.batch
+        run = model.run
         if run is not None and run.under_way and run.folder.exists:
             pid = run.folder.status().pid
             if run.folder.live and pid:
@@ -92,7 +92,7 @@ def begin(qtbot, model: BatchModel, files: list[Path]) -> None:
 
 def until(qtbot, model: BatchModel, phase: str) -> None:
     qtbot.waitUntil(
-        lambda: model.batch is not None and model.batch.loaded and model.batch.phase == phase,
+        lambda: model.run is not None and model.run.loaded and model.run.phase == phase,
         timeout=20_000,
     )
 
@@ -114,6 +114,9 @@ def test_what_is_added_is_looked_at_and_becomes_a_plan(qtbot, meshes, tmp_path):
     assert plan.synthesise.tolerance is None
     setup.set_value("accuracy", "tolerance")
     assert setup.plan().synthesise.tolerance == setup.tolerance
+    for form in FORMATS:
+        setup.set_value("format", form)
+        assert setup.plan().export.format == form
     setup.set_value("denoise", False)
     setup.set_value("export", False)
     setup.set_out(tmp_path / "made")
@@ -168,20 +171,20 @@ def test_choices_are_kept_from_one_start_to_the_next(qtbot, meshes, tmp_path):
     first = BatchSetupModel(settings)
     first.add(meshes)
     first.set_out(tmp_path / "made")
-    first.set_value("format", "hdf5")
+    first.set_value("format", "h5")
     first.set_value("fit", False)
-    first.set_workers(1)
+    first.set_value("workers", 1)
     first.close()
     again = BatchSetupModel(settings)
     looked(qtbot, again)
     assert [entry.path for entry in again.entries] == meshes
     assert (again.out, again.workers) == (tmp_path / "made", 1)
     assert (again.value("format"), again.value("fit"), again.value("denoise")) == (
-        "hdf5",
+        "h5",
         False,
         True,
     )
-    again.set_workers(10_000)
+    again.set_value("workers", 10_000)
     assert again.workers < 10_000
     again.close()
     settings.set_value("batch/format", "nonsense")
@@ -251,7 +254,7 @@ def test_a_batch_runs_to_its_end_and_its_results_are_listed(qtbot, made, meshes)
     model.noted.connect(said.append)
     begin(qtbot, model, meshes)
     until(qtbot, model, "finished")
-    run = model.batch
+    run = model.run
     assert read_plan(run.folder.plan).recordings.files == tuple(map(str, meshes))
     assert headline(run) == "Finished, but 1 task could not be done"
     assert step_facts(run) == [
@@ -287,12 +290,12 @@ def test_a_batch_outlives_the_model_and_is_found_again(qtbot, made, meshes):
     begin(qtbot, first, meshes)
     until(qtbot, first, "running")
     # Its process is there before it has said what it does.
-    qtbot.waitUntil(lambda: first.batch.folder.exists, timeout=20_000)
+    qtbot.waitUntil(lambda: first.run.folder.exists, timeout=20_000)
     first.close()
     second = made(settings=settings)
     said: list[str] = []
     second.noted.connect(said.append)
-    second.look_for_batch()
+    second.look_for_runs()
     until(qtbot, second, "running")
     assert any("is at work" in words for words in said)
     until(qtbot, second, "finished")
@@ -303,13 +306,13 @@ def test_stop_keeps_what_is_done_and_the_same_goes_on(qtbot, made, meshes):
     model = made("--step-s", 0.3)
     begin(qtbot, model, meshes)
     until(qtbot, model, "running")
-    model.stop()
-    assert model.batch.phase == "stopping"
+    model.tell("stop")
+    assert model.run.phase == "stopping"
     until(qtbot, model, "stopped")
-    assert model.batch.resumable
+    assert model.run.resumable
     model.resume()
     until(qtbot, model, "finished")
-    assert not model.batch.failures
+    assert not model.run.failures
 
 
 def test_a_stop_before_there_is_a_folder_is_heard(qtbot, made, meshes):
@@ -319,7 +322,7 @@ def test_a_stop_before_there_is_a_folder_is_heard(qtbot, made, meshes):
     model.ask_estimate()
     qtbot.waitUntil(lambda: not model.why_not_start, timeout=20_000)
     model.start()
-    model.stop()
+    model.tell("stop")
     until(qtbot, model, "stopped")
 
 
@@ -336,9 +339,9 @@ def test_a_batch_that_breaks_says_why(qtbot, made, meshes, options, phase, words
     model.failed.connect(said.append)
     begin(qtbot, model, meshes)
     until(qtbot, model, phase)
-    assert words in model.batch.text
+    assert words in model.run.text
     assert any("did not come to its end" in one for one in said)
-    assert model.batch.resumable
+    assert model.run.resumable
 
 
 def test_a_batch_that_is_refused_says_what_it_was_told(qtbot, made, meshes, tmp_path):
@@ -348,7 +351,7 @@ def test_a_batch_that_is_refused_says_what_it_was_told(qtbot, made, meshes, tmp_
     (tmp_path / "other" / "thesis.txt").write_text("mine")
     begin(qtbot, model, meshes)
     until(qtbot, model, "failed")
-    assert "is not the folder of a batch" in model.batch.text
+    assert "is not the folder of a batch" in model.run.text
     assert BatchFolder(tmp_path / "other").output.exists()
     assert (tmp_path / "other" / "thesis.txt").read_text() == "mine"
 
@@ -356,7 +359,7 @@ def test_a_batch_that_is_refused_says_what_it_was_told(qtbot, made, meshes, tmp_
 def test_two_are_not_started_in_one_folder(qtbot, made, meshes, tmp_path):
     model = made("--step-s", 30)
     begin(qtbot, model, meshes)
-    qtbot.waitUntil(lambda: model.batch.status is not None, timeout=20_000)
+    qtbot.waitUntil(lambda: model.run.status is not None, timeout=20_000)
     model.select(None)
     model.ask_estimate()
     qtbot.waitUntil(lambda: not model.why_not_start, timeout=20_000)
@@ -372,8 +375,8 @@ def test_a_batch_that_was_deleted_is_looked_at_no_more(qtbot, made, meshes):
     model = made()
     begin(qtbot, model, meshes)
     until(qtbot, model, "finished")
-    shutil.rmtree(model.batch.folder.path)
-    qtbot.waitUntil(lambda: model.batch is None, timeout=20_000)
+    shutil.rmtree(model.run.folder.path)
+    qtbot.waitUntil(lambda: model.run is None, timeout=20_000)
     assert not BatchFolder(meshes[0].parent / "ann batch").exists
 
 

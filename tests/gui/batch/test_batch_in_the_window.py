@@ -16,6 +16,7 @@ from window_models import models_of
 
 from sd2app.background import run_monitor
 from sd2app.batch import dialog as batch_dialogs
+from sd2app.batch import questions
 from sd2app.batch.dialog import BatchWindow
 from sd2app.batch.model import BatchModel
 from sd2app.settings import Settings
@@ -59,7 +60,7 @@ def opened(qtbot, compiled_kernels, fake, fake_models, recording_copy):
 
     yield make
     for window in windows:
-        run = models_of(window).batch.batch
+        run = models_of(window).batch.run
         if run is not None and run.folder.live:
             os.kill(run.folder.status().pid, signal.SIGKILL)
         models_of(window).document.undo_stack.clear()
@@ -91,7 +92,7 @@ def ready(qtbot, batch: BatchModel) -> None:
 
 def until(qtbot, batch: BatchModel, phase: str) -> None:
     qtbot.waitUntil(
-        lambda: batch.batch is not None and batch.batch.loaded and batch.batch.phase == phase,
+        lambda: batch.run is not None and batch.run.loaded and batch.run.phase == phase,
         timeout=20_000,
     )
 
@@ -127,7 +128,7 @@ def test_a_batch_is_set_up_started_and_its_results_opened(
     assert "2 of 2" in words(dialog)
     qtbot.waitUntil(lambda: bool(batch.results.rows), timeout=20_000)
     shown: list[Path] = []
-    monkeypatch.setattr(batch_dialogs, "_show_in_files", shown.append)
+    monkeypatch.setattr(questions, "_show_in_files", shown.append)
     click(dialog, "Open folder")
     assert shown == [tmp_path / "made"]
     click(dialog, "Data set")
@@ -165,7 +166,7 @@ def test_failures_and_their_reasons_are_shown_and_a_batch_is_stopped(opened, qtb
     ready(qtbot, batch)
     assert "1 recording: the first tasks tell how long it takes" in words(dialog)
     click(dialog, "Start")
-    qtbot.waitUntil(lambda: batch.batch is not None and bool(batch.batch.failures), timeout=20_000)
+    qtbot.waitUntil(lambda: batch.run is not None and bool(batch.run.failures), timeout=20_000)
     assert "At work" in words(dialog)
     assert "1:00 so far" in words(dialog)
     failures = dialog._run._failures.toPlainText()
@@ -184,7 +185,7 @@ def test_placements_of_the_recording_or_of_a_file_are_taken(opened, qtbot, tmp_p
     setup = context.batch.setup
     context.edits.plan_placements(PlacementGrid((1.0, 2.0, 3.0)))
     window.bring_up("Sensor", "Placements")
-    window.features.batch.dialogs.show_with_placements()
+    window.features.batch.show_with_placements()
     dialog = window.findChild(BatchWindow)
     qtbot.waitUntil(lambda: not setup.problem, timeout=20_000)
     assert setup.plan().placement_count == 3
@@ -225,8 +226,8 @@ def test_the_window_closes_and_the_batch_goes_on(opened, qtbot):
     dialog = begin(window)
     ready(qtbot, batch)
     click(dialog, "Start")
-    qtbot.waitUntil(lambda: batch.batch is not None and batch.batch.status is not None)
-    folder = batch.batch.folder
+    qtbot.waitUntil(lambda: batch.run is not None and batch.run.status is not None)
+    folder = batch.run.folder
     models_of(window).document.undo_stack.clear()
     window.close()
     assert not dialog.isVisible()
