@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QFileDialog, QWidget
 from sd2app.feature import Action, Feature, Shell
 from sd2app.mesh_comparison.model import ComparisonModel
 from sd2app.mesh_comparison.window import ComparisonWindow
-from sd2app.playback.timeline import TimeRuler
+from sd2app.playback.views import TimeRuler
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
 from sd2app.video.overlay_settings import OverlayModel

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import SignalInstance
@@ -18,6 +19,22 @@ from sd2app.session.session import Session
 
 if TYPE_CHECKING:
     from sd2app.scene.view import SceneView
+
+
+_COLOURS: tuple[tuple[MeshColour, str, str], ...] = (
+    ("velocity", "Colour by radial velocity",
+     "Blue recedes, red approaches, grey is hidden or still"),
+    ("range", "Colour by range", "Distance from the sensor in metres"),
+    ("visibility", "Colour by visibility", "What the sensor sees, and what is hidden from it"),
+    ("plain", "Plain mesh", "One colour"),
+)  # fmt: skip
+_VIEWS: tuple[tuple[str, Preset, str, str], ...] = (
+    ("view_three_quarter", "overview", "overview", "See sensor, camera and body"),
+    ("view_camera", "camera", "from the camera", "See what the camera sees"),
+    ("view_sensor", "sensor", "from the sensor", "See what the sensor sees"),
+    ("view_side", "side", "from the side", "See sensor and body sideways"),
+    ("view_top", "top", "from above", "See sensor and body from above"),
+)
 
 
 class SceneFeature(Feature):
@@ -40,56 +57,35 @@ class SceneFeature(Feature):
         return self.view is None
 
     def actions(self) -> Sequence[Action]:
-        """Colours and views."""
+        """Colours, dots and views."""
         display, there = self._session.display, self._there
-        return (
-            self._colour(
-                "colour_velocity", "Colour by radial velocity", "Alt+1",
-                "Blue recedes, red approaches, grey is hidden or still", "velocity",
-            ),
-            self._colour(
-                "colour_range", "Colour by range", "Alt+2", "Distance from the sensor in metres",
-                "range",
-            ),
-            self._colour(
-                "colour_visibility", "Colour by visibility", "Alt+3",
-                "What the sensor sees, and what is hidden from it", "visibility",
-            ),
-            self._colour("colour_plain", "Plain mesh", "Alt+4", "One colour", "plain"),
+        colours = (
             Action(
-                "dots", "View", "Vertices as dots", ("D",), "Draw vertices instead of the surface",
-                lambda: display.set_as_dots(not display.as_dots), there, lambda: display.as_dots,
-            ),
-            self._look(
-                "view_three_quarter", "overview", "overview", "Ctrl+1",
-                "See sensor, camera and body",
-            ),
-            self._look(
-                "view_camera", "from the camera", "camera", "Ctrl+2", "See what the camera sees"
-            ),
-            self._look(
-                "view_sensor", "from the sensor", "sensor", "Ctrl+3", "See what the sensor sees"
-            ),
-            self._look(
-                "view_side", "from the side", "side", "Ctrl+4", "See sensor and body sideways"
-            ),
-            self._look("view_top", "from above", "top", "Ctrl+5", "See sensor and body from above"),
+                f"colour_{colour}", "View", text, (f"Alt+{number}",), tip,
+                partial(display.set_mesh_colour, colour), there,
+                partial(self._shows, colour),
+            )
+            for number, (colour, text, tip) in enumerate(_COLOURS, start=1)
         )  # fmt: skip
-
-    def _colour(self, name: str, text: str, key: str, tip: str, colour: MeshColour) -> Action:
-        display = self._session.display
-        return Action(
-            name, "View", text, (key,), tip,
-            lambda: display.set_mesh_colour(colour), self._there,
-            lambda: display.mesh_colour == colour,
+        dots = Action(
+            "dots", "View", "Vertices as dots", ("D",), "Draw vertices instead of the surface",
+            lambda: display.set_as_dots(not display.as_dots), there, lambda: display.as_dots,
         )  # fmt: skip
+        views = (
+            Action(
+                name, "View", f"Scene: {text}", (f"Ctrl+{number}",), tip,
+                partial(self._look_from, preset), there,
+            )
+            for number, (name, preset, text, tip) in enumerate(_VIEWS, start=1)
+        )  # fmt: skip
+        return (*colours, dots, *views)
 
-    def _look(self, name: str, text: str, view: Preset, key: str, tip: str) -> Action:
-        def look() -> None:
-            if self.view is not None:
-                self.view.set_view(view)
+    def _shows(self, colour: MeshColour) -> bool:
+        return self._session.display.mesh_colour == colour
 
-        return Action(name, "View", f"Scene: {text}", (key,), tip, look, self._there)
+    def _look_from(self, preset: Preset) -> None:
+        if self.view is not None:
+            self.view.set_view(preset)
 
     def _there(self) -> bool:
         return self._session.has_mesh

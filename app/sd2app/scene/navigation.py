@@ -1,4 +1,4 @@
-"""Mouse in the scene: rotate, pan, zoom, drag the sensor; no Qt, no VTK.
+"""Mouse in the scene: rotate, pan, zoom, drag the sensor; no widgets, no VTK.
 
 Positions are device-independent pixels of the view.
 """
@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
+from PySide6.QtCore import Qt
 
 from sd2app.scene.camera import Vector, drag_along, drag_in_view, triple
 from sd2app.scene.scene import Scene
@@ -18,7 +19,7 @@ from sd2app.scene.scene import Scene
 if TYPE_CHECKING:
     from sd2app.session.undo import Edits
 
-Button = Literal["left", "middle", "right"]
+_BUTTONS = (Qt.MouseButton.LeftButton, Qt.MouseButton.MiddleButton, Qt.MouseButton.RightButton)
 Constraint = Literal["view", "vertical", "sight"]
 
 LEAST_GRAB_PX = 14.0
@@ -55,7 +56,7 @@ class Navigator:
         self._pick, self._changed = pick, changed
         self.hovers_sensor = False  # the pointer is over the sensor
         self.marker: int | None = None  # number of the planned place under the pointer
-        self._button: Button | None = None
+        self._button: Qt.MouseButton | None = None
         self._held: _Held | None = None
         self._moving: Literal["orbit", "pan"] | None = None
         self._last_px = (0.0, 0.0)
@@ -85,26 +86,29 @@ class Navigator:
         nearest = int(away.argmin())
         return nearest if away[nearest] <= _MARKER_PX else None
 
-    def press(self, x_px: float, y_px: float, button: Button, shift: bool, ctrl: bool) -> None:
-        """Handle a pressed button; a second one changes nothing."""
-        if self._button is not None:
+    def press(
+        self, x_px: float, y_px: float, button: Qt.MouseButton, keys: Qt.KeyboardModifier
+    ) -> None:
+        """Handle a pressed button, with keys held; a second button changes nothing."""
+        if self._button is not None or button not in _BUTTONS:
             return
+        left = button == Qt.MouseButton.LeftButton
         self._button = button
         self._last_px = (x_px, y_px)
-        if button == "left" and self.sensor_at(x_px, y_px):
+        if left and self.sensor_at(x_px, y_px):
             start = np.asarray(self._scene.sensor.position_m)
             x, y, _ = self._scene.pose.project(start)[0]
-            self._held = _Held(start, (x - x_px, y - y_px), _constraint(shift, ctrl))
+            self._held = _Held(start, (x - x_px, y - y_px), _constraint(keys))
             self._edits.begin_sensor_drag()
             self._show_hot()
-        elif button == "left" and not shift:
+        elif left and not keys & Qt.KeyboardModifier.ShiftModifier:
             marker = self.marker_at(x_px, y_px)
             self._clicking = None if marker is None else (marker, x_px, y_px)
             self._moving = "orbit"
         else:
             self._moving = "pan"
 
-    def move(self, x_px: float, y_px: float, shift: bool, ctrl: bool) -> None:
+    def move(self, x_px: float, y_px: float, keys: Qt.KeyboardModifier) -> None:
         """Handle a move of the pointer, with a button or without."""
         if self._clicking is not None:
             _, x, y = self._clicking
@@ -114,7 +118,7 @@ class Navigator:
         dx, dy = x_px - self._last_px[0], y_px - self._last_px[1]
         self._last_px = (x_px, y_px)
         if self._held is not None:
-            self._drag(self._held, x_px, y_px, _constraint(shift, ctrl))
+            self._drag(self._held, x_px, y_px, _constraint(keys))
         elif self._moving is not None:
             pose = self._scene.pose
             self._scene.preset = None
@@ -124,7 +128,7 @@ class Navigator:
         else:
             self._look(x_px, y_px)
 
-    def release(self, x_px: float, y_px: float, button: Button) -> None:
+    def release(self, x_px: float, y_px: float, button: Qt.MouseButton) -> None:
         """Handle a released button."""
         if button == self._button:
             clicked = self._clicking
@@ -185,7 +189,7 @@ class Navigator:
         self._changed()
 
 
-def _constraint(shift: bool, ctrl: bool) -> Constraint:
-    if ctrl:
+def _constraint(keys: Qt.KeyboardModifier) -> Constraint:
+    if keys & Qt.KeyboardModifier.ControlModifier:
         return "sight"
-    return "vertical" if shift else "view"
+    return "vertical" if keys & Qt.KeyboardModifier.ShiftModifier else "view"

@@ -51,7 +51,7 @@ class ImageBackend(QWidget):
         self._picture: QImage | None = None
         self._dirty = True
         self._fine = False
-        self._renderings = 0
+        self.renderings = 0  # number of times the scene was rendered
         self._idle = QTimer(self)
         self._idle.setSingleShot(True)
         self._idle.setInterval(_IDLE_MS)
@@ -64,15 +64,6 @@ class ImageBackend(QWidget):
     def widget(self) -> QWidget:
         """The widget itself."""
         return self
-
-    @property
-    def renderings(self) -> int:
-        """Number of times the scene was rendered."""
-        return self._renderings
-
-    def sizeHint(self) -> QSize:
-        """A comfortable size."""
-        return QSize(600, 450)
 
     def start(self, prepare: Prepare) -> None:
         """Draw from now on."""
@@ -131,7 +122,7 @@ class ImageBackend(QWidget):
         window.SetSize(width, height)
         prepare((size.width(), size.height()), factor * ratio)
         window.Render()
-        self._renderings += 1
+        self.renderings += 1
         window.GetRGBACharPixelData(0, 0, width - 1, height - 1, 0, self._pixels, 0)
         rows = vtk_to_numpy(self._pixels).reshape(height, width, 4)
         upright = np.ascontiguousarray(rows[::-1])  # OpenGL counts rows from below

@@ -44,7 +44,6 @@ class InteractorBackend:
         self.renderer.SetUseFXAA(driver is not None and not is_software(driver))
         self._prepare: Prepare | None = None
         self._observer = self.renderer.AddObserver("StartEvent", self._before_rendering)
-        self._closed = False
 
     @property
     def widget(self) -> QWidget:
@@ -59,14 +58,10 @@ class InteractorBackend:
 
     def request_render(self) -> None:
         """Draw again in the next turn of the event loop, once, if visible."""
-        if not self._closed:
-            self._interactor.update()
+        self._interactor.update()
 
     def shut_down(self) -> None:
         """Release everything of VTK."""
-        if self._closed:
-            return
-        self._closed = True
         self._prepare = None
         self.renderer.RemoveObserver(self._observer)
         self._interactor.close()

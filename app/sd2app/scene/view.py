@@ -15,7 +15,7 @@ from PySide6.QtWidgets import QLabel, QWidget
 from sd2app.scene.backend import Backend, NoOpenGL, chosen_backend
 from sd2app.scene.camera import Preset
 from sd2app.scene.colours import SceneColours
-from sd2app.scene.navigation import Button, Navigator
+from sd2app.scene.navigation import Navigator
 from sd2app.scene.overlay import Overlay
 from sd2app.scene.scene import Scene
 from sd2core.errors import Sd2Error
@@ -26,11 +26,6 @@ if TYPE_CHECKING:
     from sd2app.session.session import Session
     from sd2core.mesh.sequence import MeshSequence
 
-_BUTTONS: dict[Qt.MouseButton, Button] = {
-    Qt.MouseButton.LeftButton: "left",
-    Qt.MouseButton.MiddleButton: "middle",
-    Qt.MouseButton.RightButton: "right",
-}
 _MOUSE = (
     QEvent.Type.MouseMove,
     QEvent.Type.MouseButtonPress,
@@ -144,18 +139,14 @@ class SceneView(QWidget):
     def _handle_mouse(self, event: QMouseEvent) -> None:
         kind, place = event.type(), _place(event)
         if kind == QEvent.Type.MouseMove:
-            self.navigator.move(*place, *_modifiers(event))
-            return
-        button = _BUTTONS.get(event.button())
-        if button is None:
-            return
-        if kind == QEvent.Type.MouseButtonRelease:
-            self.navigator.release(*place, button)
+            self.navigator.move(*place, event.modifiers())
+        elif kind == QEvent.Type.MouseButtonRelease:
+            self.navigator.release(*place, event.button())
         elif kind == QEvent.Type.MouseButtonDblClick and not self._at_something(place):
             self.set_view("overview")
         else:
             # Also the second press of a double click: a hurried hand takes the sensor.
-            self.navigator.press(*place, button, *_modifiers(event))
+            self.navigator.press(*place, event.button(), event.modifiers())
 
     def _at_something(self, place: tuple[float, float]) -> bool:
         at_marker = self.navigator.marker_at(*place) is not None
@@ -315,11 +306,3 @@ def make_backend(parent: QWidget) -> Backend:
 
 def _place(event: QMouseEvent | QWheelEvent) -> tuple[float, float]:
     return (event.position().x(), event.position().y())
-
-
-def _modifiers(event: QMouseEvent) -> tuple[bool, bool]:
-    held = event.modifiers()
-    return (
-        bool(held & Qt.KeyboardModifier.ShiftModifier),
-        bool(held & Qt.KeyboardModifier.ControlModifier),
-    )

@@ -108,7 +108,7 @@ class MainWindow(QMainWindow):
         """Load what takes time to import, and fill the skeleton."""
         # Imported here so that the skeleton is on screen before NumPy, PyAV,
         # numba and VTK are loaded.
-        from sd2app.playback.transport import TransportBar
+        from sd2app.playback.views import TransportBar
         from sd2app.session.session import build_session
         from sd2app.shell.keys.bindings import KeyBindings
         from sd2app.shell.menus import Menus, in_order

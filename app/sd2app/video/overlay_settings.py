@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.settings import Settings
+from sd2app.settings import Settings, StoredChoices
 
 
 @dataclass(frozen=True)
@@ -25,25 +25,19 @@ class OverlayModel(QObject):
 
     def __init__(self, settings: Settings, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._settings = settings
-        self._style = OverlayStyle(
-            shown=settings.flag("overlay/shown", OverlayStyle.shown),
-            opacity=settings.share("overlay/opacity", OverlayStyle.opacity),
-            as_dots=settings.flag("overlay/as_dots", OverlayStyle.as_dots),
-        )
+        self._stored = StoredChoices(settings, "overlay", vars(OverlayStyle()))
+        if not 0 <= self._stored["opacity"] <= 1:
+            self._stored.set("opacity", OverlayStyle.opacity)
 
     @property
     def style(self) -> OverlayStyle:
         """Style of the mesh."""
-        return self._style
+        return OverlayStyle(**{name: self._stored[name] for name in self._stored.defaults})
 
-    def set_style(self, **changes: object) -> None:
+    def set_style(self, **changes: float) -> None:
         """Change some of it, and remember it."""
-        style = replace(self._style, **changes)  # type: ignore[arg-type]
-        style = replace(style, opacity=min(max(style.opacity, 0.0), 1.0))
-        if style == self._style:
-            return
-        self._style = style
-        for name, value in vars(style).items():
-            self._settings.set_value(f"overlay/{name}", value)
-        self.changed.emit()
+        if "opacity" in changes:
+            changes["opacity"] = min(max(changes["opacity"], 0.0), 1.0)
+        changed = [self._stored.set(name, value) for name, value in changes.items()]
+        if any(changed):
+            self.changed.emit()

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from PySide6.QtCore import Qt
 from vtkmodules.vtkRenderingCore import vtkRenderer
 
 from sd2app.scene.camera import EyePose
@@ -17,6 +18,9 @@ from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
 
 SIZE = (640.0, 460.0)
+LEFT, MIDDLE = Qt.MouseButton.LeftButton, Qt.MouseButton.MiddleButton
+NONE = Qt.KeyboardModifier.NoModifier
+SHIFT, CTRL = Qt.KeyboardModifier.ShiftModifier, Qt.KeyboardModifier.ControlModifier
 
 
 class Hand:
@@ -61,19 +65,19 @@ def hand() -> Hand:
 def test_the_sensor_stays_under_the_pointer_where_it_was_taken(hand: Hand) -> None:
     start = hand.sensor_px
     grip = np.add(start, (5, -3))
-    hand.navigator.press(*grip, "left", False, False)
+    hand.navigator.press(*grip, LEFT, NONE)
     for step in ((40, 10), (-120, 70), (33.5, -80.25)):
-        hand.navigator.move(*np.add(grip, step), False, False)
+        hand.navigator.move(*np.add(grip, step), NONE)
         np.testing.assert_allclose(hand.sensor_px, np.add(start, step), atol=1e-6)
-    hand.navigator.release(*np.add(grip, step), "left")
+    hand.navigator.release(*np.add(grip, step), LEFT)
     assert hand.log == ["begin", "drag", "drag", "drag", "end"]
     assert not hand.navigator.holds_sensor
 
 
 def test_a_press_alone_does_not_move_the_sensor(hand: Hand) -> None:
     before = hand.sensor_m
-    hand.navigator.press(*np.add(hand.sensor_px, 6), "left", False, False)
-    hand.navigator.release(*np.add(hand.sensor_px, 6), "left")
+    hand.navigator.press(*np.add(hand.sensor_px, 6), LEFT, NONE)
+    hand.navigator.release(*np.add(hand.sensor_px, 6), LEFT)
     assert hand.log == ["begin", "end"]
     np.testing.assert_array_equal(hand.sensor_m, before)
 
@@ -88,8 +92,8 @@ def test_the_grip_is_wide_enough_for_a_hand(hand: Hand) -> None:
 
 def test_shift_keeps_the_sensor_on_its_vertical(hand: Hand) -> None:
     before, start = hand.sensor_m, hand.sensor_px
-    hand.navigator.press(*start, "left", False, False)
-    hand.navigator.move(start[0] + 30, start[1] + 60, True, False)
+    hand.navigator.press(*start, LEFT, NONE)
+    hand.navigator.move(start[0] + 30, start[1] + 60, SHIFT)
     np.testing.assert_allclose(hand.sensor_m[[0, 2]], before[[0, 2]], atol=1e-9)
     assert hand.sensor_m[1] > before[1] + 0.05
 
@@ -97,8 +101,8 @@ def test_shift_keeps_the_sensor_on_its_vertical(hand: Hand) -> None:
 def test_ctrl_keeps_the_sensor_on_the_line_to_the_body(hand: Hand) -> None:
     before, start = hand.sensor_m, hand.sensor_px
     body = hand.scene.extent.centre_m
-    hand.navigator.press(*start, "left", False, False)
-    hand.navigator.move(start[0] + 60, start[1], False, True)
+    hand.navigator.press(*start, LEFT, NONE)
+    hand.navigator.move(start[0] + 60, start[1], CTRL)
     moved = hand.sensor_m - before
     assert np.linalg.norm(moved) > 0.05
     np.testing.assert_allclose(np.cross(moved, body - before), 0.0, atol=1e-9)
@@ -107,18 +111,20 @@ def test_ctrl_keeps_the_sensor_on_the_line_to_the_body(hand: Hand) -> None:
 
 def test_changing_the_constraint_goes_on_from_where_the_sensor_is(hand: Hand) -> None:
     start = hand.sensor_px
-    hand.navigator.press(*start, "left", False, False)
-    hand.navigator.move(start[0] + 80, start[1] + 40, False, False)
+    hand.navigator.press(*start, LEFT, NONE)
+    hand.navigator.move(start[0] + 80, start[1] + 40, NONE)
     middle = hand.sensor_m
-    hand.navigator.move(start[0] + 80, start[1] + 41, True, False)
+    hand.navigator.move(start[0] + 80, start[1] + 41, SHIFT)
     assert np.linalg.norm(hand.sensor_m - middle) < 0.02
 
 
-@pytest.mark.parametrize(("button", "shift"), [("left", False), ("middle", False), ("left", True)])
-def test_the_view_moves_and_the_sensor_does_not(hand: Hand, button: str, shift: bool) -> None:
+@pytest.mark.parametrize(("button", "keys"), [(LEFT, NONE), (MIDDLE, NONE), (LEFT, SHIFT)])
+def test_the_view_moves_and_the_sensor_does_not(
+    hand: Hand, button: Qt.MouseButton, keys: Qt.KeyboardModifier
+) -> None:
     before, pose = hand.sensor_m, hand.scene.pose
-    hand.navigator.press(500.0, 400.0, button, shift, False)
-    hand.navigator.move(520.0, 380.0, shift, False)
+    hand.navigator.press(500.0, 400.0, button, keys)
+    hand.navigator.move(520.0, 380.0, keys)
     hand.navigator.release(520.0, 380.0, button)
     assert hand.log == []
     np.testing.assert_array_equal(hand.sensor_m, before)
@@ -126,7 +132,7 @@ def test_the_view_moves_and_the_sensor_does_not(hand: Hand, button: str, shift: 
         hand.scene.pose.azimuth_deg,
         hand.scene.pose.elevation_deg,
     )
-    assert turned == (button == "left" and not shift)
+    assert turned == (button == LEFT and keys == NONE)
     assert hand.scene.pose != pose
 
 
@@ -135,7 +141,7 @@ def test_the_wheel_comes_nearer_but_not_while_the_sensor_is_held(hand: Hand) -> 
     hand.navigator.wheel(300.0, 200.0, 1.0)
     assert hand.scene.pose.distance_m < distance
     pose = hand.scene.pose
-    hand.navigator.press(*hand.sensor_px, "left", False, False)
+    hand.navigator.press(*hand.sensor_px, LEFT, NONE)
     hand.navigator.wheel(300.0, 200.0, 1.0)
     assert hand.scene.pose == pose
 
@@ -170,14 +176,14 @@ def test_a_sensor_far_away_does_not_shrink_the_view_to_nothing(hand: Hand) -> No
 
 def test_another_button_does_not_end_a_drag(hand: Hand) -> None:
     start = hand.sensor_px
-    hand.navigator.press(*start, "left", False, False)
-    hand.navigator.press(*start, "middle", False, False)
-    hand.navigator.release(*start, "middle")
+    hand.navigator.press(*start, LEFT, NONE)
+    hand.navigator.press(*start, MIDDLE, NONE)
+    hand.navigator.release(*start, MIDDLE)
     assert hand.navigator.holds_sensor
-    hand.navigator.move(*np.add(start, 20), False, False)
+    hand.navigator.move(*np.add(start, 20), NONE)
     np.testing.assert_allclose(hand.sensor_px, np.add(start, 20), atol=1e-6)
     hand.navigator.let_go()
-    hand.navigator.release(*start, "left")
+    hand.navigator.release(*start, LEFT)
     assert hand.log == ["begin", "drag", "end"]
 
 
@@ -205,11 +211,11 @@ def test_a_click_picks_the_nearest_place_and_turns_nothing(planned: Hand) -> Non
     pose = planned.scene.pose
     for number in (2, 1, 0):
         x, y = marker_px(planned, number)
-        planned.navigator.move(x, y, False, False)
+        planned.navigator.move(x, y, NONE)
         assert planned.navigator.marker == number
-        planned.navigator.press(x, y, "left", False, False)
-        planned.navigator.move(x + 2, y - 1, False, False)
-        planned.navigator.release(x + 2, y - 1, "left")
+        planned.navigator.press(x, y, LEFT, NONE)
+        planned.navigator.move(x + 2, y - 1, NONE)
+        planned.navigator.release(x + 2, y - 1, LEFT)
     assert planned.picked == [2, 1, 0]
     assert planned.scene.pose == pose
     assert planned.log == []
@@ -218,9 +224,9 @@ def test_a_click_picks_the_nearest_place_and_turns_nothing(planned: Hand) -> Non
 def test_a_drag_that_begins_on_a_place_turns_the_view_and_picks_nothing(planned: Hand) -> None:
     pose = planned.scene.pose
     x, y = marker_px(planned, 2)
-    planned.navigator.press(x, y, "left", False, False)
-    planned.navigator.move(x + 30, y, False, False)
-    planned.navigator.release(x + 30, y, "left")
+    planned.navigator.press(x, y, LEFT, NONE)
+    planned.navigator.move(x + 30, y, NONE)
+    planned.navigator.release(x + 30, y, LEFT)
     assert planned.picked == []
     assert planned.scene.pose != pose
 
@@ -229,12 +235,12 @@ def test_a_place_under_the_sensor_leaves_the_sensor_to_the_hand(planned: Hand) -
     planned.scene.set_sensor(VirtualSensor(tuple(planned.scene.markers.positions_m[2])))
     x, y = marker_px(planned, 2)
     assert planned.navigator.marker_at(x, y) is None
-    planned.navigator.press(x, y, "left", False, False)
+    planned.navigator.press(x, y, LEFT, NONE)
     assert planned.navigator.holds_sensor
 
 
 def test_places_that_go_away_are_not_under_the_pointer(planned: Hand) -> None:
-    planned.navigator.move(*marker_px(planned, 2), False, False)
+    planned.navigator.move(*marker_px(planned, 2), NONE)
     planned.scene.set_markers((), np.zeros(0), None)
     planned.navigator.look_again()
     assert planned.navigator.marker is None

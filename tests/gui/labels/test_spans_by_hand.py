@@ -26,7 +26,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QToolButton
 from window_models import menu_of, models_of
 
-from sd2app.playback.timeline import TimeRuler
+from sd2app.playback.views import TimeRuler
 
 THERE, BACK = ("there", 6, 24), ("back", 30, 60)
 

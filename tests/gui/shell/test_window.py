@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QApplication, QMessageBox
 from window_models import all_actions, models_of
 
 from sd2app.maps.overview import Overview
-from sd2app.playback.timeline import TimeRuler
+from sd2app.playback.views import TimeRuler
 from sd2app.shell.keys.dialog import KeysDialog
 from sd2app.video.view import VideoView
 from sd2core.accuracy.plans import AccuracyPlan

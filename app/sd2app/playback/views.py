@@ -1,0 +1,200 @@
+"""Bar that plays, steps and scrubs, and the time axis under the tracks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+from PySide6.QtCore import QPointF, QRectF, QSignalBlocker, Qt, SignalInstance
+from PySide6.QtGui import QAction, QColor, QMouseEvent, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QSlider, QToolButton, QWidget
+
+from sd2app.session.display import DisplayModel
+from sd2app.session.playback import PlaybackModel
+from sd2app.session.time_window import TimeWindow
+from sd2app.widgets.time_axis import (
+    GUTTER_PX,
+    MARGIN_PX,
+    TimeScale,
+    clock_text,
+    tick_step,
+    ticks,
+)
+from sd2core.labels.spans import Span
+
+_BUTTONS = ("first_frame", "previous_frame", "play", "next_frame", "last_frame", "loop")
+
+
+class Looped(Protocol):
+    """Span that is played in a loop."""
+
+    @property
+    def changed(self) -> SignalInstance:
+        """Emitted when a loop begins or ends."""
+
+    @property
+    def span(self) -> Span | None:
+        """The span, or None."""
+
+    def end(self) -> None:
+        """Leave the loop and play on."""
+
+
+class TransportBar(QWidget):
+    """One row of controls over the clock."""
+
+    def __init__(
+        self,
+        playback: PlaybackModel,
+        looped: Looped,
+        action: Callable[[str], QAction],
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._playback, self._looped = playback, looped
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(8, 4, 8, 4)
+        layout.setSpacing(4)
+        for name in _BUTTONS:
+            layout.addWidget(self._button(action(name)))
+        self._stretch = self._button()
+        self._stretch.setObjectName("outlined")
+        self._stretch.setToolTip("Play on beyond the span (Esc)")
+        self._stretch.clicked.connect(looped.end)
+        self._time = self._label("00:00.000 ")
+        self._frame = self._label("frame 162000 / 162000")
+        self._frame.setObjectName("muted")
+        self._slider = QSlider(Qt.Orientation.Horizontal, self)
+        self._slider.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._slider.setAccessibleName("Frame")
+        self._slider.valueChanged.connect(playback.seek_frame)
+        self._speed = self._label("0.25× ")
+        self._speed.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        layout.addWidget(self._stretch)
+        layout.addSpacing(8)
+        layout.addWidget(self._time)
+        layout.addWidget(self._frame)
+        layout.addWidget(self._slider, 1)
+        layout.addWidget(self._button(action("slower")))
+        layout.addWidget(self._speed)
+        layout.addWidget(self._button(action("faster")))
+        playback.frame_changed.connect(self._refresh)
+        playback.speed_changed.connect(self._refresh)
+        looped.changed.connect(self._show_stretch)
+        self._show_stretch()
+        self._refresh()
+
+    def _button(self, action: QAction | None = None) -> QToolButton:
+        button = QToolButton(self)
+        button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        if action is not None:
+            button.setDefaultAction(action)
+        return button
+
+    def _label(self, longest: str) -> QLabel:
+        """A label that has room for a text, so that nothing beside it moves."""
+        label = QLabel(self)
+        label.setMinimumWidth(label.fontMetrics().horizontalAdvance(longest) + 4)
+        return label
+
+    def _refresh(self) -> None:
+        playback = self._playback
+        last = len(playback.timebase) - 1
+        with QSignalBlocker(self._slider):
+            self._slider.setRange(0, last)
+            self._slider.setValue(playback.frame)
+        self._time.setText(clock_text(playback.time_s))
+        self._frame.setText(f"frame {playback.frame} / {last}")
+        self._speed.setText(f"{playback.speed:g}×")
+
+    def _show_stretch(self) -> None:
+        span = self._looped.span
+        self._stretch.setVisible(span is not None)
+        if span is not None:
+            stretch = f"{clock_text(span.start_s)} – {clock_text(span.end_s)}"
+            label = self.fontMetrics().elidedText(span.label, Qt.TextElideMode.ElideRight, 120)
+            self._stretch.setText(f"Looping {label}  {stretch}  ✕")
+            self._stretch.setAccessibleName(f"End the loop of {span.label}, {stretch}")
+
+
+class TimeRuler(QWidget):
+    """Seconds under the tracks; click or drag seeks."""
+
+    def __init__(
+        self,
+        span: TimeWindow,
+        playback: PlaybackModel,
+        display: DisplayModel,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._span = span
+        self._playback = playback
+        self._display = display
+        self.setFixedHeight(24)
+        for signal in (
+            span.changed,
+            playback.frame_changed,
+            playback.stretch_changed,
+            display.theme_changed,
+        ):
+            signal.connect(self.update)
+
+    @property
+    def scale(self) -> TimeScale:
+        """Time axis of this widget."""
+        return TimeScale(self._span.start_s, self._span.end_s, self.width())
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Ticks with times, and the cursor."""
+        with QPainter(self) as painter:
+            self._paint(painter)
+
+    def _paint(self, painter: QPainter) -> None:
+        colours, scale = self._display.palette, self.scale
+        painter.fillRect(self.rect(), QColor(colours.panel))
+        self._paint_stretch(painter, scale)
+        most = max(int(scale.plot_width_px / 80), 1)
+        step = tick_step(self._span.duration_s, most)
+        decimals = 0 if step >= 1 else (1 if step >= 0.1 else 2)
+        painter.setPen(QColor(colours.muted))
+        for time_s in ticks(self._span.start_s, self._span.end_s, most):
+            x = scale.x_of(time_s)
+            painter.drawLine(QPointF(x, 0), QPointF(x, 4))
+            box = QRectF(x - 40, 4, 80, self.height() - 4)
+            if box.right() - 20 < self.width():
+                painter.drawText(box, Qt.AlignmentFlag.AlignCenter, clock_text(time_s, decimals))
+        x = scale.x_of(self._playback.time_s)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(colours.accent))
+        painter.drawPolygon([QPointF(x - 5, 0), QPointF(x + 5, 0), QPointF(x, 7)])
+
+    def _paint_stretch(self, painter: QPainter, scale: TimeScale) -> None:
+        """Paint a bracket around the repeated time range."""
+        if self._playback.stretch_s is None:
+            return
+        left, right = (
+            min(max(scale.x_of(time_s), GUTTER_PX - 2.0), self.width() - MARGIN_PX + 2.0)
+            for time_s in self._playback.stretch_s
+        )
+        band = QColor(self._display.palette.accent)
+        band.setAlpha(60)
+        painter.fillRect(QRectF(left, 0, right - left, self.height()), band)
+        painter.setPen(QPen(QColor(self._display.palette.accent), 2))
+        for x, inwards in ((left + 1, 4), (right - 1, -4)):
+            painter.drawPolyline(
+                [
+                    QPointF(x + inwards, 1),
+                    QPointF(x, 1),
+                    QPointF(x, self.height() - 1),
+                    QPointF(x + inwards, self.height() - 1),
+                ]
+            )
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """Seek."""
+        self._playback.seek(self.scale.time_of(event.position().x()))
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        """Seek."""
+        self._playback.seek(self.scale.time_of(event.position().x()))
