@@ -25,6 +25,8 @@ Scale = Literal["dB", "linear"]
 
 _WIDTH_IN, _ROW_IN, _PIXELS_PER_INCH = 8.0, 1.55, 200
 _NOTHING, _MUTED = "#e9ebee", "#5a6370"
+_DIFFERENCE = ["#b4520b", "#f7f8f9", "#0b7a5b"]
+"""Colours of negative, no and positive differences."""
 LANE_IN = 0.2
 """Height of one lane of spans."""
 _FREE_COLOUR = "#8a8f98"
@@ -112,16 +114,14 @@ def draw_maps(
     start_s: float,
     end_s: float,
     difference: tuple[int, int] | None = None,
-    colours: tuple[str, str] = ("#b4520b", "#0b7a5b"),
     labels: Labels | None = None,
     heading: str = "",
 ) -> Figure:
     """Draw maps on one time axis, from top to bottom, between two times.
 
     ``difference`` names two rows: the level of the first minus that of the second is a last
-    row, in ``colours`` of negative and positive differences. Labels are drawn below the
-    maps, and their edges on them, where any is in view. The heading is the subject of the
-    maps, with the word simulated where it is.
+    row. Labels are drawn below the maps, and their edges on them, where any is in view. The
+    heading is the subject of the maps, with the word simulated where it is.
     """
     from matplotlib.figure import Figure
 
@@ -155,7 +155,7 @@ def draw_maps(
     bar.ax.tick_params(labelsize=7)
     if difference is not None:
         first, second = _in_view(rows[difference[0]], start_s, end_s), rows[difference[1]]
-        _draw_difference(figure, maps_axes[-1], first, second, levels, colours)
+        _draw_difference(figure, maps_axes[-1], first, second, levels)
     if labels is not None and lanes:
         in_per_s = 0.8 * _WIDTH_IN / (end_s - start_s)
         draw_lanes(all_axes[-1], lanes, labels, start_s, end_s, in_per_s)
@@ -216,19 +216,12 @@ def _draw(
 
 
 def _draw_difference(
-    figure: Figure,
-    axes: Axes,
-    first: MapRow,
-    second: MapRow,
-    levels: Levels,
-    colours: tuple[str, str],
+    figure: Figure, axes: Axes, first: MapRow, second: MapRow, levels: Levels
 ) -> None:
     from matplotlib.colors import LinearSegmentedColormap
 
     values, known = difference_of(first, second, levels)
-    table = LinearSegmentedColormap.from_list(
-        "difference", [colours[0], "#f7f8f9", colours[1]], N=255
-    )
+    table = LinearSegmentedColormap.from_list("difference", _DIFFERENCE, N=255)
     low, high = levels.ends
     limit = high - low
     level = np.where(known, values, np.nan)

@@ -15,8 +15,7 @@ from PIL import Image
 
 from sd2core.body.camera import PinholeCamera
 from sd2core.errors import Sd2Error
-from sd2core.figures.strip import plot_strip, save_strip
-from sd2core.figures.strip_drawing import Body, _reduced, strip_box
+from sd2core.figures.strip import Body, _reduced, _strip_box, plot_strip, save_strip
 from sd2core.figures.strip_source import StripOptions, StripSource
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics.compiled import warm_up
@@ -120,12 +119,12 @@ def test_the_overlay_lets_the_person_through(source) -> None:
 def test_the_box_holds_the_body_of_every_frame(source) -> None:
     options = StripOptions(rows=("mesh",))
     bodies = [Body.at(source, frame, options) for frame in (0, 11)]
-    box = strip_box(source, bodies, options)
+    box = _strip_box(source, bodies, options)
     radius_px = 150 * 0.3 / (3 - SPEED_MPS * 11 / RATE)
     assert box.left < 80 - radius_px
     assert box.left + box.width > 80 + radius_px
     assert box.width < 160
-    assert strip_box(source, bodies, replace(options, whole=True)).width == 160
+    assert _strip_box(source, bodies, replace(options, whole=True)).width == 160
 
 
 def test_a_frame_in_which_nobody_was_found_says_so(source, ball, tmp_path) -> None:
