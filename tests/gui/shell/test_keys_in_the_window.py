@@ -8,8 +8,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel, QLineEdit, QPushButton, QToolButton
 from window_models import models_of
 
-from sd2app.shell.keys.capture import KeyCapture
-from sd2app.shell.keys.dialog import KeysDialog, KeyTable
+from sd2app.shell.keys.dialog import KeyCapture, KeysDialog, KeyTable
 from sd2app.shell.keys.model import KeyListModel
 from sd2app.shell.program import MOUSE
 from sd2app.widgets.inputs import NumberBox

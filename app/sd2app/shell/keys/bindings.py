@@ -1,13 +1,13 @@
-"""Which keys do what: the usual ones, those the user chose instead, and those of labels."""
+"""Keys of actions: the usual ones, those the user chose instead, and those of labels."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Protocol
 
 from PySide6.QtCore import QObject, Signal
 
+from sd2app.feature import Action
 from sd2app.labels.model import LabelsModel
 from sd2app.settings import Settings
 from sd2app.widgets.key_text import canonical, native
@@ -24,47 +24,18 @@ _RESERVED = {
 }
 
 
-class Bindable(Protocol):
-    """An action that keys can do."""
-
-    @property
-    def id(self) -> str:
-        """Its own name."""
-
-    @property
-    def menu(self) -> str:
-        """Where it stands."""
-
-    @property
-    def text(self) -> str:
-        """What it is called."""
-
-    @property
-    def tip(self) -> str:
-        """What it does."""
-
-    @property
-    def keys(self) -> tuple[str, ...]:
-        """Its usual keys."""
-
-
 class KeyBindings(QObject):
     """The keys of every action. No key does two things.
 
     A key that the user gives to an action is free, or is refused with the name of who has it.
     Labels come with the recording: where one has a key of an action, it has it for as long.
-
-    Signals
-    -------
-    changed
-        Some action has other keys.
     """
 
-    changed = Signal()
+    changed = Signal()  # some action has other keys
 
     def __init__(
         self,
-        actions: Iterable[Bindable],
+        actions: Iterable[Action],
         labels: LabelsModel,
         settings: Settings,
         parent: QObject | None = None,
@@ -79,7 +50,7 @@ class KeyBindings(QObject):
         labels.changed.connect(self._follow_labels)
 
     @property
-    def actions(self) -> Sequence[Bindable]:
+    def actions(self) -> Sequence[Action]:
         """All of them, in the order of the menus."""
         return tuple(self._actions.values())
 
@@ -94,7 +65,7 @@ class KeyBindings(QObject):
         }
 
     def is_usual(self, action_id: str) -> bool:
-        """Whether the user has left its keys as they are."""
+        """True if the user has left its keys as they are."""
         return action_id not in self._chosen
 
     def owner(self, key: str, besides: str = "") -> str:
@@ -115,10 +86,7 @@ class KeyBindings(QObject):
     def bind(self, action_id: str, keys: Iterable[str]) -> None:
         """Give an action these keys, and no others.
 
-        Raises
-        ------
-        Sd2Error
-            When one is no key, is reserved or is taken; nothing is changed then.
+        Raises Sd2Error if one is no key, is reserved or is taken; nothing is changed then.
         """
         wanted = tuple(dict.fromkeys(canonical(key) for key in keys))
         text = self._actions[action_id].text

@@ -1,18 +1,18 @@
-"""All keys: found, changed, given back."""
+"""Dialog of all keys: found, changed, reset."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-from PySide6.QtCore import QModelIndex, QObject, Qt
-from PySide6.QtGui import QKeyEvent
+from PySide6.QtCore import QEvent, QKeyCombination, QModelIndex, QObject, Qt, Signal
+from PySide6.QtGui import QKeyEvent, QKeySequence
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QDialog,
     QDialogButtonBox,
     QHBoxLayout,
     QHeaderView,
-    QLabel,
+    QLineEdit,
     QPushButton,
     QStyledItemDelegate,
     QStyleOptionViewItem,
@@ -21,13 +21,23 @@ from PySide6.QtWidgets import (
 )
 
 from sd2app.shell.keys.bindings import KeyBindings
-from sd2app.shell.keys.capture import KeyCapture
 from sd2app.shell.keys.model import KEYS, KeyListModel
 from sd2app.widgets.inputs import SearchLine
+from sd2app.widgets.panel import sentence
 from sd2app.widgets.table import CellTable
 from sd2core.errors import Sd2Error
 
 _KEYS_PX = 250
+_MODIFIERS = (
+    Qt.Key.Key_Shift,
+    Qt.Key.Key_Control,
+    Qt.Key.Key_Alt,
+    Qt.Key.Key_AltGr,
+    Qt.Key.Key_Meta,
+    Qt.Key.Key_CapsLock,
+)
+_KEYPAD = Qt.KeyboardModifier.KeypadModifier
+
 
 
 class KeysDialog(QDialog):
@@ -48,9 +58,7 @@ class KeysDialog(QDialog):
         self._table.selectionModel().currentRowChanged.connect(self._refresh)
         bindings.changed.connect(self._refresh)
         model.modelReset.connect(self._refresh)
-        self._said = QLabel(self)
-        self._said.setObjectName("warning")
-        self._said.setWordWrap(True)
+        self._said = sentence("", "warning")
         self._change = self._button("Change", "Wait for another key", self._begin)
         self._add = self._button("Add", "Wait for a key besides", lambda: self._begin(besides=True))
         self._clear = self._button("Remove", "Leave it without a key", self._take_away)
@@ -179,3 +187,50 @@ class KeyCells(QStyledItemDelegate):
 
     def setModelData(self, editor: QWidget, model: object, index: QModelIndex) -> None:
         """The key has been taken already."""
+
+
+class KeyCapture(QLineEdit):
+    """A field that takes the next key for what it is, instead of doing what it does.
+
+    Escape leaves everything as it was.
+    """
+
+    captured = Signal(str)  # the key that was pressed, as Qt writes it
+    given_up = Signal()  # Escape
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setReadOnly(True)
+        self.setContextMenuPolicy(Qt.ContextMenuPolicy.NoContextMenu)
+        self.setPlaceholderText("Press a key; Esc: leave it")
+        self.setAccessibleName("Press the new key, or Escape to leave it as it is")
+
+    def event(self, event: QEvent) -> bool:
+        """Claim every key before it is taken for that of an action, Tab too."""
+        if event.type() == QEvent.Type.ShortcutOverride:
+            event.accept()
+            return True
+        if event.type() == QEvent.Type.KeyPress and isinstance(event, QKeyEvent):
+            self.keyPressEvent(event)
+            return True
+        return super().event(event)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Take it."""
+        key = Qt.Key(event.key())
+        if key in _MODIFIERS or key == Qt.Key.Key_unknown:
+            return
+        if key == Qt.Key.Key_Escape and not event.modifiers():
+            self.given_up.emit()
+            return
+        self.captured.emit(_written(event))
+
+
+def _written(event: QKeyEvent) -> str:
+    modifiers = event.modifiers() & ~_KEYPAD
+    text = event.text()
+    # Shift that only reaches a sign, as for "?", is not part of the key.
+    if text and text.isprintable() and not text.isalnum() and not text.isspace():
+        modifiers &= ~Qt.KeyboardModifier.ShiftModifier
+    combination = QKeyCombination(modifiers, Qt.Key(event.key()))
+    return QKeySequence(combination).toString(QKeySequence.SequenceFormat.PortableText)

@@ -6,46 +6,33 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from PySide6.QtCore import QAbstractTableModel, QModelIndex, QObject, QPersistentModelIndex, Qt
+from PySide6.QtCore import QObject, Qt
 from PySide6.QtGui import QFont
 
 from sd2app.labels.columns import Change
 from sd2app.labels.model import LabelsModel
 from sd2app.shell.keys.bindings import KeyBindings
 from sd2app.widgets.key_text import canonical, native
+from sd2app.widgets.record_table import Heading, Index, RecordTableModel
 from sd2core.labels.field_edits import set_key
 
-Index = QModelIndex | QPersistentModelIndex
-
-HEADINGS = ("Menu", "What it does", "Keys")
+_HEADINGS = (Heading("Menu"), Heading("What it does"), Heading("Keys", editable=True))
 KEYS = 2
-_NOWHERE = QModelIndex()
 
 
 @dataclass(frozen=True)
 class KeyRow:
-    """One row: an action, a label, or something the mouse does.
-
-    Parameters
-    ----------
-    menu, text, tip : str
-    action : str
-        Id of the action, if it is one.
-    label : str
-        Name of the label, if it is one.
-    mouse : str
-        What the hand does, if it is neither.
-    """
+    """One row: an action, a label, or a use of the mouse."""
 
     menu: str
     text: str
     tip: str
-    action: str = ""
-    label: str = ""
-    mouse: str = ""
+    action: str = ""  # id of the action, if it is one
+    label: str = ""  # name of the label, if it is one
+    mouse: str = ""  # what the hand does, if it is neither
 
 
-class KeyListModel(QAbstractTableModel):
+class KeyListModel(RecordTableModel[KeyRow]):
     """Every row that a search leaves; keys are changed through :class:`KeyBindings`."""
 
     def __init__(
@@ -56,41 +43,35 @@ class KeyListModel(QAbstractTableModel):
         apply: Callable[[Change], bool],
         parent: QObject | None = None,
     ) -> None:
-        super().__init__(parent)
+        super().__init__(_HEADINGS, parent)
         self._bindings, self._labels, self._mouse, self._apply = bindings, labels, mouse, apply
         self._search = ""
         self._rows = self._listed()
-        bindings.changed.connect(self._follow)
+        bindings.changed.connect(self._refresh)
 
     @property
     def rows(self) -> Sequence[KeyRow]:
-        """What is listed."""
+        """Rows that are listed."""
         return self._rows
 
     def set_search(self, text: str) -> None:
-        """List what has these words in its menu, name, tip or keys."""
+        """List rows with all these words in menu, name, tip or keys."""
         self._search = text
-        self._follow()
+        self._refresh()
 
     # --- changing -------------------------------------------------------------------------
 
     def can_change(self, row: int) -> bool:
-        """Whether something else than a hand does it."""
+        """True if keys do it, not the mouse."""
         return not self._rows[row].mouse
 
     def is_usual(self, row: int) -> bool:
-        """Whether there is nothing to be given back."""
+        """True if there is nothing to reset."""
         action = self._rows[row].action
         return not action or self._bindings.is_usual(action)
 
     def change(self, row: int, key: str, *, besides: bool = False) -> None:
-        """Give a row another key, or one besides those it has.
-
-        Raises
-        ------
-        Sd2Error
-            When the key is taken, or cannot be one.
-        """
+        """Give a row another key, or one besides those it has; Sd2Error if it cannot have it."""
         at = self._rows[row]
         if at.action:
             kept = self._bindings.keys_of(at.action) if besides else ()
@@ -114,10 +95,10 @@ class KeyListModel(QAbstractTableModel):
 
     # --- the list -------------------------------------------------------------------------
 
-    def _follow(self) -> None:
+    def _refresh(self) -> None:
         rows = self._listed()
         if rows == self._rows:
-            last = self.index(len(rows) - 1, len(HEADINGS) - 1)
+            last = self.index(len(rows) - 1, KEYS)
             self.dataChanged.emit(self.index(0, 0), last)
             return
         self.beginResetModel()
@@ -156,45 +137,24 @@ class KeyListModel(QAbstractTableModel):
         taken = [f"{native(key)}: now “{label}”" for key, label in lent.items()]
         return ", ".join([*map(native, self._bindings.keys_of(row.action)), *taken])
 
-    # --- Qt's questions -------------------------------------------------------------------
+    # --- cells ----------------------------------------------------------------------------
 
-    def rowCount(self, parent: Index = _NOWHERE) -> int:
-        """Rows that the search leaves."""
-        return 0 if parent.isValid() else len(self._rows)
+    def _text(self, record: KeyRow, column: int) -> str:
+        return (record.menu, record.text, self.keys_text(record))[column]
 
-    def columnCount(self, parent: Index = _NOWHERE) -> int:
-        """Menu, what it does, keys."""
-        return 0 if parent.isValid() else len(HEADINGS)
-
-    def headerData(
-        self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole
-    ) -> Any:
-        """Headings."""
-        if orientation != Qt.Orientation.Horizontal:
-            return None
-        if role == Qt.ItemDataRole.TextAlignmentRole:
-            return Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
-        return HEADINGS[section] if role == Qt.ItemDataRole.DisplayRole else None
+    def _tip(self, record: KeyRow, column: int) -> str:
+        return record.tip
 
     def flags(self, index: Index) -> Qt.ItemFlag:
-        """Keys can be changed, but what the hand does."""
-        if not index.isValid():
-            return Qt.ItemFlag.NoItemFlags
-        read = Qt.ItemFlag.ItemIsSelectable | Qt.ItemFlag.ItemIsEnabled
-        editable = index.column() == KEYS and self.can_change(index.row())
-        return read | Qt.ItemFlag.ItemIsEditable if editable else read
+        """Return which keys can be changed: all but those of the mouse."""
+        flags = super().flags(index)
+        fixed = index.isValid() and not self.can_change(index.row())
+        return flags & ~Qt.ItemFlag.ItemIsEditable if fixed else flags
 
     def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
-        """A cell; keys that the user chose are bold."""
-        if not index.isValid():
-            return None
-        row = self._rows[index.row()]
-        if role == Qt.ItemDataRole.DisplayRole:
-            return (row.menu, row.text, self.keys_text(row))[index.column()]
-        if role == Qt.ItemDataRole.ToolTipRole:
-            return row.tip
-        if role == Qt.ItemDataRole.FontRole and index.column() == KEYS:
+        """Return text, tip or font of a cell; keys that the user chose are bold."""
+        if role == Qt.ItemDataRole.FontRole and index.isValid() and index.column() == KEYS:
             font = QFont()
             font.setBold(not self.is_usual(index.row()))
             return font
-        return None
+        return super().data(index, role)
