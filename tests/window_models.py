@@ -17,7 +17,6 @@ from sd2app.shell.menus import in_order
 from sd2app.shell.parts import Parts
 from sd2app.shell.window import MainWindow
 from sd2app.shell.wiring import Features, build_features
-from sd2core.errors import Sd2Error
 
 
 def models_of(window: MainWindow) -> SimpleNamespace:
@@ -51,14 +50,13 @@ class NoShell:
     dialog_parent = None
 
     def warn(self, text: str) -> None:
-        raise AssertionError(text)
+        pass
+
+    def note(self, text: str) -> None:
+        pass
 
     def attempt(self, work: Callable[[], object]) -> object:
-        try:
-            return work()
-        except (Sd2Error, OSError) as error:
-            self.warn(str(error))
-            return None
+        return work()
 
     def open_paths(self, paths: list[Path]) -> None:
         raise AssertionError(paths)

@@ -116,14 +116,6 @@ class Feature:
         """Bars above the content, hidden while they have nothing to say."""
         return ()
 
-    def warnings(self) -> Sequence[SignalInstance]:
-        """Signals with a sentence about something that went wrong."""
-        return ()
-
-    def notes(self) -> Sequence[SignalInstance]:
-        """Signals with a sentence about something that was done."""
-        return ()
-
     def changes(self) -> Sequence[SignalInstance]:
         """Signals after which an action may be possible that was not, or the reverse."""
         return ()

@@ -24,6 +24,8 @@ class AccuracyFeature(Feature):
         self.model = AccuracyModel(
             session.jobs, session.settings, library or AccuracyLibrary(), parent
         )
+        self.model.failed.connect(shell.warn)
+        self.model.noted.connect(shell.note)
 
     def actions(self) -> Sequence[Action]:
         """Panel and measurement."""
@@ -49,14 +51,6 @@ class AccuracyFeature(Feature):
         """The panel at the side."""
         measure = self._shell.action("measure")
         return {"Accuracy": AccuracyPanel(self.model, self._session.display, measure)}
-
-    def warnings(self) -> Sequence[SignalInstance]:
-        """Failures of choosing and measuring."""
-        return (self.model.failed,)
-
-    def notes(self) -> Sequence[SignalInstance]:
-        """What was chosen."""
-        return (self.model.noted,)
 
     def changes(self) -> Sequence[SignalInstance]:
         """Plans and measurements."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from PySide6.QtCore import QObject, SignalInstance
+from PySide6.QtCore import QObject
 
 from sd2app.background.run_command import COMMAND
 from sd2app.batch.dialog import BatchWindow
@@ -28,6 +28,8 @@ class BatchFeature(Feature):
         parent: QObject,
     ) -> None:
         self.model = BatchModel(session.settings, parent, command or COMMAND)
+        self.model.failed.connect(shell.warn)
+        self.model.noted.connect(shell.note)
         self._shell = shell
         self._questions = BatchQuestions(self.model, session, shell, placements, installed)
         self._questions.said.connect(self._say)
@@ -64,14 +66,6 @@ class BatchFeature(Feature):
                 self.show,
             ),
         )  # fmt: skip
-
-    def warnings(self) -> Sequence[SignalInstance]:
-        """Failures of the batch."""
-        return (self.model.failed,)
-
-    def notes(self) -> Sequence[SignalInstance]:
-        """Ends of batches."""
-        return (self.model.noted,)
 
     def look_for_unfinished(self) -> None:
         """Find a batch that outlived its window."""

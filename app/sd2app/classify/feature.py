@@ -57,6 +57,9 @@ class ClassifyFeature(Feature):
         self.gestures = GestureFinder(self.model)
         self.training = ClassTraining(session.settings, self.model.use, parent)
         self.dialogs = ClassifyDialogs(shell, self.model, self.training, session)
+        self.model.failed.connect(shell.warn)
+        self.training.failed.connect(shell.warn)
+        self.training.noted.connect(shell.note)
         self._menu: ModelMenu | None = None
 
     @property
@@ -126,14 +129,6 @@ class ClassifyFeature(Feature):
     def take_dropped(self, path: Path) -> bool:
         """Use a classifier that was dropped."""
         return path.suffix == ".safetensors" and self.dialogs.take_dropped(path)
-
-    def warnings(self) -> Sequence[SignalInstance]:
-        """Classifiers that cannot be used, failures of runs."""
-        return self.model.failed, self.training.failed
-
-    def notes(self) -> Sequence[SignalInstance]:
-        """Ends of runs."""
-        return (self.training.noted,)
 
     def changes(self) -> Sequence[SignalInstance]:
         """The classifier."""

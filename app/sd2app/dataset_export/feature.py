@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import QObject, Qt, SignalInstance
+from PySide6.QtCore import QObject, Qt
 from PySide6.QtWidgets import QMessageBox
 
 from sd2app.dataset_export.dialog import ExportDialog
@@ -19,6 +19,8 @@ class DatasetExportFeature(Feature):
     def __init__(self, session: Session, shell: Shell, parent: QObject) -> None:
         self._session, self._shell = session, shell
         self.model = ExportModel(session.jobs, parent)
+        self.model.failed.connect(shell.warn)
+        self.model.noted.connect(shell.note)
 
     def actions(self) -> Sequence[Action]:
         """The dialog."""
@@ -57,14 +59,6 @@ class DatasetExportFeature(Feature):
             buttons.Save,
         )
         return answer == buttons.Save and self._shell.save()
-
-    def warnings(self) -> Sequence[SignalInstance]:
-        """Failures of an export."""
-        return (self.model.failed,)
-
-    def notes(self) -> Sequence[SignalInstance]:
-        """Ends of exports."""
-        return (self.model.noted,)
 
     def look_for_unfinished(self) -> None:
         """Find an export that outlived its window."""

@@ -56,6 +56,8 @@ class DenoiseFeature(Feature):
             s.edits.choose_denoiser,
             parent,
         )
+        self.model.failed.connect(shell.warn)
+        self.model.noted.connect(shell.note)
         self.live = LiveDenoiseModel(s.playback, maps.synthetic, self.model, s.settings, parent)
         self._menu: ModelMenu | None = None
 
@@ -144,14 +146,6 @@ class DenoiseFeature(Feature):
         )
         if name:
             self._shell.attempt(lambda: self.model.export(Path(name)))
-
-    def warnings(self) -> Sequence[SignalInstance]:
-        """Models that cannot be used."""
-        return (self.model.failed,)
-
-    def notes(self) -> Sequence[SignalInstance]:
-        """Remarks on the model in use."""
-        return (self.model.noted,)
 
     def changes(self) -> Sequence[SignalInstance]:
         """Model and live denoising."""

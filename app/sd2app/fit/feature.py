@@ -30,6 +30,7 @@ class FitFeature(Feature):
         self._session, self._shell = session, shell
         self.model = FitModel(session.settings, parent, command or COMMAND_IN_FOLDER)
         self.on_screen = FitOnScreen(session, self.model, parent)
+        self.on_screen.noted.connect(shell.note)
 
     @property
     def landmarks_changed(self) -> tuple[SignalInstance, ...]:
@@ -63,10 +64,6 @@ class FitFeature(Feature):
                 resume=self._resume,
             ),
         )
-
-    def notes(self) -> Sequence[SignalInstance]:
-        """Results that were taken over."""
-        return (self.on_screen.noted,)
 
     def changes(self) -> Sequence[SignalInstance]:
         """State of the fit."""

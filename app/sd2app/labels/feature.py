@@ -68,6 +68,10 @@ class LabelsFeature(Feature):
         self._track_dialogs = TrackDialogs(shell, labels, self.tracks, self.reaction)
         self._keys: LabelActions | None = None
         self.edits.done_at.connect(s.span.reveal_any)
+        self.edits.failed.connect(shell.warn)
+        for model in (self.autosave, self.cut_out):
+            model.failed.connect(shell.warn)
+            model.noted.connect(shell.note)
         s.document.changed.connect(self._follow_capture)
 
     # --- menus ----------------------------------------------------------------------------
@@ -227,14 +231,6 @@ class LabelsFeature(Feature):
     def take_dropped(self, path: Path) -> bool:
         """Import a file of labels that was dropped."""
         return self.files.take_dropped(path)
-
-    def warnings(self) -> Sequence[SignalInstance]:
-        """Edits that are refused, files that cannot be written."""
-        return self.autosave.failed, self.edits.failed, self.cut_out.failed
-
-    def notes(self) -> Sequence[SignalInstance]:
-        """Where cut-outs are, labels that were found again."""
-        return self.autosave.noted, self.cut_out.noted
 
     def changes(self) -> Sequence[SignalInstance]:
         """Labels, selection and marks."""

@@ -33,6 +33,8 @@ class MapsFeature(Feature):
         self.uncertainty = UncertaintyModel(session, self.synthesis, accuracy, parent)
         self.difference = DifferenceModel(session, parent)
         session.document.changed.connect(session.follow_capture)
+        self.synthesis.failed.connect(shell.warn)
+        self.uncertainty.failed.connect(shell.warn)
 
     @property
     def busy(self) -> bool:
@@ -99,10 +101,6 @@ class MapsFeature(Feature):
         layout.addWidget(SpectrumView(self._session), 1)
         layout.addWidget(LevelBar(self._session, self._shell.action("uncertain")))
         return {"spectrum": pane}
-
-    def warnings(self) -> Sequence[SignalInstance]:
-        """Failures of synthesis."""
-        return self.synthesis.failed, self.uncertainty.failed
 
     def changes(self) -> Sequence[SignalInstance]:
         """Maps that are complete, and what is shown of them."""

@@ -35,6 +35,7 @@ class SensorFeature(Feature):
         self.placements = PlacementsModel(
             session.document, session.sensor, accuracy, session.edits, parent
         )
+        self.placements.failed.connect(shell.warn)
 
     @property
     def busy(self) -> bool:
@@ -91,10 +92,6 @@ class SensorFeature(Feature):
                 InnerPage("Placements", "Many places around the body, for a map each", placements),
             )
         }
-
-    def warnings(self) -> Sequence[SignalInstance]:
-        """Plans that cannot be made."""
-        return (self.placements.failed,)
 
     def changes(self) -> Sequence[SignalInstance]:
         """Planned placements."""

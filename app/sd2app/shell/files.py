@@ -24,6 +24,8 @@ class FilesFeature(Feature):
     def __init__(self, session: Session, shell: Shell) -> None:
         self._session, self._shell = session, shell
         self._document = session.document
+        self._document.failed.connect(shell.warn)
+        self._document.noted.connect(shell.note)
 
     def actions(self) -> Sequence[Action]:
         """Open, add, find, save."""
@@ -166,14 +168,6 @@ class FilesFeature(Feature):
     def may_close(self) -> bool:
         """Ask what becomes of unsaved edits."""
         return self.may_discard()
-
-    def warnings(self) -> Sequence[SignalInstance]:
-        """Files that cannot be read."""
-        return (self._document.failed,)
-
-    def notes(self) -> Sequence[SignalInstance]:
-        """Remarks on files."""
-        return (self._document.noted,)
 
     def changes(self) -> Sequence[SignalInstance]:
         """The recording that is open."""

@@ -170,10 +170,6 @@ class MainWindow(QMainWindow):
     def _connect(self) -> None:
         s, features = self.session, self.features
         for feature in features:
-            for signal in feature.warnings():
-                signal.connect(self.messages.warn)
-            for signal in feature.notes():
-                signal.connect(self.messages.note)
             for signal in feature.changes():
                 signal.connect(self._refresh)
         self.keys.changed.connect(self._refresh)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import QObject, SignalInstance
+from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QWidget
 
 from sd2app.feature import Action, Feature, Shell
@@ -31,6 +31,9 @@ class TrainingFeature(Feature):
         self.model = TrainingModel(session.settings, parent, command or COMMAND)
         self.adoption = ModelAdoption(self.model, denoise, session.maps, user_models_folder, parent)
         self._dialogs = TrainingDialogs(shell, self.model)
+        for model in (self.model, self.adoption):
+            model.failed.connect(shell.warn)
+            model.noted.connect(shell.note)
 
     def actions(self) -> Sequence[Action]:
         """The panel."""
@@ -45,14 +48,6 @@ class TrainingFeature(Feature):
     def panel(self) -> QWidget:
         """Page of the Train panel."""
         return TrainingPanel(self.model, self.adoption, self._session.display, self._dialogs)
-
-    def warnings(self) -> Sequence[SignalInstance]:
-        """Failures of runs."""
-        return self.model.failed, self.adoption.failed
-
-    def notes(self) -> Sequence[SignalInstance]:
-        """Ends of runs, models put to use."""
-        return self.model.noted, self.adoption.noted
 
     def look_for_unfinished(self) -> None:
         """Find runs under way and ended."""

@@ -21,6 +21,7 @@ class VideoFeature(Feature):
     ) -> None:
         self._session, self._shell, self._landmarks = session, shell, landmarks
         self.overlay = OverlayModel(session.settings, parent)
+        session.video.failed.connect(shell.warn)
 
     @property
     def busy(self) -> bool:
@@ -53,10 +54,6 @@ class VideoFeature(Feature):
         layout.addWidget(VideoBar(self.overlay, self._shell.action))
         layout.addWidget(VideoView(self._session, self.overlay, self._landmarks), 1)
         return {"video": pane}
-
-    def warnings(self) -> Sequence[SignalInstance]:
-        """Frames that cannot be decoded."""
-        return (self._session.video.failed,)
 
     def changes(self) -> Sequence[SignalInstance]:
         """Style of the overlay."""

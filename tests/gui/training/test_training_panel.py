@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -35,6 +36,7 @@ from sd2app.training.result import ModelAdoption
 from sd2app.widgets.chart import ChartView
 from sd2app.widgets.inputs import Choice, NumberBox
 from sd2app.widgets.theme import apply_theme
+from sd2core.errors import Sd2Error
 from sd2core.runs.pace import keep_pace
 
 FAKE = Path(__file__).resolve().parents[2] / "fake_train.py"
@@ -74,6 +76,13 @@ class SayingShell(NoShell):
 
     def warn(self, text: str) -> None:
         self._said.append(text)
+
+    def attempt(self, work: Callable[[], object]) -> object:
+        try:
+            return work()
+        except (Sd2Error, OSError) as error:
+            self.warn(str(error))
+            return None
 
 
 class Window:

@@ -39,7 +39,6 @@ _MODIFIERS = (
 _KEYPAD = Qt.KeyboardModifier.KeypadModifier
 
 
-
 class KeysDialog(QDialog):
     """A list of what keys and mouse do; Return or a double click waits for another key."""
 
