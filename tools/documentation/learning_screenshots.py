@@ -17,7 +17,7 @@ from PySide6.QtWidgets import QApplication
 from sd2app.batch.dialog import BatchWindow
 from sd2app.classify.result_dialog import ClassResultDialog
 from sd2app.dataset_export.dialog import ExportDialog
-from sd2app.shell.screenshot import wait_until_settled
+from sd2app.shell.app import wait_until_settled
 from sd2app.shell.window import MainWindow
 from sd2core.files.resources import resource_path
 from sd2core.placements.placements import PlacementGrid

@@ -19,7 +19,7 @@ from PySide6.QtWidgets import QApplication
 
 from sd2app.fit.request import FitRequest
 from sd2app.mesh_comparison.window import ComparisonWindow
-from sd2app.shell.screenshot import wait_until_settled
+from sd2app.shell.app import wait_until_settled
 from sd2app.shell.window import MainWindow
 from sd2core.files.resources import resource_path
 from sd2core.placements.placements import PlacementCloud

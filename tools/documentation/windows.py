@@ -10,7 +10,7 @@ from pathlib import Path
 from PySide6.QtWidgets import QApplication, QWidget
 
 from sd2app.settings import Settings
-from sd2app.shell.screenshot import wait_until_settled
+from sd2app.shell.app import wait_until_settled
 from sd2app.shell.window import MainWindow
 from sd2app.widgets.theme import apply_theme
 from tools.documentation.places import IMAGES, REPOSITORY

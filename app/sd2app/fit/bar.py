@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QProgressBar, QToolButton, QWidget
+from PySide6.QtWidgets import QFrame, QLabel, QProgressBar, QToolButton, QWidget
 
 from sd2app.fit.model import FitModel
 from sd2app.fit.on_screen import FitOnScreen
+from sd2app.widgets.layouts import row
 from sd2app.widgets.panel import ElidedLabel, outlined, sentence
 from sd2app.widgets.text import about
 
@@ -59,21 +60,11 @@ class FitBar(QFrame):
             "close": self._button("✕", "Close this message", self._close),
         }
         self._buttons["follow"].setCheckable(True)
-        self._lay_out()
+        parts = (self._title, (self._reason, 1), (self._stage, 1), self._bar, self._left)
+        buttons = self._buttons.values()
+        self.setLayout(row(*parts, *buttons, spacing_px=8, margins_px=(12, 4, 4, 4)))
         on_screen.changed.connect(self._refresh)
         self._refresh()
-
-    def _lay_out(self) -> None:
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(12, 4, 4, 4)
-        layout.setSpacing(8)
-        layout.addWidget(self._title)
-        layout.addWidget(self._reason, 1)
-        layout.addWidget(self._stage, 1)
-        layout.addWidget(self._bar)
-        layout.addWidget(self._left)
-        for button in self._buttons.values():
-            layout.addWidget(button)
 
     def _button(self, text: str, tip: str, run: Callable[[], object]) -> QToolButton:
         button = outlined(text, tip, run, self)

@@ -12,11 +12,9 @@ from PySide6.QtWidgets import (
     QDialogButtonBox,
     QFileDialog,
     QFormLayout,
-    QHBoxLayout,
     QLabel,
     QSlider,
     QToolButton,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -24,7 +22,8 @@ from sd2app.fit.person_picker import PersonPicker
 from sd2app.fit.setup import ANGLES_DEG, DEFAULT_STATURE_M, STATURES_M, FitSetupModel
 from sd2app.palette import Palette
 from sd2app.widgets.inputs import Choice, NumberBox
-from sd2app.widgets.panel import ElidedLabel, outlined, say, sentence, side_by_side
+from sd2app.widgets.layouts import STRETCH, column, row
+from sd2app.widgets.panel import ElidedLabel, outlined, say, sentence
 from sd2app.widgets.time_axis import clock_text
 
 VIDEOS = "Video (*.mp4 *.mkv *.mov *.avi *.webm *.m4v *.mpg *.ts *.wmv);;All files (*)"
@@ -112,10 +111,10 @@ class NewFromVideoDialog(QDialog):
         form.setVerticalSpacing(12)
         form.setHorizontalSpacing(16)
         form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
-        form.addRow("Video", _row(self._video, self._other_video))
-        form.addRow("Person", _row(self._person, self._clear))
+        form.addRow("Video", row((self._video, 1), self._other_video, spacing_px=8))
+        form.addRow("Person", row((self._person, 1), self._clear, spacing_px=8))
         form.addRow("", sentence("Drag a rectangle around the person, where there are several."))
-        form.addRow("Body height", side_by_side(self._known, self._stature))
+        form.addRow("Body height", row(self._known, self._stature, STRETCH, spacing_px=8))
         form.addRow(
             "",
             sentence(
@@ -123,27 +122,15 @@ class NewFromVideoDialog(QDialog):
                 " and velocities are proportional to it."
             ),
         )
-        form.addRow("Camera", side_by_side(self._camera, self._angle, self._focal))
-        form.addRow("Save as", _row(self._folder, self._other_folder))
-        right = QVBoxLayout()
-        right.addLayout(form)
-        right.addStretch(1)
-        right.addWidget(self._message)
-        left = QVBoxLayout()
-        left.addWidget(self.picker, 1)
-        under = QHBoxLayout()
-        under.addWidget(self._slider, 1)
-        under.addWidget(self._where)
-        left.addLayout(under)
-        columns = QHBoxLayout()
-        columns.setSpacing(24)
-        columns.addLayout(left, 3)
-        columns.addLayout(right, 2)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(16, 16, 16, 16)
-        layout.setSpacing(16)
-        layout.addLayout(columns, 1)
-        layout.addWidget(self._buttons)
+        camera = row(self._camera, self._angle, self._focal, STRETCH, spacing_px=8)
+        form.addRow("Camera", camera)
+        form.addRow("Save as", row((self._folder, 1), self._other_folder, spacing_px=8))
+        left = column((self.picker, 1), row((self._slider, 1), self._where))
+        right = column(form, STRETCH, self._message)
+        columns = row((left, 3), (right, 2), spacing_px=24)
+        self.setLayout(
+            column((columns, 1), self._buttons, spacing_px=16, margins_px=(16, 16, 16, 16))
+        )
 
     # --- following the model --------------------------------------------------------------
 
@@ -207,11 +194,3 @@ class NewFromVideoDialog(QDialog):
         )
         if name:
             self._setup.change(folder=Path(name))
-
-
-def _row(*widgets: QWidget) -> QHBoxLayout:
-    row = QHBoxLayout()
-    row.setSpacing(8)
-    for number, widget in enumerate(widgets):
-        row.addWidget(widget, 0 if number else 1)
-    return row

@@ -4,39 +4,31 @@ from __future__ import annotations
 
 import os
 import sys
+import time
 from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from PySide6.QtCore import QTimer
+from PySide6.QtWidgets import QApplication
+
+from sd2app.settings import Settings
+from sd2app.shell.parts import Parts
+from sd2app.shell.window import MainWindow, is_dark
+from sd2app.widgets.theme import apply_theme
+
 _SCREENSHOT_LIMIT_S = 120
+_SETTLE_S = 0.5
 
 
 def run(paths: Sequence[Path] = (), *, screenshot: Path | None = None) -> int:
-    """Open the window on some files and run until it is closed.
+    """Open the window on a recording or its files, and run until it is closed.
 
-    Parameters
-    ----------
-    paths : sequence of Path
-        A recording, or files that make up one.
-    screenshot : Path, optional
-        Draw the window off-screen when everything is computed, write it there
-        and return.
-
-    Returns
-    -------
-    int
-        Exit code.
+    With ``screenshot``, draw it off-screen when everything is computed, and write it there.
+    Returns an exit code.
     """
     if screenshot is not None:
         os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
-    from PySide6.QtCore import QTimer
-    from PySide6.QtWidgets import QApplication
-
-    from sd2app.settings import Settings
-    from sd2app.shell.parts import Parts
-    from sd2app.shell.window import MainWindow, is_dark
-    from sd2app.widgets.theme import apply_theme
-
     application = QApplication.instance() or QApplication(sys.argv[:1])
     assert isinstance(application, QApplication)
     application.setApplicationName("SD² Studio")
@@ -59,7 +51,41 @@ def run(paths: Sequence[Path] = (), *, screenshot: Path | None = None) -> int:
     window.show()
     if screenshot is None or aside is None:
         return application.exec()
-    from sd2app.shell.screenshot import take_screenshot
-
     with aside:
-        return take_screenshot(application, window, screenshot, limit_s=_SCREENSHOT_LIMIT_S)
+        return _take_screenshot(application, window, screenshot, limit_s=_SCREENSHOT_LIMIT_S)
+
+
+def wait_until_settled(application: QApplication, window: MainWindow, limit_s: float) -> bool:
+    """Run the event loop until nothing is under way; False when that takes too long."""
+    deadline = time.monotonic() + limit_s
+    calm_since = None
+    while time.monotonic() < deadline:
+        application.processEvents()
+        time.sleep(0.005)
+        if not (window.ready and window.settled):
+            calm_since = None
+        elif calm_since is None:
+            calm_since = time.monotonic()
+        elif time.monotonic() - calm_since > _SETTLE_S:
+            return True
+    return False
+
+
+def _take_screenshot(
+    application: QApplication, window: MainWindow, path: Path, limit_s: float
+) -> int:
+    """Write the window as PNG and close it; returns an exit code."""
+    settled = wait_until_settled(application, window, limit_s)
+    saved = window.grab().save(str(path), "PNG")
+    failure = window.messages.text if window.ready else ""
+    window.close()
+    application.processEvents()
+    if not saved:
+        print(f"{path} cannot be written.", file=sys.stderr)
+        return 1
+    if not settled:
+        print(f"The window was still busy after {limit_s:.0f} s; {path} shows it.", file=sys.stderr)
+        return 1
+    if failure:
+        print(failure, file=sys.stderr)
+    return 0

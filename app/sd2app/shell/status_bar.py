@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QTimer
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QToolButton, QWidget
+from PySide6.QtWidgets import QLabel, QProgressBar, QToolButton, QWidget
 
 from sd2app.accuracy.model import AccuracyModel
 from sd2app.maps.model import SynthesisModel
-from sd2app.session.maps import PointerModel, Reading
-from sd2app.session.tasks import TaskList
+from sd2app.session.maps import Reading
+from sd2app.session.session import Session
+from sd2app.widgets.layouts import STRETCH, row
 from sd2app.widgets.panel import ElidedLabel
 from sd2app.widgets.time_axis import clock_text
 
@@ -20,17 +21,14 @@ class StatusLine(QWidget):
 
     def __init__(
         self,
-        pointer: PointerModel,
-        jobs: TaskList,
-        trade: AccuracyModel,
+        session: Session,
+        accuracy: AccuracyModel,
         synthesis: SynthesisModel,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
-        self._pointer = pointer
-        self._jobs = jobs
-        self._trade = trade
-        self._synthesis = synthesis
+        self._pointer, self._jobs = session.pointer, session.jobs
+        self._accuracy, self._synthesis = accuracy, synthesis
         self._reading = ElidedLabel(self)
         self._plan = ElidedLabel(self)
         for label in (self._reading, self._plan):
@@ -44,14 +42,10 @@ class StatusLine(QWidget):
         self._cancel = QToolButton(self)
         self._cancel.setText("Cancel")
         self._cancel.clicked.connect(self._cancel_job)
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(12, 0, 8, 4)
-        layout.setSpacing(16)
-        layout.addWidget(self._reading)
-        layout.addStretch(1)
-        layout.addWidget(self._plan)
-        for widget in (self._title, self._bar, self._cancel):
-            layout.addWidget(widget)
+        self._job = (self._title, self._bar, self._cancel)
+        parts = (self._reading, STRETCH, self._plan, *self._job)
+        self.setLayout(row(*parts, spacing_px=16, margins_px=(12, 0, 8, 4)))
+        for widget in self._job:
             widget.hide()
         self.setFixedHeight(28)
         # Work that is over at once should not flicker.
@@ -59,10 +53,10 @@ class StatusLine(QWidget):
         self._delay.setSingleShot(True)
         self._delay.setInterval(_QUIET_MS)
         self._delay.timeout.connect(self._show_job)
-        pointer.changed.connect(self._read)
-        for signal in (trade.changed, trade.plan_changed, synthesis.moving_changed):
+        session.pointer.changed.connect(self._read)
+        for signal in (accuracy.changed, accuracy.plan_changed, synthesis.moving_changed):
             signal.connect(self._show_plan)
-        jobs.changed.connect(self._follow)
+        session.jobs.changed.connect(self._follow)
 
     def _read(self) -> None:
         reading = self._pointer.reading
@@ -70,8 +64,8 @@ class StatusLine(QWidget):
 
     def _show_plan(self) -> None:
         """While the sensor moves the budget rules, at rest the tolerance does."""
-        trade, moving = self._trade, self._synthesis.moving
-        in_use = trade.while_dragging if moving else trade.in_use
+        accuracy, moving = self._accuracy, self._synthesis.moving
+        in_use = accuracy.while_dragging if moving else accuracy.in_use
         text = ""
         if in_use is not None:
             text = f"While dragging: {in_use}" if moving else f"Plan: {in_use}"
@@ -86,7 +80,7 @@ class StatusLine(QWidget):
 
     def _show_job(self) -> None:
         job = self._jobs.jobs[0] if self._jobs.jobs else None
-        for widget in (self._title, self._bar, self._cancel):
+        for widget in self._job:
             widget.setVisible(job is not None)
         if job is None:
             return
@@ -100,12 +94,6 @@ class StatusLine(QWidget):
             self._jobs.cancel(self._jobs.jobs[0])
 
 
-def _value_text(reading: Reading) -> str:
-    if reading.deviation is None:
-        return f"{reading.value:.3g}"
-    return f"{reading.value:.3g} ± {reading.deviation:.2g}"
-
-
 def reading_text(reading: Reading) -> str:
     """Time, frame, velocity with sign, and level, in words."""
     if reading.velocity_mps > 0:
@@ -114,12 +102,15 @@ def reading_text(reading: Reading) -> str:
         direction = "receding" if reading.velocity_mps < 0 else "still"
     velocity = f"{reading.velocity_mps:+.3f}".replace("-", "−")
     level = f"{reading.level_db:.1f} dB".replace("-", "−") if reading.value > 0 else "−∞ dB"
+    value = f"{reading.value:.3g}"
+    if reading.deviation is not None:
+        value += f" ± {reading.deviation:.2g}"
     parts = [
         reading.track,
         clock_text(reading.time_s),
         f"frame {reading.frame}",
         f"{velocity} m/s ({direction})",
-        reading.text or f"{level} ({_value_text(reading)})",
+        reading.text or f"{level} ({value})",
     ]
     if reading.note:
         parts.append(reading.note)

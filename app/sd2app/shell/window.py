@@ -8,23 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import (
-    QAction,
-    QCloseEvent,
-    QDragEnterEvent,
-    QDropEvent,
-    QPaintEvent,
-)
-from PySide6.QtWidgets import (
-    QApplication,
-    QMainWindow,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtGui import QAction, QCloseEvent, QDragEnterEvent, QDropEvent, QPaintEvent
+from PySide6.QtWidgets import QApplication, QMainWindow, QWidget
 
 from sd2app.background.latest import LatestRunner
 from sd2app.settings import Settings
 from sd2app.shell.parts import Parts
+from sd2app.widgets.layouts import column
 from sd2app.widgets.panel import fill, panel, splitter
 from sd2app.widgets.theme import apply_theme
 
@@ -96,10 +86,7 @@ class MainWindow(QMainWindow):
             (992, 272),
         )
         self._rows = splitter(Qt.Orientation.Vertical, [self._top, self._bottom], (360, 336))
-        self._column = QVBoxLayout()
-        self._column.setContentsMargins(8, 0, 8, 0)
-        self._column.setSpacing(4)
-        self._column.addWidget(self._rows, 1)
+        self._column = column((self._rows, 1), spacing_px=4, margins_px=(8, 0, 8, 0))
         centre = QWidget(self)
         centre.setLayout(self._column)
         self.setCentralWidget(centre)
@@ -134,7 +121,7 @@ class MainWindow(QMainWindow):
             TransportBar(s.playback, self.features.labels.loop, self.action, self)
         )
         accuracy, synthesis = self.features.accuracy.model, self.features.maps.synthesis
-        self._column.addWidget(StatusLine(s.pointer, s.jobs, accuracy, synthesis, self))
+        self._column.addWidget(StatusLine(s, accuracy, synthesis, self))
         self._connect()
         self._restyle()
         self._refresh()
@@ -150,8 +137,7 @@ class MainWindow(QMainWindow):
         self._importer.submit(lambda emit: import_module("sd2app.scene.view"))
 
     def _fill_panels(self) -> None:
-        from sd2app.shell.page_widths import PageWidths
-        from sd2app.shell.side_panel import SidePanel
+        from sd2app.shell.side_panel import PageWidths, SidePanel
         from sd2app.shell.wiring import side_pages, track_stack
 
         views = {name: view for feature in self.features for name, view in feature.panels().items()}

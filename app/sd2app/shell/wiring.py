@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 
 from PySide6.QtCore import QObject
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from sd2app.accuracy.feature import AccuracyFeature
 from sd2app.agreement.feature import AgreementFeature
@@ -38,6 +38,7 @@ from sd2app.suggestions.feature import SuggestionsFeature
 from sd2app.training.feature import TrainingFeature
 from sd2app.video.feature import VideoFeature
 from sd2app.widgets.pages import InnerPage, paged_panel
+from sd2app.widgets.layouts import column
 from sd2core.labels.recovery import recovery_folder
 
 
@@ -209,13 +210,8 @@ def track_stack(
     features.denoise.put_buttons(maps)
     labels.let_drag_on(maps.views)
     stack = QWidget()
-    column = QVBoxLayout(stack)
-    column.setContentsMargins(0, 0, 0, 0)
-    column.setSpacing(0)
-    column.addWidget(maps, 1)
+    below = [views[name] for name in ("classes", "suggestions", "labels", "other labels")]
     ruler = TimeRuler(session.span, session.playback, session.display)
-    for name in ("classes", "suggestions", "labels", "other labels"):
-        column.addWidget(views[name])
-    column.addWidget(ruler)
-    column.addWidget(maps.overview)
+    parts = ((maps, 1), *below, ruler, maps.overview)
+    stack.setLayout(column(*parts, spacing_px=0, margins_px=(0, 0, 0, 0)))
     return stack, maps

@@ -6,15 +6,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import (
-    QButtonGroup,
-    QHBoxLayout,
-    QSizePolicy,
-    QStackedWidget,
-    QToolButton,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QButtonGroup, QSizePolicy, QStackedWidget, QToolButton, QWidget
+
+from sd2app.widgets.layouts import STRETCH, column, row
 
 
 class InnerPage(NamedTuple):
@@ -41,26 +35,18 @@ class InnerPages(QWidget):
         self._pages = QStackedWidget(self)
         self._pages.currentChanged.connect(self.turned)
         self._buttons = QButtonGroup(self)
-        row = QHBoxLayout()
-        row.setSpacing(6)
         for place, page in enumerate(pages):
             self._pages.addWidget(page.page)
             button = self._button(page)
             button.setChecked(place == 0)
             self._buttons.addButton(button, place)
-            row.addWidget(button)
         self._buttons.idClicked.connect(self._pages.setCurrentIndex)
         self._pages.currentChanged.connect(self._give_room)
         self._give_room(0)
-        if beside is None:
-            row.addStretch(1)
-        else:
-            row.addWidget(beside, 1)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(6)
-        layout.addLayout(row)
-        layout.addWidget(self._pages, 1)
+        top = row(
+            *self._buttons.buttons(), STRETCH if beside is None else (beside, 1), spacing_px=6
+        )
+        self.setLayout(column(top, (self._pages, 1), spacing_px=6, margins_px=(0, 0, 0, 0)))
 
     @property
     def shown(self) -> int:

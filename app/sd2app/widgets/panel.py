@@ -15,9 +15,10 @@ from PySide6.QtWidgets import (
     QSizePolicy,
     QSplitter,
     QToolButton,
-    QVBoxLayout,
     QWidget,
 )
+
+from sd2app.widgets.layouts import column
 
 
 def title(text: str) -> QLabel:
@@ -172,11 +173,4 @@ def splitter(
 
 def fill(frame: QFrame, content: QWidget | QLayout) -> None:
     """Fill an empty panel."""
-    if isinstance(content, QWidget):
-        layout: QLayout = QVBoxLayout()
-        layout.addWidget(content)
-    else:
-        layout = content
-    layout.setContentsMargins(1, 1, 1, 1)
-    layout.setSpacing(0)
-    frame.setLayout(layout)
+    frame.setLayout(column(content, spacing_px=0, margins_px=(1, 1, 1, 1)))

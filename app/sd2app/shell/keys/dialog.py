@@ -10,19 +10,18 @@ from PySide6.QtWidgets import (
     QAbstractItemView,
     QDialog,
     QDialogButtonBox,
-    QHBoxLayout,
     QHeaderView,
     QLineEdit,
     QPushButton,
     QStyledItemDelegate,
     QStyleOptionViewItem,
-    QVBoxLayout,
     QWidget,
 )
 
 from sd2app.shell.keys.bindings import KeyBindings
 from sd2app.shell.keys.model import KEYS, KeyListModel
 from sd2app.widgets.inputs import SearchLine
+from sd2app.widgets.layouts import STRETCH, column, row
 from sd2app.widgets.panel import sentence
 from sd2app.widgets.table import CellTable
 from sd2core.errors import Sd2Error
@@ -66,17 +65,9 @@ class KeysDialog(QDialog):
         close = QDialogButtonBox(QDialogButtonBox.StandardButton.Close, self)
         close.rejected.connect(self.reject)
         close.button(QDialogButtonBox.StandardButton.Close).setAutoDefault(False)
-        row = QHBoxLayout()
-        for button in (self._change, self._add, self._clear, self._reset):
-            row.addWidget(button)
-        row.addStretch(1)
-        row.addWidget(every)
-        row.addWidget(close)
-        layout = QVBoxLayout(self)
-        layout.addWidget(self._search)
-        layout.addWidget(self._table, 1)
-        layout.addWidget(self._said)
-        layout.addLayout(row)
+        changing = (self._change, self._add, self._clear, self._reset)
+        buttons = row(*changing, STRETCH, every, close)
+        self.setLayout(column(self._search, (self._table, 1), self._said, buttons))
         self.resize(760, 620)
         self._find()
 
