@@ -32,9 +32,10 @@ class DenoiserChoice:
         path = Path(path)
         return cls(bundled=path.stem) if is_bundled(path) else cls(path=path.absolute())
 
-    def put_into(self, recording: Recording) -> None:
-        """Remember it with a recording."""
-        recording.denoiser, recording.bundled_denoiser = self.path, self.bundled
+    @property
+    def fields(self) -> dict[str, object]:
+        """Fields of a recording that remember it."""
+        return {"denoiser": self.path, "bundled_denoiser": self.bundled}
 
 
 UNSAID = DenoiserChoice()

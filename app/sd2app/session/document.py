@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,13 +12,11 @@ from PySide6.QtGui import QUndoStack
 
 from sd2app.background.latest import Emit, LatestRunner
 from sd2app.session.content import Content, load_content, recording_of
-from sd2app.session.denoiser_choice import DenoiserChoice
 from sd2app.session.tasks import Job, TaskList
 from sd2core.body.camera import PinholeCamera
 from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.placements.placements import Placements
 from sd2core.recording.recording import Recording
 from sd2core.recording.relinking import Relinked
 from sd2core.sensor import VelocityAxis
@@ -44,10 +42,10 @@ class DocumentModel(QObject):
         self.undo_stack = QUndoStack(self)
         self._jobs = jobs
         self._job: Job | None = None
-        self._content: Content | None = None
+        self.content: Content | None = None  # all parts; None while nothing is open
+        self.clutter: Clutter = "mean"  # method that removes static echoes from the capture
+        self.goes_on = False  # the recording is the one that was open before, with other files
         self._base: Recording | None = None
-        self._goes_on = False
-        self._clutter: Clutter = "mean"
         self._runner = LatestRunner("open", self)
         self._runner.partial.connect(self._report)
         self._runner.finished.connect(self._receive)
@@ -59,54 +57,49 @@ class DocumentModel(QObject):
     # --- what is there --------------------------------------------------------------------
 
     @property
-    def content(self) -> Content | None:
-        """All parts, None when nothing is open."""
-        return self._content
-
-    @property
     def recording(self) -> Recording | None:
         """Description of what belongs together."""
-        return self._content.recording if self._content else None
+        return self.content.recording if self.content else None
 
     @property
     def video(self) -> VideoReader | None:
         """Open video file."""
-        return self._content.video if self._content else None
+        return self.content.video if self.content else None
 
     @property
     def mesh(self) -> MeshSequence | None:
         """Moving mesh or point cloud."""
-        return self._content.mesh if self._content else None
+        return self.content.mesh if self.content else None
 
     @property
     def capture(self) -> RadarCapture | None:
         """Raw radar capture, on its own clock."""
-        return self._content.capture if self._content else None
+        return self.content.capture if self.content else None
 
     @property
     def radar_map(self) -> DopplerMap | None:
         """Doppler map of the capture, on its own clock."""
-        return self._content.radar_map if self._content else None
+        return self.content.radar_map if self.content else None
 
     @property
     def timebase(self) -> Timebase | None:
         """Frames of the recording's clock: the video's, else the mesh's, else the radar's."""
-        return self._content.timebase if self._content else None
+        return self.content.timebase if self.content else None
 
     @property
     def title(self) -> str:
         """Name on the window."""
-        return self._content.recording.title if self._content else ""
+        return self.content.recording.title if self.content else ""
 
     @property
     def simulated(self) -> bool:
         """True if the recording is simulated, without camera and radar."""
-        return self._content is not None and self._content.recording.simulated
+        return self.content is not None and self.content.recording.simulated
 
     @property
     def labels(self) -> Labels:
         """Labels of the recording, or those that its radar file brings where it has none."""
-        content = self._content
+        content = self.content
         if content is None:
             return Labels()
         recording, brought = content.recording, content.radar_labels
@@ -117,28 +110,18 @@ class DocumentModel(QObject):
     @property
     def camera(self) -> PinholeCamera:
         """The camera that took the video, by default one with the usual field of view."""
-        if self._content is None or self._content.video is None:
+        if self.content is None or self.content.video is None:
             return PinholeCamera()
-        width, height = self._content.video.width, self._content.video.height
-        focal_px = self._content.recording.focal_px(width, height)
+        width, height = self.content.video.width, self.content.video.height
+        focal_px = self.content.recording.focal_px(width, height)
         if focal_px is None:
             return PinholeCamera.default(width, height)
         return PinholeCamera(width, height, focal_px)
 
     @property
-    def clutter(self) -> Clutter:
-        """Method that removes static echoes from the capture."""
-        return self._clutter
-
-    @property
     def modified(self) -> bool:
         """True if there are unsaved edits."""
-        return self._content is not None and not self.undo_stack.isClean()
-
-    @property
-    def goes_on(self) -> bool:
-        """True if the opened recording is the one that was open before, with other files."""
-        return self._goes_on
+        return self.content is not None and not self.undo_stack.isClean()
 
     # --- opening --------------------------------------------------------------------------
 
@@ -165,13 +148,13 @@ class DocumentModel(QObject):
         """Stop all work and let go of the files."""
         self._runner.close()
         self._maps.close()
-        if self._content is not None:
-            self._content.close()
-            self._content = None
+        if self.content is not None:
+            self.content.close()
+            self.content = None
 
     def _start(self, base: Recording | None, paths: list[Path]) -> None:
         name = paths[0].name if paths else (base.title if base else "")
-        clutter = self._clutter
+        clutter = self.clutter
         self._base = base
 
         def read(emit: Emit) -> Content:
@@ -188,12 +171,12 @@ class DocumentModel(QObject):
 
     def _receive(self, content: Content) -> None:
         self._end_job()
-        before, self._content = self._content, content
+        before, self.content = self.content, content
         if before is not None and before.video is not content.video:
             before.close()
-        self._goes_on = before is not None and content.recording is self._base
-        unsaved = self._goes_on and self.modified
-        if before is not None and self._goes_on:
+        self.goes_on = before is not None and content.recording is self._base
+        unsaved = self.goes_on and self.modified
+        if before is not None and self.goes_on:
             _keep_edits(before.recording, content.recording)
         self.undo_stack.clear()
         if unsaved:
@@ -216,32 +199,20 @@ class DocumentModel(QObject):
 
     # --- changing -------------------------------------------------------------------------
 
-    def set_radar_offset(self, offset_s: float) -> None:
-        """Align the capture: time of its first frame on the recording's clock."""
+    def assign(self, fields: Mapping[str, object]) -> None:
+        """Change fields of the recording, such as ``radar_offset_s``."""
         recording = self.recording
-        if recording is not None and offset_s != recording.radar_offset_s:
-            recording.radar_offset_s = offset_s
-            self.changed.emit()
-
-    def set_denoiser(self, choice: DenoiserChoice) -> None:
-        """Denoise with another model."""
-        recording = self.recording
-        if recording is not None and choice != DenoiserChoice.of(recording):
-            choice.put_into(recording)
-            self.changed.emit()
-
-    def set_placements(self, placements: Placements | None) -> None:
-        """Plan other places for sensors, or none."""
-        recording = self.recording
-        if recording is not None and placements != recording.placements:
-            recording.placements = placements
-            self.changed.emit()
+        if recording is None or all(getattr(recording, name) == fields[name] for name in fields):
+            return
+        for name, value in fields.items():
+            setattr(recording, name, value)
+        self.changed.emit()
 
     def set_clutter(self, clutter: Clutter) -> None:
         """Remove static echoes another way."""
-        if clutter == self._clutter:
+        if clutter == self.clutter:
             return
-        self._clutter = clutter
+        self.clutter = clutter
         capture = self.capture
         self.changed.emit()
         if capture is None:
@@ -257,27 +228,27 @@ class DocumentModel(QObject):
         self._maps.submit(process)
 
     def _receive_map(self, radar_map: DopplerMap) -> None:
-        if self._content is not None:
-            self._content = replace(self._content, radar_map=radar_map)
+        if self.content is not None:
+            self.content = replace(self.content, radar_map=radar_map)
             self.changed.emit()
 
     # --- saving ---------------------------------------------------------------------------
 
     def save(self) -> None:
         """Write the recording where it came from; Sd2Error or OSError if that fails."""
-        if self._content is not None and self._content.saved:
-            self._content.recording.save(self._content.timebase)
+        if self.content is not None and self.content.saved:
+            self.content.recording.save(self.content.timebase)
             self._tell_saved()
 
     def save_as(self, folder: Path) -> None:
         """Make a recording folder that refers to the files where they are."""
-        if self._content is None:
+        if self.content is None:
             return
-        title = "" if not self._content.saved else self.title
-        made = replace(self._content.recording, title=title).save_as(
-            folder, timebase=self._content.timebase
+        title = "" if not self.content.saved else self.title
+        made = replace(self.content.recording, title=title).save_as(
+            folder, timebase=self.content.timebase
         )
-        self._content = replace(self._content, recording=made)
+        self.content = replace(self.content, recording=made)
         self._tell_saved()
 
     def relink(self, folder: Path) -> Relinked | None:
@@ -286,15 +257,15 @@ class DocumentModel(QObject):
             return None
         relinked = self.recording.relink(folder)
         if relinked.found:
-            if self._content is not None and self._content.saved:
+            if self.content is not None and self.content.saved:
                 self._tell_saved()
             self.reload()
         return relinked
 
     def read_labels_again(self) -> None:
         """Take over labels that another program has written; Sd2Error if the file is damaged."""
-        if self._content is not None and self._content.saved:
-            self._content.recording.read_labels_again()
+        if self.content is not None and self.content.saved:
+            self.content.recording.read_labels_again()
 
     def _tell_saved(self) -> None:
         self.undo_stack.setClean()

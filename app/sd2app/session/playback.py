@@ -11,10 +11,10 @@ _TICK_MS = 5
 
 
 class PlaybackModel(QObject):
-    """Time, play state, speed, loop, and the time range that is repeated.
+    """Time, play state, speed, loop, and the half-open time range that is repeated.
 
-    The frame on screen follows from elapsed time, so a late frame is dropped
-    rather than slowing the clock.
+    Its values are changed by its methods only, which tell so by a signal. The frame on screen
+    follows from elapsed time, so a late frame is dropped rather than slowing the clock.
     """
 
     time_changed = Signal(float)
@@ -26,12 +26,12 @@ class PlaybackModel(QObject):
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._timebase = Timebase([0.0])
-        self._time_s = 0.0
-        self._frame = 0
-        self._speed = 1.0
-        self._loop = False
-        self._stretch_s: tuple[float, float] | None = None
+        self.timebase = Timebase([0.0])  # frames that the clock steps through
+        self.time_s = 0.0  # on screen: always the time of a frame while paused
+        self.frame = 0  # of the timebase, on screen
+        self.speed = 1.0  # seconds of recording per second
+        self.loop = False  # start again at the end
+        self.stretch_s: tuple[float, float] | None = None  # repeated until one seeks beyond it
         self._origin_s = 0.0
         self._elapsed = QElapsedTimer()
         self._timer = QTimer(self)
@@ -40,53 +40,23 @@ class PlaybackModel(QObject):
         self._timer.timeout.connect(self._tick)
 
     @property
-    def timebase(self) -> Timebase:
-        """Frames that the clock steps through."""
-        return self._timebase
-
-    @property
-    def time_s(self) -> float:
-        """Time on screen: always the time of a frame while paused."""
-        return self._time_s
-
-    @property
-    def frame(self) -> int:
-        """Frame of :attr:`timebase` on screen."""
-        return self._frame
-
-    @property
     def playing(self) -> bool:
         """True while the clock runs."""
         return self._timer.isActive()
-
-    @property
-    def speed(self) -> float:
-        """Seconds of recording per second."""
-        return self._speed
-
-    @property
-    def loop(self) -> bool:
-        """True if playback starts again at the end."""
-        return self._loop
-
-    @property
-    def stretch_s(self) -> tuple[float, float] | None:
-        """Half-open time range that is repeated; seeking beyond it ends that."""
-        return self._stretch_s
 
     def set_timebase(self, timebase: Timebase) -> None:
         """Clock another recording, from its first frame."""
         self.pause()
         self.set_stretch(None)
-        self._timebase = timebase
+        self.timebase = timebase
         self._move_to(timebase.start_s, force=True)
 
     def play(self) -> None:
         """Run from here, or from the start when at the end."""
-        if self.playing or len(self._timebase) < 2:
+        if self.playing or len(self.timebase) < 2:
             return
-        if self._frame >= len(self._timebase) - 1:
-            self._move_to(self._stretch_s[0] if self._stretch_s else self._timebase.start_s)
+        if self.frame >= len(self.timebase) - 1:
+            self._move_to(self.stretch_s[0] if self.stretch_s else self.timebase.start_s)
         self._restart_clock()
         self._timer.start()
         self.playing_changed.emit(True)
@@ -99,8 +69,8 @@ class PlaybackModel(QObject):
 
     def set_stretch(self, stretch_s: tuple[float, float] | None) -> None:
         """Repeat this time range from now on, or none."""
-        if stretch_s != self._stretch_s:
-            self._stretch_s = stretch_s
+        if stretch_s != self.stretch_s:
+            self.stretch_s = stretch_s
             self.stretch_changed.emit()
 
     def pause(self) -> None:
@@ -108,7 +78,7 @@ class PlaybackModel(QObject):
         if not self.playing:
             return
         self._timer.stop()
-        self._move_to(self._timebase.time_of(self._frame))
+        self._move_to(self.timebase.time_of(self.frame))
         self.playing_changed.emit(False)
 
     def toggle(self) -> None:
@@ -120,15 +90,15 @@ class PlaybackModel(QObject):
 
     def seek(self, time_s: float) -> None:
         """Show the frame at ``time_s``, held inside the recording."""
-        self.seek_frame(self._timebase.frame_at(time_s))
+        self.seek_frame(self.timebase.frame_at(time_s))
 
     def seek_frame(self, frame: int) -> None:
         """Show ``frame``, held inside the recording."""
-        frame = min(max(frame, 0), len(self._timebase) - 1)
-        time_s = self._timebase.time_of(frame)
+        frame = min(max(frame, 0), len(self.timebase) - 1)
+        time_s = self.timebase.time_of(frame)
         # Its first frame may have begun before it.
-        if self._stretch_s is not None and not (
-            self._timebase.frame_at(self._stretch_s[0]) <= frame and time_s < self._stretch_s[1]
+        if self.stretch_s is not None and not (
+            self.timebase.frame_at(self.stretch_s[0]) <= frame and time_s < self.stretch_s[1]
         ):
             self.set_stretch(None)
         self._move_to(time_s)
@@ -137,52 +107,52 @@ class PlaybackModel(QObject):
     def step_frames(self, count: int) -> None:
         """Pause and go ``count`` frames on (or back)."""
         self.pause()
-        self.seek_frame(self._frame + count)
+        self.seek_frame(self.frame + count)
 
     def step_seconds(self, seconds: float) -> None:
         """Go ``seconds`` on (or back)."""
-        self.seek(self._time_s + seconds)
+        self.seek(self.time_s + seconds)
 
     def set_speed(self, speed: float) -> None:
         """Set seconds of recording per second (one of :data:`SPEEDS`)."""
         if speed not in SPEEDS:
             raise ValueError(f"speed {speed} is not one of {SPEEDS}")
-        if speed != self._speed:
-            self._speed = speed
+        if speed != self.speed:
+            self.speed = speed
             self._restart_clock()
             self.speed_changed.emit(speed)
 
     def change_speed(self, steps: int) -> None:
         """Go ``steps`` along :data:`SPEEDS`."""
-        index = SPEEDS.index(self._speed) + steps
+        index = SPEEDS.index(self.speed) + steps
         self.set_speed(SPEEDS[min(max(index, 0), len(SPEEDS) - 1)])
 
     def set_loop(self, loop: bool) -> None:
         """Start again at the end, or stop there."""
-        if loop != self._loop:
-            self._loop = loop
+        if loop != self.loop:
+            self.loop = loop
             self.loop_changed.emit(loop)
 
     def _restart_clock(self) -> None:
-        self._origin_s = self._time_s
+        self._origin_s = self.time_s
         self._elapsed.start()
 
     def _tick(self) -> None:
-        time_s = self._origin_s + self._elapsed.nsecsElapsed() * 1e-9 * self._speed
-        start_s, end_s = self._stretch_s or (self._timebase.start_s, self._timebase.end_s)
+        time_s = self._origin_s + self._elapsed.nsecsElapsed() * 1e-9 * self.speed
+        start_s, end_s = self.stretch_s or (self.timebase.start_s, self.timebase.end_s)
         if time_s < end_s:
             self._move_to(time_s)
-        elif self._loop or self._stretch_s is not None:
+        elif self.loop or self.stretch_s is not None:
             self._move_to(start_s + (time_s - start_s) % (end_s - start_s))
             self._restart_clock()
         else:
             self.pause()
-            self.seek_frame(len(self._timebase) - 1)
+            self.seek_frame(len(self.timebase) - 1)
 
     def _move_to(self, time_s: float, force: bool = False) -> None:
-        frame = self._timebase.frame_at(time_s)
-        self._time_s = time_s
-        if frame != self._frame or force or not self.playing:
-            self._frame = frame
+        frame = self.timebase.frame_at(time_s)
+        self.time_s = time_s
+        if frame != self.frame or force or not self.playing:
+            self.frame = frame
             self.frame_changed.emit(frame)
             self.time_changed.emit(time_s)

@@ -15,27 +15,17 @@ class SensorModel(QObject):
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._sensor = VirtualSensor()
-        self._dragging = False
-
-    @property
-    def sensor(self) -> VirtualSensor:
-        """Current placement."""
-        return self._sensor
-
-    @property
-    def dragging(self) -> bool:
-        """True while the sensor is dragged."""
-        return self._dragging
+        self.sensor = VirtualSensor()
+        self.dragging = False  # true while the sensor is dragged
 
     def set_sensor(self, sensor: VirtualSensor) -> None:
         """Place the sensor."""
-        if sensor != self._sensor:
-            self._sensor = sensor
+        if sensor != self.sensor:
+            self.sensor = sensor
             self.changed.emit()
 
     def set_dragging(self, dragging: bool) -> None:
         """Note that a drag of the sensor began or ended."""
-        if dragging != self._dragging:
-            self._dragging = dragging
+        if dragging != self.dragging:
+            self.dragging = dragging
             self.dragging_changed.emit(dragging)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -96,7 +96,7 @@ class Edits:
             return
         if self._planned_before is None or self._planned_before[0] is not recording:
             self._planned_before = (recording, recording.placements)
-        self._document.set_placements(placements)
+        self._document.assign({"placements": placements})
 
     def end_typing_placements(self) -> None:
         """End typing: all of it is one step in the history."""
@@ -104,19 +104,13 @@ class Edits:
         self._planned_before = None
         # Another recording may have been opened while the user typed.
         if recording is not None and before is not None and before[0] is recording:
-            self._push(
-                "Plan placements", self._document.set_placements, before[1], recording.placements
-            )
+            self._push_change("Plan placements", {"placements": before[1]})
 
     # --- alignment of the real capture ----------------------------------------------------
 
     def set_radar_offset(self, offset_s: float) -> None:
         """Align the capture."""
-        if self._document.recording is None:
-            return
-        before = self._document.recording.radar_offset_s
-        self._document.set_radar_offset(offset_s)
-        self._push("Align radar", self._document.set_radar_offset, before, offset_s)
+        self._change("Align radar", {"radar_offset_s": offset_s})
 
     def begin_offset_drag(self) -> None:
         """Begin a drag of the measured map."""
@@ -125,18 +119,11 @@ class Edits:
 
     def drag_offset(self, seconds: float) -> None:
         """Shift the measured map by ``seconds`` since the drag began."""
-        self._document.set_radar_offset(round(self._before + seconds, 3))
+        self._document.assign({"radar_offset_s": round(self._before + seconds, 3)})
 
     def end_offset_drag(self) -> None:
         """End the drag; it becomes one step in the history."""
-        recording = self._document.recording
-        if recording is not None:
-            self._push(
-                "Align radar",
-                self._document.set_radar_offset,
-                self._before,
-                recording.radar_offset_s,
-            )
+        self._push_change("Align radar", {"radar_offset_s": self._before})
 
     # --- processing of the capture --------------------------------------------------------
 
@@ -150,9 +137,22 @@ class Edits:
 
     def choose_denoiser(self, choice: DenoiserChoice) -> None:
         """Denoise the recording with another model, or with none."""
-        before = DenoiserChoice.of(self._document.recording)
-        self._document.set_denoiser(choice)
-        self._push("Choose denoiser", self._document.set_denoiser, before, choice)
+        self._change("Choose denoiser", choice.fields)
+
+    # --- the history ----------------------------------------------------------------------
+
+    def _change(self, text: str, fields: Mapping[str, object]) -> None:
+        """Change fields of the recording as one step."""
+        before = self._fields(fields)
+        self._document.assign(fields)
+        self._push_change(text, before)
+
+    def _push_change(self, text: str, before: Mapping[str, object]) -> None:
+        """Make one step of what was changed already."""
+        self._push(text, self._document.assign, before, self._fields(before))
+
+    def _fields(self, names: Iterable[str]) -> dict[str, object]:
+        return {name: getattr(self._document.recording, name, None) for name in names}
 
     def _push(
         self, text: str, assign: Callable[[Any], None], before: object, after: object

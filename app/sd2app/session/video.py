@@ -22,9 +22,9 @@ class VideoModel(QObject):
     def __init__(self, playback: PlaybackModel, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._playback = playback
-        self._reader: VideoReader | None = None
-        self._picture: NDArray[np.uint8] | None = None
-        self._shown = -1
+        self.reader: VideoReader | None = None
+        self.picture: NDArray[np.uint8] | None = None  # RGB picture on screen, (H, W, 3)
+        self.shown_frame = -1  # frame of the video that the picture is; -1 for none
         self._wanted = -1
         self._runner = LatestRunner("video", self)
         self._runner.finished.connect(self._receive)
@@ -32,31 +32,16 @@ class VideoModel(QObject):
         playback.frame_changed.connect(self._follow)
 
     @property
-    def reader(self) -> VideoReader | None:
-        """The open video."""
-        return self._reader
-
-    @property
-    def picture(self) -> NDArray[np.uint8] | None:
-        """RGB picture on screen, (H, W, 3)."""
-        return self._picture
-
-    @property
     def busy(self) -> bool:
         """True while a picture is being decoded."""
         return self._runner.busy
 
-    @property
-    def shown_frame(self) -> int:
-        """Frame of the video that :attr:`picture` is, minus one for none."""
-        return self._shown
-
     def set_reader(self, reader: VideoReader | None) -> None:
         """Show another video, or none; the one before is closed by its owner."""
         self._runner.cancel()
-        self._reader = reader
-        self._picture = None
-        self._shown = self._wanted = -1
+        self.reader = reader
+        self.picture = None
+        self.shown_frame = self._wanted = -1
         self.frame_changed.emit()
         self._follow()
 
@@ -65,7 +50,7 @@ class VideoModel(QObject):
         self._runner.close()
 
     def _follow(self) -> None:
-        reader = self._reader
+        reader = self.reader
         if reader is None:
             return
         frame = reader.timebase.frame_at(self._playback.time_s)
@@ -77,7 +62,7 @@ class VideoModel(QObject):
             self._request(frame)
 
     def _request(self, frame: int) -> None:
-        reader = self._reader
+        reader = self.reader
         assert reader is not None
 
         def decode(emit: Emit) -> tuple[int, NDArray[np.uint8]]:
@@ -87,9 +72,9 @@ class VideoModel(QObject):
         self._runner.submit(decode)
 
     def _receive(self, result: Any) -> None:
-        self._shown, self._picture = result
+        self.shown_frame, self.picture = result
         self.frame_changed.emit()
-        if self._wanted != self._shown and self._reader is not None:
+        if self._wanted != self.shown_frame and self.reader is not None:
             self._request(self._wanted)
 
     def _report(self, error: Exception) -> None:
