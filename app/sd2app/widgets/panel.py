@@ -37,7 +37,7 @@ def sentence(text: str, role: str = "muted") -> QLabel:
     return label
 
 
-def say(label: QLabel, text: str, role: str) -> None:
+def say(label: QLabel, text: str, role: str = "muted") -> None:
     """Show a text in the style of a role, such as ``muted`` or ``warning``."""
     if label.objectName() != role:
         label.setObjectName(role)
