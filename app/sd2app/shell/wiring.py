@@ -212,6 +212,7 @@ def track_stack(
     stack = QWidget()
     below = [views[name] for name in ("classes", "suggestions", "labels", "other labels")]
     ruler = TimeRuler(session.span, session.playback, session.display)
-    parts = ((maps, 1), *below, ruler, maps.overview)
-    stack.setLayout(column(*parts, spacing_px=0, margins_px=(0, 0, 0, 0)))
+    stack.setLayout(
+        column((maps, 1), *below, ruler, maps.overview, spacing_px=0, margins_px=(0, 0, 0, 0))
+    )
     return stack, maps
