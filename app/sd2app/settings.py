@@ -63,10 +63,7 @@ class Settings:
 
     def share(self, name: str, default: float) -> float:
         """A number from 0 to 1."""
-        try:
-            share = float(self._store.value(name, default))
-        except (TypeError, ValueError):
-            return default
+        share = self.stored(name, default)
         return share if 0 <= share <= 1 else default
 
     def stored(self, name: str, default: T) -> T:
@@ -94,8 +91,7 @@ class Settings:
     @property
     def dark(self) -> bool | None:
         """Theme the user chose, or None to follow the system."""
-        value = self._store.value("dark")
-        return None if value is None else str(value).lower() == "true"
+        return None if self._store.value("dark") is None else self.flag("dark", False)
 
     @dark.setter
     def dark(self, dark: bool) -> None:
@@ -104,10 +100,7 @@ class Settings:
     @property
     def tolerance(self) -> float:
         """Error of a map that the user accepts: relative L1 after smoothing."""
-        try:
-            tolerance = float(self._store.value("tolerance", DEFAULT_TOLERANCE))
-        except (TypeError, ValueError):
-            return DEFAULT_TOLERANCE
+        tolerance = self.stored("tolerance", DEFAULT_TOLERANCE)
         return tolerance if 0 < tolerance <= 1 else DEFAULT_TOLERANCE
 
     @tolerance.setter

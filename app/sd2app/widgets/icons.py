@@ -10,21 +10,49 @@ from PySide6.QtGui import QColor, QIcon, QPainter, QPainterPath, QPen, QPixmap
 _SIZE = 16
 _SWATCH = 12
 _SCALES = (1, 2, 3)
+_SHAPES: dict[str, tuple[QRectF | tuple[float, float], ...]] = {
+    "play": ((4, 13),),
+    "pause": (QRectF(4, 3, 3, 10), QRectF(9, 3, 3, 10)),
+    "previous": ((10, 4), QRectF(11, 3, 2, 10)),
+    "next": ((6, 12), QRectF(3, 3, 2, 10)),
+    "first": (QRectF(2, 3, 2, 10), (9, 4), (14, 9)),
+    "last": ((2, 7), (7, 12), QRectF(12, 3, 2, 10)),
+    "slower": (QRectF(3, 7, 10, 2),),
+    "faster": (QRectF(3, 7, 10, 2), QRectF(7, 3, 2, 10)),
+}
+"""Icons of bars and triangles, each triangle from the x of its base to that of its tip."""
 
 
 def transport_icon(name: str, colour: str) -> QIcon:
-    """Icon ``name`` (see the table below) in one colour."""
+    """Icon of the transport bar, ``loop`` or one of the shapes above, in one colour."""
     icon = QIcon()
     for scale in _SCALES:
         pixmap = QPixmap(_SIZE * scale, _SIZE * scale)
         pixmap.setDevicePixelRatio(scale)
         pixmap.fill(Qt.GlobalColor.transparent)
-        painter = QPainter(pixmap)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        _DRAW[name](painter, QColor(colour))
-        painter.end()
+        with QPainter(pixmap) as painter:
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+            if name == "loop":
+                _draw_loop(painter, QColor(colour))
+            else:
+                for shape in _SHAPES[name]:
+                    path = QPainterPath()
+                    if isinstance(shape, QRectF):
+                        path.addRect(shape)
+                    else:
+                        base, tip = shape
+                        path.addPolygon([QPointF(base, 3), QPointF(base, 13), QPointF(tip, 8)])
+                    painter.fillPath(path, QColor(colour))
         icon.addPixmap(pixmap)
     return icon
+
+
+def _draw_loop(painter: QPainter, colour: QColor) -> None:
+    painter.setPen(QPen(colour, 1.8))
+    painter.drawArc(QRectF(3, 3, 10, 10), 60 * 16, 300 * 16)
+    head = QPainterPath()
+    head.addPolygon([QPointF(8.5, 0.5), QPointF(13, 3.6), QPointF(8.5, 6.7)])
+    painter.fillPath(head, colour)
 
 
 @lru_cache(maxsize=64)
@@ -35,75 +63,3 @@ def swatch_icon(colour: str) -> QIcon:
     icon = QIcon(swatch)
     icon.addPixmap(swatch, QIcon.Mode.Selected)
     return icon
-
-
-def _triangle(left: float, right: float) -> QPainterPath:
-    path = QPainterPath(QPointF(left, 3))
-    path.lineTo(left, 13)
-    path.lineTo(right, 8)
-    path.closeSubpath()
-    return path
-
-
-def _play(painter: QPainter, colour: QColor) -> None:
-    painter.fillPath(_triangle(4, 13), colour)
-
-
-def _pause(painter: QPainter, colour: QColor) -> None:
-    painter.fillRect(QRectF(4, 3, 3, 10), colour)
-    painter.fillRect(QRectF(9, 3, 3, 10), colour)
-
-
-def _previous(painter: QPainter, colour: QColor) -> None:
-    painter.fillPath(_triangle(10, 4), colour)
-    painter.fillRect(QRectF(11, 3, 2, 10), colour)
-
-
-def _next(painter: QPainter, colour: QColor) -> None:
-    painter.fillPath(_triangle(6, 12), colour)
-    painter.fillRect(QRectF(3, 3, 2, 10), colour)
-
-
-def _first(painter: QPainter, colour: QColor) -> None:
-    painter.fillRect(QRectF(2, 3, 2, 10), colour)
-    painter.fillPath(_triangle(9, 4), colour)
-    painter.fillPath(_triangle(14, 9), colour)
-
-
-def _last(painter: QPainter, colour: QColor) -> None:
-    painter.fillPath(_triangle(2, 7), colour)
-    painter.fillPath(_triangle(7, 12), colour)
-    painter.fillRect(QRectF(12, 3, 2, 10), colour)
-
-
-def _slower(painter: QPainter, colour: QColor) -> None:
-    painter.setPen(QPen(colour, 2))
-    painter.drawLine(QPointF(4, 8), QPointF(12, 8))
-
-
-def _faster(painter: QPainter, colour: QColor) -> None:
-    _slower(painter, colour)
-    painter.drawLine(QPointF(8, 4), QPointF(8, 12))
-
-
-def _loop(painter: QPainter, colour: QColor) -> None:
-    painter.setPen(QPen(colour, 1.8))
-    painter.drawArc(QRectF(3, 3, 10, 10), 60 * 16, 300 * 16)
-    head = QPainterPath(QPointF(8.5, 0.5))
-    head.lineTo(13, 3.6)
-    head.lineTo(8.5, 6.7)
-    head.closeSubpath()
-    painter.fillPath(head, colour)
-
-
-_DRAW = {
-    "play": _play,
-    "pause": _pause,
-    "previous": _previous,
-    "next": _next,
-    "first": _first,
-    "last": _last,
-    "slower": _slower,
-    "faster": _faster,
-    "loop": _loop,
-}
