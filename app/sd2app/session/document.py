@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QUndoStack
 
 from sd2app.background.latest import Emit, LatestRunner
 from sd2app.session.content import Content, load_content, recording_of
-from sd2app.session.tasks import Job, TaskList
+from sd2app.session.tasks import ListedRunner, TaskList
 from sd2core.body.camera import PinholeCamera
 from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap
@@ -40,16 +40,13 @@ class DocumentModel(QObject):
     def __init__(self, jobs: TaskList, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self.undo_stack = QUndoStack(self)
-        self._jobs = jobs
-        self._job: Job | None = None
         self.content: Content | None = None  # all parts; None while nothing is open
         self.clutter: Clutter = "mean"  # method that removes static echoes from the capture
         self.goes_on = False  # the recording is the one that was open before, with other files
         self._base: Recording | None = None
-        self._runner = LatestRunner("open", self)
-        self._runner.partial.connect(self._report)
+        self._runner = ListedRunner("open", jobs, self)
         self._runner.finished.connect(self._receive)
-        self._runner.failed.connect(self._fail)
+        self._runner.failed.connect(lambda error: self.failed.emit(str(error)))
         self._maps = LatestRunner("radar", self)
         self._maps.finished.connect(self._receive_map)
         self._maps.failed.connect(lambda error: self.failed.emit(str(error)))
@@ -134,16 +131,6 @@ class DocumentModel(QObject):
         recording = self.recording
         self._start(replace(recording) if recording is not None else None, list(paths))
 
-    def reload(self) -> None:
-        """Read all parts again, e.g. after files were found."""
-        if self.recording is not None:
-            self._start(self.recording, [])
-
-    def cancel_opening(self) -> None:
-        """Stop reading; what is open stays open."""
-        self._runner.cancel()
-        self._end_job()
-
     def close(self) -> None:
         """Stop all work and let go of the files."""
         self._runner.close()
@@ -161,16 +148,9 @@ class DocumentModel(QObject):
             recording = recording_of(paths, base) if paths or base is None else base
             return load_content(recording, clutter, lambda done, total: emit((done, total)))
 
-        self._end_job()
-        self._job = self._jobs.start(f"Opening {name}", self.cancel_opening)
-        self._runner.submit(read)
-
-    def _report(self, progress: Any) -> None:
-        if self._job is not None:
-            self._jobs.report(self._job, *progress)
+        self._runner.submit(read, f"Opening {name}")
 
     def _receive(self, content: Content) -> None:
-        self._end_job()
         before, self.content = self.content, content
         if before is not None and before.video is not content.video:
             before.close()
@@ -187,15 +167,6 @@ class DocumentModel(QObject):
             self.failed.emit(problem)
         if content.notes:
             self.noted.emit(" ".join(content.notes))
-
-    def _fail(self, error: Exception) -> None:
-        self._end_job()
-        self.failed.emit(str(error))
-
-    def _end_job(self) -> None:
-        if self._job is not None:
-            self._jobs.finish(self._job)
-            self._job = None
 
     # --- changing -------------------------------------------------------------------------
 
@@ -259,7 +230,7 @@ class DocumentModel(QObject):
         if relinked.found:
             if self.content is not None and self.content.saved:
                 self._tell_saved()
-            self.reload()
+            self._start(self.recording, [])
         return relinked
 
     def read_labels_again(self) -> None:
