@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -55,6 +56,22 @@ def atomic_write_text(path: Path, text: str) -> None:
     """Replace ``path`` by ``text`` (UTF-8) in one step."""
     with atomic_write(path) as stream:
         stream.write(text.encode("utf-8"))
+
+
+@contextmanager
+def atomic_folder(path: Path) -> Iterator[Path]:
+    """Make a folder elsewhere that becomes ``path`` when the block succeeds.
+
+    One that is there goes then; when the block raises, it stays as it was.
+    """
+    workspace = Path(tempfile.mkdtemp(prefix=f".{path.name}.", suffix=".tmp", dir=path.parent))
+    new = workspace / path.name
+    try:
+        new.mkdir()
+        yield new
+        replace_folder(new, path, workspace / f"{path.name}.old")
+    finally:
+        shutil.rmtree(workspace, ignore_errors=True)
 
 
 def replace_folder(new: Path, path: Path, aside: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import tempfile
 import zipfile
 from dataclasses import dataclass, field
@@ -13,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
-from sd2core.files.atomic import atomic_write, replace_folder
+from sd2core.files.atomic import atomic_folder, atomic_write
 from sd2core.mesh.sequence import MeshSequence, VertexArray, refuse_missing
 from sd2core.progress import Progress, silent
 
@@ -248,33 +247,31 @@ def write_zarr(mesh: MeshSequence, path: Path, progress: Progress = silent) -> N
 
     A chunk holds about 2 MB: all vertices of a stretch of frames.
     """
+    if path.suffix.lower() == ".zip":
+        with tempfile.TemporaryDirectory(".tmp", f".{path.name}.", path.parent) as place:
+            _write_group(mesh, Path(place), progress)
+            with atomic_write(path) as stream:
+                _zip_folder(Path(place), stream)
+    elif path.is_file():
+        raise Sd2Error(f"{path} is a file", "a folder name for a .zarr mesh", "Remove or rename it")
+    else:
+        with atomic_folder(path) as folder:
+            _write_group(mesh, folder, progress)
+    progress(mesh.frame_count, mesh.frame_count)
+
+
+def _write_group(mesh: MeshSequence, folder: Path, progress: Progress) -> None:
     import zarr
 
-    zipped = path.suffix.lower() == ".zip"
     step = frames_per_chunk(mesh.vertices.shape, mesh.vertices.dtype)
-    workspace = Path(tempfile.mkdtemp(prefix=f".{path.name}.", suffix=".tmp", dir=path.parent))
-    try:
-        folder = workspace / "new"
-        group = zarr.open_group(str(folder), mode="w")
-        group.attrs.update({"format": _FORMAT, "version": 1, "unit": "m"})
-        vertices = create_vertices(group, mesh.vertices.shape, mesh.vertices.dtype)
-        for start in range(0, mesh.frame_count, step):
-            progress(start, mesh.frame_count)
-            block = _block(mesh, start, step)
-            vertices[start : start + len(block)] = block
-        write_small(mesh, group)
-        if zipped:
-            with atomic_write(path) as stream:
-                _zip_folder(folder, stream)
-        else:
-            if path.is_file():
-                raise Sd2Error(
-                    f"{path} is a file", "a folder name for a .zarr mesh", "Remove or rename it"
-                )
-            replace_folder(folder, path, workspace / "old")
-    finally:
-        shutil.rmtree(workspace, ignore_errors=True)
-    progress(mesh.frame_count, mesh.frame_count)
+    group = zarr.open_group(str(folder), mode="w")
+    group.attrs.update({"format": _FORMAT, "version": 1, "unit": "m"})
+    vertices = create_vertices(group, mesh.vertices.shape, mesh.vertices.dtype)
+    for start in range(0, mesh.frame_count, step):
+        progress(start, mesh.frame_count)
+        block = _block(mesh, start, step)
+        vertices[start : start + len(block)] = block
+    write_small(mesh, group)
 
 
 def small_arrays(mesh: MeshSequence) -> dict[str, NDArray[Any]]:

@@ -7,8 +7,6 @@ video would be, with coordinates rounded so that it is small.
 
 from __future__ import annotations
 
-import shutil
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,6 +15,7 @@ from numpy.typing import NDArray
 
 from sd2core.body.model import Body, Resolution
 from sd2core.errors import Sd2Error
+from sd2core.files.atomic import atomic_folder
 from sd2core.fmcw.options import Reflector, SignalOptions
 from sd2core.fmcw.signal import simulate_capture
 from sd2core.io.mesh_arrays import write_small
@@ -72,17 +71,9 @@ def make_sample(out: Path, progress: Progress = silent, *, duration_s: float = D
     if not out.absolute().parent.is_dir():
         raise Sd2Error(f"The folder {out.absolute().parent} does not exist", "an existing folder")
     times_s = np.arange(max(round(duration_s * FRAMES_PER_S), 2)) / FRAMES_PER_S
-    workspace = Path(tempfile.mkdtemp(prefix=f".{out.name}.", suffix=".tmp", dir=out.parent))
-    try:
-        folder = workspace / out.name
-        folder.mkdir()
+    with atomic_folder(out) as folder:
         _fill(folder, times_s, progress)
         folder.chmod(0o755)
-        if out.exists():
-            out.rmdir()
-        folder.rename(out)
-    finally:
-        shutil.rmtree(workspace, ignore_errors=True)
     return out
 
 

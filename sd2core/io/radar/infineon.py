@@ -11,8 +11,6 @@ A recording is a folder, usually called ``RadarIfxAvian_00``::
 from __future__ import annotations
 
 import json
-import shutil
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from sd2core.errors import Sd2Error
-from sd2core.files.atomic import atomic_write, atomic_write_text, replace_folder
+from sd2core.files.atomic import atomic_folder, atomic_write, atomic_write_text
 from sd2core.io.radar.capture import RadarCapture, check_cube
 from sd2core.radar_config import RadarConfig
 from sd2core.timebase import Timebase
@@ -179,18 +177,12 @@ def write_capture(
     }
     times = timebase.times_s + start_unix_s
     folder.parent.mkdir(parents=True, exist_ok=True)
-    workspace = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", suffix=".tmp", dir=folder.parent))
-    new = workspace / "new"
-    try:
-        new.mkdir()
+    with atomic_folder(folder) as new:
         atomic_write_text(new / _CONFIG, _json({"device_config": {"fmcw_single_shape": shape}}))
         atomic_write_text(new / _META, _json(described))
         atomic_write_text(new / _TIMES, "".join(f"{time!r}\n" for time in times.tolist()))
         with atomic_write(new / _DATA) as stream:
             np.save(stream, cube, allow_pickle=False)
-        replace_folder(new, folder, workspace / "old")
-    finally:
-        shutil.rmtree(workspace, ignore_errors=True)
     return folder
 
 
