@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from PySide6.QtCore import QTimer
 from PySide6.QtGui import QHideEvent, QShowEvent
-from PySide6.QtWidgets import QDialog, QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QDialog, QStackedWidget, QWidget
 
 from sd2app.batch.model import BatchModel
 from sd2app.batch.questions import BatchQuestions
 from sd2app.batch.run_view import BatchRunView
 from sd2app.batch.setup_view import BatchSetupView
+from sd2app.widgets.layouts import column_of, row_of
 from sd2app.widgets.panel import outlined, sentence, title
 
 _ESTIMATE_MS = 600
@@ -24,22 +25,15 @@ class BatchWindow(QDialog):
         self._batch = batch
         self._title = title("New batch")
         another = outlined("Open batch…", "One that lies elsewhere", asks.open_batch, self)
-        head = QHBoxLayout()
-        head.addWidget(self._title, 1)
-        head.addWidget(another)
         self._setup = BatchSetupView(batch, asks, self)
         self._run = BatchRunView(batch, asks, self)
         self._pages = QStackedWidget(self)
         self._pages.addWidget(self._setup)
         self._pages.addWidget(self._run)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(16, 12, 16, 16)
-        layout.setSpacing(10)
         self._warning = sentence("", "warning")
         self._warning.hide()
-        layout.addLayout(head)
-        layout.addWidget(self._warning)
-        layout.addWidget(self._pages, 1)
+        parts = (row_of((self._title, 1), another), self._warning, (self._pages, 1))
+        self.setLayout(column_of(*parts, spacing_px=10, margins_px=(16, 12, 16, 16)))
         # Not while the user still changes a number.
         self._patience = QTimer(self)
         self._patience.setSingleShot(True)

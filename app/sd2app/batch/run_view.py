@@ -15,13 +15,13 @@ from PySide6.QtWidgets import (
     QProgressBar,
     QTableView,
     QTextBrowser,
-    QVBoxLayout,
     QWidget,
 )
 
 from sd2app.batch.model import BatchModel
 from sd2app.batch.questions import BatchQuestions
 from sd2app.batch.text import failure_text, headline, step_facts, time_text
+from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.pages import InnerPage, InnerPages
 from sd2app.widgets.panel import ElidedLabel, outlined, sentence, side_by_side
 from sd2app.widgets.table import ROW_PX
@@ -40,9 +40,6 @@ class BatchRunView(QWidget):
         super().__init__(parent)
         self._batch, self._asks = batch, asks
         self._shown_card: str | None = None
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(8)
         self._name = ElidedLabel(self)
         self._headline = QLabel(self)
         self._headline.setObjectName("title")
@@ -50,11 +47,9 @@ class BatchRunView(QWidget):
         self._headline.setAccessibleName("How the batch stands")
         self._time = sentence("")
         self._reason = sentence("", "warning")
-        for widget in (self._name, self._headline, self._time, self._reason):
-            layout.addWidget(widget)
-        layout.addLayout(self._bars())
-        layout.addLayout(self._button_row())
-        layout.addWidget(self._pages(), 1)
+        parts = (self._name, self._headline, self._time, self._reason)
+        below = (self._bars(), self._button_row(), (self._pages(), 1))
+        self.setLayout(column_of(*parts, *below, spacing_px=8, margins_px=(0, 0, 0, 0)))
         batch.changed.connect(self._refresh)
         self._refresh()
 
@@ -103,12 +98,8 @@ class BatchRunView(QWidget):
         )
         self._no_results = sentence("What was made is listed once the batch has come to its end.")
         results = QWidget(self)
-        layout = QVBoxLayout(results)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(6)
-        layout.addWidget(self._no_results)
-        layout.addWidget(self._table, 1)
-        layout.addLayout(side_by_side(self._open_result))
+        parts = (self._no_results, (self._table, 1), row_of(self._open_result, STRETCH))
+        results.setLayout(column_of(*parts, spacing_px=6, margins_px=(0, 0, 0, 0)))
         self._inner = InnerPages(
             (
                 InnerPage("Results", "The maps that were made", results),

@@ -12,11 +12,9 @@ from PySide6.QtWidgets import (
     QCheckBox,
     QDialog,
     QFormLayout,
-    QHBoxLayout,
     QLabel,
     QLayout,
     QLineEdit,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -24,6 +22,7 @@ from sd2app.figures.model import DrawnFigure, MapFigure, StripModel
 from sd2app.palette import Palette
 from sd2app.widgets.dialogs import ExportButtons, ask_figure
 from sd2app.widgets.inputs import Choice, NumberBox
+from sd2app.widgets.layouts import column_of, row_of
 from sd2app.widgets.mesh_painting import paint_picture
 from sd2app.widgets.panel import side_by_side
 
@@ -72,12 +71,8 @@ class FigureDialog(QDialog):
         self._model, self._name = model, name
         self.setWindowTitle(self.TITLE)
         self._buttons = ExportButtons(self, self._ask)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(16, 16, 16, 16)
-        layout.setSpacing(16)
-        layout.addWidget(FigurePreview(model, palette, self), 1)
-        layout.addLayout(self._choices())
-        layout.addWidget(self._buttons)
+        parts = ((FigurePreview(model, palette, self), 1), self._choices(), self._buttons)
+        self.setLayout(column_of(*parts, spacing_px=16, margins_px=(16, 16, 16, 16)))
         model.changed.connect(self._refresh)
         model.written.connect(lambda _: self.accept())
         self._refresh()
@@ -206,11 +201,7 @@ class StripDialog(FigureDialog):
         right.addRow("Rows", side_by_side(*self._rows.values()))
         right.addRow("Mesh", side_by_side(self._shape, QLabel("colour"), self._colour, self._limit))
         right.addRow("Part", side_by_side(self._whole))
-        columns = QHBoxLayout()
-        columns.setSpacing(32)
-        columns.addLayout(left, 1)
-        columns.addLayout(right, 1)
-        return columns
+        return row_of((left, 1), (right, 1), spacing_px=32)
 
     def _refresh(self) -> None:
         super()._refresh()

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QFrame, QLabel, QProgressBar, QToolButton, QWidget
 
 from sd2app.fit.model import FitModel
 from sd2app.fit.on_screen import FitOnScreen
-from sd2app.widgets.layouts import row
+from sd2app.widgets.layouts import row_of
 from sd2app.widgets.panel import ElidedLabel, outlined, sentence
 from sd2app.widgets.text import about
 
@@ -62,7 +62,7 @@ class FitBar(QFrame):
         self._buttons["follow"].setCheckable(True)
         parts = (self._title, (self._reason, 1), (self._stage, 1), self._bar, self._left)
         buttons = self._buttons.values()
-        self.setLayout(row(*parts, *buttons, spacing_px=8, margins_px=(12, 4, 4, 4)))
+        self.setLayout(row_of(*parts, *buttons, spacing_px=8, margins_px=(12, 4, 4, 4)))
         on_screen.changed.connect(self._refresh)
         self._refresh()
 

@@ -22,8 +22,8 @@ from sd2app.fit.person_picker import PersonPicker
 from sd2app.fit.setup import ANGLES_DEG, DEFAULT_STATURE_M, STATURES_M, FitSetupModel
 from sd2app.palette import Palette
 from sd2app.widgets.inputs import Choice, NumberBox
-from sd2app.widgets.layouts import STRETCH, column, row
-from sd2app.widgets.panel import ElidedLabel, outlined, say, sentence
+from sd2app.widgets.layouts import STRETCH, column_of, row_of
+from sd2app.widgets.panel import ElidedLabel, outlined, say, sentence, side_by_side
 from sd2app.widgets.time_axis import clock_text
 
 VIDEOS = "Video (*.mp4 *.mkv *.mov *.avi *.webm *.m4v *.mpg *.ts *.wmv);;All files (*)"
@@ -111,10 +111,10 @@ class NewFromVideoDialog(QDialog):
         form.setVerticalSpacing(12)
         form.setHorizontalSpacing(16)
         form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
-        form.addRow("Video", row((self._video, 1), self._other_video, spacing_px=8))
-        form.addRow("Person", row((self._person, 1), self._clear, spacing_px=8))
+        form.addRow("Video", row_of((self._video, 1), self._other_video, spacing_px=8))
+        form.addRow("Person", row_of((self._person, 1), self._clear, spacing_px=8))
         form.addRow("", sentence("Drag a rectangle around the person, where there are several."))
-        form.addRow("Body height", row(self._known, self._stature, STRETCH, spacing_px=8))
+        form.addRow("Body height", side_by_side(self._known, self._stature))
         form.addRow(
             "",
             sentence(
@@ -122,14 +122,13 @@ class NewFromVideoDialog(QDialog):
                 " and velocities are proportional to it."
             ),
         )
-        camera = row(self._camera, self._angle, self._focal, STRETCH, spacing_px=8)
-        form.addRow("Camera", camera)
-        form.addRow("Save as", row((self._folder, 1), self._other_folder, spacing_px=8))
-        left = column((self.picker, 1), row((self._slider, 1), self._where))
-        right = column(form, STRETCH, self._message)
-        columns = row((left, 3), (right, 2), spacing_px=24)
+        form.addRow("Camera", side_by_side(self._camera, self._angle, self._focal))
+        form.addRow("Save as", row_of((self._folder, 1), self._other_folder, spacing_px=8))
+        left = column_of((self.picker, 1), row_of((self._slider, 1), self._where))
+        right = column_of(form, STRETCH, self._message)
+        columns = row_of((left, 3), (right, 2), spacing_px=24)
         self.setLayout(
-            column((columns, 1), self._buttons, spacing_px=16, margins_px=(16, 16, 16, 16))
+            column_of((columns, 1), self._buttons, spacing_px=16, margins_px=(16, 16, 16, 16))
         )
 
     # --- following the model --------------------------------------------------------------

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from PySide6.QtCore import QObject, SignalInstance
-from PySide6.QtWidgets import QFileDialog, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFileDialog, QWidget
 
 from sd2app.accuracy.model import AccuracyModel
 from sd2app.feature import Action, Feature, Shell
@@ -19,6 +19,7 @@ from sd2app.maps.stack import MapStack
 from sd2app.maps.uncertainty import UncertaintyModel
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
+from sd2app.widgets.layouts import pane
 from sd2app.widgets.time_plot import Overlay
 
 
@@ -94,13 +95,8 @@ class MapsFeature(Feature):
 
     def panels(self) -> Mapping[str, QWidget]:
         """The spectra of this frame over the levels of all maps."""
-        pane = QWidget()
-        layout = QVBoxLayout(pane)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(0)
-        layout.addWidget(SpectrumView(self._session), 1)
-        layout.addWidget(LevelBar(self._session, self._shell.action("uncertain")))
-        return {"spectrum": pane}
+        levels = LevelBar(self._session, self._shell.action("uncertain"))
+        return {"spectrum": pane((SpectrumView(self._session), 1), levels)}
 
     def changes(self) -> Sequence[SignalInstance]:
         """Maps that are complete, and what is shown of them."""

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 from PySide6.QtCore import QRectF, QSignalBlocker, QSize
 from PySide6.QtGui import QAction, QColor, QImage, QPainter, QPaintEvent
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from sd2app.session.display import COLOUR_MAPS
 from sd2app.session.session import Session
 from sd2app.widgets.colour_maps import lookup_table, uncertain_table
 from sd2app.widgets.inputs import Choice, NumberBox, action_button
+from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import ElidedLabel
 
 _STRIP_PX = 14
@@ -66,24 +67,16 @@ class LevelBar(QWidget):
         self._colours.currentTextChanged.connect(lambda text: set_levels(colour_map=text))
         # One line each: the plot above needs the height.
         self._references = [ElidedLabel(self) for _ in self._tracks]
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(8, 4, 8, 8)
-        layout.setSpacing(4)
-        layout.addWidget(_ColourStrip(session, self))
-        ends = QHBoxLayout()
-        ends.addWidget(self._low)
-        ends.addStretch(1)
-        ends.addWidget(action_button(uncertain, "Uncertain"))
-        ends.addStretch(1)
-        ends.addWidget(self._high)
-        layout.addLayout(ends)
-        choices = QHBoxLayout()
-        choices.addWidget(self._scale, 1)
-        choices.addWidget(self._colours, 1)
-        layout.addLayout(choices)
         for label in self._references:
             label.setObjectName("muted")
-            layout.addWidget(label)
+        ends = row_of(
+            self._low, STRETCH, action_button(uncertain, "Uncertain"), STRETCH, self._high
+        )
+        choices = row_of((self._scale, 1), (self._colours, 1))
+        controls = column_of(_ColourStrip(session, self), ends, choices, spacing_px=4)
+        self.setLayout(
+            column_of(controls, *self._references, spacing_px=4, margins_px=(8, 4, 8, 8))
+        )
         for signal in (self._display.levels_changed, *(track.changed for track in self._tracks)):
             signal.connect(self._refresh)
         self._refresh()

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from sd2app.maps.difference import DifferenceModel
 from sd2app.maps.difference_view import DifferenceView
 from sd2app.maps.heatmap import HeatmapView
 from sd2app.maps.overview import Overview
 from sd2app.session.session import Session
+from sd2app.widgets.layouts import column_of
 from sd2app.widgets.time_plot import Overlay
 
 _LOWEST_PX = {1: 96, 2: 96, 3: 72, 4: 54}
@@ -37,11 +38,8 @@ class MapStack(QWidget):
         self.difference = DifferenceView(difference, session, over_maps)
         self.overview = Overview(session, over_all)
         self._offer: QWidget | None = None
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(0)
-        for view in self.views:
-            column.addWidget(view, 1)
+        views = [(view, 1) for view in self.views]
+        self.setLayout(column_of(*views, spacing_px=0, margins_px=(0, 0, 0, 0)))
         self._shown: object = None
         for track in maps.all:
             track.changed.connect(self.refresh)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QAction, QCloseEvent
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QWidget
 
 from sd2app.mesh_comparison.model import ComparisonModel
 from sd2app.mesh_comparison.views import ComparedPicture, JointCurves, JointTable
@@ -15,6 +15,7 @@ from sd2app.session.session import Session
 from sd2app.video.overlay_settings import OverlayModel
 from sd2app.widgets.dialogs import ask_figure
 from sd2app.widgets.inputs import Choice
+from sd2app.widgets.layouts import column_of, row_of
 from sd2app.widgets.panel import ElidedLabel, fill, outlined, panel, say, splitter
 
 
@@ -41,10 +42,7 @@ class ComparisonWindow(QWidget):
         simulated = " (simulated)" if session.document.simulated else ""
         self.setWindowTitle(f"{session.document.title}{simulated}: compare meshes")
         self.addActions(keys)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(8, 8, 8, 8)
-        layout.setSpacing(8)
-        layout.addLayout(self._head())
+        head = self._head()
         pictures = [ComparedPicture(number, model, session, overlay) for number in (0, 1)]
         tracks = [*map(map_view, model.tracks), JointCurves(model, session)]
         table = panel("joints")
@@ -55,17 +53,16 @@ class ComparisonWindow(QWidget):
             (320, 420),
         )
         body = splitter(Qt.Orientation.Horizontal, [left, table], (820, 400))
-        layout.addWidget(body, 1)
         self._notes = QLabel(self)
         self._notes.setWordWrap(True)
-        layout.addWidget(self._notes)
+        self.setLayout(
+            column_of(head, (body, 1), self._notes, spacing_px=8, margins_px=(8, 8, 8, 8))
+        )
         model.changed.connect(self._refresh)
         self._refresh()
         self.resize(1240, 820)
 
     def _head(self) -> QHBoxLayout:
-        row = QHBoxLayout()
-        row.setSpacing(8)
         self._summary = ElidedLabel(self)
         self._summary.setObjectName("title")
         self._reference = Choice("The mesh that is taken to be right", self)
@@ -78,11 +75,8 @@ class ComparisonWindow(QWidget):
         self._reference.currentIndexChanged.connect(self._model.set_reference)
         tip = "Write maps and velocities of both (.png, .svg, .pdf)"
         self._export = outlined("Export figure…", tip, self._ask, self)
-        row.addWidget(self._summary, 1)
-        row.addWidget(QLabel("measured against", self))
-        row.addWidget(self._reference)
-        row.addWidget(self._export)
-        return row
+        against = QLabel("measured against", self)
+        return row_of((self._summary, 1), against, self._reference, self._export, spacing_px=8)
 
     # --- following the model --------------------------------------------------------------
 
@@ -127,17 +121,12 @@ class ComparisonWindow(QWidget):
 
 
 def _side_by_side(name: str, widgets: Sequence[QWidget]) -> QFrame:
-    frame, row = panel(name), QHBoxLayout()
-    for widget in widgets:
-        row.addWidget(widget, 1)
-    fill(frame, row)
+    frame = panel(name)
+    fill(frame, row_of(*((widget, 1) for widget in widgets)))
     return frame
 
 
 def _below(name: str, widgets: Sequence[QWidget], ruler: QWidget) -> QFrame:
-    frame, column = panel(name), QVBoxLayout()
-    for widget in widgets:
-        column.addWidget(widget, 1)
-    column.addWidget(ruler)
-    fill(frame, column)
+    frame = panel(name)
+    fill(frame, column_of(*((widget, 1) for widget in widgets), ruler))
     return frame

@@ -6,10 +6,11 @@ from collections.abc import Callable
 
 from PySide6.QtCore import QSignalBlocker, Qt
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QMenu, QToolButton, QWidget
+from PySide6.QtWidgets import QLabel, QMenu, QToolButton, QWidget
 
 from sd2app.session.display import DisplayModel
 from sd2app.widgets.inputs import Choice, action_button
+from sd2app.widgets.layouts import STRETCH, row_of
 from sd2app.widgets.panel import title
 
 _COLOURS = (
@@ -38,16 +39,9 @@ class SceneBar(QWidget):
         self._colour.currentIndexChanged.connect(
             lambda _: display.set_mesh_colour(self._colour.currentData())
         )
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(8, 2, 4, 2)
-        layout.setSpacing(4)
-        layout.addWidget(title("Scene"))
-        layout.addSpacing(8)
-        layout.addWidget(QLabel("colour", self))
-        layout.addWidget(self._colour)
-        layout.addWidget(action_button(action("dots"), "Dots"))
-        layout.addStretch(1)
-        layout.addWidget(_view_menu(action))
+        colour = (QLabel("colour", self), self._colour, action_button(action("dots"), "Dots"))
+        parts = (title("Scene"), 8, *colour, STRETCH, _view_menu(action))
+        self.setLayout(row_of(*parts, spacing_px=4, margins_px=(8, 2, 4, 2)))
         display.mesh_changed.connect(self._refresh)
         self._refresh()
 

@@ -7,7 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import SignalInstance
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from sd2app.feature import Action, Feature, Shell
 from sd2app.maps.model import SynthesisModel
@@ -16,6 +16,7 @@ from sd2app.scene.camera import Preset
 from sd2app.sensor.placements import PlacementsModel
 from sd2app.session.display import MeshColour
 from sd2app.session.session import Session
+from sd2app.widgets.layouts import pane
 
 if TYPE_CHECKING:
     from sd2app.scene.view import SceneView
@@ -94,14 +95,8 @@ class SceneFeature(Feature):
         """The 3D view under its bar."""
         from sd2app.scene.view import SceneView
 
-        s, pane = self._session, QWidget()
-        self.view = SceneView(s, self._synthesis, self._placements)
-        layout = QVBoxLayout(pane)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(0)
-        layout.addWidget(SceneBar(s.display, self._shell.action))
-        layout.addWidget(self.view, 1)
-        return pane
+        self.view = SceneView(self._session, self._synthesis, self._placements)
+        return pane(SceneBar(self._session.display, self._shell.action), (self.view, 1))
 
     def changes(self) -> Sequence[SignalInstance]:
         """Colour and dots."""

@@ -9,7 +9,7 @@ from sd2app.accuracy.model import AccuracyModel
 from sd2app.maps.model import SynthesisModel
 from sd2app.session.maps import Reading
 from sd2app.session.session import Session
-from sd2app.widgets.layouts import STRETCH, row
+from sd2app.widgets.layouts import STRETCH, row_of
 from sd2app.widgets.panel import ElidedLabel
 from sd2app.widgets.time_axis import clock_text
 
@@ -44,7 +44,7 @@ class StatusLine(QWidget):
         self._cancel.clicked.connect(self._cancel_job)
         self._job = (self._title, self._bar, self._cancel)
         parts = (self._reading, STRETCH, self._plan, *self._job)
-        self.setLayout(row(*parts, spacing_px=16, margins_px=(12, 0, 8, 4)))
+        self.setLayout(row_of(*parts, spacing_px=16, margins_px=(12, 0, 8, 4)))
         for widget in self._job:
             widget.hide()
         self.setFixedHeight(28)

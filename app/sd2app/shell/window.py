@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QApplication, QMainWindow, QWidget
 from sd2app.background.latest import LatestRunner
 from sd2app.settings import Settings
 from sd2app.shell.parts import Parts
-from sd2app.widgets.layouts import column
+from sd2app.widgets.layouts import column_of
 from sd2app.widgets.panel import fill, panel, splitter
 from sd2app.widgets.theme import apply_theme
 
@@ -86,7 +86,7 @@ class MainWindow(QMainWindow):
             (992, 272),
         )
         self._rows = splitter(Qt.Orientation.Vertical, [self._top, self._bottom], (360, 336))
-        self._column = column((self._rows, 1), spacing_px=4, margins_px=(8, 0, 8, 0))
+        self._column = column_of((self._rows, 1), spacing_px=4, margins_px=(8, 0, 8, 0))
         centre = QWidget(self)
         centre.setLayout(self._column)
         self.setCentralWidget(centre)

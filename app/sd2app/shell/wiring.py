@@ -38,7 +38,7 @@ from sd2app.suggestions.feature import SuggestionsFeature
 from sd2app.training.feature import TrainingFeature
 from sd2app.video.feature import VideoFeature
 from sd2app.widgets.pages import InnerPage, paged_panel
-from sd2app.widgets.layouts import column
+from sd2app.widgets.layouts import pane
 from sd2core.labels.recovery import recovery_folder
 
 
@@ -209,10 +209,6 @@ def track_stack(
     maps = features.maps.stack((labels.over_maps,), (labels.over_all,))
     features.denoise.put_buttons(maps)
     labels.let_drag_on(maps.views)
-    stack = QWidget()
     below = [views[name] for name in ("classes", "suggestions", "labels", "other labels")]
     ruler = TimeRuler(session.span, session.playback, session.display)
-    stack.setLayout(
-        column((maps, 1), *below, ruler, maps.overview, spacing_px=0, margins_px=(0, 0, 0, 0))
-    )
-    return stack, maps
+    return pane((maps, 1), *below, ruler, maps.overview), maps

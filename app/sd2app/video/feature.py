@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from PySide6.QtCore import QObject, SignalInstance
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from sd2app.feature import Action, Feature, Shell
 from sd2app.session.session import Session
 from sd2app.video.overlay_settings import OverlayModel
 from sd2app.video.view import Landmarks, VideoBar, VideoView
+from sd2app.widgets.layouts import pane
 
 
 class VideoFeature(Feature):
@@ -47,13 +48,8 @@ class VideoFeature(Feature):
 
     def panels(self) -> Mapping[str, QWidget]:
         """The video under its bar."""
-        pane = QWidget()
-        layout = QVBoxLayout(pane)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(0)
-        layout.addWidget(VideoBar(self.overlay, self._shell.action))
-        layout.addWidget(VideoView(self._session, self.overlay, self._landmarks), 1)
-        return {"video": pane}
+        view = VideoView(self._session, self.overlay, self._landmarks)
+        return {"video": pane(VideoBar(self.overlay, self._shell.action), (view, 1))}
 
     def changes(self) -> Sequence[SignalInstance]:
         """Style of the overlay."""

@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QRectF, QSignalBlocker, QSize, Qt, SignalInstance
 from PySide6.QtGui import QAction, QColor, QPainter, QPaintEvent
-from PySide6.QtWidgets import QHBoxLayout, QSlider, QWidget
+from PySide6.QtWidgets import QSlider, QWidget
 
 from sd2app.session.session import Session
 from sd2app.video.landmark_overlay import draw_landmarks
 from sd2app.video.overlay_settings import OverlayModel
 from sd2app.widgets.inputs import action_button
+from sd2app.widgets.layouts import STRETCH, row_of
 from sd2app.widgets.mesh_painting import draw_mesh, paint_picture
 from sd2app.widgets.panel import title
 
@@ -117,14 +118,12 @@ class VideoBar(QWidget):
         self._slider.valueChanged.connect(
             lambda value: overlay.set_style(opacity=value / _OPACITY_STEPS)
         )
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(8, 2, 4, 2)
-        layout.setSpacing(4)
-        layout.addWidget(title("Video"))
-        layout.addStretch(1)
-        layout.addWidget(action_button(self._mesh, "Mesh"))
-        layout.addWidget(self._slider)
-        layout.addWidget(action_button(action("overlay_dots"), "Dots"))
+        mesh, dots = (
+            action_button(self._mesh, "Mesh"),
+            action_button(action("overlay_dots"), "Dots"),
+        )
+        parts = (title("Video"), STRETCH, mesh, self._slider, dots)
+        self.setLayout(row_of(*parts, spacing_px=4, margins_px=(8, 2, 4, 2)))
         overlay.changed.connect(self._refresh)
         self._mesh.changed.connect(self._refresh)
         self._refresh()

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QLayout, QVBoxLayout, QWidget
 
-Part = QWidget | QLayout | tuple[QWidget | QLayout | None, int]
-"""A widget or a layout, perhaps with its share of what room is left over."""
+Part = QWidget | QLayout | int | tuple[QWidget | QLayout | None, int]
+"""A widget or a layout, perhaps with its share of what room is left over; or pixels of a gap."""
 STRETCH: Part = (None, 1)
 """Empty room."""
 Margins = tuple[int, int, int, int]
 """Left, top, right and bottom, in pixels."""
 
 
-def row(
+def row_of(
     *parts: Part, spacing_px: int | None = None, margins_px: Margins | None = None
 ) -> QHBoxLayout:
     """Parts side by side; spacing and margins are those of the style or of what is around."""
@@ -21,13 +21,20 @@ def row(
     return layout
 
 
-def column(
+def column_of(
     *parts: Part, spacing_px: int | None = None, margins_px: Margins | None = None
 ) -> QVBoxLayout:
-    """Parts below each other; see :func:`row`."""
+    """Parts below each other; see :func:`row_of`."""
     layout = QVBoxLayout()
     _fill(layout, parts, spacing_px, margins_px)
     return layout
+
+
+def pane(*parts: Part) -> QWidget:
+    """Widget of parts below each other without gaps."""
+    widget = QWidget()
+    widget.setLayout(column_of(*parts, spacing_px=0, margins_px=(0, 0, 0, 0)))
+    return widget
 
 
 def _fill(
@@ -39,7 +46,9 @@ def _fill(
         layout.setContentsMargins(*margins_px)
     for part in parts:
         content, stretch = part if isinstance(part, tuple) else (part, 0)
-        if isinstance(content, QWidget):
+        if isinstance(content, int):
+            layout.addSpacing(content)
+        elif isinstance(content, QWidget):
             layout.addWidget(content, stretch)
         elif isinstance(content, QLayout):
             layout.addLayout(content, stretch)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFrame, QToolButton, QWidget
 
-from sd2app.widgets.layouts import row
+from sd2app.widgets.layouts import row_of
 from sd2app.widgets.panel import say, sentence
 
 
@@ -21,7 +21,7 @@ class MessageBar(QFrame):
         close.setToolTip("Close this message")
         close.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         close.clicked.connect(self.hide)
-        layout = row((self._text, 1), margins_px=(12, 4, 4, 4))
+        layout = row_of((self._text, 1), margins_px=(12, 4, 4, 4))
         layout.addWidget(close, 0, Qt.AlignmentFlag.AlignTop)
         self.setLayout(layout)
         self.hide()

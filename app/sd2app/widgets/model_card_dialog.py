@@ -10,10 +10,10 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
     QScrollArea,
-    QVBoxLayout,
     QWidget,
 )
 
+from sd2app.widgets.layouts import column_of
 from sd2app.widgets.model_page import ModelPage
 
 
@@ -39,9 +39,7 @@ class ModelCardDialog(QDialog):
         scroll.setWidgetResizable(True)
         buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close, self)
         buttons.rejected.connect(self.reject)
-        layout = QVBoxLayout(self)
-        layout.addWidget(scroll)
-        layout.addWidget(buttons)
+        self.setLayout(column_of(scroll, buttons))
         self.resize(640, 560)
 
     def _head(self, page: ModelPage) -> QHBoxLayout:

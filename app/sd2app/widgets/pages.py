@@ -8,7 +8,7 @@ from typing import NamedTuple
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QButtonGroup, QSizePolicy, QStackedWidget, QToolButton, QWidget
 
-from sd2app.widgets.layouts import STRETCH, column, row
+from sd2app.widgets.layouts import STRETCH, column_of, row_of
 
 
 class InnerPage(NamedTuple):
@@ -43,10 +43,10 @@ class InnerPages(QWidget):
         self._buttons.idClicked.connect(self._pages.setCurrentIndex)
         self._pages.currentChanged.connect(self._give_room)
         self._give_room(0)
-        top = row(
+        top = row_of(
             *self._buttons.buttons(), STRETCH if beside is None else (beside, 1), spacing_px=6
         )
-        self.setLayout(column(top, (self._pages, 1), spacing_px=6, margins_px=(0, 0, 0, 0)))
+        self.setLayout(column_of(top, (self._pages, 1), spacing_px=6, margins_px=(0, 0, 0, 0)))
 
     @property
     def shown(self) -> int:

@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from sd2app.widgets.layouts import column
+from sd2app.widgets.layouts import STRETCH, column_of, row_of
 
 
 def title(text: str) -> QLabel:
@@ -70,12 +70,7 @@ def outlined(text: str, tip: str, run: Callable[[], object] | None, parent: QWid
 
 def side_by_side(*widgets: QWidget, spacing_px: int = 8) -> QHBoxLayout:
     """Widgets in a row that begins at the left and leaves the rest empty."""
-    row = QHBoxLayout()
-    row.setSpacing(spacing_px)
-    for widget in widgets:
-        row.addWidget(widget)
-    row.addStretch(1)
-    return row
+    return row_of(*widgets, STRETCH, spacing_px=spacing_px)
 
 
 class FactRows(QWidget):
@@ -173,4 +168,4 @@ def splitter(
 
 def fill(frame: QFrame, content: QWidget | QLayout) -> None:
     """Fill an empty panel."""
-    frame.setLayout(column(content, spacing_px=0, margins_px=(1, 1, 1, 1)))
+    frame.setLayout(column_of(content, spacing_px=0, margins_px=(1, 1, 1, 1)))

@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
 from sd2app.shell.keys.bindings import KeyBindings
 from sd2app.shell.keys.model import KEYS, KeyListModel
 from sd2app.widgets.inputs import SearchLine
-from sd2app.widgets.layouts import STRETCH, column, row
+from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import sentence
 from sd2app.widgets.table import CellTable
 from sd2core.errors import Sd2Error
@@ -66,8 +66,8 @@ class KeysDialog(QDialog):
         close.rejected.connect(self.reject)
         close.button(QDialogButtonBox.StandardButton.Close).setAutoDefault(False)
         changing = (self._change, self._add, self._clear, self._reset)
-        buttons = row(*changing, STRETCH, every, close)
-        self.setLayout(column(self._search, (self._table, 1), self._said, buttons))
+        buttons = row_of(*changing, STRETCH, every, close)
+        self.setLayout(column_of(self._search, (self._table, 1), self._said, buttons))
         self.resize(760, 620)
         self._find()
 
