@@ -37,8 +37,8 @@ from sd2app.shell.program import ProgramFeature
 from sd2app.suggestions.feature import SuggestionsFeature
 from sd2app.training.feature import TrainingFeature
 from sd2app.video.feature import VideoFeature
-from sd2app.widgets.pages import InnerPage, paged_panel
 from sd2app.widgets.layouts import pane
+from sd2app.widgets.pages import InnerPage, paged_panel
 from sd2core.labels.recovery import recovery_folder
 
 
