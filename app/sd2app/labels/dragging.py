@@ -7,8 +7,6 @@ from collections.abc import Collection
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.labels.edits import Change, LabelEdits
-from sd2app.labels.model import LabelsModel
-from sd2app.session.playback import PlaybackModel
 from sd2core.errors import Sd2Error
 from sd2core.labels import edits
 from sd2core.labels.edits import Edit, Side, move_together
@@ -25,15 +23,9 @@ class LabelDragging(QObject):
 
     changed = Signal()
 
-    def __init__(
-        self,
-        labels: LabelsModel,
-        playback: PlaybackModel,
-        edits: LabelEdits,
-        parent: QObject | None = None,
-    ) -> None:
+    def __init__(self, edits: LabelEdits, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._labels, self._playback, self._edits = labels, playback, edits
+        self._labels, self._playback, self._edits = edits.labels, edits.playback, edits
         self._before: Labels | None = None
         self._dragged: Edit | None = None
         edits.applying.connect(self.end_drag)

@@ -16,7 +16,7 @@ from sd2core.errors import Sd2Error
 from sd2core.labels import edits, field_edits
 from sd2core.labels.comparison import changed_stretch
 from sd2core.labels.edits import Edit, Side, duplicate_together, nudge_together
-from sd2core.labels.spans import Labels, Overlap, Span
+from sd2core.labels.spans import Labels, Span
 from sd2core.timebase import Timebase
 
 Change = Callable[[Labels, Timebase], Edit]
@@ -66,8 +66,8 @@ class LabelEdits(QObject):
         parent: QObject | None = None,
     ) -> None:
         super().__init__(parent)
-        self._document, self._labels, self._playback = document, labels, playback
-        self._session = session
+        self.labels, self.playback = labels, playback
+        self._document, self._session = document, session
 
     @property
     def refusal(self) -> str:
@@ -78,17 +78,22 @@ class LabelEdits(QObject):
 
     def relabel(self, label: str) -> None:
         """Give the selected spans another label."""
-        self._labels.set_label(label)
+        self.labels.set_label(label)
         ids = self._ids()
         self.apply(lambda labels, base: field_edits.relabel(labels, ids, label))
 
+    def put_on_track(self, track: str) -> None:
+        """Put the selected spans on another track."""
+        ids = self._ids()
+        self.apply(lambda labels, base: field_edits.set_track(labels, ids, track))
+
     def edge_here(self, side: Side) -> None:
         """Put an edge of the selected span at the frame on screen."""
-        chosen, base = self._labels.selected, self._playback.timebase
+        chosen, base = self.labels.selected, self.playback.timebase
         if not chosen:
             return
         # The frame on screen is the first of the span, or its last.
-        frame = self._playback.frame + (side == "end")
+        frame = self.playback.frame + (side == "end")
         time_s = base.time_of(frame) if frame < len(base) else base.end_s
         self.apply(lambda labels, base: edits.resize(labels, base, chosen[0].id, side, time_s))
 
@@ -119,7 +124,7 @@ class LabelEdits(QObject):
 
     def duplicate(self) -> None:
         """Copy the selected spans to the frame on screen; behind them where it is within them."""
-        chosen = self._labels.selected
+        chosen = self.labels.selected
         if not chosen:
             return
         ids, now_s = self._ids(), self._now_s
@@ -135,9 +140,9 @@ class LabelEdits(QObject):
 
     def fill_gaps(self) -> None:
         """Fill every gap of the track with a span of background."""
-        track = self._labels.track
+        track = self.labels.track
         if track:
-            label = self._labels.background
+            label = self.labels.background
             self.apply(lambda labels, base: edits.fill_gaps(labels, base, track, label))
 
     def restore(self) -> None:
@@ -146,17 +151,17 @@ class LabelEdits(QObject):
         if recording is None or self._session.offer is None or self.refused():
             return
         self.applying.emit()
-        before = self._labels.labels
+        before = self.labels.labels
         recording.labels = self._session.take_offer()  # on disk already, as a session of its own
-        self._labels.set_labels(recording.labels)
+        self.labels.set_labels(recording.labels)
         self.make(Edit("Restore labels", recording.labels), before)
 
     # --- finding one's way ----------------------------------------------------------------
 
     def step(self, towards: Literal[-1, 1]) -> None:
         """Select the next span of the track, or the one before, and go to its start."""
-        spans = self._labels.labels.of_track(self._labels.track) if self._labels.track else ()
-        chosen = self._labels.selected
+        spans = self.labels.labels.of_track(self.labels.track) if self.labels.track else ()
+        chosen = self.labels.selected
         from_s = chosen[0].start_s if chosen else self._now_s
         if towards > 0:
             found = next((one for one in spans if one.start_s > from_s), None)
@@ -167,20 +172,20 @@ class LabelEdits(QObject):
 
     def go_to(self, span: Span) -> None:
         """Select a span and show its first frame."""
-        self._labels.select((span.id,))
-        self._playback.seek(span.start_s)
+        self.labels.select((span.id,))
+        self.playback.seek(span.start_s)
 
     # --- doing ----------------------------------------------------------------------------
 
     @property
     def _now_s(self) -> float:
-        return self._playback.timebase.time_of(self._playback.frame)
+        return self.playback.timebase.time_of(self.playback.frame)
 
     def _candidates(self) -> Iterable[Span]:
-        return self._labels.selected or self._labels.labels.of_track(self._labels.track)
+        return self.labels.selected or self.labels.labels.of_track(self.labels.track)
 
     def _ids(self) -> tuple[int, ...]:
-        return tuple(span.id for span in self._labels.selected)
+        return tuple(span.id for span in self.labels.selected)
 
     def apply(self, change: Change) -> bool:
         """Make an edit, one step in the history; False where it was refused.
@@ -190,9 +195,9 @@ class LabelEdits(QObject):
         if self.refused():
             return False
         self.applying.emit()
-        before = self._labels.labels
+        before = self.labels.labels
         try:
-            done = change(before, self._playback.timebase)
+            done = change(before, self.playback.timebase)
         except Sd2Error as error:
             self.failed.emit(str(error))
             return False
@@ -212,7 +217,7 @@ class LabelEdits(QObject):
             step.redo()
             self._document.undo_stack.push(step)
         if done.ids:
-            self._labels.select(done.ids)
+            self.labels.select(done.ids)
 
     def _become(self, name: str, before: Labels, after: Labels) -> None:
         """Change the labels: the only place that does, on disk first, then on screen."""
@@ -221,81 +226,6 @@ class LabelEdits(QObject):
             return
         self._session.keep(name, before, after)
         recording.labels = after
-        self._labels.set_labels(after)
+        self.labels.set_labels(after)
         if (stretch := changed_stretch(before, after)) is not None:
             self.done_at.emit(*stretch)
-
-
-class LabelTracks:
-    """Edits of the track for new spans, and the choice of it."""
-
-    def __init__(self, labels: LabelsModel, edits: LabelEdits) -> None:
-        self._labels, self._edits = labels, edits
-
-    @property
-    def free(self) -> bool:
-        """True if spans of the track may overlap."""
-        track = self._labels.track
-        return bool(track) and self._labels.labels.track(track).overlap == "free"
-
-    @property
-    def new_name(self) -> str:
-        """Name that no track has."""
-        taken = {track.name for track in self._labels.labels.tracks}
-        names = (f"Track {number}" for number in range(len(taken) + 1, 2 * len(taken) + 3))
-        return next(name for name in names if name not in taken)
-
-    def step(self, towards: Literal[-1, 1]) -> None:
-        """Make the next or the previous track the one for new spans."""
-        names, place = self._names, self._place + towards
-        if 0 <= place < len(names):
-            self._labels.set_track(names[place])
-
-    def add(self, name: str, overlap: Overlap) -> bool:
-        """Add a track for new spans; False where it was refused."""
-        done = self._edits.apply(lambda labels, _: field_edits.add_track(labels, name, overlap))
-        if done:
-            self._labels.set_track(name)
-        return done
-
-    def rename(self, name: str) -> bool:
-        """Rename the track; False where it was refused."""
-        old = self._labels.track
-        done = self._edits.apply(lambda labels, _: field_edits.rename_track(labels, old, name))
-        if done:
-            self._labels.set_track(name)
-        return done
-
-    def remove(self) -> bool:
-        """Remove the track with its spans; False where it was refused."""
-        gone = self._labels.track
-        return self._edits.apply(lambda labels, _: field_edits.remove_track(labels, gone))
-
-    def move(self, towards: Literal[-1, 1]) -> None:
-        """Move the track up or down."""
-        track, place = self._labels.track, self._place + towards
-        if 0 <= place < len(self._names):
-            self._edits.apply(lambda labels, _: field_edits.move_track(labels, track, place))
-
-    def toggle_overlap(self) -> None:
-        """Allow or forbid that spans of the track overlap."""
-        track = self._labels.track
-        overlap: Overlap = "exclusive" if self.free else "free"
-        self._edits.apply(lambda labels, _: field_edits.set_overlap(labels, track, overlap))
-
-    def put_spans(self, towards: Literal[-1, 1]) -> None:
-        """Move the selected spans to the track below or above."""
-        names, chosen = self._names, self._labels.selected
-        place = names.index(chosen[0].track) + towards if chosen else -1
-        if 0 <= place < len(names):
-            ids = [span.id for span in chosen]
-            self._edits.apply(lambda labels, _: field_edits.set_track(labels, ids, names[place]))
-            self._labels.set_track(self._labels.selected[0].track)
-
-    @property
-    def _names(self) -> list[str]:
-        return [track.name for track in self._labels.labels.tracks]
-
-    @property
-    def _place(self) -> int:
-        return self._names.index(self._labels.track) if self._labels.track else -1

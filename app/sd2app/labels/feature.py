@@ -9,31 +9,23 @@ from PySide6.QtCore import QObject, SignalInstance
 from PySide6.QtWidgets import QMenu, QWidget
 
 from sd2app.feature import Action, Feature, Shell
-from sd2app.labels.actions import (
-    LabelActions,
-    ReactionMenu,
-    TrackMenu,
-    editing,
-    marking_actions,
-    span_actions,
-    track_actions,
-)
+from sd2app.labels.actions import LabelActions, ReactionMenu, editing
 from sd2app.labels.autosave import LabelAutosave
 from sd2app.labels.cut_out_model import CutOutModel
 from sd2app.labels.dragging import LabelDragging
-from sd2app.labels.edits import LabelEdits, LabelTracks
+from sd2app.labels.edits import LabelEdits
 from sd2app.labels.files_dialogs import LabelFileDialogs
 from sd2app.labels.label_set_dialog import LabelSetDialogs
 from sd2app.labels.loop import SpanLoop
 from sd2app.labels.map_dragging import SpanDragger
-from sd2app.labels.marking import LabelMarking, ReactionModel
+from sd2app.labels.marking import LabelMarking, Reaction
 from sd2app.labels.model import LabelsModel
 from sd2app.labels.painting import map_overlay, strip_overlay
 from sd2app.labels.panel import LabelsPanel
 from sd2app.labels.recovery_bar import LabelBar
 from sd2app.labels.recovery_dialog import choose_recovery
 from sd2app.labels.timeline import LabelArea, LabelTimeline
-from sd2app.labels.tracks_dialog import TrackDialogs
+from sd2app.labels.tracks import LabelTracks, TrackMenu
 from sd2app.session.session import Session
 from sd2app.widgets.time_plot import Overlay, TimePlot
 
@@ -57,15 +49,14 @@ class LabelsFeature(Feature):
         self.model = labels = LabelsModel(parent)
         self.autosave = LabelAutosave(s.document, labels, recovery, parent)
         self.edits = LabelEdits(s.document, labels, s.playback, self.autosave, parent)
-        self.reaction = ReactionModel(s.settings, parent)
-        self.dragging = LabelDragging(labels, s.playback, self.edits, parent)
-        self.marking = LabelMarking(labels, s.playback, self.reaction, self.edits, parent)
-        self.tracks = LabelTracks(labels, self.edits)
+        self.reaction = Reaction(s.settings)
+        self.dragging = LabelDragging(self.edits, parent)
+        self.marking = LabelMarking(self.edits, self.reaction)
+        self.tracks = LabelTracks(shell, self.edits)
         self.loop = SpanLoop(labels, s.playback, parent)
         maps = {"synthetic": s.maps.synthetic, "denoised": s.maps.denoised, "radar": s.maps.real}
         self.cut_out = CutOutModel(s.document, maps, s.jobs, parent)
         self.files = LabelFileDialogs(shell, s, labels, self.edits, self.cut_out)
-        self._track_dialogs = TrackDialogs(shell, labels, self.tracks, self.reaction)
         self._keys: LabelActions | None = None
         self.edits.done_at.connect(s.span.reveal_any)
         self.edits.failed.connect(shell.warn)
@@ -78,7 +69,9 @@ class LabelsFeature(Feature):
 
     def actions(self) -> Sequence[Action]:
         """Everything that can be done to labels."""
-        s, labels, edits, autosave = self._session, self.model, self.edits, self.autosave
+        s, labels, edits, loop = self._session, self.model, self.edits, self.loop
+        marking, tracks, autosave = self.marking, self.tracks, self.autosave
+        bring_up = self._shell.bring_up
 
         def has_content() -> bool:
             return s.has_content
@@ -86,12 +79,119 @@ class LabelsFeature(Feature):
         def has_spans() -> bool:
             return bool(labels.labels.spans)
 
+        def has_marks() -> bool:
+            return bool(labels.marks)
+
+        def some_selected() -> bool:
+            return bool(labels.selected)
+
+        def one_selected() -> bool:
+            return len(labels.selected) == 1
+
+        def has_track() -> bool:
+            return bool(labels.track)
+
+        def has_tracks() -> bool:
+            return len(labels.labels.tracks) > 1
+
+        def can_put() -> bool:
+            return some_selected() and has_tracks()
+
         return (
-            *marking_actions(labels, edits, self.marking, self.dragging, self.loop),
-            *span_actions(labels, edits, self.loop, has_content),
-            *track_actions(labels, edits, self.tracks, self._track_dialogs, has_content),
             *editing(
                 edits,
+                Action(
+                    "end_marks", "Labels", "End what is being marked", ("E",),
+                    "End all spans that have begun, before the frame on screen",
+                    marking.end_marks, has_marks,
+                ),
+                Action(
+                    "carve_marks", "Labels", "End what is being marked, cutting others", ("K",),
+                    "The same, taking from other spans of the track what they hold of it",
+                    lambda: marking.end_marks(cutting=True), has_marks,
+                ),
+                Action(
+                    "span_starts_here", "Labels", "Selected span starts here", ("[",),
+                    "The frame on screen is the first one of the selected span",
+                    lambda: edits.edge_here("start"), one_selected,
+                ),
+                Action(
+                    "span_ends_here", "Labels", "Selected span ends here", ("]",),
+                    "The frame on screen is the last one of the selected span",
+                    lambda: edits.edge_here("end"), one_selected,
+                ),
+                Action(
+                    "nudge_back", "Labels", "Move selected spans one frame back", ("Alt+Left",),
+                    "They stop at their neighbours", lambda: edits.nudge(-1), some_selected,
+                ),
+                Action(
+                    "nudge_on", "Labels", "Move selected spans one frame on", ("Alt+Right",),
+                    "They stop at their neighbours", lambda: edits.nudge(1), some_selected,
+                ),
+                Action(
+                    "split_span", "Labels", "Split span here", ("/",),
+                    "Cut the span under the cursor in two, before the frame on screen",
+                    edits.split, has_spans,
+                ),
+                Action(
+                    "merge_spans", "Labels", "Merge selected spans", ("G",),
+                    "One span from the first start to the last end (Ctrl+click selects several)",
+                    edits.merge, lambda: len(labels.selected) > 1,
+                ),
+                Action(
+                    "delete_spans", "Labels", "Delete selected spans", ("Backspace", "Del"),
+                    "Undo brings them back", edits.delete, some_selected,
+                ),
+                Action(
+                    "duplicate_spans", "Labels", "Duplicate selected spans here", ("C",),
+                    "The copies begin with the frame on screen, or behind the spans where that is"
+                    " within them",
+                    edits.duplicate, some_selected,
+                ),
+                Action(
+                    "meet_spans", "Labels", "Let two selected spans meet here", ("J",),
+                    "The first ends and the second begins with the frame on screen",
+                    edits.meet, lambda: len(labels.selected) == 2,
+                ),
+                Action(
+                    "fill_gaps", "Labels", "Fill gaps of the track with background", ("Shift+F",),
+                    "A span in every gap, with the label of the class background or the one last"
+                    " used",
+                    edits.fill_gaps, lambda: has_content() and has_track(),
+                ),
+                Action(
+                    "spans_up", "Tracks", "Put selected spans on the track above", ("Alt+Up",),
+                    "At the times that they have", lambda: tracks.put_spans(-1), can_put,
+                ),
+                Action(
+                    "spans_down", "Tracks", "Put selected spans on the track below", ("Alt+Down",),
+                    "At the times that they have", lambda: tracks.put_spans(1), can_put,
+                ),
+                Action(
+                    "add_track", "Tracks", "Add track…", (), "A row of spans below the others",
+                    tracks.ask_to_add, has_content,
+                ),
+                Action(
+                    "rename_track", "Tracks", "Rename track…", (),
+                    "The one on which new spans come", tracks.rename, has_track,
+                ),
+                Action(
+                    "overlap", "Tracks", "Spans of the track may overlap", (),
+                    "Several at once, drawn one below the other",
+                    tracks.toggle_overlap, has_track, lambda: tracks.free,
+                ),
+                Action(
+                    "track_up", "Tracks", "Move track up", (), "Above the one before it",
+                    lambda: tracks.move(-1), has_tracks,
+                ),
+                Action(
+                    "track_down", "Tracks", "Move track down", (), "Below the one after it",
+                    lambda: tracks.move(1), has_tracks,
+                ),
+                Action(
+                    "remove_track", "Tracks", "Remove track", (),
+                    "With its spans; undo brings them back", tracks.remove, has_track,
+                ),
                 Action(
                     "import_labels", "Labels", "Import labels…", ("Ctrl+I",),
                     "Take the labels of a file: SD² Studio, table, Audacity, ELAN, Praat, BORIS,"
@@ -103,6 +203,37 @@ class LabelsFeature(Feature):
                     "Take over what an earlier session left behind; one undo takes that back",
                     edits.restore, lambda: autosave.offer is not None,
                 ),
+            ),
+            Action(
+                "leave", "Labels", "Cancel", ("Esc",),
+                "Let go of what is dragged; else forget what is being marked; else end the loop of"
+                " a span; else select nothing",
+                self._cancel, self._can_cancel,
+            ),
+            Action(
+                "loop_span", "Labels", "Play selected span in a loop", ("O",),
+                "Again and again, also while its edges are moved, until Esc or going elsewhere",
+                lambda: loop.play(labels.selected[0]), some_selected,
+            ),
+            Action(
+                "select_all", "Labels", "Select all spans", ("Ctrl+A",), "On all tracks",
+                labels.select_all, has_spans,
+            ),
+            Action(
+                "next_span", "Labels", "Next span", ("N",), "Select it and go to its start",
+                lambda: edits.step(1), has_spans,
+            ),
+            Action(
+                "previous_span", "Labels", "Previous span", ("P",), "Select it and go to its start",
+                lambda: edits.step(-1), has_spans,
+            ),
+            Action(
+                "previous_track", "Tracks", "Previous track", ("Shift+Up",),
+                "New spans come on the track above", lambda: tracks.step(-1), has_tracks,
+            ),
+            Action(
+                "next_track", "Tracks", "Next track", ("Shift+Down",),
+                "New spans come on the track below", lambda: tracks.step(1), has_tracks,
             ),
             Action(
                 "export_labels", "Labels", "Export labels…", ("Ctrl+Shift+I",),
@@ -128,19 +259,33 @@ class LabelsFeature(Feature):
             Action(
                 "find_spans", "Labels", "Find spans…", ("Ctrl+F",),
                 "Search the table of spans for a label, a note or a track",
-                lambda: self._shell.bring_up("Labels", "Search"), has_content,
+                lambda: bring_up("Labels", "Search"), has_content,
             ),
             Action(
                 "label_set", "Labels", "Label set…", ("Ctrl+L",),
                 "Names, keys, colours and classes of the labels, to be edited and shared",
-                lambda: self._shell.bring_up("Labels", "Label set"),
+                lambda: bring_up("Labels", "Label set"),
             ),
             Action(
                 "show_labels", "View", "Labels panel", ("Shift+L",),
                 "The spans as a table, statistics of them, and the label set",
-                lambda: self._shell.bring_up("Labels", "Spans"),
+                lambda: bring_up("Labels", "Spans"),
             ),
         )  # fmt: skip
+
+    def _can_cancel(self) -> bool:
+        at_work = self.dragging.dragging or self.loop.span is not None
+        return at_work or bool(self.model.marks or self.model.selected)
+
+    def _cancel(self) -> None:
+        if self.dragging.dragging:
+            self.dragging.cancel_drag()
+        elif self.model.marks:
+            self.model.set_marks(())
+        elif self.loop.span is not None:
+            self.loop.end()
+        else:
+            self.model.select(())
 
     def menus(self) -> Mapping[str, Callable[[QMenu], object]]:
         """Labels with their keys, tracks, reaction times."""
@@ -148,7 +293,7 @@ class LabelsFeature(Feature):
             "label keys": self._fill_keys,
             "tracks": lambda menu: TrackMenu(menu, self.model),
             "reaction": lambda menu: menu.addMenu(
-                ReactionMenu(self.reaction, self._track_dialogs.reaction, menu)
+                ReactionMenu(self.reaction, menu, self._shell.dialog_parent)
             ),
         }
 

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QObject, Signal
-
 from sd2app.labels.edits import LabelEdits
-from sd2app.labels.model import LabelsModel, Mark
-from sd2app.session.playback import PlaybackModel
+from sd2app.labels.model import Mark
 from sd2app.settings import Settings
 from sd2core.labels import edits
 from sd2core.labels.free_time import LONGEST_REACTION_S, seen_at
@@ -16,13 +13,10 @@ OFFERED_MS = (0, 100, 150, 200, 250, 300, 400)
 _NAME = "reaction_ms"
 
 
-class ReactionModel(QObject):
+class Reaction:
     """The user's reaction time, kept in the settings; marks are put back by it."""
 
-    changed = Signal()
-
-    def __init__(self, settings: Settings, parent: QObject | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, settings: Settings) -> None:
         self._settings = settings
 
     @property
@@ -37,28 +31,18 @@ class ReactionModel(QObject):
 
     def set_reaction_ms(self, reaction_ms: int) -> None:
         """Set the reaction time."""
-        if reaction_ms != self.reaction_ms:
-            self._settings.set_value(_NAME, min(max(reaction_ms, 0), LONGEST_MS))
-            self.changed.emit()
+        self._settings.set_value(_NAME, min(max(reaction_ms, 0), LONGEST_MS))
 
 
-class LabelMarking(QObject):
+class LabelMarking:
     """Begins and ends marks, at the frame on screen or, while playing, the reaction time earlier.
 
     The reaction time is real time: played at half speed, half as much of the recording goes by.
     """
 
-    def __init__(
-        self,
-        labels: LabelsModel,
-        playback: PlaybackModel,
-        reaction: ReactionModel,
-        edits: LabelEdits,
-        parent: QObject | None = None,
-    ) -> None:
-        super().__init__(parent)
-        self._labels, self._playback, self._reaction = labels, playback, reaction
-        self._edits = edits
+    def __init__(self, edits: LabelEdits, reaction: Reaction) -> None:
+        self._labels, self._playback, self._edits = edits.labels, edits.playback, edits
+        self._reaction = reaction
 
     def mark(self, label: str) -> None:
         """Begin a span with this label, or end the one that has begun.
@@ -87,10 +71,6 @@ class LabelMarking(QObject):
         """End all marks; ``cutting`` cuts away other spans of the track there."""
         for mark in self._labels.marks:
             self._end(mark, self._seen_s(mark.track), cutting=cutting)
-
-    def drop_marks(self) -> None:
-        """Discard all marks."""
-        self._labels.set_marks(())
 
     def _seen_s(self, track: str) -> float:
         playback = self._playback

@@ -14,7 +14,7 @@ from labelled import even, imported, random_edit
 from sd2app.labels.autosave import LabelAutosave
 from sd2app.labels.dragging import LabelDragging
 from sd2app.labels.edits import LabelEdits
-from sd2app.labels.marking import LabelMarking, ReactionModel
+from sd2app.labels.marking import LabelMarking, Reaction
 from sd2app.labels.model import LabelsModel
 from sd2app.session.document import DocumentModel
 from sd2app.session.playback import PlaybackModel
@@ -35,10 +35,8 @@ class Desk:
         self.labels, self.playback = LabelsModel(), PlaybackModel()
         self.session = LabelAutosave(self.document, self.labels, root)
         self.edits = LabelEdits(self.document, self.labels, self.playback, self.session)
-        self.marking = LabelMarking(
-            self.labels, self.playback, ReactionModel(Settings.forgetful()), self.edits
-        )
-        self.hand = LabelDragging(self.labels, self.playback, self.edits)
+        self.marking = LabelMarking(self.edits, Reaction(Settings.forgetful()))
+        self.hand = LabelDragging(self.edits)
         self.said: list[str] = []
         for signal in (self.session.failed, self.session.noted, self.edits.failed):
             signal.connect(self.said.append)

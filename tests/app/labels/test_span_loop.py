@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from sd2app.labels.loop import SpanLoop
-from sd2app.labels.marking import LONGEST_MS, ReactionModel
+from sd2app.labels.marking import LONGEST_MS, Reaction
 from sd2app.labels.model import LabelsModel
 from sd2app.session import playback as playback_module
 from sd2app.session.playback import PlaybackModel
@@ -99,10 +99,10 @@ def test_the_loop_follows_its_span(playback) -> None:
 
 def test_the_reaction_time_is_remembered_and_stays_within_a_second() -> None:
     settings = Settings.forgetful()
-    reaction = ReactionModel(settings)
+    reaction = Reaction(settings)
     assert reaction.reaction_ms == 0
     reaction.set_reaction_ms(250)
-    assert ReactionModel(settings).reaction_s == 0.25
+    assert Reaction(settings).reaction_s == 0.25
     reaction.set_reaction_ms(5000)
     assert reaction.reaction_ms == LONGEST_MS
     settings.set_value("reaction_ms", "nonsense")

@@ -182,7 +182,7 @@ def test_a_map_that_is_being_computed_is_waited_for(set_up, qtbot) -> None:
 
 
 def test_what_a_hand_holds_is_a_step_before(set_up) -> None:
-    hand = LabelDragging(set_up.labels, set_up.playback, set_up.edits)
+    hand = LabelDragging(set_up.edits)
     hand.begin_drag()
     hand.drag_new("Gestures", 1.0, 2.0, 0.0)
     set_up.look()

@@ -24,7 +24,7 @@ from PySide6.QtWidgets import QCheckBox, QInputDialog, QLineEdit
 from window_models import menu_of, models_of
 
 from sd2app.labels.timeline import LabelArea
-from sd2app.labels.tracks_dialog import TrackDialog
+from sd2app.labels.tracks import TrackDialog
 
 THERE, BACK = ("there", 6, 24), ("back", 30, 60)
 

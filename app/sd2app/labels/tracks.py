@@ -1,0 +1,179 @@
+"""Tracks of labels: choice of the one for new spans, its edits, dialogs and menu."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from PySide6.QtGui import QAction, QActionGroup
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QDialog,
+    QDialogButtonBox,
+    QFormLayout,
+    QInputDialog,
+    QLineEdit,
+    QMenu,
+    QWidget,
+)
+
+from sd2app.feature import Shell
+from sd2app.labels.edits import LabelEdits
+from sd2app.labels.model import LabelsModel
+from sd2app.widgets.text import counted
+from sd2core.labels import field_edits
+from sd2core.labels.spans import LabelTrack, Overlap
+
+
+class LabelTracks:
+    """Edits of the track for new spans, and the choice of it."""
+
+    def __init__(self, shell: Shell, edits: LabelEdits) -> None:
+        self._shell, self._edits, self._labels = shell, edits, edits.labels
+
+    @property
+    def free(self) -> bool:
+        """True if spans of the track may overlap."""
+        track = self._labels.track
+        return bool(track) and self._labels.labels.track(track).overlap == "free"
+
+    def step(self, towards: Literal[-1, 1]) -> None:
+        """Make the next or the previous track the one for new spans."""
+        names, place = self._names, self._place + towards
+        if 0 <= place < len(names):
+            self._labels.set_track(names[place])
+
+    def ask_to_add(self) -> None:
+        """Ask for a name, and add a track."""
+        taken = self._names
+        names = (f"Track {number}" for number in range(len(taken) + 1, 2 * len(taken) + 3))
+        new_name = next(name for name in names if name not in taken)
+        dialog = TrackDialog(new_name, self._shell.dialog_parent)
+        if dialog.exec() == QDialog.DialogCode.Accepted:
+            self.add(dialog.name, dialog.overlap)
+        dialog.deleteLater()
+
+    def add(self, name: str, overlap: Overlap) -> bool:
+        """Add a track for new spans; False where it was refused."""
+        done = self._edits.apply(lambda labels, _: field_edits.add_track(labels, name, overlap))
+        if done:
+            self._labels.set_track(name)
+        return done
+
+    def rename(self) -> None:
+        """Ask for another name of the track."""
+        old = self._labels.track
+        text, accepted = QInputDialog.getText(
+            self._shell.dialog_parent, "Rename track", "Name", text=old
+        )
+        new = text.strip()
+        if accepted and self._edits.apply(
+            lambda labels, _: field_edits.rename_track(labels, old, new)
+        ):
+            self._labels.set_track(new)
+
+    def remove(self) -> None:
+        """Remove the track, and report the spans removed with it."""
+        gone, count = self._labels.track, len(self._labels.labels.of_track(self._labels.track))
+        if self._edits.apply(lambda labels, _: field_edits.remove_track(labels, gone)) and count:
+            self._shell.note(
+                f"Removed {gone!r} with {counted(count, 'span')}; undo brings them back."
+            )
+
+    def move(self, towards: Literal[-1, 1]) -> None:
+        """Move the track up or down."""
+        track, place = self._labels.track, self._place + towards
+        if 0 <= place < len(self._names):
+            self._edits.apply(lambda labels, _: field_edits.move_track(labels, track, place))
+
+    def toggle_overlap(self) -> None:
+        """Allow or forbid that spans of the track overlap."""
+        track = self._labels.track
+        overlap: Overlap = "exclusive" if self.free else "free"
+        self._edits.apply(lambda labels, _: field_edits.set_overlap(labels, track, overlap))
+
+    def put_spans(self, towards: Literal[-1, 1]) -> None:
+        """Move the selected spans to the track below or above."""
+        names, chosen = self._names, self._labels.selected
+        place = names.index(chosen[0].track) + towards if chosen else -1
+        if 0 <= place < len(names):
+            self._edits.put_on_track(names[place])
+            self._labels.set_track(self._labels.selected[0].track)
+
+    @property
+    def _names(self) -> list[str]:
+        return [track.name for track in self._labels.labels.tracks]
+
+    @property
+    def _place(self) -> int:
+        return self._names.index(self._labels.track) if self._labels.track else -1
+
+
+class TrackDialog(QDialog):
+    """Name of a new track, and a choice if its spans may overlap."""
+
+    def __init__(self, name: str, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Add track")
+        self._name = QLineEdit(name, self)
+        self._name.setAccessibleName("Name of the track")
+        self._name.selectAll()
+        self._free = QCheckBox("Spans may overlap, e.g. of two hands", self)
+        buttons = QDialogButtonBox(
+            QDialogButtonBox.StandardButton.Ok | QDialogButtonBox.StandardButton.Cancel, self
+        )
+        buttons.accepted.connect(self.accept)
+        buttons.rejected.connect(self.reject)
+        accept = buttons.button(QDialogButtonBox.StandardButton.Ok)
+        accept.setText("Add track")
+        self._name.textChanged.connect(lambda text: accept.setEnabled(bool(text.strip())))
+        layout = QFormLayout(self)
+        layout.addRow("Name", self._name)
+        layout.addRow("", self._free)
+        layout.addRow(buttons)
+
+    @property
+    def name(self) -> str:
+        """Name typed."""
+        return self._name.text().strip()
+
+    @property
+    def overlap(self) -> Overlap:
+        """Overlap chosen."""
+        return "free" if self._free.isChecked() else "exclusive"
+
+
+class TrackMenu:
+    """Menu of tracks, the first entries of which choose the one for new spans."""
+
+    def __init__(self, menu: QMenu, labels: LabelsModel) -> None:
+        self._menu, self._labels = menu, labels
+        self._group = QActionGroup(menu)
+        self._first = menu.addSeparator()
+        self._shown: tuple[LabelTrack, ...] = ()
+        labels.changed.connect(self._follow)
+        labels.selection_changed.connect(self._check)
+        self._follow()
+
+    def _follow(self) -> None:
+        tracks = self._labels.labels.tracks
+        if tracks != self._shown:
+            self._shown = tracks
+            for action in self._group.actions():
+                self._group.removeAction(action)
+                self._menu.removeAction(action)
+                action.deleteLater()
+            self._menu.insertActions(self._first, [self._made(track) for track in tracks])
+        self._check()
+
+    def _made(self, track: LabelTrack) -> QAction:
+        # An ampersand would underline what comes after it.
+        action = QAction(track.name.replace("&", "&&"), self._menu)
+        action.setCheckable(True)
+        action.setToolTip("Spans may overlap" if track.overlap == "free" else "One span at a time")
+        action.triggered.connect(lambda _=False: self._labels.set_track(track.name))
+        self._group.addAction(action)
+        return action
+
+    def _check(self) -> None:
+        for action, track in zip(self._group.actions(), self._shown, strict=True):
+            action.setChecked(track.name == self._labels.track)
