@@ -1,36 +1,79 @@
-"""Dialog to export labels: the format and its losses."""
+"""Export of labels to another program's format, with its losses shown beforehand."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import NamedTuple
 
-from PySide6.QtWidgets import (
-    QDialog,
-    QFileDialog,
-    QFormLayout,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QDialog, QFileDialog, QFormLayout, QVBoxLayout, QWidget
 
-from sd2app.labels.export_model import LabelExportModel
+from sd2app.background.latest import Emit, LatestRunner
+from sd2app.feature import Shell
+from sd2app.labels.model import LabelsModel
+from sd2app.session.session import Session
 from sd2app.widgets.dialogs import ExportButtons
 from sd2app.widgets.inputs import Choice
-from sd2app.widgets.panel import rule, sentence
-from sd2core.labels.formats import FORMATS
+from sd2app.widgets.panel import rule, say, sentence
+from sd2app.widgets.text import counted
+from sd2core.errors import Sd2Error
+from sd2core.labels.formats import FORMATS, LabelFormat, Loss, would_lose, write_labels
+from sd2core.labels.spans import Labels
+from sd2core.timebase import Timebase
+
+
+def export_labels(shell: Shell, session: Session, labels: LabelsModel) -> None:
+    """Ask for format and file, show the losses, and write it."""
+    content = session.document.content
+    if content is None:
+        return
+    dialog = LabelExportDialog(
+        labels.labels,
+        session.playback.timebase,
+        content.recording.video,
+        session.document.title,
+        shell.dialog_parent,
+    )
+    dialog.written.connect(lambda _, text: shell.note(text))
+    dialog.exec()
+    dialog.finish()
+    dialog.deleteLater()
+
+
+class _Written(NamedTuple):
+    path: Path
+    losses: tuple[Loss, ...]
 
 
 class LabelExportDialog(QDialog):
-    """View of :class:`LabelExportModel`; accepted once the file is written."""
+    """Choice of a format; accepted once the file is written.
 
-    def __init__(self, model: LabelExportModel, name: str, parent: QWidget | None = None) -> None:
+    The losses are computed by writing to a temporary folder. ``name`` is proposed for the file.
+    """
+
+    written = Signal(Path, str)  # the file, and a sentence on it
+
+    def __init__(
+        self,
+        labels: Labels,
+        timebase: Timebase,
+        media: Path | None,
+        name: str,
+        parent: QWidget | None = None,
+    ) -> None:
         super().__init__(parent)
-        self._model, self._name = model, name
+        self._labels, self._timebase, self._media, self._name = labels, timebase, media, name
+        self.losses: tuple[Loss, ...] | None = None  # of the format; None while unknown
+        self.problem = ""  # why the file cannot be written
+        self.exporting = False
+        self._runner = LatestRunner("labels", self)
+        self._runner.finished.connect(self._receive)
+        self._runner.failed.connect(self._refuse)
         self.setWindowTitle("Export labels")
         self._format = Choice("The program that is to read the file", self)
-        for one in FORMATS:
-            self._format.addItem(one.title, one.name)
-        self._format.currentIndexChanged.connect(lambda _: model.choose(self._format.currentData()))
-        self._about, self._losses = sentence(""), sentence("")
+        self._format.addItems([one.title for one in FORMATS])
+        self._format.currentIndexChanged.connect(self._look)
+        self._about, self._said = sentence(""), sentence("")
         self._buttons = ExportButtons(self, self._ask)
         form = QFormLayout()
         form.setHorizontalSpacing(12)
@@ -39,41 +82,82 @@ class LabelExportDialog(QDialog):
         layout.setContentsMargins(16, 16, 16, 16)
         layout.setSpacing(8)
         layout.addLayout(form)
-        layout.addWidget(self._about)
-        layout.addWidget(rule())
-        layout.addWidget(self._losses)
+        for widget in (self._about, rule(), self._said):
+            layout.addWidget(widget)
         layout.addStretch(1)
         layout.addWidget(self._buttons)
-        model.changed.connect(self._refresh)
-        model.written.connect(lambda _: self.accept())
-        self._refresh()
+        self._look()
         self.resize(560, 300)
 
+    @property
+    def format(self) -> LabelFormat:
+        """Format chosen."""
+        return FORMATS[self._format.currentIndex()]
+
+    def export(self, path: Path) -> None:
+        """Write the file, with the usual suffix where the name has none."""
+        labels, base, chosen, media = self._labels, self._timebase, self.format, self._media
+        target = path if path.suffix else path.with_suffix(chosen.suffixes[0])
+        if target != path and target.exists():
+            # The user was not asked about that one.
+            remedy = "Type the ending as well to replace it"
+            self._refuse(Sd2Error(f"{target} exists", "another name", remedy))
+            return
+
+        def write(emit: Emit) -> _Written:
+            return _Written(
+                target, tuple(write_labels(target, labels, base, chosen.name, media=media))
+            )
+
+        self.exporting, self.problem = True, ""
+        self._runner.submit(write)
+        self._refresh()
+
+    def finish(self) -> None:
+        """Finish the file being written."""
+        self._runner.close()
+
+    def _look(self) -> None:
+        self.losses, self.problem = None, ""
+        labels, base, name, media = self._labels, self._timebase, self.format.name, self._media
+        self._runner.submit(lambda emit: tuple(would_lose(labels, base, name, media=media)))
+        self._refresh()
+
+    def _receive(self, result: _Written | tuple[Loss, ...]) -> None:
+        if not isinstance(result, _Written):
+            self.losses = result
+            self._refresh()
+            return
+        self.exporting = False
+        text = f"Wrote {result.path} with {counted(len(self._labels.spans), 'span')}."
+        lost = " ".join(f"{loss}." for loss in result.losses)
+        kept = f"Not kept: {lost}" if lost else "The file holds everything."
+        self.written.emit(result.path, f"{text} {kept}")
+        self.accept()
+
+    def _refuse(self, error: Exception) -> None:
+        self.exporting, self.problem = False, str(error)
+        self._refresh()
+
     def _refresh(self) -> None:
-        model, chosen = self._model, self._model.format
-        self._about.setText(
-            f"{', '.join(chosen.suffixes)}, opened by {chosen.made_for}. {chosen.remark}".strip()
-        )
-        if model.problem:
-            role, text = "warning", model.problem
-        elif model.losses is None:
-            role, text = "muted", "Computing the losses…"
-        elif not model.losses:
-            role, text = "muted", "It holds everything: read back, the labels are the same."
+        chosen = self.format
+        about = f"{', '.join(chosen.suffixes)}, opened by {chosen.made_for}. {chosen.remark}"
+        self._about.setText(about.strip())
+        if self.losses is None:
+            text = "Computing the losses…"
+        elif not self.losses:
+            text = "It holds everything: read back, the labels are the same."
         else:
-            role = "muted"
-            text = "It cannot hold everything:\n" + "\n".join(f"• {one}." for one in model.losses)
-        self._losses.setObjectName(role)
-        self._losses.style().unpolish(self._losses)
-        self._losses.style().polish(self._losses)
-        self._losses.setText(text)
-        self._buttons.show_state(possible=model.losses is not None, exporting=model.exporting)
+            lines = "\n".join(f"• {one}." for one in self.losses)
+            text = f"It cannot hold everything:\n{lines}"
+        say(self._said, self.problem or text, "warning" if self.problem else "muted")
+        self._buttons.show_state(possible=self.losses is not None, exporting=self.exporting)
 
     def _ask(self) -> None:
-        chosen = self._model.format
+        chosen = self.format
         kinds = " ".join(f"*{suffix}" for suffix in chosen.suffixes)
         name, _ = QFileDialog.getSaveFileName(
             self, "Export labels", f"{self._name}{chosen.suffixes[0]}", f"{chosen.title} ({kinds})"
         )
         if name:
-            self._model.export(Path(name))
+            self.export(Path(name))

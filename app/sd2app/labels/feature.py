@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from PySide6.QtCore import QObject, SignalInstance
+from PySide6.QtCore import QObject, QTimer, SignalInstance
 from PySide6.QtWidgets import QMenu, QWidget
 
 from sd2app.feature import Action, Feature, Shell
 from sd2app.labels.actions import LabelActions, ReactionMenu, editing
 from sd2app.labels.autosave import LabelAutosave
-from sd2app.labels.cut_out_model import CutOutModel
+from sd2app.labels.cut_out import CutOutModel, ask_about_others, ask_for_cut_outs
 from sd2app.labels.dragging import LabelDragging
 from sd2app.labels.edits import LabelEdits
-from sd2app.labels.files_dialogs import LabelFileDialogs
+from sd2app.labels.export_dialog import export_labels
+from sd2app.labels.import_dialog import import_labels, is_label_file
 from sd2app.labels.label_set_dialog import LabelSetDialogs
 from sd2app.labels.loop import SpanLoop
 from sd2app.labels.map_dragging import SpanDragger
@@ -54,9 +55,10 @@ class LabelsFeature(Feature):
         self.marking = LabelMarking(self.edits, self.reaction)
         self.tracks = LabelTracks(shell, self.edits)
         self.loop = SpanLoop(labels, s.playback, parent)
-        maps = {"synthetic": s.maps.synthetic, "denoised": s.maps.denoised, "radar": s.maps.real}
-        self.cut_out = CutOutModel(s.document, maps, s.jobs, parent)
-        self.files = LabelFileDialogs(shell, s, labels, self.edits, self.cut_out)
+        self.cut_out = CutOutModel(s, parent)
+        self.cut_out.asked.connect(
+            lambda *others: ask_about_others(shell.dialog_parent, self.cut_out, *others)
+        )
         self._keys: LabelActions | None = None
         self.edits.done_at.connect(s.span.reveal_any)
         self.edits.failed.connect(shell.warn)
@@ -196,7 +198,7 @@ class LabelsFeature(Feature):
                     "import_labels", "Labels", "Import labels…", ("Ctrl+I",),
                     "Take the labels of a file: SD² Studio, table, Audacity, ELAN, Praat, BORIS,"
                     " MNE",
-                    lambda: self.files.import_labels(), has_content,
+                    lambda: import_labels(self._shell, edits), has_content,
                 ),
                 Action(
                     "restore_labels", "Labels", "Restore labels that were not saved", (),
@@ -238,12 +240,12 @@ class LabelsFeature(Feature):
             Action(
                 "export_labels", "Labels", "Export labels…", ("Ctrl+Shift+I",),
                 "Write the labels for another program, and say what its file cannot hold",
-                self.files.export_labels, has_content,
+                lambda: export_labels(self._shell, s, labels), has_content,
             ),
             Action(
                 "cut_out", "Labels", "Export cut-outs…", ("Ctrl+Shift+X",),
                 "Write video, mesh and maps of each span into a folder of its own, with an index",
-                self.files.cut_out, has_spans,
+                lambda: ask_for_cut_outs(self._shell, labels, self.cut_out), has_spans,
             ),
             Action(
                 "recover_labels", "File", "Recover labels…", (),
@@ -374,8 +376,12 @@ class LabelsFeature(Feature):
         self._follow_capture()
 
     def take_dropped(self, path: Path) -> bool:
-        """Import a file of labels that was dropped."""
-        return self.files.take_dropped(path)
+        """Import a dropped file of labels; False where it is none."""
+        if not is_label_file(path):
+            return False
+        # A dialog during the drop would keep the program waiting that it came from.
+        QTimer.singleShot(0, lambda: import_labels(self._shell, self.edits, path))
+        return True
 
     def changes(self) -> Sequence[SignalInstance]:
         """Labels, selection and marks."""

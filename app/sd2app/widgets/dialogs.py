@@ -8,7 +8,10 @@ from pathlib import Path
 from PySide6.QtWidgets import QDialog, QDialogButtonBox, QFileDialog, QMessageBox, QWidget
 
 from sd2core.files.figure_files import SUFFIXES
+from sd2core.labels.formats import FORMATS
 
+LABEL_SUFFIXES = tuple(dict.fromkeys(suffix for one in FORMATS for suffix in one.suffixes))
+LABEL_FILES = f"Labels ({' '.join(f'*{suffix}' for suffix in LABEL_SUFFIXES)});;All files (*)"
 FIGURES = ";;".join(f"{suffix[1:].upper()} (*{suffix})" for suffix in SUFFIXES)
 
 

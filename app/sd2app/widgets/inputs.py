@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 
 from PySide6.QtCore import QEvent, QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QAction, QFocusEvent, QKeyEvent, QWheelEvent
@@ -106,6 +106,14 @@ class Choice(QComboBox):
         self.setToolTip(tip)
         self.setAccessibleName(tip)
         self.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+
+    def offer(self, texts: Sequence[str], place: int) -> None:
+        """Follow a model: list these texts, with the one at a place chosen; emits nothing."""
+        with QSignalBlocker(self):
+            if list(texts) != [self.itemText(at) for at in range(self.count())]:
+                self.clear()
+                self.addItems(list(texts))
+            self.setCurrentIndex(place)
 
     def wheelEvent(self, event: QWheelEvent) -> None:
         """Scroll what is behind it."""

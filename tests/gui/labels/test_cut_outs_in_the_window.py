@@ -11,7 +11,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QCheckBox, QComboBox, QFileDialog, QPushButton
 from window_models import models_of
 
-from sd2app.labels.cut_out_dialog import CutOutDialog
+from sd2app.labels.cut_out import CutOutDialog
 from sd2core.io.video import open_video
 
 LEFT = Qt.MouseButton.LeftButton

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QComboBox, QFileDialog, QPushButton
 from window_models import models_of
 
 from sd2app.labels.export_dialog import LabelExportDialog
-from sd2app.labels.import_dialog import LabelImportDialog
+from sd2app.labels.import_dialog import LabelImportDialog, import_labels
 from sd2core.labels.formats import FORMATS, read_labels, write_labels
 from sd2core.labels.spans import Labels, LabelTrack, Span
 
@@ -94,7 +94,7 @@ def test_cancelled_is_cancelled(window, theirs, qtbot, monkeypatch) -> None:
 
 
 def test_without_a_recording_it_says_what_to_do(empty_window, tmp_path) -> None:
-    empty_window.features.labels.files.import_labels(tmp_path / "ben.eaf")
+    import_labels(empty_window, models_of(empty_window).label_edits, tmp_path / "ben.eaf")
     assert "Nothing is open" in empty_window.messages.text
 
 

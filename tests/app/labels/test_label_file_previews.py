@@ -1,4 +1,4 @@
-"""What an import and an export say before anything is done; no window."""
+"""Content of a file before it is imported, and losses before and after an export."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from sd2app.labels.export_model import LabelExportModel, Written
-from sd2app.labels.import_model import LabelImportModel, is_label_file
+from sd2app.labels.export_dialog import LabelExportDialog
+from sd2app.labels.import_dialog import LabelFile, is_label_file
+from sd2app.widgets.inputs import Choice
 from sd2core.labels.formats import read_labels, write_labels
 from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.timebase import Timebase
@@ -26,8 +27,8 @@ def of(*spans: tuple[float, float, str]) -> Labels:
 def importing(qtbot):
     models = []
 
-    def read(path: Path, here: Labels = HERE) -> LabelImportModel:
-        model = LabelImportModel(path, here, FRAMES)
+    def read(path: Path, here: Labels = HERE) -> LabelFile:
+        model = LabelFile(path, here, FRAMES)
         models.append(model)
         qtbot.waitUntil(lambda: bool(model.incoming or model.problem), timeout=10_000)
         return model
@@ -100,24 +101,25 @@ def test_what_is_a_label_file() -> None:
 
 
 def test_an_export_says_its_losses_before_and_after(qtbot, tmp_path) -> None:
-    model = LabelExportModel(HERE, FRAMES, None)
+    model = LabelExportDialog(HERE, FRAMES, None, "mine")
+    qtbot.addWidget(model)
     qtbot.waitUntil(lambda: model.losses is not None, timeout=10_000)
     assert model.losses == ()
-    model.choose("audacity")
+    model.findChild(Choice).setCurrentText("Audacity")
     qtbot.waitUntil(lambda: model.losses is not None, timeout=10_000)
     assert "notes" in {loss.what for loss in model.losses}
     with qtbot.waitSignal(model.written, timeout=10_000) as said:
         model.export(tmp_path / "mine")
-    written: Written = said.args[0]
-    assert written.path == tmp_path / "mine.txt"
-    assert "keeps no notes: 1 note left out" in str(written)
-    assert len(read_labels(written.path).spans) == 1
-    before = written.path.read_bytes()
+    path, text = said.args
+    assert path == tmp_path / "mine.txt"
+    assert "keeps no notes: 1 note left out" in text
+    assert len(read_labels(path).spans) == 1
+    before = path.read_bytes()
     model.export(tmp_path / "mine")
-    assert f"{written.path} exists" in model.problem
-    assert written.path.read_bytes() == before
+    assert f"{path} exists" in model.problem
+    assert path.read_bytes() == before
     model.export(tmp_path / "no such folder" / "mine.txt")
     assert not model.problem
     qtbot.waitUntil(lambda: bool(model.problem), timeout=10_000)
     assert not model.exporting
-    model.close()
+    model.finish()

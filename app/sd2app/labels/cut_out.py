@@ -1,0 +1,275 @@
+"""Export of cut-outs into a folder: choice of spans and parts, and writing in the background."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QDialog,
+    QDialogButtonBox,
+    QFileDialog,
+    QFormLayout,
+    QHBoxLayout,
+    QMessageBox,
+    QVBoxLayout,
+    QWidget,
+)
+
+from sd2app.background.latest import Emit, LatestRunner
+from sd2app.feature import Shell
+from sd2app.labels.model import LabelsModel
+from sd2app.session.session import Session
+from sd2app.session.tasks import Job
+from sd2app.widgets.inputs import Choice
+from sd2app.widgets.panel import sentence
+from sd2app.widgets.text import counted
+from sd2core.cutouts.cutting import Cut, cut_out, plan_cuts
+from sd2core.cutouts.source import CutSource, Part
+from sd2core.labels.spans import Labels, Span
+
+_ABOUT = (
+    "Each span becomes a folder of its own, with 0 s at its first frame, and an index lists them"
+    " all. Cut-outs that are in the folder already are kept."
+)
+
+
+class _Plan(NamedTuple):
+    source: CutSource
+    cuts: list[Cut]
+    folder: Path
+
+
+class _Done(NamedTuple):
+    folder: Path
+    written: int
+    same: int
+
+
+class CutOutModel(QObject):
+    """Cuts spans out into folders; asks first where a folder holds something else."""
+
+    asked = Signal(int, str)  # number of occupied folders, one of them; answer: go_on or give_up
+    noted = Signal(str)
+    failed = Signal(str)
+
+    def __init__(self, session: Session, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._session = session
+        self._plan: _Plan | None = None
+        self._job: Job | None = None
+        self._runner = LatestRunner("cut", self)
+        self._runner.partial.connect(self._report)
+        self._runner.finished.connect(self._receive)
+        self._runner.failed.connect(self._fail)
+
+    def source(self, parts: Iterable[Part] = ("video", "mesh", "maps")) -> CutSource | None:
+        """Return the parts of the recording, without maps that are still computed."""
+        content, maps = self._session.document.content, self._session.maps
+        if content is None:
+            return None
+        files = {"synthetic": maps.synthetic, "denoised": maps.denoised, "radar": maps.real}
+        recording = content.recording
+        whole = CutSource(
+            recording.title,
+            recording.simulated,
+            content.timebase,
+            recording.video if content.video is not None else None,
+            content.mesh,
+            {
+                name: track.map.shifted(track.offset_s)
+                for name, track in files.items()
+                if track.map is not None and track.covered is None
+            },
+            recording.sensor.position_m,
+        )
+        return whole.only(parts)
+
+    def start(self, spans: Sequence[Span], parts: Iterable[Part], folder: Path) -> None:
+        """Compare with the folder, then export."""
+        source = self.source(parts)
+        if source is None:
+            return
+        self._end()
+        title = f"Cutting out {counted(len(spans), 'span')}"
+        self._job = self._session.jobs.start(title, self.give_up)
+        self._runner.submit(lambda emit: _Plan(source, plan_cuts(source, spans, folder), folder))
+
+    def go_on(self, *, replace_others: bool) -> None:
+        """Export; folders that hold something else are replaced or kept."""
+        plan, self._plan = self._plan, None
+        if plan is None:
+            return
+
+        def cut(emit: Emit) -> _Done:
+            written = cut_out(
+                plan.source,
+                plan.cuts,
+                plan.folder,
+                replace_others=replace_others,
+                progress=lambda done, total: emit((done, total)),
+            )
+            return _Done(plan.folder, len(written), len(plan.cuts) - len(written))
+
+        self._runner.submit(cut)
+
+    def give_up(self) -> None:
+        """Stop; complete folders stay, and the next export continues from there."""
+        self._runner.cancel()
+        self._plan = None
+        self._end()
+
+    def close(self) -> None:
+        """Stop, and wait until nothing is being written."""
+        self._runner.close()
+        self._end()
+
+    def _end(self) -> None:
+        if self._job is not None:
+            self._session.jobs.finish(self._job)
+            self._job = None
+
+    def _report(self, progress: Any) -> None:
+        if self._job is not None:
+            self._session.jobs.report(self._job, *progress)
+
+    def _receive(self, result: _Plan | _Done) -> None:
+        if isinstance(result, _Plan):
+            self._plan = result
+            others = [cut.path.name for cut in result.cuts if cut.state == "other"]
+            if others:
+                self.asked.emit(len(others), others[0])
+            else:
+                self.go_on(replace_others=False)
+            return
+        self._end()
+        words = f"{counted(result.written, 'span')} cut out into {result.folder}."
+        same = f" {result.same} stayed as they were." if result.same else ""
+        self.noted.emit(words + same)
+
+    def _fail(self, error: Exception) -> None:
+        self._end()
+        self.failed.emit(str(error))
+
+
+def ask_for_cut_outs(shell: Shell, labels: LabelsModel, model: CutOutModel) -> None:
+    """Ask for spans, parts and folder, and export the cut-outs."""
+    source, groups = model.source(), _groups(labels.labels, labels.selected)
+    if source is None:
+        return
+    if not groups[-1][1]:
+        shell.warn("There is nothing to cut out: accept the suggestions first.")
+        return
+    dialog = CutOutDialog(groups, source, shell.dialog_parent)
+    accepted = dialog.exec() == QDialog.DialogCode.Accepted
+    spans, parts = dialog.spans, dialog.parts
+    dialog.deleteLater()
+    if not accepted:
+        return
+    folder = QFileDialog.getExistingDirectory(shell.dialog_parent, "Folder for the cut-outs")
+    if folder:
+        model.start(spans, parts, Path(folder))
+
+
+def ask_about_others(parent: QWidget, model: CutOutModel, count: int, example: str) -> None:
+    """Ask what to do with folders that hold something else."""
+    box = QMessageBox(parent)
+    box.setWindowTitle("Replace cut-outs?")
+    folders = counted(count, "folder")
+    box.setText(f"{folders} of the same name hold something else, such as {example}.")
+    replace = box.addButton("Replace", QMessageBox.ButtonRole.DestructiveRole)
+    keep = box.addButton("Keep them", QMessageBox.ButtonRole.AcceptRole)
+    box.addButton(QMessageBox.StandardButton.Cancel)
+    box.setDefaultButton(keep)
+    box.exec()
+    if box.clickedButton() in (replace, keep):
+        model.go_on(replace_others=box.clickedButton() is replace)
+    else:
+        model.give_up()
+    box.deleteLater()
+
+
+def _groups(labels: Labels, selected: Sequence[Span]) -> list[tuple[str, tuple[Span, ...]]]:
+    """Choices of spans: the selection, all, or the spans of one label."""
+    decided = tuple(span for span in labels.spans if span.origin != "suggestion")
+    chosen = tuple(span for span in selected if span.origin != "suggestion")
+    by_label: dict[str, list[Span]] = {}
+    for span in decided:
+        by_label.setdefault(span.label, []).append(span)
+    found = [("the selected", chosen)] if chosen else []
+    return [*found, ("all", decided), *((name, tuple(spans)) for name, spans in by_label.items())]
+
+
+class CutOutDialog(QDialog):
+    """Accepted to choose a folder for :attr:`spans` and :attr:`parts`."""
+
+    def __init__(
+        self,
+        groups: Sequence[tuple[str, tuple[Span, ...]]],
+        source: CutSource,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Export cut-outs")
+        self._groups, self._source = groups, source
+        self._which = Choice("Which spans", self)
+        self._which.addItems([f"{name} ({len(spans)})" for name, spans in groups])
+        self._which.currentIndexChanged.connect(self._refresh)
+        maps = ", ".join(source.maps)
+        there: dict[Part, tuple[str, bool]] = {
+            "video": ("video", source.video is not None),
+            "mesh": ("mesh", source.mesh is not None),
+            "maps": (f"maps: {maps}" if maps else "maps", bool(maps)),
+        }
+        self._parts: dict[Part, QCheckBox] = {}
+        row = QHBoxLayout()
+        row.setSpacing(16)
+        for part, (text, has) in there.items():
+            box = self._parts[part] = QCheckBox(text, self)
+            box.setEnabled(has)
+            box.setChecked(has)
+            box.toggled.connect(self._refresh)
+            row.addWidget(box)
+        row.addStretch(1)
+        self._size = sentence("")
+        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel, self)
+        self._go = buttons.addButton("Choose folder…", QDialogButtonBox.ButtonRole.AcceptRole)
+        self._go.setDefault(True)
+        buttons.accepted.connect(self.accept)
+        buttons.rejected.connect(self.reject)
+        form = QFormLayout()
+        form.setHorizontalSpacing(16)
+        form.setVerticalSpacing(8)
+        form.addRow("Spans", self._which)
+        form.addRow("Parts", row)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(16, 16, 16, 16)
+        layout.setSpacing(12)
+        layout.addLayout(form)
+        layout.addWidget(self._size)
+        layout.addWidget(sentence(_ABOUT))
+        layout.addStretch(1)
+        layout.addWidget(buttons)
+        self._refresh()
+        self.setMinimumWidth(520)
+
+    @property
+    def spans(self) -> tuple[Span, ...]:
+        """Spans chosen."""
+        return self._groups[self._which.currentIndex()][1]
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """Parts chosen."""
+        return tuple(part for part, box in self._parts.items() if box.isChecked())
+
+    def _refresh(self) -> None:
+        frames = sum(
+            stop - first for first, stop in (self._source.frames_of(one) for one in self.spans)
+        )
+        seconds = sum(one.duration_s for one in self.spans)
+        self._size.setText(f"{frames:,} frames, {seconds:.1f} s in all.")
+        self._go.setEnabled(bool(self.spans and self.parts))
