@@ -27,7 +27,7 @@ from window_models import models_of
 # Before the fork, so that a window stands in a second.
 import sd2app.scene.view
 import sd2app.shell.wiring  # noqa: F401
-from sd2app.labels.recovery_bar import LabelBar
+from sd2app.labels.recovery import LabelBar
 from sd2app.labels.timeline import ROW_PX, LabelTimeline
 from sd2app.settings import Settings
 from sd2app.shell.parts import Parts

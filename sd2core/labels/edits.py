@@ -22,7 +22,7 @@ is not moved, or an end of the recording.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -48,6 +48,10 @@ class Edit:
     name: str  # Name of the step in the history, such as "Move span".
     labels: Labels  # After the edit.
     ids: tuple[int, ...] = ()  # Spans that were made or changed, to be selected next.
+
+
+Change = Callable[[Labels, Timebase], Edit]
+"""Edit that waits for the labels and frames to be applied to."""
 
 
 def create(

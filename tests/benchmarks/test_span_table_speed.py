@@ -13,9 +13,8 @@ from labelled import even, many_spans
 from PySide6.QtCore import QItemSelectionModel, Qt
 from PySide6.QtWidgets import QTableView
 
-from sd2app.labels.columns import COLUMNS
 from sd2app.labels.model import LabelsModel
-from sd2app.labels.table_model import SpanFilter, SpanTableModel
+from sd2app.labels.table_model import COLUMNS, SpanFilter, SpanTableModel
 from sd2app.session.playback import PlaybackModel
 from sd2core.labels.edits import delete, resize
 from sd2core.labels.spans import Labels

@@ -6,10 +6,10 @@ from collections.abc import Collection
 
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.labels.edits import Change, LabelEdits
+from sd2app.labels.edits import LabelEdits
 from sd2core.errors import Sd2Error
 from sd2core.labels import edits
-from sd2core.labels.edits import Edit, Side, move_together
+from sd2core.labels.edits import Change, Edit, Side, move_together
 from sd2core.labels.free_time import snap
 from sd2core.labels.spans import Labels
 

@@ -15,11 +15,8 @@ from sd2app.session.playback import PlaybackModel
 from sd2core.errors import Sd2Error
 from sd2core.labels import edits, field_edits
 from sd2core.labels.comparison import changed_stretch
-from sd2core.labels.edits import Edit, Side, duplicate_together, nudge_together
+from sd2core.labels.edits import Change, Edit, Side, duplicate_together, nudge_together
 from sd2core.labels.spans import Labels, Span
-from sd2core.timebase import Timebase
-
-Change = Callable[[Labels, Timebase], Edit]
 
 
 class _Step(QUndoCommand):

@@ -16,15 +16,13 @@ from sd2app.labels.dragging import LabelDragging
 from sd2app.labels.edits import LabelEdits
 from sd2app.labels.export_dialog import export_labels
 from sd2app.labels.import_dialog import import_labels, is_label_file
-from sd2app.labels.label_set_dialog import LabelSetDialogs
 from sd2app.labels.loop import SpanLoop
 from sd2app.labels.map_dragging import SpanDragger
 from sd2app.labels.marking import LabelMarking, Reaction
 from sd2app.labels.model import LabelsModel
 from sd2app.labels.painting import map_overlay, strip_overlay
 from sd2app.labels.panel import LabelsPanel
-from sd2app.labels.recovery_bar import LabelBar
-from sd2app.labels.recovery_dialog import choose_recovery
+from sd2app.labels.recovery import LabelBar, choose_recovery
 from sd2app.labels.timeline import LabelArea, LabelTimeline
 from sd2app.labels.tracks import LabelTracks, TrackMenu
 from sd2app.session.session import Session
@@ -321,9 +319,7 @@ class LabelsFeature(Feature):
     def panels(self) -> Mapping[str, QWidget]:
         """The panel at the side, and the timeline below the maps."""
         s, shell = self._session, self._shell
-        asks = LabelSetDialogs(shell, self.model, self.edits.apply)
-        panel = LabelsPanel(s, self.model, self.edits, shell.keys, shell.action, asks)
-        panel.model.noted.connect(shell.note)
+        panel = LabelsPanel(s, self.edits, shell)
         timeline = LabelTimeline(
             self.model, self.edits, self.dragging, self.loop, s.span, s.playback, s.display
         )
@@ -331,8 +327,7 @@ class LabelsFeature(Feature):
 
     def bars(self) -> Sequence[QWidget]:
         """Labels that were not saved, and who else edits."""
-        document, restore = self._session.document, self.edits.restore
-        return (LabelBar(self.autosave, document, restore, self._recover),)
+        return (LabelBar(self.autosave, self.edits, self._session.document, self._recover),)
 
     @property
     def over_maps(self) -> Overlay:

@@ -11,12 +11,12 @@ from PySide6.QtCore import QObject, Qt
 from PySide6.QtGui import QIcon
 
 from sd2app.feature import Keys
-from sd2app.labels.columns import Change
 from sd2app.labels.model import LabelsModel
 from sd2app.widgets.icons import swatch_icon
 from sd2app.widgets.key_text import canonical, native
 from sd2app.widgets.record_table import Heading, Index, RecordTableModel
 from sd2core.labels.colours import OFFERED, Alike, alike
+from sd2core.labels.edits import Change
 from sd2core.labels.field_edits import (
     CLASSES,
     add_label,
@@ -108,10 +108,9 @@ class LabelSetModel(RecordTableModel[Label]):
         name = self._set.labels[row].name
         return self._apply(lambda labels, _: remove_label(labels, name, instead))
 
-    def rename_set(self, name: str) -> bool:
-        """Rename the set."""
-        named = replace(self._set, name=name.strip())
-        return self._apply(lambda labels, _: set_label_set(labels, named))
+    def use(self, label_set: LabelSet) -> bool:
+        """Use another label set."""
+        return self._apply(lambda labels, _: set_label_set(labels, label_set))
 
     def setData(self, index: Index, value: Any, role: int = Qt.ItemDataRole.EditRole) -> bool:
         """Make the edit typed; False, with the cell unchanged, where it was refused."""

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from dataclasses import replace
+from pathlib import Path
 
 from PySide6.QtCore import (
     QAbstractItemModel,
-    QEvent,
     QModelIndex,
     QPersistentModelIndex,
     QPoint,
@@ -14,9 +14,11 @@ from PySide6.QtCore import (
     QTimer,
     Signal,
 )
-from PySide6.QtGui import QHideEvent, QKeyEvent, QShowEvent
+from PySide6.QtGui import QColor, QKeyEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
+    QColorDialog,
+    QFileDialog,
     QHBoxLayout,
     QLineEdit,
     QMenu,
@@ -26,44 +28,30 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from sd2app.feature import Shell
 from sd2app.labels.label_set_model import CLASS, COLOUR, KEY, NAME, NO_CLASS, LabelSetModel
 from sd2app.widgets.icons import swatch_icon
-from sd2app.widgets.inputs import claims
+from sd2app.widgets.inputs import TypedLine
 from sd2app.widgets.panel import ElidedLabel, outlined
 from sd2app.widgets.table import CellTable, Choosable, FramedCells, ListedEditor
+from sd2core.labels.files import read_label_set, write_label_set
+from sd2core.labels.label_set import GESTURES
 
 _WIDE = ("■ a longer name", "Key", "■ vermilion (alike)", "background", "Spans")
 _PADDING_PX = 14
 _OTHER = "other"
-_OWN_KEYS = (Qt.Key.Key_Escape, Qt.Key.Key_Return, Qt.Key.Key_Enter)
-
-
-class Asks(Protocol):
-    """Dialogs of the page."""
-
-    def ask_colour(self, colour: str) -> str:
-        """Let the user choose any colour; empty where there is none."""
-
-    def import_set(self) -> None:
-        """Use the set of a file."""
-
-    def export_set(self) -> None:
-        """Write the set to a file."""
-
-    def usual_set(self) -> None:
-        """Use the set that comes with the program."""
+_FILES = "Label set (*.json);;All files (*)"
 
 
 class LabelSetPage(QWidget):
     """The table, warnings about colours, and buttons."""
 
-    def __init__(self, model: LabelSetModel, asks: Asks, parent: QWidget | None = None) -> None:
+    def __init__(self, model: LabelSetModel, shell: Shell, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._model = model
-        self._name = NameLine("Name of the label set", self)
-        self._name.editingFinished.connect(lambda: model.rename_set(self._name.text()))
-        self._name.given_up.connect(lambda: self._name.setText(model.label_set.name))
-        self.table = table = LabelSetTable(model, asks, self)
+        self._model, self._shell = model, shell
+        self._name = TypedLine("Name of the label set", "Name of the label set", self)
+        self._name.ended.connect(self._rename)
+        self.table = table = LabelSetTable(model, self)
         table.removed.connect(self._remove)
         self._warning = ElidedLabel(self)
         self._warning.setObjectName("warning")
@@ -73,7 +61,7 @@ class LabelSetPage(QWidget):
         self._down = outlined("Down", "Offer it later", lambda: self._move(1), self)
         file = outlined("File", "Share the set as a file, or take another", None, self)
         file.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
-        file.setMenu(self._file_menu(asks))
+        file.setMenu(self._file_menu())
         top, below = QHBoxLayout(), QHBoxLayout()
         for row in (top, below):
             row.setSpacing(6)
@@ -94,15 +82,31 @@ class LabelSetPage(QWidget):
         table.selectionModel().currentRowChanged.connect(self._refresh)
         self._refresh()
 
-    def _file_menu(self, asks: Asks) -> QMenu:
+    def _file_menu(self) -> QMenu:
         menu = QMenu(self)
-        menu.addAction("Import label set…").triggered.connect(lambda _: asks.import_set())
-        menu.addAction("Export label set…").triggered.connect(lambda _: asks.export_set())
+        menu.addAction("Import label set…").triggered.connect(lambda _: self._import())
+        menu.addAction("Export label set…").triggered.connect(lambda _: self._export())
         menu.addSeparator()
-        menu.addAction("Usual label set").triggered.connect(lambda _: asks.usual_set())
+        usual = menu.addAction("Usual label set")
+        usual.triggered.connect(lambda _: self._model.use(GESTURES))
         return menu
 
     # --- what the buttons do --------------------------------------------------------------
+
+    def _rename(self) -> None:
+        self._model.use(replace(self._model.label_set, name=self._name.text().strip()))
+
+    def _import(self) -> None:
+        name, _ = QFileDialog.getOpenFileName(self, "Import label set", "", _FILES)
+        if name:
+            self._shell.attempt(lambda: self._model.use(read_label_set(Path(name))))
+
+    def _export(self) -> None:
+        shown = self._model.label_set
+        start = f"{shown.name or 'labels'}.json".replace("/", "-")
+        name, _ = QFileDialog.getSaveFileName(self, "Export label set", start, _FILES)
+        if name:
+            self._shell.attempt(lambda: write_label_set(Path(name), shown))
 
     def _added(self) -> None:
         if self._model.add():
@@ -149,16 +153,6 @@ class LabelSetPage(QWidget):
 
     # --- following ------------------------------------------------------------------------
 
-    def showEvent(self, event: QShowEvent) -> None:
-        """Follow the labels."""
-        super().showEvent(event)
-        self._model.set_watched(True)
-
-    def hideEvent(self, event: QHideEvent) -> None:
-        """Stop following the labels."""
-        super().hideEvent(event)
-        self._model.set_watched(False)
-
     def _refresh(self) -> None:
         row, count = self.table.currentIndex().row(), self._model.rowCount()
         self._less.setEnabled(row >= 0)
@@ -170,39 +164,15 @@ class LabelSetPage(QWidget):
             self._name.setText(self._model.label_set.name)
 
 
-class NameLine(QLineEdit):
-    """Line for the name: Return accepts, Escape restores, and both leave it."""
-
-    given_up = Signal()
-
-    def __init__(self, name: str, parent: QWidget) -> None:
-        super().__init__(parent)
-        self.setAccessibleName(name)
-        self.setToolTip(name)
-
-    def event(self, event: QEvent) -> bool:
-        """Keep Escape and Return for this line."""
-        return claims(event, _OWN_KEYS) or super().event(event)
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Accept or restore the name."""
-        if event.key() == Qt.Key.Key_Escape:
-            self.given_up.emit()
-        else:
-            super().keyPressEvent(event)
-        if event.key() in _OWN_KEYS:
-            self.clearFocus()
-
-
 class LabelSetTable(CellTable):
     """A row per label; Delete removes the current one."""
 
     removed = Signal()
 
-    def __init__(self, model: LabelSetModel, asks: Asks, parent: QWidget) -> None:
+    def __init__(self, model: LabelSetModel, parent: QWidget) -> None:
         super().__init__("Label set", (Qt.Key.Key_Delete, Qt.Key.Key_Backspace), parent)
         self.setModel(model)
-        self.setItemDelegate(_LabelSetCells(model, asks, self))
+        self.setItemDelegate(_LabelSetCells(model, self))
         self.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
         metrics = self.fontMetrics()
         for column, text in enumerate(_WIDE):
@@ -219,9 +189,9 @@ class LabelSetTable(CellTable):
 class _LabelSetCells(FramedCells):
     """Lists for colours and classes, lines for names and keys."""
 
-    def __init__(self, model: LabelSetModel, asks: Asks, parent: QWidget) -> None:
+    def __init__(self, model: LabelSetModel, parent: QWidget) -> None:
         super().__init__(parent)
-        self._model, self._asks = model, asks
+        self._model = model
 
     def createEditor(
         self, parent: QWidget, option: QStyleOptionViewItem, index: QModelIndex
@@ -252,6 +222,8 @@ class _LabelSetCells(FramedCells):
     def _ask(self, place: QPersistentModelIndex) -> None:
         if not place.isValid():
             return
-        colour = self._asks.ask_colour(place.data(Qt.ItemDataRole.EditRole))
-        if colour and place.isValid():
-            self._model.setData(place, colour)
+        before, parent = QColor(place.data(Qt.ItemDataRole.EditRole)), self.parent()
+        assert isinstance(parent, QWidget)
+        colour = QColorDialog.getColor(before, parent.window(), "Colour of the label")
+        if colour.isValid() and place.isValid():
+            self._model.setData(place, colour.name())

@@ -2,26 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QShowEvent
+from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QToolButton, QVBoxLayout, QWidget
 
-from PySide6.QtCore import QSignalBlocker, Qt
-from PySide6.QtGui import QAction, QHideEvent, QShowEvent
-from PySide6.QtWidgets import (
-    QHBoxLayout,
-    QSizePolicy,
-    QToolButton,
-    QVBoxLayout,
-    QWidget,
-)
-
-from sd2app.feature import Keys
-from sd2app.labels.columns import COLUMNS
+from sd2app.feature import Shell
 from sd2app.labels.edits import LabelEdits
 from sd2app.labels.label_set_model import LabelSetModel
-from sd2app.labels.label_set_page import Asks, LabelSetPage
+from sd2app.labels.label_set_page import LabelSetPage
 from sd2app.labels.model import LabelsModel
-from sd2app.labels.statistics import StatisticsTableModel
-from sd2app.labels.statistics_page import StatisticsPage
+from sd2app.labels.statistics import StatisticsPage
 from sd2app.labels.table import SpanTable
 from sd2app.labels.table_model import SpanFilter, SpanTableModel
 from sd2app.session.session import Session
@@ -30,18 +20,13 @@ from sd2app.widgets.pages import InnerPage, InnerPages
 from sd2app.widgets.panel import ElidedLabel, outlined
 
 _ANY = {"label": "Any label", "track": "Any track"}
-_LISTED = {one.id: one for one in COLUMNS if one.listed is not None}
 
 
 class SpanPage(QWidget):
     """A line of filters above the table; kept up to date while it is shown."""
 
     def __init__(
-        self,
-        model: SpanTableModel,
-        labels: LabelsModel,
-        table: SpanTable,
-        parent: QWidget | None = None,
+        self, model: SpanTableModel, labels: LabelsModel, table: SpanTable, parent: QWidget
     ) -> None:
         super().__init__(parent)
         self._model, self.table = model, table
@@ -76,16 +61,9 @@ class SpanPage(QWidget):
         self.search.selectAll()
 
     def showEvent(self, event: QShowEvent) -> None:
-        """Follow the labels."""
+        """Bring the filters up to date."""
         super().showEvent(event)
         self._offer()
-        self._model.set_watched(True)
-        self.table.mirror()
-
-    def hideEvent(self, event: QHideEvent) -> None:
-        """Stop following the labels."""
-        super().hideEvent(event)
-        self._model.set_watched(False)
 
     def _filter(self) -> None:
         chosen = {
@@ -96,18 +74,12 @@ class SpanPage(QWidget):
 
     def _offer(self) -> None:
         """Update the filters; one on a label or track that is gone is cleared."""
-        if not self.isVisible():
-            return
-        for name, choice in self._chosen.items():
-            texts = [_ANY[name], *self._model.choices(_LISTED[name])]
-            if texts == [choice.itemText(place) for place in range(choice.count())]:
-                continue
-            before = choice.currentText()
-            with QSignalBlocker(choice):
-                choice.clear()
-                choice.addItems(texts)
-                choice.setCurrentIndex(max(choice.findText(before), 0))
-        self._filter()
+        if self.isVisible():
+            for name, choice in self._chosen.items():
+                texts = [_ANY[name], *self._model.choices(name)]
+                before = choice.currentText()
+                choice.offer(texts, texts.index(before) if before in texts else 0)
+            self._filter()
 
 
 _PAGES = (
@@ -115,37 +87,27 @@ _PAGES = (
     ("Statistics", "How many spans each label has, and how long they are"),
     ("Label set", "Names, keys, colours and classes of the labels"),
 )
-_MENU = ("span_starts_here", "span_ends_here", "split_span", "merge_spans", "delete_spans")
-"""Actions that the table's own menu has too."""
 
 
 class LabelsPanel(QWidget):
     """One page at a time; a button for each."""
 
     def __init__(
-        self,
-        session: Session,
-        labels: LabelsModel,
-        edits: LabelEdits,
-        keys: Keys,
-        action: Callable[[str], QAction],
-        asks: Asks,
-        parent: QWidget | None = None,
+        self, session: Session, edits: LabelEdits, shell: Shell, parent: QWidget | None = None
     ) -> None:
         super().__init__(parent)
         self.setObjectName("page")
-        s = session
-        self.model = model = SpanTableModel(labels, s.playback, edits.apply, self)
-        table = SpanTable(model, labels, edits, s.playback, s.span, s.settings, self)
-        table.set_menu([action(name) for name in _MENU])
+        labels = edits.labels
+        self.model = model = SpanTableModel(labels, edits.playback, edits.apply, self)
+        model.noted.connect(shell.note)
+        table = SpanTable(model, edits, session, shell, self)
         self.spans = SpanPage(model, labels, table, self)
-        statistics = StatisticsPage(StatisticsTableModel(labels, s.playback, self), self)
-        set_model = LabelSetModel(labels, keys, edits.apply, self)
-        self._label_set = LabelSetPage(set_model, asks, self)
+        set_model = LabelSetModel(labels, shell.keys, edits.apply, self)
+        self._label_set = LabelSetPage(set_model, shell, self)
         self._count = ElidedLabel(self)
         self._count.setObjectName("muted")
         self._count.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-        pages = (self.spans, statistics, self._label_set)
+        pages = self.spans, StatisticsPage(labels, edits.playback, self), self._label_set
         self._pages = InnerPages(
             [InnerPage(*words, page) for words, page in zip(_PAGES, pages, strict=True)],
             self._count,

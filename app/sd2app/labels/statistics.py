@@ -1,20 +1,20 @@
-"""Statistics per label as the rows of a table."""
+"""Page of statistics per label, with buttons to copy them."""
 
 from __future__ import annotations
 
-from PySide6.QtCore import QObject
-from PySide6.QtGui import QIcon
+from functools import partial
+
+from PySide6.QtCore import QMimeData, QObject
+from PySide6.QtGui import QGuiApplication, QIcon
+from PySide6.QtWidgets import QAbstractItemView, QHBoxLayout, QVBoxLayout, QWidget
 
 from sd2app.labels.model import LabelsModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.widgets.icons import swatch_icon
+from sd2app.widgets.panel import outlined
 from sd2app.widgets.record_table import Heading, RecordTableModel
-from sd2core.labels.statistics import (
-    HEADINGS,
-    label_statistics,
-    statistics_rows,
-    statistics_text,
-)
+from sd2app.widgets.table import RecordTable
+from sd2core.labels.statistics import HEADINGS, label_statistics, statistics_rows, statistics_text
 
 _TIPS = (
     "Labels of the set, then any others that spans have",
@@ -27,6 +27,8 @@ _TIPS = (
     "Longest length",
     "Share of the recording that they cover; overlaps count once",
 )
+_WIDE = "■ left-to-right  "
+_PADDING_PX = 10
 
 
 class StatisticsTableModel(RecordTableModel[tuple[str, ...]]):
@@ -60,3 +62,42 @@ class StatisticsTableModel(RecordTableModel[tuple[str, ...]]):
 
     def _icon(self, record: tuple[str, ...], column: int) -> QIcon | None:
         return None if column else swatch_icon(self._labels.colour_of(record[0]))
+
+
+class StatisticsPage(QWidget):
+    """A row per label; kept up to date while it is shown."""
+
+    def __init__(
+        self, labels: LabelsModel, playback: PlaybackModel, parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self._model = StatisticsTableModel(labels, playback, self)
+        table = RecordTable("Statistics per label", self)
+        table.setModel(self._model)
+        table.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
+        table.setTabKeyNavigation(False)
+        for column, heading in enumerate(self._model.headings):
+            text = heading.text if column else _WIDE
+            wide = self.fontMetrics().horizontalAdvance(text) + _PADDING_PX
+            table.setColumnWidth(column, max(wide, 52))
+        row = QHBoxLayout()
+        row.setSpacing(6)
+        row.addStretch(1)
+        for text, tip, separator in (
+            ("Copy table", "To be pasted into a sheet", "\t"),
+            ("Copy CSV", "Comma-separated values", ","),
+        ):
+            row.addWidget(outlined(text, tip, partial(self._copy, separator), self))
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(6)
+        layout.addWidget(table, 1)
+        layout.addLayout(row)
+
+    def _copy(self, separator: str) -> None:
+        text = self._model.text(separator)
+        copied = QMimeData()
+        copied.setText(text)
+        if separator == ",":
+            copied.setData("text/csv", text.encode())
+        QGuiApplication.clipboard().setMimeData(copied)

@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable
+from functools import partial
 from itertools import pairwise
 from typing import cast
 
 from PySide6.QtCore import QItemSelection, QItemSelectionModel, QItemSelectionRange, QModelIndex, Qt
-from PySide6.QtGui import QAction, QContextMenuEvent, QFocusEvent, QPainter, QPaintEvent
+from PySide6.QtGui import QContextMenuEvent, QFocusEvent, QPainter, QPaintEvent, QShowEvent
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QMenu, QStyleOptionViewItem, QWidget
 
-from sd2app.labels.columns import COLUMNS
+from sd2app.feature import Shell
 from sd2app.labels.edits import LabelEdits
 from sd2app.labels.model import LabelsModel
-from sd2app.labels.table_model import SpanTableModel
-from sd2app.session.playback import PlaybackModel
-from sd2app.session.time_window import TimeWindow
-from sd2app.settings import Settings
+from sd2app.labels.table_model import COLUMNS, SpanTableModel
+from sd2app.session.session import Session
 from sd2app.widgets.icons import swatch_icon
 from sd2app.widgets.table import CellTable, Choosable, FramedCells
-from sd2core.labels import field_edits
 
 
 class SpanCells(FramedCells):
@@ -42,13 +40,15 @@ class SpanCells(FramedCells):
         coloured = column.id == "label"
         choices = [
             Choosable(one, one, swatch_icon(self._labels.colour_of(one)) if coloured else None)
-            for one in self._table.choices(column)
+            for one in self._table.choices(column.listed)
         ]
         return self.listed(choices, column.heading, parent)
 
 
 _PADDING_PX = 12
 _HIDDEN = "span_table/hidden"
+_MENU = ("span_starts_here", "span_ends_here", "split_span", "merge_spans", "delete_spans")
+"""Actions of the window that the context menu has too."""
 
 
 class SpanTable(CellTable):
@@ -60,29 +60,22 @@ class SpanTable(CellTable):
     def __init__(
         self,
         model: SpanTableModel,
-        labels: LabelsModel,
         edits: LabelEdits,
-        playback: PlaybackModel,
-        visible: TimeWindow,
-        settings: Settings,
+        session: Session,
+        shell: Shell,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__("Spans", parent=parent)
-        self._model, self._labels, self._edits = model, labels, edits
-        self._playback, self._visible, self._settings = playback, visible, settings
+        self._model, self._edits, self._session, self._shell = model, edits, session, shell
+        self._labels, self._playback = edits.labels, session.playback
         self._mirroring = False
-        self._menu_actions: Sequence[QAction] = ()
         self.setModel(model)
-        self.setItemDelegate(SpanCells(model, labels, self))
+        self.setItemDelegate(SpanCells(model, edits.labels, self))
         self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
         self._arrange_columns()
         self.clicked.connect(self._go)
-        labels.selection_changed.connect(self.mirror)
-        labels.changed.connect(self.mirror)
-
-    def set_menu(self, actions: Sequence[QAction]) -> None:
-        """Set the window's actions that the context menu offers as well."""
-        self._menu_actions = actions
+        edits.labels.selection_changed.connect(self.mirror)
+        edits.labels.changed.connect(self.mirror)
 
     # --- columns --------------------------------------------------------------------------
 
@@ -94,7 +87,8 @@ class SpanTable(CellTable):
         header.setMinimumSectionSize(40)
         header.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         metrics = self.fontMetrics()
-        hidden = self._hidden()
+        usual = " ".join(column.id for column in COLUMNS if column.hidden)
+        hidden = self._session.settings.stored(_HIDDEN, usual).split()
         for place, column in enumerate(COLUMNS):
             widest_px = max(map(metrics.horizontalAdvance, (column.wide, column.heading)))
             self.setColumnWidth(place, widest_px + _PADDING_PX)
@@ -122,11 +116,7 @@ class SpanTable(CellTable):
     def _show_column(self, place: int, shown: bool) -> None:
         self.setColumnHidden(place, not shown)
         hidden = [one.id for k, one in enumerate(COLUMNS) if self.isColumnHidden(k)]
-        self._settings.set_value(_HIDDEN, " ".join(hidden))
-
-    def _hidden(self) -> list[str]:
-        usual = " ".join(column.id for column in COLUMNS if column.hidden)
-        return self._settings.stored(_HIDDEN, usual).split()
+        self._session.settings.set_value(_HIDDEN, " ".join(hidden))
 
     # --- one selection --------------------------------------------------------------------
 
@@ -156,7 +146,12 @@ class SpanTable(CellTable):
         at_end = column.edge is not None and column.edge.side == "end"
         if stop > first:
             self._playback.seek_frame(stop - 1 if at_end else first)
-            self._visible.reveal(self._playback.time_s)
+            self._session.span.reveal(self._playback.time_s)
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Follow the labels and their selection."""
+        super().showEvent(event)
+        self.mirror()
 
     def mirror(self) -> None:
         """Select the rows of the spans selected elsewhere."""
@@ -221,20 +216,13 @@ class SpanTable(CellTable):
         if not self._labels.selected:
             return
         menu = QMenu(self)
-        for title, place in (("Give label", "label"), ("Put on track", "track")):
-            column = next(one for one in COLUMNS if one.id == place)
+        for title, listed, run in (
+            ("Give label", "label", self._edits.relabel),
+            ("Put on track", "track", self._edits.put_on_track),
+        ):
             submenu = menu.addMenu(title)
-            for choice in self._model.choices(column):
-                run = self._edits.relabel if place == "label" else self._put_on_track
-                submenu.addAction(choice).triggered.connect(_called(run, choice))
+            for choice in self._model.choices(listed):
+                submenu.addAction(choice, partial(run, choice))
         menu.addSeparator()
-        menu.addActions(list(self._menu_actions))
+        menu.addActions([self._shell.action(name) for name in _MENU])
         menu.exec(event.globalPos())
-
-    def _put_on_track(self, track: str) -> None:
-        ids = [span.id for span in self._labels.selected]
-        self._edits.apply(lambda labels, _: field_edits.set_track(labels, ids, track))
-
-
-def _called(run: Callable[[str], object], choice: str) -> Callable[..., object]:
-    return lambda _=False: run(choice)

@@ -1,20 +1,154 @@
-"""Spans as the rows of a table: sorted, filtered, and edited cell by cell."""
+"""Spans as the rows of a table: columns, order, filter, and the edits made by typing."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtGui import QIcon
 
-from sd2app.labels.columns import COLUMNS, Change, Column, Edge
 from sd2app.labels.model import LabelsModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.widgets.icons import swatch_icon
 from sd2app.widgets.record_table import NO_PARENT, Heading, Index, RecordTableModel
-from sd2core.labels.spans import Span
+from sd2core.errors import Sd2Error
+from sd2core.labels import edits, field_edits
+from sd2core.labels.edits import Change, Edit, Side
+from sd2core.labels.spans import Labels, Span
+from sd2core.labels.typed_times import typed_duration_end, typed_end, typed_start
+from sd2core.timebase import Timebase
+
+Typed = Callable[[str, Sequence[Span]], Change]
+"""Makes the edit of a typed text, given the spans concerned, that of the cell first."""
+When = Callable[[str, Span, Timebase], float]
+
+
+@dataclass(frozen=True)
+class Edge:
+    """Edge of a span that a cell moves, and the time parsed from typed text."""
+
+    side: Side
+    when: When
+
+    def of(self, span: Span) -> float:
+        """Return the time of the edge."""
+        return span.start_s if self.side == "start" else span.end_s
+
+    def typed(self, text: str, spans: Sequence[Span]) -> Change:
+        """Make the edit that moves the edge."""
+        span_id = spans[0].id
+        return lambda labels, base: edits.resize(
+            labels, base, span_id, self.side, self.when(text, labels.span(span_id), base)
+        )
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of the table of spans."""
+
+    id: str
+    heading: str
+    tip: str
+    text: Callable[[Span, Timebase], str]
+    order: Callable[[Span], Any]  # sort key; ties stay in the order of time
+    typed: Typed | None = None  # makes the edit of a typed text; None: not editable
+    listed: Literal["label", "track"] | None = None  # chosen from a list, for all selected spans
+    wide: str = "000.000"  # a text as wide as the column is at first
+    number: bool = False
+    hidden: bool = False  # at first
+    edge: Edge | None = None  # edge that typing moves, in a column of times
+
+
+_START = Edge("start", lambda text, _, base: typed_start(text, base))
+_END = Edge("end", lambda text, _, base: typed_end(text, base))
+_DURATION = Edge("end", lambda text, span, base: typed_duration_end(text, span.start_s, base))
+_TIMES = "seconds (1.5 or 1:02.5) or a frame (f48)"
+
+
+def _frames(span: Span, timebase: Timebase) -> str:
+    first, stop = timebase.frames_between(span.start_s, span.end_s)
+    return f"{first}–{stop - 1}" if stop > first else ""
+
+
+def _given(
+    edit: Callable[[Labels, Sequence[int], Any], Edit], value: Callable[[str], Any] = str.strip
+) -> Typed:
+    """Typing that gives spans a value, read from the text."""
+
+    def typed(text: str, spans: Sequence[Span]) -> Change:
+        ids = [span.id for span in spans]
+        return lambda labels, _: edit(labels, ids, value(text))
+
+    return typed
+
+
+def _confidence(text: str) -> float | None:
+    typed = text.strip().replace(",", ".")
+    try:
+        return float(typed) if typed else None
+    except ValueError:
+        raise Sd2Error(
+            f"{text[:40]!r} was typed as a confidence", "a number from 0 to 1, or nothing"
+        ) from None
+
+
+COLUMNS: tuple[Column, ...] = (
+    Column(
+        "start", "Start s", f"Start. Type {_TIMES}: the first one of the span",
+        lambda span, _: f"{span.start_s:.3f}", lambda span: span.start_s, _START.typed,
+        number=True, edge=_START,
+    ),
+    Column(
+        "end", "End s", f"End. Type {_TIMES}: the last one of the span",
+        lambda span, _: f"{span.end_s:.3f}", lambda span: span.end_s, _END.typed,
+        number=True, edge=_END,
+    ),
+    Column(
+        "label", "Label", "Label of the set, given to all selected spans",
+        lambda span, _: span.label, lambda span: span.label.casefold(),
+        _given(field_edits.relabel, str), "label",
+        wide="■ right-to-left",
+    ),
+    Column(
+        "duration", "Length s", "Duration. Type seconds or frames (12 f): its end moves",
+        lambda span, _: f"{span.duration_s:.3f}", lambda span: span.duration_s,
+        _DURATION.typed, number=True, edge=_DURATION,
+    ),
+    Column(
+        "frames", "Frames", "The first frame and the last one",
+        _frames, lambda span: span.start_s, wide="0000–0000", number=True,
+    ),
+    Column(
+        "track", "Track", "Track, for all selected spans",
+        lambda span, _: span.track, lambda span: span.track.casefold(),
+        _given(field_edits.set_track, str), "track",
+        wide="Gestures ▾",
+    ),
+    Column(
+        "note", "Note", "Any text",
+        lambda span, _: span.note, lambda span: span.note.casefold(), _given(field_edits.set_note),
+        wide="some words",
+    ),
+    Column(
+        "author", "Author", "Person who marked it",
+        lambda span, _: span.author, lambda span: span.author.casefold(),
+        _given(field_edits.set_author),
+        wide="some name", hidden=True,
+    ),
+    Column(
+        "confidence", "Sure", "Confidence, 0 to 1",
+        lambda span, _: "" if span.confidence is None else f"{span.confidence:g}",
+        lambda span: -1.0 if span.confidence is None else span.confidence,
+        _given(field_edits.set_confidence, _confidence),
+        wide="0.00", number=True, hidden=True,
+    ),
+    Column(
+        "origin", "Origin", "A person, a suggestion, or an import",
+        lambda span, _: span.origin, lambda span: span.origin, wide="suggestion", hidden=True,
+    ),
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -35,9 +169,7 @@ class SpanFilter:
             and (not self.track or span.track == self.track)
             and (
                 not text
-                or text in span.label.casefold()
-                or text in span.note.casefold()
-                or text in span.track.casefold()
+                or any(text in one.casefold() for one in (span.label, span.note, span.track))
             )
         ]
 
@@ -73,11 +205,6 @@ class SpanTableModel(RecordTableModel[Span]):
         return self._following
 
     @property
-    def filter(self) -> SpanFilter:
-        """Filter of the rows."""
-        return self._filter
-
-    @property
     def total(self) -> int:
         """Number of all spans."""
         return len(self._labels.labels.spans)
@@ -99,10 +226,10 @@ class SpanTableModel(RecordTableModel[Span]):
             self._row_of = {span.id: row for row, span in enumerate(self._rows)}
         return self._row_of.get(span_id)
 
-    def choices(self, column: Column) -> list[str]:
-        """Return the values a column offers: labels of the set and others in use, or tracks."""
+    def choices(self, listed: str) -> list[str]:
+        """Return the labels of the set and others in use, or the tracks."""
         labels = self._labels.labels
-        if column.listed == "track":
+        if listed == "track":
             return [track.name for track in labels.tracks]
         known = [label.name for label in labels.label_set.labels]
         return known + sorted({span.label for span in labels.spans}.difference(known))

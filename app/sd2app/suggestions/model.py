@@ -12,13 +12,10 @@ from sd2app.labels.model import LabelsModel
 from sd2app.session.maps import MapModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.suggestions.finders import Found, SpanFinder, Threshold
-from sd2core.labels.edits import Edit
+from sd2core.labels.edits import Change
 from sd2core.labels.field_edits import offer, pending, reject, take
 from sd2core.labels.spans import Labels, Span
 from sd2core.labels.suggest import LABEL, TRACK
-from sd2core.timebase import Timebase
-
-Apply = Callable[[Callable[[Labels, Timebase], Edit]], bool]
 
 
 class SuggestionsModel(QObject):
@@ -37,7 +34,7 @@ class SuggestionsModel(QObject):
         playback: PlaybackModel,
         finders: Sequence[SpanFinder],
         undo_stack: QUndoStack,
-        apply: Apply,
+        apply: Callable[[Change], bool],
         parent: QObject | None = None,
     ) -> None:
         super().__init__(parent)

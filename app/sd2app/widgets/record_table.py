@@ -33,7 +33,7 @@ class RecordTableModel(QAbstractTableModel, Generic[Record]):
 
     def __init__(self, headings: Sequence[Heading], parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._headings = tuple(headings)
+        self.headings = tuple(headings)
         self._rows: Sequence[Record] = ()
         self._watched = False
 
@@ -71,7 +71,7 @@ class RecordTableModel(QAbstractTableModel, Generic[Record]):
 
     def columnCount(self, parent: Index = NO_PARENT) -> int:
         """Return the number of columns, hidden ones included."""
-        return 0 if parent.isValid() else len(self._headings)
+        return 0 if parent.isValid() else len(self.headings)
 
     def headerData(
         self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole
@@ -79,7 +79,7 @@ class RecordTableModel(QAbstractTableModel, Generic[Record]):
         """Return text, tip or alignment of a heading."""
         if orientation != Qt.Orientation.Horizontal:
             return None
-        heading = self._headings[section]
+        heading = self.headings[section]
         if role == Qt.ItemDataRole.DisplayRole:
             return heading.text
         if role == Qt.ItemDataRole.TextAlignmentRole:
@@ -91,7 +91,7 @@ class RecordTableModel(QAbstractTableModel, Generic[Record]):
         if not index.isValid():
             return Qt.ItemFlag.NoItemFlags
         read = Qt.ItemFlag.ItemIsSelectable | Qt.ItemFlag.ItemIsEnabled
-        editable = self._headings[index.column()].editable
+        editable = self.headings[index.column()].editable
         return read | Qt.ItemFlag.ItemIsEditable if editable else read
 
     def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
@@ -104,7 +104,7 @@ class RecordTableModel(QAbstractTableModel, Generic[Record]):
         if role == Qt.ItemDataRole.EditRole:
             return self._edited_text(record, column)
         if role == Qt.ItemDataRole.TextAlignmentRole:
-            return _RIGHT if self._headings[column].number else _LEFT
+            return _RIGHT if self.headings[column].number else _LEFT
         if role == Qt.ItemDataRole.DecorationRole:
             return self._icon(record, column)
         return self._tip(record, column) if role == Qt.ItemDataRole.ToolTipRole else None

@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 from PySide6.QtCore import QAbstractItemModel, QEvent, QModelIndex, QRect, Qt
-from PySide6.QtGui import QIcon, QKeyEvent, QPainter, QPalette
+from PySide6.QtGui import QHideEvent, QIcon, QKeyEvent, QPainter, QPalette, QShowEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QComboBox,
@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
 )
 
 from sd2app.widgets.inputs import claims
+from sd2app.widgets.record_table import RecordTableModel
 
 ROW_PX = 22
 _OWN_KEYS = (
@@ -106,7 +107,34 @@ class FramedCells(QStyledItemDelegate):
             super().setModelData(editor, model, index)
 
 
-class CellTable(QTableView):
+class RecordTable(QTableView):
+    """Plain rows; those of a :class:`RecordTableModel` are kept up to date while shown."""
+
+    def __init__(self, name: str, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setAccessibleName(name)
+        self.setShowGrid(False)
+        self.verticalHeader().hide()
+        self.verticalHeader().setDefaultSectionSize(ROW_PX)
+        self.horizontalHeader().setHighlightSections(False)
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Follow the records."""
+        super().showEvent(event)
+        self._watch(True)
+
+    def hideEvent(self, event: QHideEvent) -> None:
+        """Stop following the records."""
+        super().hideEvent(event)
+        self._watch(False)
+
+    def _watch(self, watched: bool) -> None:
+        model = self.model()
+        if isinstance(model, RecordTableModel):
+            model.set_watched(watched)
+
+
+class CellTable(RecordTable):
     """Return or a double click edits a cell, Tab goes to the next one that can be edited.
 
     Escape gives the keyboard back to the window.
@@ -115,20 +143,15 @@ class CellTable(QTableView):
     def __init__(
         self, name: str, own_keys: Collection[Qt.Key] = (), parent: QWidget | None = None
     ) -> None:
-        super().__init__(parent)
+        super().__init__(name, parent)
         self._own_keys = {*_OWN_KEYS, *own_keys}
-        self.setAccessibleName(name)
         self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
         self.setEditTriggers(
             QAbstractItemView.EditTrigger.DoubleClicked
             | QAbstractItemView.EditTrigger.EditKeyPressed
         )
-        self.setShowGrid(False)
         self.setWordWrap(False)
         self.setHorizontalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
-        self.verticalHeader().hide()
-        self.verticalHeader().setDefaultSectionSize(ROW_PX)
-        self.horizontalHeader().setHighlightSections(False)
         self.horizontalHeader().setStretchLastSection(True)
 
     def event(self, event: QEvent) -> bool:

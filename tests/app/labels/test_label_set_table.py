@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from PySide6.QtTest import QAbstractItemModelTester
 
-from sd2app.labels.columns import Change
 from sd2app.labels.label_set_model import (
     CLASS,
     COLOUR,
@@ -18,6 +19,7 @@ from sd2app.labels.model import LabelsModel
 from sd2app.settings import Settings
 from sd2app.shell.keys.bindings import KeyBindings
 from sd2core.errors import Sd2Error
+from sd2core.labels.edits import Change
 from sd2core.labels.label_set import GESTURES
 from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.timebase import Timebase
@@ -130,7 +132,7 @@ def test_labels_are_put_in_another_order_and_removed(edited) -> None:
 
 
 def test_the_set_has_a_name(edited) -> None:
-    assert edited.model.rename_set(" Mine ")
+    assert edited.model.use(replace(GESTURES, name="Mine"))
     assert edited.labels.labels.label_set.name == "Mine"
     assert edited.labels.labels.label_set.labels == GESTURES.labels
 

@@ -9,11 +9,11 @@ from labelled import even, imported, many_spans, random_edit
 from PySide6.QtCore import QItemSelectionModel, QPersistentModelIndex, Qt
 from PySide6.QtTest import QAbstractItemModelTester
 
-from sd2app.labels.columns import COLUMNS, Change
 from sd2app.labels.model import LabelsModel
-from sd2app.labels.table_model import SpanFilter, SpanTableModel
+from sd2app.labels.table_model import COLUMNS, SpanFilter, SpanTableModel
 from sd2app.session.playback import PlaybackModel
 from sd2core.errors import Sd2Error
+from sd2core.labels.edits import Change
 from sd2core.labels.spans import Labels, LabelTrack, Span
 
 AT = {column.id: place for place, column in enumerate(COLUMNS)}
@@ -179,10 +179,10 @@ def test_a_label_goes_to_all_that_are_selected_and_a_note_does_not(table) -> Non
 
 
 def test_choices_are_the_labels_of_the_set_then_others_and_the_tracks(table) -> None:
-    labels = table.model.choices(COLUMNS[AT["label"]])
+    labels = table.model.choices("label")
     assert labels[0] == "left-to-right"
     assert labels[-1] == "clap"
-    assert table.model.choices(COLUMNS[AT["track"]]) == ["Gestures", "Free"]
+    assert table.model.choices("track") == ["Gestures", "Free"]
 
 
 def test_nothing_is_made_while_nobody_looks(table) -> None:

@@ -17,8 +17,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QToolButton
 from window_models import models_of
 
-from sd2app.labels.recovery_bar import LabelBar
-from sd2app.labels.recovery_dialog import RecoverLabelsDialog
+from sd2app.labels.recovery import LabelBar, RecoverLabelsDialog
 from sd2app.labels.timeline import ROW_PX, LabelTimeline
 from sd2core.labels.recovery import RecoveryPlace, offers_in, recovery_folder
 from sd2core.labels.spans import Span
@@ -174,7 +173,7 @@ class TestAfterACrash:
             assert not dialog._open.isEnabled()
             assert "is not there any more" in dialog._open.toolTip()
             monkeypatch.setattr(
-                "sd2app.labels.recovery_dialog.QFileDialog.getSaveFileName",
+                "sd2app.labels.recovery.QFileDialog.getSaveFileName",
                 lambda *_: (str(out), ""),
             )
             qtbot.mouseClick(dialog._write, Qt.MouseButton.LeftButton)

@@ -4,8 +4,16 @@ from __future__ import annotations
 
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QColor
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QFileDialog, QLabel, QLineEdit, QToolButton
+from PySide6.QtWidgets import (
+    QApplication,
+    QColorDialog,
+    QFileDialog,
+    QLabel,
+    QLineEdit,
+    QToolButton,
+)
 from window_models import models_of
 
 from sd2app.labels.label_set_model import COLOUR, KEY, NAME
@@ -111,7 +119,7 @@ def test_a_colour_is_chosen_from_a_list_and_likeness_is_said(window, page) -> No
 
 
 def test_any_other_colour_is_asked_for(window, page, qtbot, monkeypatch) -> None:
-    monkeypatch.setattr(page.table.itemDelegate()._asks, "ask_colour", lambda colour: "#123456")
+    monkeypatch.setattr(QColorDialog, "getColor", lambda *_: QColor("#123456"))
     go(page, 0, COLOUR)
     press(Qt.Key.Key_Return)
     press(Qt.Key.Key_End)
@@ -137,7 +145,7 @@ def test_order_and_name_of_the_set(window, page) -> None:
     assert page.table.currentIndex().row() == 2
     page._name.setFocus()
     press(Qt.Key.Key_A, CONTROL)
-    QTest.keyClicks(page._name, "Mine")
+    QTest.keyClicks(page._name, " Mine ")
     press(Qt.Key.Key_Return)
     assert models_of(window).labels.labels.label_set.name == "Mine"
 

@@ -9,9 +9,9 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit, QToolButton
 from window_models import models_of
 
-from sd2app.labels.columns import COLUMNS
 from sd2app.labels.panel import LabelsPanel
 from sd2app.labels.table import SpanTable
+from sd2app.labels.table_model import COLUMNS
 from sd2app.labels.timeline import ROW_PX, LabelTimeline
 from sd2app.widgets.table import ListedEditor
 

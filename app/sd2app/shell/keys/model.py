@@ -9,11 +9,11 @@ from typing import Any
 from PySide6.QtCore import QObject, Qt
 from PySide6.QtGui import QFont
 
-from sd2app.labels.columns import Change
 from sd2app.labels.model import LabelsModel
 from sd2app.shell.keys.bindings import KeyBindings
 from sd2app.widgets.key_text import canonical, native
 from sd2app.widgets.record_table import Heading, Index, RecordTableModel
+from sd2core.labels.edits import Change
 from sd2core.labels.field_edits import set_key
 
 _HEADINGS = (Heading("Menu"), Heading("What it does"), Heading("Keys", editable=True))

@@ -1,0 +1,240 @@
+"""Offers of labels that were not saved: a bar above the window, and a list of all recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from PySide6.QtCore import QSize, Qt
+from PySide6.QtWidgets import (
+    QDialog,
+    QDialogButtonBox,
+    QFileDialog,
+    QFrame,
+    QHBoxLayout,
+    QHeaderView,
+    QMessageBox,
+    QSizePolicy,
+    QToolButton,
+    QTreeWidget,
+    QTreeWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from sd2app.labels.autosave import LabelAutosave
+from sd2app.labels.edits import LabelEdits
+from sd2app.session.document import DocumentModel
+from sd2app.widgets.dialogs import may_delete
+from sd2app.widgets.panel import outlined, sentence, title
+from sd2app.widgets.text import clock_text, counted
+from sd2core.errors import Sd2Error
+from sd2core.labels.comparison import compare
+from sd2core.labels.files import write_labels
+from sd2core.labels.recovery import Offer
+
+_SAID = (
+    "Edits of labels that were not saved when the program ended. Open a recording to see what"
+    " they change."
+)
+_NOTHING = "There is nothing to recover: all edits were saved or discarded."
+_ROW_PX, _MARGIN_PX, _BAR_PX = 24, 16, 40
+_HEADINGS = ("Recording", "Edits that were not saved", "Holds", "")
+
+
+def _edits_text(offer: Offer) -> str:
+    """Number of edits, and time and name of the last."""
+    edits, until = counted(offer.edits, "edit"), clock_text(offer.time_unix_s)
+    return f"{edits} until {until}, the last “{offer.last}”"
+
+
+class LabelBar(QFrame):
+    """Offers what the user has to decide about the labels; hidden when there is nothing.
+
+    ``recover`` opens the list for all recordings.
+    """
+
+    def __init__(
+        self,
+        autosave: LabelAutosave,
+        edits: LabelEdits,
+        document: DocumentModel,
+        recover: Callable[[], None],
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self.setObjectName("panel")
+        self.setAccessibleName("State of the labels")
+        self.setMinimumHeight(_BAR_PX)
+        self._autosave, self._document = autosave, document
+        self._title, self._text = title(""), sentence("")
+        self._text.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(12, 4, 4, 4)
+        layout.setSpacing(8)
+        layout.addWidget(self._title)
+        layout.addWidget(self._text, 1)
+        self._buttons: dict[str, QToolButton] = {}
+        for name, text, tip, run in (
+            ("again", "Try again", "Edit them here, once the other window is closed",
+             autosave.try_again),
+            ("restore", "Restore", "Use these labels; one undo takes that back", edits.restore),
+            ("decline", "Discard", "Do not offer them again; File → Recover labels… lists them",
+             autosave.decline),
+            ("postpone", "Not now", "Offer them again when this recording is opened next",
+             autosave.postpone),
+            ("recover", "Recover labels…", "See what is there, and open its recording", recover),
+            ("close", "✕", "Close this message", autosave.dismiss),
+        ):  # fmt: skip
+            self._buttons[name] = outlined(text, tip, run, self)
+            layout.addWidget(self._buttons[name])
+        self._buttons["close"].setObjectName("")
+        self._buttons["close"].setAccessibleName("Close this message")
+        autosave.changed.connect(self._refresh)
+        # What is offered is compared with what is there by now.
+        document.undo_stack.indexChanged.connect(self._refresh)
+        self._refresh()
+
+    @property
+    def text(self) -> str:
+        """Text shown, empty while hidden."""
+        return "" if self.isHidden() else f"{self._title.text()}: {self._text.text()}"
+
+    def _refresh(self) -> None:
+        autosave, offer = self._autosave, self._autosave.offer
+        if autosave.read_only:
+            said = "Labels are read-only", f"{autosave.refusal}."
+            shown = {"again"}
+        elif offer is not None:
+            said = "Labels were not saved", self._offered(offer)
+            shown = {"restore", "decline", "postpone"}
+        elif autosave.notes:
+            said, shown = ("Labels", ""), {"close"}
+        else:
+            said = "Labels were not saved", self._waiting()
+            shown = {"recover", "close"}
+        self._title.setText(said[0])
+        self._text.setText("\n".join(filter(None, (said[1], *autosave.notes))))
+        for name, button in self._buttons.items():
+            button.setVisible(name in shown)
+        self.setVisible(bool(self._text.text()))
+
+    def _offered(self, offer: Offer) -> str:
+        """Offer, compared with the open labels."""
+        holds, difference = offer.labels, compare(self._document.labels, offer.labels)
+        spans = counted(len(holds.spans), "span")
+        return f"{_edits_text(offer)}. {spans}; against what is open: {difference}."
+
+    def _waiting(self) -> str:
+        """Names of the recordings with unsaved labels; empty without any."""
+        offers = self._autosave.waiting.offers
+        names = list(dict.fromkeys(one.recording.name for one in offers if not one.declined))
+        if not names:
+            return ""
+        listed = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
+        return f"The program ended before labels were saved: {listed}."
+
+
+def choose_recovery(autosave: LabelAutosave, parent: QWidget) -> Offer | None:
+    """Show the dialog; return the offer whose recording is to be opened."""
+    dialog = RecoverLabelsDialog(autosave, parent)
+    accepted = dialog.exec() == QDialog.DialogCode.Accepted
+    dialog.deleteLater()
+    return dialog.offer if accepted else None
+
+
+class RecoverLabelsDialog(QDialog):
+    """A row for each session with unsaved edits: open, write to a file, discard."""
+
+    def __init__(self, autosave: LabelAutosave, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._autosave = autosave
+        self.setWindowTitle("Recover labels")
+        self._said, self._notes = sentence(""), sentence("", "warning")
+        self._said.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self._list = QTreeWidget(self)
+        self._list.setHeaderLabels(_HEADINGS)
+        self._list.setAccessibleName("Labels that can be recovered")
+        self._list.setRootIsDecorated(False)
+        self._list.setUniformRowHeights(True)
+        self._list.setAllColumnsShowFocus(True)
+        self._list.header().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        self._list.currentItemChanged.connect(self._follow)
+        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close, self)
+        roles = QDialogButtonBox.ButtonRole
+        self._open = buttons.addButton("Open recording", roles.AcceptRole)
+        self._write = buttons.addButton("Write to file…", roles.ActionRole)
+        self._discard = buttons.addButton("Discard", roles.ActionRole)
+        self._list.itemActivated.connect(lambda *_: self._open.isEnabled() and self.accept())
+        self._open.clicked.connect(self.accept)
+        self._write.clicked.connect(self._write_file)
+        self._discard.clicked.connect(self._give_up)
+        buttons.rejected.connect(self.reject)
+        layout = QVBoxLayout(self)
+        for one in (self._said, self._list, self._notes, buttons):
+            layout.addWidget(one)
+        self.resize(800, 320)
+        self._fill()
+
+    def _fill(self) -> None:
+        found = self._autosave.recoveries()
+        self._list.clear()
+        for offer in found.offers:
+            name, spans = offer.recording.name, counted(len(offer.labels.spans), "span")
+            declined = "discarded" if offer.declined else ""
+            item = QTreeWidgetItem([name, _edits_text(offer), spans, declined])
+            item.setData(0, Qt.ItemDataRole.UserRole, offer)
+            item.setToolTip(0, str(offer.recording))
+            width = self._list.fontMetrics().horizontalAdvance(name)
+            item.setSizeHint(0, QSize(width + _MARGIN_PX, _ROW_PX))
+            self._list.addTopLevelItem(item)
+        self._said.setText(_SAID if found.offers else _NOTHING)
+        self._list.setVisible(bool(found.offers))
+        self._notes.setText("\n".join(found.notes))
+        self._notes.setVisible(bool(found.notes))
+        if (first := self._list.topLevelItem(0)) is not None:
+            self._list.setCurrentItem(first)
+        self._follow()
+
+    @property
+    def offer(self) -> Offer | None:
+        """Offer of the current row."""
+        item = self._list.currentItem()
+        return None if item is None else item.data(0, Qt.ItemDataRole.UserRole)
+
+    def _follow(self) -> None:
+        offer = self.offer
+        there = offer is not None and offer.recording.exists()
+        self._open.setEnabled(there)
+        self._open.setToolTip(
+            f"{offer.recording} is not there any more; its labels can be written to a file"
+            if offer is not None and not there
+            else "Its labels are offered there beside those that were saved"
+        )
+        self._write.setEnabled(offer is not None)
+        self._discard.setEnabled(offer is not None)
+        declined = offer is not None and offer.declined
+        self._discard.setText("Delete…" if declined else "Discard")
+        self._discard.setToolTip(
+            "Delete them for good" if declined else "Offer them no more; this list keeps them"
+        )
+
+    def _write_file(self) -> None:
+        offer = self.offer
+        assert offer is not None
+        name, _ = QFileDialog.getSaveFileName(
+            self, "Write labels", f"{offer.recording.stem}-labels.json", "Labels (*.json)"
+        )
+        if name:
+            try:
+                write_labels(Path(name), offer.labels, recording=offer.recording)
+            except (OSError, Sd2Error) as error:
+                QMessageBox.warning(self, "Write labels", str(error))
+
+    def _give_up(self) -> None:
+        offer = self.offer
+        assert offer is not None
+        what = f"{_edits_text(offer)} of {offer.recording.name} are deleted and cannot be restored."
+        if not offer.declined or may_delete(self, "Delete for good?", what):
+            self._autosave.give_up(offer)
+            self._fill()
