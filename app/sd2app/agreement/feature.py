@@ -24,7 +24,7 @@ class AgreementFeature(Feature):
         self, session: Session, shell: Shell, labels: LabelsModel, parent: QObject
     ) -> None:
         self._session, self._shell = session, shell
-        self.model = AgreementModel(labels, session.playback, session.span, parent)
+        self.model = AgreementModel(session, labels, parent)
 
     def actions(self) -> Sequence[Action]:
         """Comparison of labels."""
@@ -70,7 +70,7 @@ class AgreementFeature(Feature):
         s = self._session
         return {
             "Agree": AgreementPanel(self.model, s.playback, self._shell.action),
-            "other labels": OtherTimeline(self.model, s.span, s.playback, s.display),
+            "other labels": OtherTimeline(s, self.model),
         }
 
     def changes(self) -> Sequence[SignalInstance]:

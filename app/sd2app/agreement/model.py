@@ -4,23 +4,19 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Literal
 
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.latest import Emit, LatestRunner
 from sd2app.labels.model import LabelsModel
-from sd2app.session.playback import PlaybackModel
-from sd2app.session.time_window import TimeWindow
+from sd2app.session.session import Session
 from sd2core.labels.agreement import Agreement, Disagreement, agreement, disagreements
 from sd2core.labels.formats import read_labels
 from sd2core.labels.import_labels import Incoming
 from sd2core.labels.spans import Labels
 
-
-class _Compared(NamedTuple):
-    found: Agreement
-    stretches: tuple[Disagreement, ...]
+Compared = tuple[Agreement, tuple[Disagreement, ...]]
 
 
 class AgreementModel(QObject):
@@ -33,24 +29,21 @@ class AgreementModel(QObject):
     failed = Signal(str)  # reason why a file could not be read
 
     def __init__(
-        self,
-        labels: LabelsModel,
-        playback: PlaybackModel,
-        span: TimeWindow,
-        parent: QObject | None = None,
+        self, session: Session, labels: LabelsModel, parent: QObject | None = None
     ) -> None:
         super().__init__(parent)
-        self._labels, self._playback, self._span = labels, playback, span
+        self._labels, self._playback, self._span = labels, session.playback, session.span
         self.other = LabelsModel(self)
-        self._path: Path | None = None
-        self._left_out = 0
-        self._compared: _Compared | None = None
+        self.path: Path | None = None  # of the other person's labels, while they are open
+        self.left_out = 0  # spans of theirs outside the recording
+        self.found: Agreement | None = None  # until it is computed
+        self.disagreements: tuple[Disagreement, ...] = ()  # in order
         self._reader = LatestRunner("labels", self)
         self._reader.finished.connect(self._receive)
-        self._reader.failed.connect(lambda error: self.failed.emit(str(error)))
         self._comparer = LatestRunner("agreement", self)
         self._comparer.finished.connect(self._take)
-        self._comparer.failed.connect(lambda error: self.failed.emit(str(error)))
+        for runner in (self._reader, self._comparer):
+            runner.failed.connect(lambda error: self.failed.emit(str(error)))
         labels.changed.connect(self._compare)
 
     # --- what is there --------------------------------------------------------------------
@@ -58,7 +51,7 @@ class AgreementModel(QObject):
     @property
     def active(self) -> bool:
         """True while another person's labels are open."""
-        return self._path is not None
+        return self.path is not None
 
     @property
     def busy(self) -> bool:
@@ -68,27 +61,7 @@ class AgreementModel(QObject):
     @property
     def name(self) -> str:
         """Name of the other person: that of the file."""
-        return self._path.stem if self._path is not None else ""
-
-    @property
-    def path(self) -> Path | None:
-        """Path of the other person's file."""
-        return self._path
-
-    @property
-    def left_out(self) -> int:
-        """Number of the other's spans outside the recording."""
-        return self._left_out
-
-    @property
-    def found(self) -> Agreement | None:
-        """Agreement of the two; None until it is computed."""
-        return self._compared.found if self._compared is not None else None
-
-    @property
-    def disagreements(self) -> tuple[Disagreement, ...]:
-        """Disagreements, in order."""
-        return self._compared.stretches if self._compared is not None else ()
+        return self.path.stem if self.path is not None else ""
 
     @property
     def current(self) -> int | None:
@@ -114,8 +87,9 @@ class AgreementModel(QObject):
         """End the comparison."""
         self._reader.cancel()
         self._comparer.cancel()
-        if self._path is not None:
-            self._path, self._compared = None, None
+        if self.active:
+            self.path = None
+            self.found, self.disagreements = None, ()
             self.other.open(Labels())
             self.changed.emit()
 
@@ -139,9 +113,9 @@ class AgreementModel(QObject):
     # --- inside ---------------------------------------------------------------------------
 
     def _receive(self, result: tuple[Path, Incoming]) -> None:
-        self._path, incoming = result
-        self._left_out = len(incoming.outside)
-        self._compared = None
+        self.path, incoming = result
+        self.left_out = len(incoming.outside)
+        self.found, self.disagreements = None, ()
         # Colours are those of this recording wherever it has the label.
         own = self._labels.labels.label_set
         names = {one.name for one in own.labels}
@@ -151,21 +125,19 @@ class AgreementModel(QObject):
         self._compare()
 
     def _compare(self) -> None:
-        if self._path is None:
+        if not self.active:
             return
         mine, theirs = _answers(self._labels.labels), _answers(self.other.labels)
         base = self._playback.timebase
 
-        def compare(emit: Emit) -> _Compared:
-            return _Compared(
-                agreement(mine, theirs, base), disagreements(mine.spans, theirs.spans, base)
-            )
+        def compare(emit: Emit) -> Compared:
+            return agreement(mine, theirs, base), disagreements(mine.spans, theirs.spans, base)
 
         self._comparer.submit(compare)
         self.changed.emit()
 
-    def _take(self, compared: _Compared) -> None:
-        self._compared = compared
+    def _take(self, compared: Compared) -> None:
+        self.found, self.disagreements = compared
         self.changed.emit()
 
 

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QRectF, QSize, Qt
-from PySide6.QtGui import QBrush, QColor, QMouseEvent, QPainter, QPaintEvent
+from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from sd2app.agreement.model import AgreementModel
-from sd2app.labels.painting import paint_spans
-from sd2app.labels.rows import LabelRows
-from sd2app.session.display import DisplayModel
-from sd2app.session.playback import PlaybackModel
-from sd2app.session.time_window import TimeWindow
+from sd2app.labels.painting import LabelRows, paint_tracks
+from sd2app.session.session import Session
 from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, TimeScale, paint_cursor
 
 _MARKS_PX = 7.0
@@ -24,20 +21,18 @@ class OtherTimeline(QWidget):
     """
 
     def __init__(
-        self,
-        model: AgreementModel,
-        span: TimeWindow,
-        playback: PlaybackModel,
-        display: DisplayModel,
-        parent: QWidget | None = None,
+        self, session: Session, model: AgreementModel, parent: QWidget | None = None
     ) -> None:
         super().__init__(parent)
-        self._model = model
-        self._span, self._playback, self._display = span, playback, display
+        self._session, self._model = session, model
         self._rows = LabelRows((), ())
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         model.changed.connect(self._follow)
-        for signal in (span.changed, playback.frame_changed, display.theme_changed):
+        for signal in (
+            session.span.changed,
+            session.playback.frame_changed,
+            session.display.theme_changed,
+        ):
             signal.connect(self.update)
         self._follow()
 
@@ -48,7 +43,7 @@ class OtherTimeline(QWidget):
     @property
     def scale(self) -> TimeScale:
         """Time axis of this widget."""
-        return TimeScale(self._span.start_s, self._span.end_s, self.width())
+        return TimeScale(self._session.span.start_s, self._session.span.end_s, self.width())
 
     def _follow(self) -> None:
         model, other = self._model, self._model.other
@@ -67,13 +62,12 @@ class OtherTimeline(QWidget):
             self._paint(painter)
 
     def _paint(self, painter: QPainter) -> None:
-        palette, scale = self._display.palette, self.scale
+        palette, scale = self._session.display.palette, self.scale
         painter.fillRect(self.rect(), QColor(palette.panel))
         width = self.width() - GUTTER_PX - MARGIN_PX
-        marks = QRectF(GUTTER_PX, 0, width, _MARKS_PX)
-        plot = QRectF(GUTTER_PX, _MARKS_PX, width, self.height() - _MARKS_PX)
+        whole = QRectF(GUTTER_PX, 0, width, self.height())
         painter.save()
-        painter.setClipRect(marks.united(plot))
+        painter.setClipRect(whole)
         for one in self._model.disagreements:
             if one.end_s > scale.start_s and one.start_s < scale.end_s:
                 left, right = scale.x_of(one.start_s), scale.x_of(one.end_s)
@@ -81,33 +75,15 @@ class OtherTimeline(QWidget):
                 painter.fillRect(mark, QColor(palette.warning))
         painter.restore()
         painter.translate(0.0, _MARKS_PX)
-        self._paint_rows(painter, plot.translated(0.0, -_MARKS_PX), scale)
+        plot = QRectF(GUTTER_PX, 0, width, self._rows.height_px)
+        other, rows = self._model.other, self._rows.tracks
+        paint_tracks(painter, plot, scale, other, rows, palette, foreign=self._model.name)
         painter.translate(0.0, -_MARKS_PX)
-        paint_cursor(painter, marks.united(plot), scale.x_of(self._playback.time_s))
-
-    def _paint_rows(self, painter: QPainter, plot: QRectF, scale: TimeScale) -> None:
-        palette = self._display.palette
-        for row in self._rows.tracks:
-            well = plot.adjusted(0, row.top_px + 1 - plot.top(), 0, 0)
-            well.setHeight(row.height_px - 2)
-            painter.fillRect(well, QColor(palette.well))
-            painter.fillRect(well, QBrush(QColor(palette.border), Qt.BrushStyle.FDiagPattern))
-            painter.setPen(QColor(palette.muted))
-            room = QRectF(0, row.top_px, GUTTER_PX - 6, row.height_px)
-            called = row.name if len(self._rows.tracks) > 1 else self._model.name
-            name = painter.fontMetrics().elidedText(
-                called, Qt.TextElideMode.ElideRight, int(room.width())
-            )
-            place = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-            painter.drawText(room, place, name)
-        painter.save()
-        painter.setClipRect(plot)
-        paint_spans(painter, plot, scale, self._model.other, self._rows.tracks, palette)
-        painter.restore()
+        paint_cursor(painter, whole, scale.x_of(self._session.playback.time_s))
 
     # --- the hand -------------------------------------------------------------------------
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         """Go to a time."""
         if event.button() == Qt.MouseButton.LeftButton and event.position().x() >= GUTTER_PX:
-            self._playback.seek(self.scale.time_of(event.position().x()))
+            self._session.playback.seek(self.scale.time_of(event.position().x()))

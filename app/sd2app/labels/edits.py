@@ -64,6 +64,7 @@ class LabelEdits(QObject):
     ) -> None:
         super().__init__(parent)
         self.labels, self.playback = labels, playback
+        self.undo_stack = document.undo_stack
         self._document, self._session = document, session
 
     @property
@@ -212,7 +213,7 @@ class LabelEdits(QObject):
         if done.labels is not before:
             step = _Step(done.name, self._become, before, done.labels)
             step.redo()
-            self._document.undo_stack.push(step)
+            self.undo_stack.push(step)
         if done.ids:
             self.labels.select(done.ids)
 

@@ -320,9 +320,7 @@ class LabelsFeature(Feature):
         """The panel at the side, and the timeline below the maps."""
         s, shell = self._session, self._shell
         panel = LabelsPanel(s, self.edits, shell)
-        timeline = LabelTimeline(
-            self.model, self.edits, self.dragging, self.loop, s.span, s.playback, s.display
-        )
+        timeline = LabelTimeline(s, self.edits, self.dragging, self.loop)
         return {"Labels": panel, "labels": LabelArea(timeline, self.model)}
 
     def bars(self) -> Sequence[QWidget]:

@@ -1,22 +1,27 @@
-"""Painting of spans: boxes on the timeline, tinted parts of maps; narrow ones together."""
+"""Tracks of spans as they are drawn: rows and lanes, boxes on timelines, tints of maps."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QLineF, QRectF, Qt
 from PySide6.QtGui import QBrush, QColor, QImage, QPainter, QPen
 
-from sd2app.labels.arrays import WIDE_PX, SpanColumns
-from sd2app.labels.model import LabelsModel
-from sd2app.labels.rows import TrackRow
+from sd2app.labels.arrays import WIDE_PX, SpanArrays, SpanColumns
+from sd2app.labels.model import LabelsModel, Mark
 from sd2app.palette import Palette
-from sd2app.widgets.time_axis import TimeScale
+from sd2app.widgets.time_axis import GUTTER_PX, TimeScale
 from sd2app.widgets.time_plot import Overlay
-from sd2core.labels.spans import Span
+from sd2core.labels.spans import LabelTrack, Span
 
+ROW_PX = 24.0
+"""Height of a track whose spans do not overlap."""
+_LANE_PX, _HIGHEST_PX = 17.0, 72.0
+_GAP_PX = 1.0
 _TINT, _SELECTED_TINT = 64, 136
 _NARROW_TINTS = 90, 255
 """Opacities of columns that narrow spans cover hardly and wholly."""
@@ -27,6 +32,81 @@ _EDGES_FROM_PX = 12.0
 _OVERVIEW_TINTS = 130, 255
 _TEXT_FROM_PX = 26.0
 _INSET_PX = 1.0
+_CHOSEN_PX = 3.0
+_SMALL = 0.82
+"""Share of the font size for names that would not fit otherwise."""
+
+
+@dataclass(frozen=True)
+class TrackRow:
+    """Row of one track; its lanes share the height."""
+
+    name: str
+    top_px: float
+    height_px: float
+    lanes: int
+
+    def lane_px(self, lane: int) -> tuple[float, float]:
+        """Return top and height of a lane."""
+        height_px = (self.height_px - 2 * _GAP_PX) / self.lanes
+        return self.top_px + _GAP_PX + lane * height_px, height_px
+
+    def lane_at(self, y_px: float) -> int:
+        """Return the lane at a height."""
+        lane = int((y_px - self.top_px - _GAP_PX) * self.lanes / (self.height_px - 2 * _GAP_PX))
+        return min(max(lane, 0), self.lanes - 1)
+
+
+@dataclass(frozen=True)
+class LabelRows:
+    """Rows of all tracks, from top to bottom, and the lane of each mark."""
+
+    tracks: tuple[TrackRow, ...]
+    mark_lanes: tuple[int, ...]
+
+    @classmethod
+    def of(
+        cls, tracks: Sequence[LabelTrack], arrays: SpanArrays, marks: Sequence[Mark]
+    ) -> LabelRows:
+        """Lay out tracks, each as high as its lanes need, up to a limit."""
+        counts = list(arrays.lanes_of_track)
+        numbers = {track.name: number for number, track in enumerate(tracks)}
+        mark_lanes: list[int] = []
+        taken: set[tuple[int, int]] = set()
+        for mark in marks:
+            number = numbers[mark.track]
+            lane = 0
+            if tracks[number].overlap == "free":
+                later = (arrays.tracks == number) & (arrays.ends_s > mark.start_s)
+                busy = {*arrays.lanes[later].tolist()}
+                while lane in busy or (number, lane) in taken:
+                    lane += 1
+            taken.add((number, lane))
+            counts[number] = max(counts[number], lane + 1)
+            mark_lanes.append(lane)
+        rows, top_px = [], 0.0
+        for track, lanes in zip(tracks, counts, strict=True):
+            height_px = ROW_PX if lanes == 1 else min(lanes * _LANE_PX, _HIGHEST_PX)
+            rows.append(TrackRow(track.name, top_px, height_px, lanes))
+            top_px += height_px
+        return cls(tuple(rows), tuple(mark_lanes))
+
+    @property
+    def height_px(self) -> float:
+        """Height of all tracks, of one at least."""
+        last = self.tracks[-1] if self.tracks else TrackRow("", 0.0, ROW_PX, 1)
+        return last.top_px + last.height_px
+
+    def row_at(self, y_px: float) -> TrackRow | None:
+        """Return the row at a height."""
+        for row in self.tracks:
+            if row.top_px <= y_px < row.top_px + row.height_px:
+                return row
+        return None
+
+    def row_of(self, track: str) -> TrackRow:
+        """Return the row of a track; it must exist."""
+        return next(row for row in self.tracks if row.name == track)
 
 
 def paint_span(
@@ -75,16 +155,74 @@ def lane_box(row: TrackRow, lane: int, left: float, right: float) -> QRectF:
     return QRectF(left, top + inset, max(right - left, 2.0), height - 2 * inset)
 
 
-def paint_spans(
+def paint_tracks(
     painter: QPainter,
     plot: QRectF,
     scale: TimeScale,
     model: LabelsModel,
-    rows: tuple[TrackRow, ...],
+    rows: Sequence[TrackRow],
+    palette: Palette,
+    *,
+    foreign: str = "",
+) -> None:
+    """Paint the rows of tracks with their names, and all spans in view.
+
+    Rows of a ``foreign`` person are hatched, and a single one has the name of that person.
+    """
+    _paint_names(painter, model, rows, palette, foreign)
+    for row in rows:
+        well = QRectF(plot.left(), row.top_px + 1, plot.width(), row.height_px - 2)
+        painter.fillRect(well, QColor(palette.well))
+        if foreign:
+            painter.fillRect(well, QBrush(QColor(palette.border), Qt.BrushStyle.FDiagPattern))
+    painter.save()
+    painter.setClipRect(plot)
+    _paint_spans(painter, plot, scale, model, rows, palette)
+    painter.restore()
+
+
+def _paint_names(
+    painter: QPainter,
+    model: LabelsModel,
+    rows: Sequence[TrackRow],
+    palette: Palette,
+    foreign: str,
+) -> None:
+    room_px = GUTTER_PX - 11
+    names = [foreign] if foreign and len(rows) == 1 else [row.name for row in rows]
+    painter.save()
+    if any(painter.fontMetrics().horizontalAdvance(name) > room_px for name in names):
+        font = painter.font()
+        font.setPixelSize(round(_SMALL * painter.fontInfo().pixelSize()))
+        painter.setFont(font)
+    metrics = painter.fontMetrics()
+    place = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+    for name, row in zip(names, rows, strict=True):
+        chosen = not foreign and name == model.track and len(rows) > 1
+        painter.setPen(QColor(palette.accent if chosen else palette.muted))
+        if chosen:
+            bar = QRectF(0, row.top_px + 3, _CHOSEN_PX, row.height_px - 6)
+            painter.fillRect(bar, QColor(palette.accent))
+        room = QRectF(5, row.top_px, room_px, row.height_px)
+        whole = metrics.horizontalAdvance(name) <= room_px
+        words = max(map(metrics.horizontalAdvance, name.split()), default=0)
+        if not whole and words <= room_px and row.height_px > 2 * metrics.height():
+            painter.drawText(room, place | Qt.TextFlag.TextWordWrap, name)
+        else:
+            shown = metrics.elidedText(name, Qt.TextElideMode.ElideRight, room_px)
+            painter.drawText(room, place, shown)
+    painter.restore()
+
+
+def _paint_spans(
+    painter: QPainter,
+    plot: QRectF,
+    scale: TimeScale,
+    model: LabelsModel,
+    rows: Sequence[TrackRow],
     palette: Palette,
 ) -> None:
-    """Paint all spans in view, each in its lane."""
-    columns = columns_in(painter, plot, scale, model)
+    columns = _columns_in(painter, plot, scale, model)
     arrays = model.arrays
     image = _tinted(columns, arrays.colours, _NARROW_TINTS)
     marked = _marked(columns, palette)
@@ -121,10 +259,27 @@ def _text(span: Span) -> str:
 
 
 def map_overlay(model: LabelsModel) -> Overlay:
-    """Make the overlay of spans on a map."""
+    """Make the overlay of spans on a map: tinted, selected ones more, with edges where wide."""
 
     def paint(painter: QPainter, plot: QRectF, scale: TimeScale) -> None:
-        paint_regions(painter, plot, scale, model)
+        columns = _columns_in(painter, plot, scale, model, together=True, wide_px=math.inf)
+        arrays = model.arrays
+        tints = np.where(columns.selected, _SELECTED_REGION_TINT, _REGION_TINT) * columns.share
+        painter.save()
+        painter.setClipRect(plot)
+        painter.drawImage(plot, _coloured(columns, arrays.colours, tints))
+        edges: dict[tuple[int, bool], list[QLineF]] = {}
+        for number in _columns_in(painter, plot, scale, model).wide.tolist():
+            span, tone = arrays.spans[number], int(arrays.tones[number])
+            left, right = scale.x_of(span.start_s), scale.x_of(span.end_s)
+            if right - left >= _EDGES_FROM_PX:
+                lines = edges.setdefault((tone, span.origin == "suggestion"), [])
+                lines += [QLineF(x, plot.top(), x, plot.bottom()) for x in (left, right)]
+        for (tone, suggested), lines in edges.items():
+            style = Qt.PenStyle.DashLine if suggested else Qt.PenStyle.SolidLine
+            painter.setPen(QPen(QColor(arrays.colours[tone]), 1.0, style))
+            painter.drawLines(lines)
+        painter.restore()
 
     return Overlay(paint, (model.changed, model.selection_changed))
 
@@ -133,40 +288,13 @@ def strip_overlay(model: LabelsModel) -> Overlay:
     """Make the overlay of the spans of all tracks as one line."""
 
     def paint(painter: QPainter, strip: QRectF, scale: TimeScale) -> None:
-        paint_strip(painter, strip, scale, model)
+        columns = _columns_in(painter, strip, scale, model, together=True, wide_px=math.inf)
+        painter.drawImage(strip, _tinted(columns, model.arrays.colours, _OVERVIEW_TINTS))
 
     return Overlay(paint, (model.changed,))
 
 
-def paint_regions(painter: QPainter, plot: QRectF, scale: TimeScale, model: LabelsModel) -> None:
-    """Paint spans on a map: tinted, selected ones more, with edges where wide."""
-    columns = columns_in(painter, plot, scale, model, together=True, wide_px=math.inf)
-    arrays = model.arrays
-    tints = np.where(columns.selected, _SELECTED_REGION_TINT, _REGION_TINT) * columns.share
-    painter.save()
-    painter.setClipRect(plot)
-    painter.drawImage(plot, _coloured(columns, arrays.colours, tints))
-    edges: dict[tuple[int, bool], list[QLineF]] = {}
-    for number in columns_in(painter, plot, scale, model).wide.tolist():
-        span, tone = arrays.spans[number], int(arrays.tones[number])
-        left, right = scale.x_of(span.start_s), scale.x_of(span.end_s)
-        if right - left >= _EDGES_FROM_PX:
-            lines = edges.setdefault((tone, span.origin == "suggestion"), [])
-            lines += [QLineF(x, plot.top(), x, plot.bottom()) for x in (left, right)]
-    for (tone, suggested), lines in edges.items():
-        style = Qt.PenStyle.DashLine if suggested else Qt.PenStyle.SolidLine
-        painter.setPen(QPen(QColor(arrays.colours[tone]), 1.0, style))
-        painter.drawLines(lines)
-    painter.restore()
-
-
-def paint_strip(painter: QPainter, strip: QRectF, scale: TimeScale, model: LabelsModel) -> None:
-    """Paint all spans of all tracks in one line."""
-    columns = columns_in(painter, strip, scale, model, together=True, wide_px=math.inf)
-    painter.drawImage(strip, _tinted(columns, model.arrays.colours, _OVERVIEW_TINTS))
-
-
-def columns_in(
+def _columns_in(
     painter: QPainter,
     plot: QRectF,
     scale: TimeScale,
@@ -175,7 +303,7 @@ def columns_in(
     together: bool = False,
     wide_px: float = WIDE_PX,
 ) -> SpanColumns:
-    """Compute the spans in view, one column per device pixel."""
+    """Spans in view, one column per device pixel."""
     ratio = painter.device().devicePixelRatioF()
     count = max(round(plot.width() * ratio), 1)
     return model.columns(scale.start_s, scale.end_s, count, wide_px * ratio, together=together)

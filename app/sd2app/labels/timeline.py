@@ -12,11 +12,8 @@ from sd2app.labels.dragging import LabelDragging
 from sd2app.labels.edits import LabelEdits
 from sd2app.labels.loop import SpanLoop
 from sd2app.labels.model import LabelsModel
-from sd2app.labels.painting import lane_box, paint_span, paint_spans
-from sd2app.labels.rows import ROW_PX, LabelRows
-from sd2app.session.display import DisplayModel
-from sd2app.session.playback import PlaybackModel
-from sd2app.session.time_window import TimeWindow
+from sd2app.labels.painting import ROW_PX, LabelRows, lane_box, paint_span, paint_tracks
+from sd2app.session.session import Session
 from sd2app.widgets.cached_paint import CachedPaint
 from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, TimeScale, paint_cursor, turn_wheel
 from sd2core.labels.spans import Span
@@ -74,9 +71,6 @@ def _tip_of(target: HitTarget) -> str:
 
 _ATTRACT_PX = 8.0
 _MOVED_PX = 3.0
-_CHOSEN_PX = 3.0
-_SMALL = 0.82
-"""Share of the font size for names that would not fit otherwise."""
 _SCROLL_MS, _SCROLL_SHARE = 30, 0.03
 
 
@@ -90,18 +84,16 @@ class LabelTimeline(QWidget):
 
     def __init__(
         self,
-        labels: LabelsModel,
+        session: Session,
         edits: LabelEdits,
         dragging: LabelDragging,
         loop: SpanLoop,
-        span: TimeWindow,
-        playback: PlaybackModel,
-        display: DisplayModel,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
-        self._labels, self._edits, self._dragging, self._loop = labels, edits, dragging, loop
-        self._span, self._playback, self._display = span, playback, display
+        self._session, self._edits, self._dragging, self._loop = session, edits, dragging, loop
+        self._labels = labels = edits.labels
+        self._span, self._playback = session.span, session.playback
         self._target: HitTarget | None = None
         self._pointer_px = 0.0
         self._attracted = self._cutting = False
@@ -120,11 +112,11 @@ class LabelTimeline(QWidget):
         for signal in (
             labels.selection_changed,
             loop.changed,
-            span.changed,
-            display.theme_changed,
+            session.span.changed,
+            session.display.theme_changed,
         ):
             signal.connect(self._redraw)
-        playback.frame_changed.connect(self.update)
+        session.playback.frame_changed.connect(self.update)
         self._follow()
 
     def sizeHint(self) -> QSize:
@@ -155,7 +147,7 @@ class LabelTimeline(QWidget):
             for mark, lane in zip(model.marks, rows.mark_lanes, strict=True):
                 left, right = sorted((scale.x_of(mark.start_s), scale.x_of(self._playback.time_s)))
                 box = lane_box(rows.row_of(mark.track), lane, left, right)
-                colour, palette = model.colour_of(mark.label), self._display.palette
+                colour, palette = model.colour_of(mark.label), self._session.display.palette
                 paint_span(painter, box, f"{mark.label} …", colour, palette, selected=True)
             paint_cursor(painter, plot, scale.x_of(self._playback.time_s))
 
@@ -164,46 +156,15 @@ class LabelTimeline(QWidget):
 
     def _paint(self, painter: QPainter) -> None:
         """Paint the parts that do not move: names, rows, spans."""
-        palette, rows = self._display.palette, self._rows.tracks
+        palette = self._session.display.palette
         painter.fillRect(self.rect(), QColor(palette.panel))
-        self._paint_names(painter)
-        for row in rows:
-            whole = QRectF(0, row.top_px, self.width(), row.height_px)
-            painter.fillRect(whole.adjusted(GUTTER_PX, 1, -MARGIN_PX, -1), QColor(palette.well))
-        plot = self._plot_rect()
-        painter.setClipRect(plot)
-        paint_spans(painter, plot, self.scale, self._labels, rows, palette)
-
-    def _paint_names(self, painter: QPainter) -> None:
-        palette, rows = self._display.palette, self._rows.tracks
-        room_px = GUTTER_PX - 11
-        painter.save()
-        if any(painter.fontMetrics().horizontalAdvance(row.name) > room_px for row in rows):
-            font = painter.font()
-            font.setPixelSize(round(_SMALL * painter.fontInfo().pixelSize()))
-            painter.setFont(font)
-        metrics = painter.fontMetrics()
-        place = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-        for row in rows:
-            chosen = row.name == self._labels.track and len(rows) > 1
-            painter.setPen(QColor(palette.accent if chosen else palette.muted))
-            if chosen:
-                bar = QRectF(0, row.top_px + 3, _CHOSEN_PX, row.height_px - 6)
-                painter.fillRect(bar, QColor(palette.accent))
-            room = QRectF(5, row.top_px, room_px, row.height_px)
-            whole = metrics.horizontalAdvance(row.name) <= room_px
-            words = max(map(metrics.horizontalAdvance, row.name.split()))
-            if not whole and words <= room_px and row.height_px > 2 * metrics.height():
-                painter.drawText(room, place | Qt.TextFlag.TextWordWrap, row.name)
-            else:
-                shown = metrics.elidedText(row.name, Qt.TextElideMode.ElideRight, room_px)
-                painter.drawText(room, place, shown)
-        painter.restore()
+        plot, rows = self._plot_rect(), self._rows.tracks
+        paint_tracks(painter, plot, self.scale, self._labels, rows, palette)
 
     def _paint_hint(self, painter: QPainter, row: QRectF) -> None:
         keys = [one.key for one in self._labels.labels.label_set.labels if one.key]
         pressed = f"Press {keys[0]} to {keys[-1]} while it plays" if keys else "Drag here"
-        painter.setPen(QColor(self._display.palette.muted))
+        painter.setPen(QColor(self._session.display.palette.muted))
         painter.drawText(
             row.adjusted(GUTTER_PX + 8, 0, -MARGIN_PX, 0),
             Qt.AlignmentFlag.AlignVCenter,

@@ -117,9 +117,7 @@ def build_features(session: Session, shell: Shell, parts: Parts, parent: QObject
         lambda finder: features.suggestions.model.start(finder),
         parent,
     )
-    suggestions = SuggestionsFeature(
-        session, shell, labels.model, labels.edits, (classify.gestures,), parent
-    )
+    suggestions = SuggestionsFeature(session, shell, labels.edits, (classify.gestures,), parent)
     agreement = AgreementFeature(session, shell, labels.model, parent)
     program = ProgramFeature(
         session,

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from PySide6.QtCore import QSignalBlocker, Qt
+from PySide6.QtCore import QSignalBlocker
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QToolButton, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QWidget
 
 from sd2app.suggestions.model import SuggestionsModel
 from sd2app.widgets.inputs import Choice, NumberBox, action_button
-from sd2app.widgets.panel import ElidedLabel
+from sd2app.widgets.panel import ElidedLabel, outlined
 
 _BUTTONS = (
     ("accept_suggestion", "Accept"),
@@ -36,7 +36,7 @@ class SuggestionBar(QWidget):
         self._as = QLabel(self)
         self._as.setObjectName("muted")
         self._source = Choice("The map in which suggestions are looked for", self)
-        self._source.activated.connect(lambda at: model.set_source(model.sources[at]))
+        self._source.activated.connect(lambda at: model.set_source(model.finder.sources[at]))
         self._by = Choice("What suggests spans: motion in a map, or the classifier", self)
         self._by.addItems([f"by {finder.title}" for finder in model.finders])
         self._by.activated.connect(lambda at: model.set_finder(model.finders[at]))
@@ -48,23 +48,17 @@ class SuggestionBar(QWidget):
         layout.addWidget(self._text, 1)
         layout.addWidget(self._as)
         for name, text in _BUTTONS:
-            layout.addWidget(_outlined(action_button(action(name), text)))
+            layout.addWidget(action_button(action(name), text, outlined=True))
         layout.addSpacing(8)
         layout.addWidget(self._by)
         layout.addWidget(self._source)
         layout.addWidget(self._threshold)
-        layout.addWidget(self._close_button())
+        close = outlined("✕", "Close; the suggestions stay", model.stop, self)
+        close.setObjectName("")
+        close.setAccessibleName("Close the suggestions")
+        layout.addWidget(close)
         model.changed.connect(self._refresh)
         self._refresh()
-
-    def _close_button(self) -> QToolButton:
-        close = QToolButton(self)
-        close.setText("✕")
-        close.setToolTip("Close; the suggestions stay")
-        close.setAccessibleName("Close the suggestions")
-        close.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-        close.clicked.connect(self._model.stop)
-        return close
 
     def _refresh(self) -> None:
         model = self._model
@@ -74,20 +68,13 @@ class SuggestionBar(QWidget):
         self._as.setToolTip(
             "The label that was used last; the key of another label accepts as that"
         )
-        titles = [track.title for track in model.sources]
-        with QSignalBlocker(self._source):
-            if titles != [self._source.itemText(at) for at in range(self._source.count())]:
-                self._source.clear()
-                self._source.addItems(titles)
-            if model.source is not None:
-                self._source.setCurrentText(model.source.title)
-        self._source.setVisible(len(titles) > 1)
+        sources, source = model.finder.sources, model.finder.source
+        place = sources.index(source) if source in sources else -1
+        self._source.offer([track.title for track in sources], place)
+        self._source.setVisible(len(sources) > 1)
         with QSignalBlocker(self._by):
             self._by.setCurrentIndex(model.finders.index(model.finder))
-        self._show_threshold()
-
-    def _show_threshold(self) -> None:
-        box, limits = self._threshold, self._model.limits
+        box, limits = self._threshold, model.finder.threshold
         with QSignalBlocker(box):
             box.setRange(limits.low, limits.high)
             box.setDecimals(limits.decimals)
@@ -95,10 +82,4 @@ class SuggestionBar(QWidget):
             box.setSuffix(limits.unit)
         box.setToolTip(limits.tip)
         box.setAccessibleName(limits.tip)
-        box.show_value(self._model.threshold)
-
-
-def _outlined(button: QToolButton) -> QToolButton:
-    button.setObjectName("outlined")
-    button.setAccessibleName(button.text())
-    return button
+        box.show_value(model.threshold)

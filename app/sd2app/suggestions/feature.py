@@ -10,7 +10,6 @@ from PySide6.QtWidgets import QWidget
 from sd2app.feature import Action, Feature, Shell
 from sd2app.labels.actions import editing
 from sd2app.labels.edits import LabelEdits
-from sd2app.labels.model import LabelsModel
 from sd2app.session.session import Session
 from sd2app.suggestions.bar import SuggestionBar
 from sd2app.suggestions.finders import MotionFinder, SpanFinder
@@ -24,21 +23,13 @@ class SuggestionsFeature(Feature):
         self,
         session: Session,
         shell: Shell,
-        labels: LabelsModel,
         edits: LabelEdits,
         others: Sequence[SpanFinder],
         parent: QObject,
     ) -> None:
         self._shell, self._edits, maps = shell, edits, session.maps
         finders = (MotionFinder((maps.synthetic, maps.denoised, maps.real)), *others)
-        self.model = SuggestionsModel(
-            labels,
-            session.playback,
-            finders,
-            session.document.undo_stack,
-            edits.apply,
-            parent,
-        )
+        self.model = SuggestionsModel(edits, finders, parent)
 
     def actions(self) -> Sequence[Action]:
         """Find, accept, reject."""

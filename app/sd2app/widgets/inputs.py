@@ -120,10 +120,12 @@ class Choice(QComboBox):
         event.ignore()
 
 
-def action_button(action: QAction, text: str) -> QToolButton:
+def action_button(action: QAction, text: str, *, outlined: bool = False) -> QToolButton:
     """A button for an action; it keeps its short text, the menu has the full one."""
     button = QToolButton()
+    button.setObjectName("outlined" if outlined else "")
     button.setText(text)
+    button.setAccessibleName(text)
     button.setToolTip(action.toolTip())
     button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
     button.setCheckable(action.isCheckable())

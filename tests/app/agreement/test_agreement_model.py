@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from sd2app.agreement.model import AgreementModel
-from sd2app.agreement.text import facts, label_facts, verdict, where
+from sd2app.agreement.panel import facts, label_facts, verdict, where
 from sd2app.labels.model import LabelsModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.time_window import TimeWindow
@@ -32,10 +33,11 @@ class Compared:
     def __init__(self, qtbot) -> None:
         self._qtbot = qtbot
         self.labels, self.playback, self.span = LabelsModel(), PlaybackModel(), TimeWindow()
+        session = SimpleNamespace(playback=self.playback, span=self.span)
         self.playback.set_timebase(FRAMES)
         self.span.set_extent(0.0, 10.0)
         self.labels.open(MINE)
-        self.model = AgreementModel(self.labels, self.playback, self.span)
+        self.model = AgreementModel(session, self.labels)
 
     def wait(self) -> None:
         self._qtbot.waitUntil(lambda: not self.model.busy, timeout=10_000)

@@ -64,13 +64,8 @@ def set_up(qtbot):
     real = MapModel("Real")
     real.set_map(moving((100, 130, 100.0), (200, 230, 20.0), (300, 330, 100.0), (400, 420, 100.0)))
     edits = LabelEdits(document, labels, playback, session)
-    model = SuggestionsModel(
-        labels,
-        playback,
-        (MotionFinder((MapModel("Synthetic"), real)), KnownSpans(real)),
-        document.undo_stack,
-        edits.apply,
-    )
+    finders = MotionFinder((MapModel("Synthetic"), real)), KnownSpans(real)
+    model = SuggestionsModel(edits, finders)
 
     def look(threshold_db: float | None = None) -> None:
         model.start() if threshold_db is None else model.set_threshold(threshold_db)

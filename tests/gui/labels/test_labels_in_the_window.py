@@ -9,7 +9,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from window_models import models_of
 
-from sd2app.labels.rows import ROW_PX
+from sd2app.labels.painting import ROW_PX
 from sd2app.labels.timeline import LabelTimeline
 from sd2core.recording.recording import Recording, Span, open_recording
 
