@@ -71,7 +71,7 @@ class LabelsFeature(Feature):
         """Everything that can be done to labels."""
         s, labels, edits, loop = self._session, self.model, self.edits, self.loop
         marking, tracks, autosave = self.marking, self.tracks, self.autosave
-        bring_up = self._shell.bring_up
+        shell = self._shell
 
         def has_content() -> bool:
             return s.has_content
@@ -196,7 +196,7 @@ class LabelsFeature(Feature):
                     "import_labels", "Labels", "Import labels…", ("Ctrl+I",),
                     "Take the labels of a file: SD² Studio, table, Audacity, ELAN, Praat, BORIS,"
                     " MNE",
-                    lambda: import_labels(self._shell, edits), has_content,
+                    lambda: import_labels(shell, edits), has_content,
                 ),
                 Action(
                     "restore_labels", "Labels", "Restore labels that were not saved", (),
@@ -238,12 +238,12 @@ class LabelsFeature(Feature):
             Action(
                 "export_labels", "Labels", "Export labels…", ("Ctrl+Shift+I",),
                 "Write the labels for another program, and say what its file cannot hold",
-                lambda: export_labels(self._shell, s, labels), has_content,
+                lambda: export_labels(shell, s, labels), has_content,
             ),
             Action(
                 "cut_out", "Labels", "Export cut-outs…", ("Ctrl+Shift+X",),
                 "Write video, mesh and maps of each span into a folder of its own, with an index",
-                lambda: ask_for_cut_outs(self._shell, labels, self.cut_out), has_spans,
+                lambda: ask_for_cut_outs(shell, labels, self.cut_out), has_spans,
             ),
             Action(
                 "recover_labels", "File", "Recover labels…", (),
@@ -259,17 +259,17 @@ class LabelsFeature(Feature):
             Action(
                 "find_spans", "Labels", "Find spans…", ("Ctrl+F",),
                 "Search the table of spans for a label, a note or a track",
-                lambda: bring_up("Labels", "Search"), has_content,
+                lambda: shell.bring_up("Labels", "Search"), has_content,
             ),
             Action(
                 "label_set", "Labels", "Label set…", ("Ctrl+L",),
                 "Names, keys, colours and classes of the labels, to be edited and shared",
-                lambda: bring_up("Labels", "Label set"),
+                lambda: shell.bring_up("Labels", "Label set"),
             ),
             Action(
                 "show_labels", "View", "Labels panel", ("Shift+L",),
                 "The spans as a table, statistics of them, and the label set",
-                lambda: bring_up("Labels", "Spans"),
+                lambda: shell.bring_up("Labels", "Spans"),
             ),
         )  # fmt: skip
 

@@ -84,17 +84,18 @@ class LabelSetPage(QWidget):
 
     def _file_menu(self) -> QMenu:
         menu = QMenu(self)
-        menu.addAction("Import label set…").triggered.connect(lambda _: self._import())
-        menu.addAction("Export label set…").triggered.connect(lambda _: self._export())
+        menu.addAction("Import label set…", self._import)
+        menu.addAction("Export label set…", self._export)
         menu.addSeparator()
-        usual = menu.addAction("Usual label set")
-        usual.triggered.connect(lambda _: self._model.use(GESTURES))
+        menu.addAction("Usual label set", lambda: self._model.use(GESTURES))
         return menu
 
     # --- what the buttons do --------------------------------------------------------------
 
     def _rename(self) -> None:
-        self._model.use(replace(self._model.label_set, name=self._name.text().strip()))
+        name, shown = self._name.text().strip(), self._model.label_set
+        if name != shown.name:
+            self._model.use(replace(shown, name=name))
 
     def _import(self) -> None:
         name, _ = QFileDialog.getOpenFileName(self, "Import label set", "", _FILES)
