@@ -47,8 +47,8 @@ class LabelAutosave(QObject):
         self._refusal = ""
         self._offers: tuple[Offer, ...] = ()
         self._wanted: Offer | None = None
-        self._notes: tuple[str, ...] = ()
-        self._waiting = Found()
+        self.notes: tuple[str, ...] = ()  # on unreadable sessions, or edits that are not kept
+        self.waiting = Found()  # at the start, until a recording is open
         document.saved.connect(self._follow_saving)
 
     @property
@@ -66,16 +66,6 @@ class LabelAutosave(QObject):
         """Unsaved labels of an earlier session that are offered, or None."""
         return self._offers[0] if self._offers else None
 
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """Notes on unreadable earlier sessions, or on a journal that cannot be written."""
-        return self._notes
-
-    @property
-    def waiting(self) -> Found:
-        """Unsaved labels found at the start, until a recording is open."""
-        return self._waiting
-
     # --- opening and closing --------------------------------------------------------------
 
     def take_over(self) -> None:
@@ -83,7 +73,7 @@ class LabelAutosave(QObject):
         recording = self._document.recording
         if recording is not None and not self._document.goes_on:
             self.close()
-            self._waiting = Found()
+            self.waiting = Found()
             self._begin_at(_labelled_path(recording), reread=True)
         self._labels.open(self._document.labels)
 
@@ -103,7 +93,7 @@ class LabelAutosave(QObject):
         if self._place is not None:
             self._place.release()
         self._place = None
-        self._refusal, self._offers, self._notes, self._keeping = "", (), (), True
+        self._refusal, self._offers, self.notes, self._keeping = "", (), (), True
 
     def _begin_at(self, path: Path, *, reread: bool) -> None:
         self._place = RecoveryPlace(self._root, path)
@@ -121,7 +111,7 @@ class LabelAutosave(QObject):
                 self._document.read_labels_again()
         except OSError as error:
             # No journal is no reason not to edit.
-            self._notes = (f"Edits of labels are not kept until they are saved ({error}).",)
+            self.notes = (f"Edits of labels are not kept until they are saved ({error}).",)
         except Sd2Error as error:
             place.release()
             self._refusal = str(error)
@@ -179,7 +169,7 @@ class LabelAutosave(QObject):
 
     def look_around(self) -> None:
         """Find recordings with unsaved labels, at the start."""
-        self._waiting = offers_in(self._root)
+        self.waiting = offers_in(self._root)
         self.changed.emit()
 
     def recoveries(self) -> Found:
@@ -208,7 +198,7 @@ class LabelAutosave(QObject):
             if own is None:
                 place.release()
         self._offers = tuple(one for one in self._offers if one != offer)
-        self._waiting = Found(tuple(one for one in self._waiting.offers if one != offer))
+        self.waiting = Found(tuple(one for one in self.waiting.offers if one != offer))
         self.changed.emit()
 
     def ask_for(self, offer: Offer) -> None:
@@ -245,7 +235,7 @@ class LabelAutosave(QObject):
 
     def dismiss(self) -> None:
         """Clear the notes once they were read."""
-        self._notes, self._waiting = (), Found()
+        self.notes, self.waiting = (), Found()
         self.changed.emit()
 
     def _look_for_offers(self, place: RecoveryPlace) -> None:
@@ -256,7 +246,7 @@ class LabelAutosave(QObject):
             self._wanted = None
         others = (one for one in found.offers if not one.declined and one not in asked)
         self._offers = tuple(self._other_than_open(place, (*asked, *others)))
-        self._notes = found.notes
+        self.notes = found.notes
 
     def _other_than_open(self, place: RecoveryPlace, offers: Iterable[Offer]) -> Iterable[Offer]:
         """Offers that differ from the open labels; the others are deleted as redundant."""

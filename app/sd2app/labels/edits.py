@@ -138,9 +138,10 @@ class LabelEdits(QObject):
 
     def fill_gaps(self) -> None:
         """Fill every gap of the track with a span of background."""
-        track = self.labels.track
+        track, offered = self.labels.track, self.labels.labels.label_set.labels
         if track:
-            label = self.labels.background
+            named = (one.name for one in offered if one.gesture_class == "background")
+            label = next(named, self.labels.label)
             self.apply(lambda labels, base: edits.fill_gaps(labels, base, track, label))
 
     def restore(self) -> None:

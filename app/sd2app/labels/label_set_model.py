@@ -57,18 +57,13 @@ class LabelSetModel(RecordTableModel[Label]):
     ) -> None:
         super().__init__(HEADINGS, parent)
         self._labels, self._keys, self._apply = labels, keys, apply
-        self._set = labels.labels.label_set
-        self._rows = self._set.labels
+        self.label_set = labels.labels.label_set  # in its order
+        self._rows = self.label_set.labels
         self._counts: Counter[str] = Counter()
         self._alike: list[Alike] = []
         labels.changed.connect(self._follow)
 
     # --- what is there --------------------------------------------------------------------
-
-    @property
-    def label_set(self) -> LabelSet:
-        """Labels in their order."""
-        return self._set
 
     @property
     def warnings(self) -> str:
@@ -77,35 +72,37 @@ class LabelSetModel(RecordTableModel[Label]):
 
     def spans_of(self, row: int) -> int:
         """Return the number of spans with a label."""
-        return self._counts[self._set.labels[row].name]
+        return self._counts[self.label_set.labels[row].name]
 
     def classes(self) -> list[str]:
         """Return the classes that a label can have; the empty one is not learnt."""
-        others = sorted({one.gesture_class for one in self._set.labels}.difference(CLASSES, {""}))
+        others = sorted(
+            {one.gesture_class for one in self.label_set.labels}.difference(CLASSES, {""})
+        )
         return ["", *CLASSES, *others]
 
     def colours(self) -> list[tuple[str, str]]:
         """Return colours to choose from, names first: the palette and others in use."""
-        others = sorted({one.colour for one in self._set.labels}.difference(_COLOURS))
+        others = sorted({one.colour for one in self.label_set.labels}.difference(_COLOURS))
         return [*OFFERED, *((colour, colour) for colour in others)]
 
     # --- changing -------------------------------------------------------------------------
 
     def add(self) -> bool:
         """Add a label with a name, a colour and a key not yet in use."""
-        made = new_label(self._set)
+        made = new_label(self.label_set)
         if made.key and self._keys.owner(made.key):
             made = replace(made, key="")
         return self._apply(lambda labels, _: add_label(labels, made))
 
     def move(self, row: int, towards: int) -> bool:
         """Put a label one place up (-1) or down (1)."""
-        name = self._set.labels[row].name
+        name = self.label_set.labels[row].name
         return self._apply(lambda labels, _: move_label(labels, name, row + towards))
 
     def remove(self, row: int, instead: str | None = None) -> bool:
         """Remove a label; its spans keep it, or get another one."""
-        name = self._set.labels[row].name
+        name = self.label_set.labels[row].name
         return self._apply(lambda labels, _: remove_label(labels, name, instead))
 
     def use(self, label_set: LabelSet) -> bool:
@@ -114,7 +111,7 @@ class LabelSetModel(RecordTableModel[Label]):
 
     def setData(self, index: Index, value: Any, role: int = Qt.ItemDataRole.EditRole) -> bool:
         """Make the edit typed; False, with the cell unchanged, where it was refused."""
-        name, text = self._set.labels[index.row()].name, str(value).strip()
+        name, text = self.label_set.labels[index.row()].name, str(value).strip()
         if text == self.data(index, Qt.ItemDataRole.EditRole):
             return False
         changes: dict[int, Change] = {
@@ -132,13 +129,13 @@ class LabelSetModel(RecordTableModel[Label]):
     def _refresh(self) -> None:
         labels = self._labels.labels
         count = len(labels.label_set.labels)
-        resized = count != len(self._set.labels)
+        resized = count != len(self.label_set.labels)
         if resized:
             self.beginResetModel()
-        self._set = labels.label_set
-        self._rows = self._set.labels
+        self.label_set = labels.label_set
+        self._rows = self.label_set.labels
         self._counts = Counter(span.label for span in labels.spans)
-        self._alike = alike(self._set.labels)
+        self._alike = alike(self.label_set.labels)
         if resized:
             self.endResetModel()
         elif count:

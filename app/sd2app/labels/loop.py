@@ -19,18 +19,13 @@ class SpanLoop(QObject):
     ) -> None:
         super().__init__(parent)
         self._labels, self._playback = labels, playback
-        self._span: Span | None = None
+        self.span: Span | None = None  # played in a loop
         labels.changed.connect(self._follow_span)
         playback.stretch_changed.connect(self._follow_clock)
 
-    @property
-    def span(self) -> Span | None:
-        """Span played in a loop, or None."""
-        return self._span
-
     def play(self, span: Span) -> None:
         """Play a span from its start in a loop."""
-        self._span = span
+        self.span = span
         self._playback.play_stretch(span.start_s, span.end_s)
         self.changed.emit()
 
@@ -39,17 +34,17 @@ class SpanLoop(QObject):
         self._playback.set_stretch(None)
 
     def _follow_span(self) -> None:
-        if self._span is None:
+        if self.span is None:
             return
-        now = next((one for one in self._labels.labels.spans if one.id == self._span.id), None)
+        now = next((one for one in self._labels.labels.spans if one.id == self.span.id), None)
         if now is None:
             self.end()
-        elif now != self._span:
-            self._span = now
+        elif now != self.span:
+            self.span = now
             self._playback.set_stretch((now.start_s, now.end_s))
             self.changed.emit()
 
     def _follow_clock(self) -> None:
-        if self._playback.stretch_s is None and self._span is not None:
-            self._span = None
+        if self._playback.stretch_s is None and self.span is not None:
+            self.span = None
             self.changed.emit()

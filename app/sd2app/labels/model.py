@@ -26,7 +26,10 @@ class Mark:
 
 
 class LabelsModel(QObject):
-    """Current labels; only :class:`sd2app.labels.edits.LabelEdits` changes them."""
+    """Current labels; only :class:`sd2app.labels.edits.LabelEdits` changes them.
+
+    Its values are changed by its methods only, which emit a signal.
+    """
 
     changed = Signal()  # spans, tracks or the label set
     selection_changed = Signal()  # selected spans, or the track or label for new ones
@@ -34,57 +37,25 @@ class LabelsModel(QObject):
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._labels = Labels()
+        self.labels = Labels()
+        self.arrays = SpanArrays.of(self.labels)  # the spans
+        self.track = self.labels.tracks[0].name  # for new spans; empty without any track
+        self.label = self.labels.label_set.labels[0].name  # for drawn spans: the one used last
+        self.marks: tuple[Mark, ...] = ()  # in progress, in the order of their starts
         self._selected: frozenset[int] = frozenset()
-        self._track = self._labels.tracks[0].name
-        self._label = self._labels.label_set.labels[0].name
-        self._marks: tuple[Mark, ...] = ()
-        self._arrays = SpanArrays.of(self._labels)
         self._columns: dict[object, SpanColumns] = {}
-
-    @property
-    def labels(self) -> Labels:
-        """All labels."""
-        return self._labels
 
     @property
     def selected(self) -> tuple[Span, ...]:
         """Selected spans, in the order of time."""
-        spans = self._labels.spans
+        spans = self.labels.spans
         return tuple(spans[row] for row in self.selected_rows)
 
     @property
     def selected_rows(self) -> NDArray[np.int64]:
         """Selected spans as rows of :attr:`arrays`."""
         chosen = np.fromiter(self._selected, np.int64, len(self._selected))
-        return np.flatnonzero(np.isin(self._arrays.ids, chosen))
-
-    @property
-    def arrays(self) -> SpanArrays:
-        """The spans as arrays."""
-        return self._arrays
-
-    @property
-    def track(self) -> str:
-        """Track for new spans; empty without any track."""
-        return self._track
-
-    @property
-    def label(self) -> str:
-        """Label for drawn spans: the one used last."""
-        return self._label
-
-    @property
-    def background(self) -> str:
-        """Label to fill gaps with: that of the background class, else the one used last."""
-        offered = self._labels.label_set.labels
-        named = (one.name for one in offered if one.gesture_class == "background")
-        return next(named, self._label)
-
-    @property
-    def marks(self) -> tuple[Mark, ...]:
-        """Marks in progress, in the order of their starts."""
-        return self._marks
+        return np.flatnonzero(np.isin(self.arrays.ids, chosen))
 
     def is_selected(self, span_id: int) -> bool:
         """True if the span is selected."""
@@ -92,14 +63,14 @@ class LabelsModel(QObject):
 
     def within(self, start_s: float, end_s: float) -> list[Span]:
         """Return the spans that overlap an interval, in order."""
-        return [self._labels.spans[row] for row in self._arrays.within(start_s, end_s)]
+        return [self.labels.spans[row] for row in self.arrays.within(start_s, end_s)]
 
     def at(self, time_s: float) -> Span | None:
         """Return the span at a time: one on the track for new spans, else the shortest."""
-        arrays = self._arrays
+        arrays = self.arrays
         rows = np.flatnonzero((arrays.starts_s <= time_s) & (time_s < arrays.ends_s))
-        found = [self._labels.spans[row] for row in rows]
-        return min(found, key=lambda one: (one.track != self._track, one.duration_s), default=None)
+        found = [self.labels.spans[row] for row in rows]
+        return min(found, key=lambda one: (one.track != self.track, one.duration_s), default=None)
 
     def columns(
         self,
@@ -116,21 +87,21 @@ class LabelsModel(QObject):
         if found is None:
             while len(self._columns) >= _COLUMNS_KEPT:
                 del self._columns[next(iter(self._columns))]
-            found = self._columns[key] = self._arrays.columns(
+            found = self._columns[key] = self.arrays.columns(
                 start_s, end_s, columns, wide_columns, self.selected_rows, together=together
             )
         return found
 
     def colour_of(self, label: str) -> str:
         """Return the ``#rrggbb`` of a label."""
-        known = self._labels.label_set.find(label)
+        known = self.labels.label_set.find(label)
         return known.colour if known is not None else UNKNOWN_COLOUR
 
     # --- changing -------------------------------------------------------------------------
 
     def open(self, labels: Labels) -> None:
         """Show another recording's labels; selection and marks are cleared."""
-        self._marks = ()
+        self.marks = ()
         self._choose(frozenset())
         self._assign(labels)
         self.selection_changed.emit()
@@ -138,7 +109,7 @@ class LabelsModel(QObject):
 
     def set_labels(self, labels: Labels) -> None:
         """Assign labels; spans that no longer exist are deselected."""
-        if labels is self._labels:
+        if labels is self.labels:
             return
         there = {span.id for span in labels.spans}
         pruned = not self._selected <= there
@@ -149,21 +120,21 @@ class LabelsModel(QObject):
 
     def select(self, ids: Iterable[int]) -> None:
         """Select these spans and no others; the track of the first is the one for new spans."""
-        wanted = frozenset(ids) & frozenset(self._arrays.ids.tolist())
+        wanted = frozenset(ids) & frozenset(self.arrays.ids.tolist())
         if wanted == self._selected:
             return
         self._choose(wanted)
         if wanted:
-            self._track = self._labels.spans[self.selected_rows[0]].track
+            self.track = self.labels.spans[self.selected_rows[0]].track
         self.selection_changed.emit()
 
     def select_all(self) -> None:
         """Select every span."""
-        self.select(self._arrays.ids.tolist())
+        self.select(self.arrays.ids.tolist())
 
     def select_up_to(self, span: Span) -> None:
         """Select from the selection to a span: spans between in time, on tracks between."""
-        names = [track.name for track in self._labels.tracks]
+        names = [track.name for track in self.labels.tracks]
         corners = [*self.selected, span]
         rows = [names.index(one.track) for one in corners]
         first_s, last_s = min(one.start_s for one in corners), max(one.end_s for one in corners)
@@ -175,21 +146,21 @@ class LabelsModel(QObject):
 
     def set_track(self, name: str) -> None:
         """Choose the track for new spans."""
-        if name != self._track:
-            self._track = self._labels.track(name).name
+        if name != self.track:
+            self.track = self.labels.track(name).name
             self.selection_changed.emit()
 
     def set_label(self, name: str) -> None:
         """Choose the label for drawn spans."""
-        if name != self._label:
-            self._label = name
+        if name != self.label:
+            self.label = name
             self.selection_changed.emit()
 
     def set_marks(self, marks: Iterable[Mark]) -> None:
         """Set the marks in progress."""
         marks = tuple(marks)
-        if marks != self._marks:
-            self._marks = marks
+        if marks != self.marks:
+            self.marks = marks
             self.marks_changed.emit()
 
     def _choose(self, ids: frozenset[int]) -> None:
@@ -197,16 +168,16 @@ class LabelsModel(QObject):
         self._columns.clear()
 
     def _assign(self, labels: Labels) -> None:
-        self._labels = labels
-        self._arrays = SpanArrays.of(labels)
+        self.labels = labels
+        self.arrays = SpanArrays.of(labels)
         self._columns.clear()
         names = [track.name for track in labels.tracks]
-        left = tuple(mark for mark in self._marks if mark.track in names)
-        dropped, self._marks = left != self._marks, left
-        if self._track not in names:
-            self._track = names[0] if names else ""
-        if labels.label_set.find(self._label) is None and labels.label_set.labels:
-            self._label = labels.label_set.labels[0].name
+        left = tuple(mark for mark in self.marks if mark.track in names)
+        dropped, self.marks = left != self.marks, left
+        if self.track not in names:
+            self.track = names[0] if names else ""
+        if labels.label_set.find(self.label) is None and labels.label_set.labels:
+            self.label = labels.label_set.labels[0].name
         self.changed.emit()
         if dropped:
             self.marks_changed.emit()
