@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, NonNegativeInt, 
 
 from sd2core.labels.label_set import Label, LabelSet
 from sd2core.labels.spans import Labels, LabelTrack, Origin, Overlap, Span
+from sd2core.timebase import Timebase
 
 
 class Entry(BaseModel):
@@ -105,12 +106,16 @@ def label_set_entry(label_set: LabelSet) -> dict[str, Any]:
     return {"name": label_set.name, "labels": labels}
 
 
-def labels_entry(labels: Labels) -> dict[str, Any]:
-    """Encode all labels of a recording."""
+def labels_entry(labels: Labels, timebase: Timebase | None = None) -> dict[str, Any]:
+    """Encode all labels of a recording; with the frames of every span, given the timebase."""
+
+    def frames(span: Span) -> tuple[int, int] | None:
+        return None if timebase is None else timebase.frames_between(span.start_s, span.end_s)
+
     return {
         "label_set": label_set_entry(labels.label_set),
         "tracks": track_entries(labels.tracks),
-        "spans": [span_entry(span) for span in labels.spans],
+        "spans": [span_entry(span, frames(span)) for span in labels.spans],
     }
 
 

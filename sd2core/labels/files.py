@@ -24,8 +24,7 @@ from sd2core.labels.entries import (
     LabelSetEntry,
     first_fault,
     label_set_entry,
-    span_entry,
-    track_entries,
+    labels_entry,
 )
 from sd2core.labels.label_set import LONGEST_NAME, LabelSet
 from sd2core.labels.spans import Labels, LabelTrack, Span
@@ -100,18 +99,7 @@ def write_labels(
         "recording": None if recording is None else stored_path(plain_path(recording), folder),
         "video": None if video is None else stored_path(plain_path(video), folder),
     }
-    spans = [
-        span_entry(
-            one, None if timebase is None else timebase.frames_between(one.start_s, one.end_s)
-        )
-        for one in labels.spans
-    ]
-    body = {
-        "label_set": label_set_entry(labels.label_set),
-        "tracks": track_entries(labels.tracks),
-        "spans": spans,
-    }
-    atomic_write_text(path, _text(head | body))
+    atomic_write_text(path, _text(head | labels_entry(labels, timebase)))
 
 
 def read_labels(path: Path) -> LabelFile:

@@ -3,27 +3,20 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import (
-    QAbstractTableModel,
-    QModelIndex,
-    QObject,
-    QPersistentModelIndex,
-    Qt,
-    Signal,
-)
+from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.latest import LatestRunner
+from sd2app.widgets.record_table import Heading, RecordTableModel
 from sd2core.batch.folder import BatchFolder
 from sd2core.errors import Sd2Error
 from sd2core.placements.placements import Place
 from sd2core.sensor import Vector, VirtualSensor, spherical_from_position
 
-Index = QModelIndex | QPersistentModelIndex
-_NOWHERE = QModelIndex()
 _MOST_ROWS = 50_000
 """Limit of shown rows; the file has all."""
 _COLUMNS = ("Recording", "Subject", "Place", "Seen from the body", "Maps")
@@ -43,14 +36,13 @@ class Result:
     maps: dict[str, str]  # file of each kind of map, relative to the folder of the batch
 
 
-class BatchResults(QAbstractTableModel):
+class BatchResults(RecordTableModel[Result]):
     """Reads ``results.jsonl`` in the background; one row per map, however many stretches."""
 
     changed = Signal()
 
     def __init__(self, parent: QObject | None = None) -> None:
-        super().__init__(parent)
-        self._rows: list[Result] = []
+        super().__init__([Heading(text) for text in _COLUMNS], parent)
         self._card = ""
         self._runner = LatestRunner("results", self)
         self._runner.finished.connect(self._take)
@@ -58,7 +50,7 @@ class BatchResults(QAbstractTableModel):
         self._runner.failed.connect(lambda error: self.forget())
 
     @property
-    def rows(self) -> list[Result]:
+    def rows(self) -> Sequence[Result]:
         """Results of the last run that reached its end."""
         return self._rows
 
@@ -86,37 +78,15 @@ class BatchResults(QAbstractTableModel):
         self.endResetModel()
         self.changed.emit()
 
-    # --- Qt's questions ---------------------------------------------------------------------
-
-    def rowCount(self, parent: Index = _NOWHERE) -> int:
-        """Number of maps."""
-        return 0 if parent.isValid() else len(self._rows)
-
-    def columnCount(self, parent: Index = _NOWHERE) -> int:
-        """Number of facts per result."""
-        return 0 if parent.isValid() else len(_COLUMNS)
-
-    def headerData(
-        self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole
-    ) -> Any:
-        """Names of the columns."""
-        if role == Qt.ItemDataRole.DisplayRole and orientation == Qt.Orientation.Horizontal:
-            return _COLUMNS[section]
-        return None
-
-    def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
-        """Text of a cell."""
-        if role != Qt.ItemDataRole.DisplayRole or not index.isValid():
-            return None
-        row = self._rows[index.row()]
-        around = spherical_from_position(row.target_m, row.sensor.position_m)
+    def _text(self, record: Result, column: int) -> str:
+        around = spherical_from_position(record.target_m, record.sensor.position_m)
         return (
-            row.recording,
-            row.subject,
-            f"{row.placement:,}" if row.placement else "own sensor",
+            record.recording,
+            record.subject,
+            f"{record.placement:,}" if record.placement else "own sensor",
             Place(*around).words.replace("-", "−"),
-            ", ".join(row.maps),
-        )[index.column()]
+            ", ".join(record.maps),
+        )[column]
 
 
 def _rows(file: Path) -> list[Result]:

@@ -28,7 +28,7 @@ class Heading(NamedTuple):
 class RecordTableModel(QAbstractTableModel, Generic[Record]):
     """Rows of records, kept up to date only while a view shows them.
 
-    A subclass assigns ``_rows`` in :meth:`_refresh` and gives the cells' texts.
+    A subclass assigns ``_rows``, usually in :meth:`_refresh`, and gives the cells' texts.
     """
 
     def __init__(self, headings: Sequence[Heading], parent: QObject | None = None) -> None:
@@ -47,7 +47,7 @@ class RecordTableModel(QAbstractTableModel, Generic[Record]):
             self._refresh()
 
     def _refresh(self) -> None:
-        raise NotImplementedError
+        """Assign the rows; without this they are assigned when there are others."""
 
     # --- cells ----------------------------------------------------------------------------
 

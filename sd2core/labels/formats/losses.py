@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, get_args
 
 from sd2core.labels.label_set import GESTURES
 from sd2core.labels.spans import Labels, LabelTrack, Span
@@ -15,10 +15,7 @@ Aspect = Literal[
     "label set", "colours and keys",
 ]  # fmt: skip
 
-ASPECTS: tuple[Aspect, ...] = (
-    "tracks", "overlap", "empty tracks", "ids", "notes", "authors", "confidence", "origin",
-    "label set", "colours and keys",
-)  # fmt: skip
+ASPECTS: tuple[Aspect, ...] = get_args(Aspect)
 """All that a file may hold besides start, end and label of each span."""
 
 DEFAULT_TRACK = "Gestures"
@@ -59,9 +56,6 @@ def losses_by_format(labels: Labels, file_format: LabelFormat) -> list[Loss]:
         if count and what not in file_format.keeps:
             found.append(Loss(what, count, sentence))
 
-    def spans_with(has: Callable[[Span], bool]) -> int:
-        return sum(has(span) for span in labels.spans)
-
     names = {track.name for track in labels.tracks}
     if names != {DEFAULT_TRACK}:
         become = f"{len(names)} tracks become one" if len(names) > 1 else "its name is left out"
@@ -74,21 +68,20 @@ def losses_by_format(labels: Labels, file_format: LabelFormat) -> list[Loss]:
     words = f"{title} does not say whether spans may overlap: {counted(apart, 'free track')}"
     leave_out("overlap", apart, f"{words} may come back as exclusive")
     count = sum(span.id != number for number, span in enumerate(labels.spans, start=1))
-    leave_out(
-        "ids", count, f"{title} keeps no numbers of spans: {counted(count, 'span')} renumbered"
-    )
-    count = spans_with(lambda span: bool(span.note))
-    leave_out("notes", count, f"{title} keeps no notes: {counted(count, 'note')} left out")
-    count = spans_with(lambda span: bool(span.author))
-    leave_out(
-        "authors", count, f"{title} keeps no authors: those of {counted(count, 'span')} left out"
-    )
-    count = spans_with(lambda span: span.confidence is not None)
-    words = f"{title} keeps no confidence: that of {counted(count, 'span')} left out"
-    leave_out("confidence", count, words)
-    count = spans_with(lambda span: span.origin != "import")
-    words = f"{title} does not say who made a span: {counted(count, 'span')} will count as imported"
-    leave_out("origin", count, words)
+    words = f"{title} keeps no numbers of spans: {counted(count, 'span')} renumbered"
+    leave_out("ids", count, words)
+    fields: tuple[tuple[Aspect, Callable[[Span], bool], str, str], ...] = (
+        ("notes", lambda span: bool(span.note), "keeps no notes: {} left out", "note"),
+        ("authors", lambda span: bool(span.author),
+         "keeps no authors: those of {} left out", "span"),
+        ("confidence", lambda span: span.confidence is not None,
+         "keeps no confidence: that of {} left out", "span"),
+        ("origin", lambda span: span.origin != "import",
+         "does not say who made a span: {} will count as imported", "span"),
+    )  # fmt: skip
+    for what, has, sentence, thing in fields:
+        count = sum(has(span) for span in labels.spans)
+        leave_out(what, count, f"{title} {sentence.format(counted(count, thing))}")
     if labels.label_set != GESTURES:
         name = labels.label_set.name
         if "label set" not in file_format.keeps:
