@@ -30,36 +30,6 @@ class HitTarget(NamedTuple):
     span: Span | None = None
 
 
-def target_at(
-    labels: LabelsModel, rows: LabelRows, scale: TimeScale, x_px: float, y_px: float
-) -> HitTarget | None:
-    """Find the part of the timeline at a place; edges of selected spans go first."""
-    row = rows.row_at(y_px)
-    if row is None:
-        return None
-    if x_px < GUTTER_PX:
-        return HitTarget("name", x_px, row.name)
-    arrays = labels.arrays
-    reach_s = _EDGE_PX * scale.seconds_per_px
-    time_s, lane = scale.time_of(x_px), row.lane_at(y_px)
-    near = [
-        arrays.spans[one]
-        for one in arrays.within(time_s - reach_s, time_s + reach_s)
-        if arrays.spans[one].track == row.name and arrays.lanes[one] == lane
-    ]
-    near.sort(key=lambda one: not labels.is_selected(one.id))
-    for span in near:
-        # The middle third of a short span is for moving it.
-        edge_s = min(reach_s, span.duration_s / 3)
-        inside = span.start_s <= time_s < span.end_s
-        if abs(time_s - span.start_s) <= (edge_s if inside else reach_s):
-            return HitTarget("start", x_px, row.name, span)
-        if abs(time_s - span.end_s) <= (edge_s if inside else reach_s):
-            return HitTarget("end", x_px, row.name, span)
-    held = next((one for one in near if one.start_s <= time_s < one.end_s), None)
-    return HitTarget("nothing" if held is None else "span", x_px, row.name, held)
-
-
 def _tip_of(target: HitTarget) -> str:
     span = target.span
     if span is None:
@@ -97,7 +67,7 @@ class LabelTimeline(QWidget):
         self._target: HitTarget | None = None
         self._pointer_px = 0.0
         self._attracted = self._cutting = False
-        self._rows = LabelRows.of(labels.labels.tracks, labels.arrays, labels.marks)
+        self.rows = LabelRows.of(labels.labels.tracks, labels.arrays, labels.marks)
         self._still = CachedPaint(self)
         self._scroll = QTimer(self)
         self._scroll.setInterval(_SCROLL_MS)
@@ -121,23 +91,18 @@ class LabelTimeline(QWidget):
 
     def sizeHint(self) -> QSize:
         """Return the height of all tracks."""
-        return QSize(640, round(self._rows.height_px))
+        return QSize(640, round(self.rows.height_px))
 
     @property
     def scale(self) -> TimeScale:
         """Time axis of this widget."""
         return TimeScale(self._span.start_s, self._span.end_s, self.width())
 
-    @property
-    def rows(self) -> LabelRows:
-        """Rows of tracks and their lanes."""
-        return self._rows
-
     # --- painting -------------------------------------------------------------------------
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Paint names, spans, marks and the cursor."""
-        scale, model, rows = self.scale, self._labels, self._rows
+        scale, model, rows = self.scale, self._labels, self.rows
         plot = self._plot_rect()
         with QPainter(self) as painter:
             self._still.paint(painter, self._paint)
@@ -158,7 +123,7 @@ class LabelTimeline(QWidget):
         """Paint the parts that do not move: names, rows, spans."""
         palette = self._session.display.palette
         painter.fillRect(self.rect(), QColor(palette.panel))
-        plot, rows = self._plot_rect(), self._rows.tracks
+        plot, rows = self._plot_rect(), self.rows.tracks
         paint_tracks(painter, plot, self.scale, self._labels, rows, palette)
 
     def _paint_hint(self, painter: QPainter, row: QRectF) -> None:
@@ -173,7 +138,7 @@ class LabelTimeline(QWidget):
 
     def _follow(self) -> None:
         labels = self._labels
-        self._rows = LabelRows.of(labels.labels.tracks, labels.arrays, labels.marks)
+        self.rows = LabelRows.of(labels.labels.tracks, labels.arrays, labels.marks)
         self.setFixedHeight(self.sizeHint().height())
         self._redraw()
 
@@ -184,8 +149,31 @@ class LabelTimeline(QWidget):
     # --- the hand -------------------------------------------------------------------------
 
     def target_at(self, x_px: float, y_px: float) -> HitTarget | None:
-        """Find the part of the timeline at a place."""
-        return target_at(self._labels, self._rows, self.scale, x_px, y_px)
+        """Find the part of the timeline at a place; edges of selected spans go first."""
+        labels, scale, row = self._labels, self.scale, self.rows.row_at(y_px)
+        if row is None:
+            return None
+        if x_px < GUTTER_PX:
+            return HitTarget("name", x_px, row.name)
+        arrays = labels.arrays
+        reach_s = _EDGE_PX * scale.seconds_per_px
+        time_s, lane = scale.time_of(x_px), row.lane_at(y_px)
+        near = [
+            arrays.spans[one]
+            for one in arrays.within(time_s - reach_s, time_s + reach_s)
+            if arrays.spans[one].track == row.name and arrays.lanes[one] == lane
+        ]
+        near.sort(key=lambda one: not labels.is_selected(one.id))
+        for span in near:
+            # The middle third of a short span is for moving it.
+            edge_s = min(reach_s, span.duration_s / 3)
+            inside = span.start_s <= time_s < span.end_s
+            if abs(time_s - span.start_s) <= (edge_s if inside else reach_s):
+                return HitTarget("start", x_px, row.name, span)
+            if abs(time_s - span.end_s) <= (edge_s if inside else reach_s):
+                return HitTarget("end", x_px, row.name, span)
+        held = next((one for one in near if one.start_s <= time_s < one.end_s), None)
+        return HitTarget("nothing" if held is None else "span", x_px, row.name, held)
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         """Start a click or a drag."""
