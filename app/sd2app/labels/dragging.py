@@ -4,14 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QEvent, QObject, QPointF, Qt, Signal
+from PySide6.QtGui import QMouseEvent
 
 from sd2app.labels.edits import LabelEdits
+from sd2app.labels.loop import SpanLoop
+from sd2app.widgets.time_axis import TimeScale
+from sd2app.widgets.time_plot import TimePlot
 from sd2core.errors import Sd2Error
 from sd2core.labels import edits
 from sd2core.labels.edits import Change, Edit, Side, move_together
 from sd2core.labels.free_time import snap
 from sd2core.labels.spans import Labels
+
+MOVED_PX = 3.0
+"""Way of the mouse from which a press is a drag."""
+_EDGE_PX = 4.0
+_ATTRACT_PX = 8.0
+
+
+def attraction_s(event: QMouseEvent, scale: TimeScale) -> float:
+    """Return the distance from which edges attract what is dragged; 0 with Alt."""
+    free = event.modifiers() & Qt.KeyboardModifier.AltModifier
+    return 0.0 if free else _ATTRACT_PX * scale.seconds_per_px
 
 
 class LabelDragging(QObject):
@@ -25,7 +40,7 @@ class LabelDragging(QObject):
 
     def __init__(self, edits: LabelEdits, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._labels, self._playback, self._edits = edits.labels, edits.playback, edits
+        self.labels, self._playback, self._edits = edits.labels, edits.playback, edits
         self._before: Labels | None = None
         self._dragged: Edit | None = None
         edits.applying.connect(self.end_drag)
@@ -39,7 +54,7 @@ class LabelDragging(QObject):
         """Begin a drag; False where labels cannot be edited."""
         if self._edits.refused():
             return False
-        self._before, self._dragged = self._labels.labels, None
+        self._before, self._dragged = self.labels.labels, None
         self.changed.emit()
         return True
 
@@ -56,8 +71,8 @@ class LabelDragging(QObject):
         assert self._before is not None
         length_s = self._before.span(span_id).duration_s
         ids = {span_id}
-        if self._labels.is_selected(span_id):
-            ids.update(span.id for span in self._labels.selected)
+        if self.labels.is_selected(span_id):
+            ids.update(span.id for span in self.labels.selected)
         ends = (
             (self._snapped(start_s, within_s, ids), 0.0),
             (self._snapped(start_s + length_s, within_s, ids), length_s),
@@ -73,7 +88,7 @@ class LabelDragging(QObject):
     ) -> None:
         """Draw a span between two times; ``cutting`` cuts away others there."""
         one_s, other_s = (self._snapped(time_s, within_s) for time_s in (from_s, to_s))
-        label, make = self._labels.label, edits.overwrite if cutting else edits.create
+        label, make = self.labels.label, edits.overwrite if cutting else edits.create
         self._drag(lambda labels, base: make(labels, base, track, one_s, other_s, label))
 
     def end_drag(self) -> None:
@@ -88,7 +103,7 @@ class LabelDragging(QObject):
         """Restore the labels from before the drag."""
         before, self._before, self._dragged = self._before, None, None
         if before is not None:
-            self._labels.set_labels(before)
+            self.labels.set_labels(before)
         self.changed.emit()
 
     def _drag(self, change: Change) -> None:
@@ -97,9 +112,93 @@ class LabelDragging(QObject):
             self._dragged = change(self._before, self._playback.timebase)
         except Sd2Error:
             return
-        self._labels.set_labels(self._dragged.labels)
+        self.labels.set_labels(self._dragged.labels)
 
     def _snapped(self, time_s: float, within_s: float, held: Collection[int] = ()) -> float:
         assert self._before is not None
         base = self._playback.timebase
         return snap(self._before, base, time_s, within_s, ignore=held).time_s
+
+
+class SpanDragger(QObject):
+    """Event filter on a map; the map itself still seeks, except at edges of selected spans."""
+
+    def __init__(self, view: TimePlot, dragging: LabelDragging, loop: SpanLoop) -> None:
+        super().__init__(view)
+        self._view, self._labels, self._dragging, self._loop = view, dragging.labels, dragging, loop
+        self._pressed_px: float | None = None
+        self._edge: tuple[int, Side] | None = None
+        dragging.changed.connect(self._let_go)
+        view.installEventFilter(self)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Handle the mouse events that concern spans."""
+        if not isinstance(event, QMouseEvent):
+            return False
+        place, kind = event.position(), event.type()
+        left = event.button() == Qt.MouseButton.LeftButton
+        if kind == QEvent.Type.MouseMove:
+            return self._move(place, event)
+        if kind == QEvent.Type.MouseButtonPress and left:
+            return self._press(place)
+        if kind == QEvent.Type.MouseButtonRelease and left:
+            return self._release(place)
+        if kind == QEvent.Type.MouseButtonDblClick and left:
+            span = self._labels.at(self._time_s(place)) if self._is_inside(place) else None
+            if span is not None:
+                self._loop.play(span)
+            return span is not None
+        return False
+
+    def _press(self, place: QPointF) -> bool:
+        self._edge = self._edge_at(place)
+        self._pressed_px = place.x() if self._edge is None and self._is_inside(place) else None
+        return self._edge is not None
+
+    def _move(self, place: QPointF, event: QMouseEvent) -> bool:
+        if self._edge is None:
+            if not event.buttons() and self._edge_at(place) is not None:
+                self._view.setCursor(Qt.CursorShape.SizeHorCursor)
+                return True
+            if self._pressed_px is not None and abs(place.x() - self._pressed_px) >= MOVED_PX:
+                self._pressed_px = None
+            return False
+        if self._dragging.dragging or self._dragging.begin_drag():
+            within_s = attraction_s(event, self._view.scale)
+            self._dragging.drag_edge(*self._edge, self._time_s(place), within_s)
+        return True
+
+    def _release(self, place: QPointF) -> bool:
+        held, pressed_px = self._edge, self._pressed_px
+        self._edge = self._pressed_px = None
+        if held is not None:
+            self._dragging.end_drag()
+            return True
+        span = self._labels.at(self._time_s(place)) if pressed_px is not None else None
+        if span is not None:
+            self._labels.select((span.id,))
+        return False
+
+    def _let_go(self) -> None:
+        if not self._dragging.dragging:
+            self._edge = None
+
+    def _edge_at(self, place: QPointF) -> tuple[int, Side] | None:
+        """Edge of a selected span near a place."""
+        if not self._is_inside(place):
+            return None
+        time_s = self._time_s(place)
+        reach_s = _EDGE_PX * self._view.scale.seconds_per_px
+        for span in self._labels.within(time_s - reach_s, time_s + reach_s):
+            if self._labels.is_selected(span.id):
+                if abs(span.start_s - time_s) <= reach_s:
+                    return span.id, "start"
+                if abs(span.end_s - time_s) <= reach_s:
+                    return span.id, "end"
+        return None
+
+    def _is_inside(self, place: QPointF) -> bool:
+        return self._view.plot_rect().contains(place)
+
+    def _time_s(self, place: QPointF) -> float:
+        return self._view.scale.time_of(place.x())

@@ -12,12 +12,11 @@ from sd2app.feature import Action, Feature, Shell
 from sd2app.labels.actions import LabelActions, ReactionMenu, editing
 from sd2app.labels.autosave import LabelAutosave
 from sd2app.labels.cut_out import CutOutModel, ask_about_others, ask_for_cut_outs
-from sd2app.labels.dragging import LabelDragging
+from sd2app.labels.dragging import LabelDragging, SpanDragger
 from sd2app.labels.edits import LabelEdits
 from sd2app.labels.export_dialog import export_labels
 from sd2app.labels.import_dialog import import_labels, is_label_file
 from sd2app.labels.loop import SpanLoop
-from sd2app.labels.map_dragging import SpanDragger
 from sd2app.labels.marking import LabelMarking, Reaction
 from sd2app.labels.model import LabelsModel
 from sd2app.labels.painting import map_overlay, strip_overlay
@@ -340,7 +339,7 @@ class LabelsFeature(Feature):
     def let_drag_on(self, views: Sequence[TimePlot]) -> None:
         """Let spans be selected and their edges be dragged on maps."""
         for view in views:
-            SpanDragger(view, self.model, self.dragging, self.loop)
+            SpanDragger(view, self.dragging, self.loop)
 
     # --- life -----------------------------------------------------------------------------
 

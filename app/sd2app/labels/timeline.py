@@ -8,7 +8,7 @@ from PySide6.QtCore import QEvent, QObject, QRectF, QSize, Qt, QTimer
 from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QResizeEvent, QWheelEvent
 from PySide6.QtWidgets import QFrame, QScrollArea, QScrollBar, QSizePolicy, QWidget
 
-from sd2app.labels.dragging import LabelDragging
+from sd2app.labels.dragging import MOVED_PX, LabelDragging, attraction_s
 from sd2app.labels.edits import LabelEdits
 from sd2app.labels.loop import SpanLoop
 from sd2app.labels.model import LabelsModel
@@ -39,8 +39,6 @@ def _tip_of(target: HitTarget) -> str:
     return "\n".join(lines)
 
 
-_ATTRACT_PX = 8.0
-_MOVED_PX = 3.0
 _SCROLL_MS, _SCROLL_SHARE = 30, 0.03
 
 
@@ -66,7 +64,7 @@ class LabelTimeline(QWidget):
         self._span, self._playback = session.span, session.playback
         self._target: HitTarget | None = None
         self._pointer_px = 0.0
-        self._attracted = self._cutting = False
+        self._within_s, self._cutting = 0.0, False
         self.rows = LabelRows.of(labels.labels.tracks, labels.arrays, labels.marks)
         self._still = CachedPaint(self)
         self._scroll = QTimer(self)
@@ -190,11 +188,11 @@ class LabelTimeline(QWidget):
             return
         if not self._dragging.dragging and (
             self._target.part == "name"
-            or abs(x - self._target.x_px) < _MOVED_PX
+            or abs(x - self._target.x_px) < MOVED_PX
             or not self._dragging.begin_drag()
         ):
             return
-        self._attracted = not event.modifiers() & Qt.KeyboardModifier.AltModifier
+        self._within_s = attraction_s(event, self.scale)
         self._pointer_px = x
         outside = not GUTTER_PX <= x <= self.width() - MARGIN_PX
         if outside != self._scroll.isActive():
@@ -246,7 +244,7 @@ class LabelTimeline(QWidget):
         target = self._target
         assert target is not None
         scale = self.scale
-        within_s = _ATTRACT_PX * scale.seconds_per_px if self._attracted else 0.0
+        within_s = self._within_s
         time_s, pressed_s = scale.time_of(self._pointer_px), scale.time_of(target.x_px)
         if target.span is None or self._cutting:
             self._dragging.drag_new(
