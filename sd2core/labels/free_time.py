@@ -123,16 +123,14 @@ def steps_free(frames: Frames, span: Span, room: Stretch, count: int) -> int:
     return min(count, max(wall - here, 0))
 
 
-def free_parts(
-    labels: Labels, track: str, wanted: Stretch, ignore: Collection[int] = ()
-) -> list[Stretch]:
+def free_parts(labels: Labels, track: str, wanted: Stretch) -> list[Stretch]:
     """Return the parts of a stretch that no span of a track covers, in order."""
     parts = []
     low_s, high_s = wanted
     for span in labels.spans:
         if span.start_s >= high_s:
             break
-        if span.track == track and span.end_s > low_s and span.id not in ignore:
+        if span.track == track and span.end_s > low_s:
             if span.start_s > low_s:
                 parts.append((low_s, span.start_s))
             low_s = span.end_s
@@ -141,16 +139,14 @@ def free_parts(
     return parts
 
 
-def clip_to_free(
-    labels: Labels, track: str, wanted: Stretch, frames: Frames, ignore: Collection[int] = ()
-) -> Stretch:
+def clip_to_free(labels: Labels, track: str, wanted: Stretch, frames: Frames) -> Stretch:
     """Return the longest free part of a stretch; all of it where spans may overlap.
 
     Raises Sd2Error when no frame of it is free.
     """
     if labels.track(track).overlap == "free":
         return wanted
-    parts = [one for one in free_parts(labels, track, wanted, ignore) if frames.held(*one)]
+    parts = [one for one in free_parts(labels, track, wanted) if frames.held(*one)]
     if not parts:
         raise Sd2Error(
             f"From {wanted[0]:.3f} to {wanted[1]:.3f} s every frame has a span on {track!r}",
