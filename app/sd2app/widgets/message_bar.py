@@ -8,8 +8,6 @@ from PySide6.QtWidgets import QFrame, QToolButton, QWidget
 from sd2app.widgets.layouts import row_of
 from sd2app.widgets.panel import say, sentence
 
-from sd2app.widgets.panel import say
-
 
 class MessageBar(QFrame):
     """Bar of one message, hidden while there is none."""
