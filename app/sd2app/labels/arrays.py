@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -78,6 +79,10 @@ class SpanArrays:
         before = np.concatenate([[0], np.cumsum(self.lanes_of_track, dtype=np.int64)])
         rows: NDArray[np.int64] = before[self.tracks] + self.lanes
         return rows
+
+    def rows_of(self, ids: Collection[int]) -> NDArray[np.int64]:
+        """Return the rows of the spans of some ids, in order."""
+        return np.flatnonzero(np.isin(self.ids, list(ids)))
 
     def within(self, start_s: float, end_s: float) -> NDArray[np.int64]:
         """Return the rows of spans that overlap an interval."""

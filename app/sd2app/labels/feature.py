@@ -21,11 +21,11 @@ from sd2app.labels.marking import LabelMarking, Reaction
 from sd2app.labels.model import LabelsModel
 from sd2app.labels.painting import map_overlay, strip_overlay
 from sd2app.labels.panel import LabelsPanel
-from sd2app.labels.recovery import LabelBar, choose_recovery
+from sd2app.labels.recovery import LabelBar, recover
 from sd2app.labels.timeline import LabelArea, LabelTimeline
 from sd2app.labels.tracks import LabelTracks, TrackMenu
 from sd2app.session.session import Session
-from sd2app.widgets.time_plot import Overlay, TimePlot
+from sd2app.widgets.time_plot import TimePlot
 
 
 class LabelsFeature(Feature):
@@ -52,6 +52,7 @@ class LabelsFeature(Feature):
         self.marking = LabelMarking(self.edits, self.reaction)
         self.tracks = LabelTracks(shell, self.edits)
         self.loop = SpanLoop(labels, s.playback, parent)
+        self.over_maps, self.over_all = map_overlay(labels), strip_overlay(labels)
         self.cut_out = CutOutModel(s, parent)
         self.cut_out.asked.connect(
             lambda *others: ask_about_others(shell.dialog_parent, self.cut_out, *others)
@@ -248,7 +249,7 @@ class LabelsFeature(Feature):
                 "recover_labels", "File", "Recover labels…", (),
                 "Labels that were not saved when the program ended, or that were not wanted back"
                 " then",
-                self._recover,
+                lambda: recover(autosave, s.document, shell),
             ),
             Action(
                 "edit_labels_here", "Labels", "Try again to edit labels here", (),
@@ -324,17 +325,7 @@ class LabelsFeature(Feature):
 
     def bars(self) -> Sequence[QWidget]:
         """Labels that were not saved, and who else edits."""
-        return (LabelBar(self.autosave, self.edits, self._session.document, self._recover),)
-
-    @property
-    def over_maps(self) -> Overlay:
-        """Spans over a map."""
-        return map_overlay(self.model)
-
-    @property
-    def over_all(self) -> Overlay:
-        """Spans over the overview of the recording."""
-        return strip_overlay(self.model)
+        return (LabelBar(self.autosave, self.edits, self._session.document, self._shell),)
 
     def let_drag_on(self, views: Sequence[TimePlot]) -> None:
         """Let spans be selected and their edges be dragged on maps."""
@@ -342,17 +333,6 @@ class LabelsFeature(Feature):
             SpanDragger(view, self.dragging, self.loop)
 
     # --- life -----------------------------------------------------------------------------
-
-    def _recover(self) -> None:
-        """List what was not saved, and open the recording of what is chosen."""
-        offer = choose_recovery(self.autosave, self._shell.dialog_parent)
-        if offer is None:
-            return
-        if self.autosave.is_of_open(offer):
-            self.autosave.ask_for(offer)
-        elif self._shell.may_discard():
-            self.autosave.ask_for(offer)
-            self._session.document.open([offer.recording])
 
     def _follow_capture(self) -> None:
         """Take the labels that a radar capture brings, which follow its clock."""

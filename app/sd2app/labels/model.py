@@ -6,14 +6,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.labels.arrays import UNKNOWN_COLOUR, SpanArrays, SpanColumns
+from sd2app.labels.arrays import UNKNOWN_COLOUR, SpanArrays
 from sd2core.labels.spans import Labels, Span
-
-_COLUMNS_KEPT = 4
-"""Number of cached scales; maps, timeline and overview use few, at every frame."""
 
 
 @dataclass(frozen=True)
@@ -42,24 +38,16 @@ class LabelsModel(QObject):
         self.track = self.labels.tracks[0].name  # for new spans; empty without any track
         self.label = self.labels.label_set.labels[0].name  # for drawn spans: the one used last
         self.marks: tuple[Mark, ...] = ()  # in progress, in the order of their starts
-        self._selected: frozenset[int] = frozenset()
-        self._columns: dict[object, SpanColumns] = {}
+        self.selected_ids: frozenset[int] = frozenset()
 
     @property
     def selected(self) -> tuple[Span, ...]:
         """Selected spans, in the order of time."""
-        spans = self.labels.spans
-        return tuple(spans[row] for row in self.selected_rows)
-
-    @property
-    def selected_rows(self) -> NDArray[np.int64]:
-        """Selected spans as rows of :attr:`arrays`."""
-        chosen = np.fromiter(self._selected, np.int64, len(self._selected))
-        return np.flatnonzero(np.isin(self.arrays.ids, chosen))
+        return tuple(self.labels.spans[row] for row in self.arrays.rows_of(self.selected_ids))
 
     def is_selected(self, span_id: int) -> bool:
         """True if the span is selected."""
-        return span_id in self._selected
+        return span_id in self.selected_ids
 
     def within(self, start_s: float, end_s: float) -> list[Span]:
         """Return the spans that overlap an interval, in order."""
@@ -72,26 +60,6 @@ class LabelsModel(QObject):
         found = [self.labels.spans[row] for row in rows]
         return min(found, key=lambda one: (one.track != self.track, one.duration_s), default=None)
 
-    def columns(
-        self,
-        start_s: float,
-        end_s: float,
-        columns: int,
-        wide_columns: float,
-        *,
-        together: bool = False,
-    ) -> SpanColumns:
-        """Return :meth:`SpanArrays.columns` of a time window, cached."""
-        key = start_s, end_s, columns, wide_columns, together
-        found = self._columns.get(key)
-        if found is None:
-            while len(self._columns) >= _COLUMNS_KEPT:
-                del self._columns[next(iter(self._columns))]
-            found = self._columns[key] = self.arrays.columns(
-                start_s, end_s, columns, wide_columns, self.selected_rows, together=together
-            )
-        return found
-
     def colour_of(self, label: str) -> str:
         """Return the ``#rrggbb`` of a label."""
         known = self.labels.label_set.find(label)
@@ -102,7 +70,7 @@ class LabelsModel(QObject):
     def open(self, labels: Labels) -> None:
         """Show another recording's labels; selection and marks are cleared."""
         self.marks = ()
-        self._choose(frozenset())
+        self.selected_ids = frozenset()
         self._assign(labels)
         self.selection_changed.emit()
         self.marks_changed.emit()
@@ -112,8 +80,8 @@ class LabelsModel(QObject):
         if labels is self.labels:
             return
         there = {span.id for span in labels.spans}
-        pruned = not self._selected <= there
-        self._choose(self._selected & there)
+        pruned = not self.selected_ids <= there
+        self.selected_ids = self.selected_ids & there
         self._assign(labels)
         if pruned:
             self.selection_changed.emit()
@@ -121,11 +89,11 @@ class LabelsModel(QObject):
     def select(self, ids: Iterable[int]) -> None:
         """Select these spans and no others; the track of the first is the one for new spans."""
         wanted = frozenset(ids) & frozenset(self.arrays.ids.tolist())
-        if wanted == self._selected:
+        if wanted == self.selected_ids:
             return
-        self._choose(wanted)
+        self.selected_ids = wanted
         if wanted:
-            self.track = self.labels.spans[self.selected_rows[0]].track
+            self.track = self.selected[0].track
         self.selection_changed.emit()
 
     def select_all(self) -> None:
@@ -163,14 +131,9 @@ class LabelsModel(QObject):
             self.marks = marks
             self.marks_changed.emit()
 
-    def _choose(self, ids: frozenset[int]) -> None:
-        self._selected = ids
-        self._columns.clear()
-
     def _assign(self, labels: Labels) -> None:
         self.labels = labels
         self.arrays = SpanArrays.of(labels)
-        self._columns.clear()
         names = [track.name for track in labels.tracks]
         left = tuple(mark for mark in self.marks if mark.track in names)
         dropped, self.marks = left != self.marks, left

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -306,7 +307,22 @@ def _columns_in(
     """Spans in view, one column per device pixel."""
     ratio = painter.device().devicePixelRatioF()
     count = max(round(plot.width() * ratio), 1)
-    return model.columns(scale.start_s, scale.end_s, count, wide_px * ratio, together=together)
+    selected, wide = model.selected_ids, wide_px * ratio
+    return _columns(model.arrays, selected, scale.start_s, scale.end_s, count, wide, together)
+
+
+@lru_cache(maxsize=8)  # maps, timelines and overview use few scales, at every frame
+def _columns(
+    arrays: SpanArrays,
+    selected: frozenset[int],
+    start_s: float,
+    end_s: float,
+    count: int,
+    wide: float,
+    together: bool,
+) -> SpanColumns:
+    chosen = arrays.rows_of(selected)
+    return arrays.columns(start_s, end_s, count, wide, chosen, together=together)
 
 
 def _tinted(columns: SpanColumns, colours: tuple[str, ...], tints: tuple[int, int]) -> QImage:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import QSize, Qt
@@ -22,6 +21,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from sd2app.feature import Shell
 from sd2app.labels.autosave import LabelAutosave
 from sd2app.labels.edits import LabelEdits
 from sd2app.session.document import DocumentModel
@@ -49,17 +49,14 @@ def _edits_text(offer: Offer) -> str:
 
 
 class LabelBar(QFrame):
-    """Offers what the user has to decide about the labels; hidden when there is nothing.
-
-    ``recover`` opens the list for all recordings.
-    """
+    """Offers what the user has to decide about the labels; hidden when there is nothing."""
 
     def __init__(
         self,
         autosave: LabelAutosave,
         edits: LabelEdits,
         document: DocumentModel,
-        recover: Callable[[], None],
+        shell: Shell,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
@@ -83,7 +80,8 @@ class LabelBar(QFrame):
              autosave.decline),
             ("postpone", "Not now", "Offer them again when this recording is opened next",
              autosave.postpone),
-            ("recover", "Recover labels…", "See what is there, and open its recording", recover),
+            ("recover", "Recover labels…", "See what is there, and open its recording",
+             lambda: recover(autosave, document, shell)),
             ("close", "✕", "Close this message", autosave.dismiss),
         ):  # fmt: skip
             self._buttons[name] = outlined(text, tip, run, self)
@@ -135,12 +133,19 @@ class LabelBar(QFrame):
         return f"The program ended before labels were saved: {listed}."
 
 
-def choose_recovery(autosave: LabelAutosave, parent: QWidget) -> Offer | None:
-    """Show the dialog; return the offer whose recording is to be opened."""
-    dialog = RecoverLabelsDialog(autosave, parent)
+def recover(autosave: LabelAutosave, document: DocumentModel, shell: Shell) -> None:
+    """List what was not saved, and open the recording of what is chosen."""
+    dialog = RecoverLabelsDialog(autosave, shell.dialog_parent)
     accepted = dialog.exec() == QDialog.DialogCode.Accepted
+    offer = dialog.offer
     dialog.deleteLater()
-    return dialog.offer if accepted else None
+    if not accepted or offer is None:
+        return
+    if autosave.is_of_open(offer):
+        autosave.ask_for(offer)
+    elif shell.may_discard():
+        autosave.ask_for(offer)
+        document.open([offer.recording])
 
 
 class RecoverLabelsDialog(QDialog):
