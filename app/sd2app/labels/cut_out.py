@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import (
@@ -19,11 +19,11 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from sd2app.background.latest import Emit, LatestRunner
+from sd2app.background.latest import Emit
 from sd2app.feature import Shell
 from sd2app.labels.model import LabelsModel
 from sd2app.session.session import Session
-from sd2app.session.tasks import Job
+from sd2app.session.tasks import ListedRunner
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.panel import sentence
 from sd2app.widgets.text import counted
@@ -60,11 +60,9 @@ class CutOutModel(QObject):
         super().__init__(parent)
         self._session = session
         self._plan: _Plan | None = None
-        self._job: Job | None = None
-        self._runner = LatestRunner("cut", self)
-        self._runner.partial.connect(self._report)
+        self._runner = ListedRunner("cut", session.jobs, self)
         self._runner.finished.connect(self._receive)
-        self._runner.failed.connect(self._fail)
+        self._runner.failed.connect(lambda error: self.failed.emit(str(error)))
 
     def source(self, parts: Iterable[Part] = ("video", "mesh", "maps")) -> CutSource | None:
         """Return the parts of the recording, without maps that are still computed."""
@@ -91,12 +89,11 @@ class CutOutModel(QObject):
     def start(self, spans: Sequence[Span], parts: Iterable[Part], folder: Path) -> None:
         """Compare with the folder, then export."""
         source = self.source(parts)
-        if source is None:
-            return
-        self._end()
-        title = f"Cutting out {counted(len(spans), 'span')}"
-        self._job = self._session.jobs.start(title, self.give_up)
-        self._runner.submit(lambda emit: _Plan(source, plan_cuts(source, spans, folder), folder))
+        if source is not None:
+            self._runner.submit(
+                lambda emit: _Plan(source, plan_cuts(source, spans, folder), folder),
+                _title(len(spans)),
+            )
 
     def go_on(self, *, replace_others: bool) -> None:
         """Export; folders that hold something else are replaced or kept."""
@@ -114,27 +111,16 @@ class CutOutModel(QObject):
             )
             return _Done(plan.folder, len(written), len(plan.cuts) - len(written))
 
-        self._runner.submit(cut)
+        self._runner.submit(cut, _title(len(plan.cuts)))
 
     def give_up(self) -> None:
         """Stop; complete folders stay, and the next export continues from there."""
         self._runner.cancel()
         self._plan = None
-        self._end()
 
     def close(self) -> None:
         """Stop, and wait until nothing is being written."""
         self._runner.close()
-        self._end()
-
-    def _end(self) -> None:
-        if self._job is not None:
-            self._session.jobs.finish(self._job)
-            self._job = None
-
-    def _report(self, progress: Any) -> None:
-        if self._job is not None:
-            self._session.jobs.report(self._job, *progress)
 
     def _receive(self, result: _Plan | _Done) -> None:
         if isinstance(result, _Plan):
@@ -145,14 +131,13 @@ class CutOutModel(QObject):
             else:
                 self.go_on(replace_others=False)
             return
-        self._end()
         words = f"{counted(result.written, 'span')} cut out into {result.folder}."
         same = f" {result.same} stayed as they were." if result.same else ""
         self.noted.emit(words + same)
 
-    def _fail(self, error: Exception) -> None:
-        self._end()
-        self.failed.emit(str(error))
+
+def _title(count: int) -> str:
+    return f"Cutting out {counted(count, 'span')}"
 
 
 def ask_for_cut_outs(shell: Shell, labels: LabelsModel, model: CutOutModel) -> None:
