@@ -6,11 +6,12 @@ from collections.abc import Callable, Sequence
 from statistics import median
 
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QWidget
 
 from sd2app.agreement.model import AgreementModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.widgets.inputs import action_button
+from sd2app.widgets.layouts import STRETCH, column, row
 from sd2app.widgets.panel import ElidedLabel, FactRows, rule, sentence, title
 from sd2app.widgets.text import counted
 from sd2core.labels.agreement import kappa_words
@@ -43,35 +44,23 @@ class AgreementPanel(QWidget):
         self._labels = FactRows(_MOST_LABELS, at_the_edge=True, parent=self)
         self._nothing = sentence(_NOTHING)
         self._result = self._lay_out_result(action)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(8, 6, 8, 6)
-        layout.setSpacing(8)
-        layout.addLayout(
-            _row(self._name, action, ("compare_labels", "File…"), ("end_comparison", "End"))
-        )
-        layout.addWidget(self._nothing)
-        layout.addWidget(self._result)
-        layout.addStretch(1)
+        file = "compare_labels", "File…"
+        top = _row(self._name, action, file, ("end_comparison", "End"))
+        parts = top, self._nothing, self._result, STRETCH
+        self.setLayout(column(*parts, spacing_px=8, margins_px=(8, 6, 8, 6)))
         model.changed.connect(self._refresh)
         playback.frame_changed.connect(self._follow_cursor)
         self._refresh()
 
     def _lay_out_result(self, action: Callable[[str], QAction]) -> QWidget:
         result = QWidget(self)
-        layout = QVBoxLayout(result)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(8)
         buttons = (("previous_disagreement", "Previous"), ("next_disagreement", "Next"))
-        layout.addWidget(self._verdict)
-        layout.addWidget(sentence(_MEANING))
-        layout.addWidget(rule())
-        layout.addLayout(_row(title("Disagreements"), action, *buttons))
-        layout.addWidget(self._where)
-        layout.addWidget(rule())
-        layout.addWidget(self._facts)
-        layout.addWidget(rule())
-        layout.addWidget(title("Kappa of each label"))
-        layout.addWidget(self._labels)
+        parts = (
+            *(self._verdict, sentence(_MEANING), rule()),
+            *(_row(title("Disagreements"), action, *buttons), self._where, rule()),
+            *(self._facts, rule(), title("Kappa of each label"), self._labels),
+        )
+        result.setLayout(column(*parts, spacing_px=8, margins_px=(0, 0, 0, 0)))
         return result
 
     def _refresh(self) -> None:
@@ -94,12 +83,8 @@ class AgreementPanel(QWidget):
 def _row(
     heading: QWidget, action: Callable[[str], QAction], *buttons: tuple[str, str]
 ) -> QHBoxLayout:
-    row = QHBoxLayout()
-    row.setSpacing(6)
-    row.addWidget(heading, 1)
-    for name, text in buttons:
-        row.addWidget(action_button(action(name), text, outlined=True))
-    return row
+    made = [action_button(action(name), text, outlined=True) for name, text in buttons]
+    return row((heading, 1), *made, spacing_px=6)
 
 
 def verdict(model: AgreementModel) -> str:

@@ -13,9 +13,7 @@ from PySide6.QtWidgets import (
     QDialogButtonBox,
     QFileDialog,
     QFormLayout,
-    QHBoxLayout,
     QMessageBox,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -25,6 +23,7 @@ from sd2app.labels.model import LabelsModel
 from sd2app.session.session import Session
 from sd2app.session.tasks import ListedRunner
 from sd2app.widgets.inputs import Choice
+from sd2app.widgets.layouts import STRETCH, column, row
 from sd2app.widgets.panel import sentence
 from sd2app.widgets.text import counted
 from sd2core.cutouts.cutting import Cut, cut_out, plan_cuts
@@ -210,15 +209,11 @@ class CutOutDialog(QDialog):
             "maps": (f"maps: {maps}" if maps else "maps", bool(maps)),
         }
         self._parts: dict[Part, QCheckBox] = {}
-        row = QHBoxLayout()
-        row.setSpacing(16)
         for part, (text, has) in there.items():
             box = self._parts[part] = QCheckBox(text, self)
             box.setEnabled(has)
             box.setChecked(has)
             box.toggled.connect(self._refresh)
-            row.addWidget(box)
-        row.addStretch(1)
         self._size = sentence("")
         buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel, self)
         self._go = buttons.addButton("Choose folder…", QDialogButtonBox.ButtonRole.AcceptRole)
@@ -229,15 +224,9 @@ class CutOutDialog(QDialog):
         form.setHorizontalSpacing(16)
         form.setVerticalSpacing(8)
         form.addRow("Spans", self._which)
-        form.addRow("Parts", row)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(16, 16, 16, 16)
-        layout.setSpacing(12)
-        layout.addLayout(form)
-        layout.addWidget(self._size)
-        layout.addWidget(sentence(_ABOUT))
-        layout.addStretch(1)
-        layout.addWidget(buttons)
+        form.addRow("Parts", row(*self._parts.values(), STRETCH, spacing_px=16))
+        content = form, self._size, sentence(_ABOUT), STRETCH, buttons
+        self.setLayout(column(*content, spacing_px=12, margins_px=(16, 16, 16, 16)))
         self._refresh()
         self.setMinimumWidth(520)
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QDialog, QFileDialog, QFormLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QDialog, QFileDialog, QFormLayout, QWidget
 
 from sd2app.background.latest import Emit, LatestRunner
 from sd2app.feature import Shell
@@ -14,6 +14,7 @@ from sd2app.labels.model import LabelsModel
 from sd2app.session.session import Session
 from sd2app.widgets.dialogs import ExportButtons
 from sd2app.widgets.inputs import Choice
+from sd2app.widgets.layouts import STRETCH, column
 from sd2app.widgets.panel import rule, say, sentence
 from sd2app.widgets.text import counted
 from sd2core.errors import Sd2Error
@@ -78,14 +79,8 @@ class LabelExportDialog(QDialog):
         form = QFormLayout()
         form.setHorizontalSpacing(12)
         form.addRow("For", self._format)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(16, 16, 16, 16)
-        layout.setSpacing(8)
-        layout.addLayout(form)
-        for widget in (self._about, rule(), self._said):
-            layout.addWidget(widget)
-        layout.addStretch(1)
-        layout.addWidget(self._buttons)
+        parts = form, self._about, rule(), self._said, STRETCH, self._buttons
+        self.setLayout(column(*parts, spacing_px=8, margins_px=(16, 16, 16, 16)))
         self._look()
         self.resize(560, 300)
 

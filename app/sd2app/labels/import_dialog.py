@@ -13,7 +13,6 @@ from PySide6.QtWidgets import (
     QFileDialog,
     QFormLayout,
     QLabel,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -22,6 +21,7 @@ from sd2app.feature import Shell
 from sd2app.labels.edits import LabelEdits
 from sd2app.widgets.dialogs import LABEL_FILES, LABEL_SUFFIXES
 from sd2app.widgets.inputs import Choice
+from sd2app.widgets.layouts import column
 from sd2app.widgets.panel import FactRows, rule, say, sentence, title
 from sd2app.widgets.text import counted
 from sd2core.labels.formats import FORMATS, format_for, read_labels
@@ -217,17 +217,9 @@ class LabelImportDialog(QDialog):
         form.addRow("Read as", self._format)
         form.addRow(self._observation_name, self._observation)
         take.addRow("Take them", self._way)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(16, 16, 16, 16)
-        layout.setSpacing(8)
-        layout.addWidget(title(file.path.name))
-        layout.addLayout(form)
-        for widget in (rule(), self._said, self._facts, rule()):
-            layout.addWidget(widget)
-        layout.addLayout(take)
-        layout.addWidget(self._consequence)
-        layout.addSpacing(8)
-        layout.addWidget(buttons)
+        content = form, rule(), self._said, self._facts, rule(), take, self._consequence
+        above = column(title(file.path.name), *content, spacing_px=8)
+        self.setLayout(column(above, buttons, spacing_px=16, margins_px=(16, 16, 16, 16)))
         file.changed.connect(self._refresh)
         self._refresh()
         self.setMinimumWidth(560)

@@ -19,12 +19,10 @@ from PySide6.QtWidgets import (
     QAbstractItemView,
     QColorDialog,
     QFileDialog,
-    QHBoxLayout,
     QLineEdit,
     QMenu,
     QStyleOptionViewItem,
     QToolButton,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -32,6 +30,7 @@ from sd2app.feature import Shell
 from sd2app.labels.label_set_model import CLASS, COLOUR, KEY, NAME, NO_CLASS, LabelSetModel
 from sd2app.widgets.icons import swatch_icon
 from sd2app.widgets.inputs import TypedLine
+from sd2app.widgets.layouts import STRETCH, column, row
 from sd2app.widgets.panel import ElidedLabel, outlined
 from sd2app.widgets.table import CellTable, Choosable, FramedCells, ListedEditor
 from sd2core.labels.files import read_label_set, write_label_set
@@ -62,21 +61,10 @@ class LabelSetPage(QWidget):
         file = outlined("File", "Share the set as a file, or take another", None, self)
         file.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         file.setMenu(self._file_menu())
-        top, below = QHBoxLayout(), QHBoxLayout()
-        for row in (top, below):
-            row.setSpacing(6)
-        top.addWidget(self._name, 1)
-        top.addWidget(file)
-        for button in (self._add, self._less, self._up, self._down):
-            below.addWidget(button)
-        below.addStretch(1)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(6)
-        layout.addLayout(top)
-        layout.addWidget(table, 1)
-        layout.addWidget(self._warning)
-        layout.addLayout(below)
+        top = row((self._name, 1), file, spacing_px=6)
+        below = row(self._add, self._less, self._up, self._down, STRETCH, spacing_px=6)
+        parts = top, (table, 1), self._warning, below
+        self.setLayout(column(*parts, spacing_px=6, margins_px=(0, 0, 0, 0)))
         model.modelReset.connect(self._refresh)
         model.dataChanged.connect(self._refresh)
         table.selectionModel().currentRowChanged.connect(self._refresh)
@@ -176,8 +164,8 @@ class LabelSetTable(CellTable):
         self.setItemDelegate(_LabelSetCells(model, self))
         self.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
         metrics = self.fontMetrics()
-        for column, text in enumerate(_WIDE):
-            self.setColumnWidth(column, metrics.horizontalAdvance(text) + _PADDING_PX)
+        for place, text in enumerate(_WIDE):
+            self.setColumnWidth(place, metrics.horizontalAdvance(text) + _PADDING_PX)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Remove labels, not spans, with Delete."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QToolButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QSizePolicy, QToolButton, QWidget
 
 from sd2app.feature import Shell
 from sd2app.labels.edits import LabelEdits
@@ -16,6 +16,7 @@ from sd2app.labels.table import SpanTable
 from sd2app.labels.table_model import SpanFilter, SpanTableModel
 from sd2app.session.session import Session
 from sd2app.widgets.inputs import Choice, SearchLine
+from sd2app.widgets.layouts import column, row
 from sd2app.widgets.pages import InnerPage, InnerPages
 from sd2app.widgets.panel import ElidedLabel, outlined
 
@@ -32,25 +33,19 @@ class SpanPage(QWidget):
         self._model, self.table = model, table
         self.search = SearchLine("Search label, note, track", self)
         self._chosen = {name: Choice(f"Spans of this {name} only", self) for name in _ANY}
-        row = QHBoxLayout()
-        row.setSpacing(6)
-        row.addWidget(self.search, 5)
         for choice in self._chosen.values():
             choice.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
             choice.setMinimumWidth(48)
             choice.activated.connect(self._filter)
-            row.addWidget(choice, 4)
         columns = outlined("…", "Which columns are shown", None, self)
         columns.setAccessibleName("Columns")
         columns.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         columns.setStyleSheet("QToolButton::menu-indicator { image: none; }")
         columns.setMenu(table.columns_menu)
-        row.addWidget(columns)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(6)
-        layout.addLayout(row)
-        layout.addWidget(table, 1)
+        filters = row(
+            (self.search, 5), *((one, 4) for one in self._chosen.values()), columns, spacing_px=6
+        )
+        self.setLayout(column(filters, (table, 1), spacing_px=6, margins_px=(0, 0, 0, 0)))
         self.search.textChanged.connect(self._filter)
         self.search.returnPressed.connect(table.setFocus)
         labels.changed.connect(self._offer)
@@ -113,9 +108,7 @@ class LabelsPanel(QWidget):
             self._count,
             self,
         )
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(8, 6, 8, 6)
-        layout.addWidget(self._pages)
+        self.setLayout(column(self._pages, margins_px=(8, 6, 8, 6)))
         for signal in (
             model.rowsInserted,
             model.rowsRemoved,

@@ -10,14 +10,12 @@ from PySide6.QtWidgets import (
     QDialogButtonBox,
     QFileDialog,
     QFrame,
-    QHBoxLayout,
     QHeaderView,
     QMessageBox,
     QSizePolicy,
     QToolButton,
     QTreeWidget,
     QTreeWidgetItem,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -26,6 +24,7 @@ from sd2app.labels.autosave import LabelAutosave
 from sd2app.labels.edits import LabelEdits
 from sd2app.session.document import DocumentModel
 from sd2app.widgets.dialogs import may_delete
+from sd2app.widgets.layouts import column, row
 from sd2app.widgets.panel import outlined, sentence, title
 from sd2app.widgets.text import clock_text, counted
 from sd2core.errors import Sd2Error
@@ -66,11 +65,6 @@ class LabelBar(QFrame):
         self._autosave, self._document = autosave, document
         self._title, self._text = title(""), sentence("")
         self._text.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(12, 4, 4, 4)
-        layout.setSpacing(8)
-        layout.addWidget(self._title)
-        layout.addWidget(self._text, 1)
         self._buttons: dict[str, QToolButton] = {}
         for name, text, tip, run in (
             ("again", "Try again", "Edit them here, once the other window is closed",
@@ -85,9 +79,12 @@ class LabelBar(QFrame):
             ("close", "✕", "Close this message", autosave.dismiss),
         ):  # fmt: skip
             self._buttons[name] = outlined(text, tip, run, self)
-            layout.addWidget(self._buttons[name])
         self._buttons["close"].setObjectName("")
         self._buttons["close"].setAccessibleName("Close this message")
+        buttons = row(*self._buttons.values(), spacing_px=8)
+        self.setLayout(
+            row(self._title, (self._text, 1), buttons, spacing_px=8, margins_px=(12, 4, 4, 4))
+        )
         autosave.changed.connect(self._refresh)
         # What is offered is compared with what is there by now.
         document.undo_stack.indexChanged.connect(self._refresh)
@@ -175,9 +172,7 @@ class RecoverLabelsDialog(QDialog):
         self._write.clicked.connect(self._write_file)
         self._discard.clicked.connect(self._give_up)
         buttons.rejected.connect(self.reject)
-        layout = QVBoxLayout(self)
-        for one in (self._said, self._list, self._notes, buttons):
-            layout.addWidget(one)
+        self.setLayout(column(self._said, self._list, self._notes, buttons))
         self.resize(800, 320)
         self._fill()
 

@@ -6,11 +6,12 @@ from functools import partial
 
 from PySide6.QtCore import QMimeData, QObject
 from PySide6.QtGui import QGuiApplication, QIcon
-from PySide6.QtWidgets import QAbstractItemView, QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QAbstractItemView, QWidget
 
 from sd2app.labels.model import LabelsModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.widgets.icons import swatch_icon
+from sd2app.widgets.layouts import STRETCH, column, row
 from sd2app.widgets.panel import outlined
 from sd2app.widgets.record_table import Heading, RecordTableModel
 from sd2app.widgets.table import RecordTable
@@ -76,23 +77,19 @@ class StatisticsPage(QWidget):
         table.setModel(self._model)
         table.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
         table.setTabKeyNavigation(False)
-        for column, heading in enumerate(self._model.headings):
-            text = heading.text if column else _WIDE
+        for place, heading in enumerate(self._model.headings):
+            text = heading.text if place else _WIDE
             wide = self.fontMetrics().horizontalAdvance(text) + _PADDING_PX
-            table.setColumnWidth(column, max(wide, 52))
-        row = QHBoxLayout()
-        row.setSpacing(6)
-        row.addStretch(1)
-        for text, tip, separator in (
-            ("Copy table", "To be pasted into a sheet", "\t"),
-            ("Copy CSV", "Comma-separated values", ","),
-        ):
-            row.addWidget(outlined(text, tip, partial(self._copy, separator), self))
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(6)
-        layout.addWidget(table, 1)
-        layout.addLayout(row)
+            table.setColumnWidth(place, max(wide, 52))
+        to_paste, csv = (
+            outlined(text, tip, partial(self._copy, separator), self)
+            for text, tip, separator in (
+                ("Copy table", "To be pasted into a sheet", "\t"),
+                ("Copy CSV", "Comma-separated values", ","),
+            )
+        )
+        buttons = row(STRETCH, to_paste, csv, spacing_px=6)
+        self.setLayout(column((table, 1), buttons, spacing_px=6, margins_px=(0, 0, 0, 0)))
 
     def _copy(self, separator: str) -> None:
         text = self._model.text(separator)

@@ -6,10 +6,11 @@ from collections.abc import Callable
 
 from PySide6.QtCore import QSignalBlocker
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QWidget
+from PySide6.QtWidgets import QLabel, QWidget
 
 from sd2app.suggestions.model import SuggestionsModel
 from sd2app.widgets.inputs import Choice, NumberBox, action_button
+from sd2app.widgets.layouts import row
 from sd2app.widgets.panel import ElidedLabel, outlined
 
 _BUTTONS = (
@@ -42,21 +43,13 @@ class SuggestionBar(QWidget):
         self._by.activated.connect(lambda at: model.set_finder(model.finders[at]))
         self._threshold = NumberBox(0.0, 100.0, "", "")
         self._threshold.valueChanged.connect(model.set_threshold)
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(8, 2, 8, 2)
-        layout.setSpacing(6)
-        layout.addWidget(self._text, 1)
-        layout.addWidget(self._as)
-        for name, text in _BUTTONS:
-            layout.addWidget(action_button(action(name), text, outlined=True))
-        layout.addSpacing(8)
-        layout.addWidget(self._by)
-        layout.addWidget(self._source)
-        layout.addWidget(self._threshold)
+        buttons = [action_button(action(name), text, outlined=True) for name, text in _BUTTONS]
         close = outlined("✕", "Close; the suggestions stay", model.stop, self)
         close.setObjectName("")
         close.setAccessibleName("Close the suggestions")
-        layout.addWidget(close)
+        deciding = row((self._text, 1), self._as, *buttons, spacing_px=6)
+        finding = row(self._by, self._source, self._threshold, close, spacing_px=6)
+        self.setLayout(row((deciding, 1), finding, spacing_px=14, margins_px=(8, 2, 8, 2)))
         model.changed.connect(self._refresh)
         self._refresh()
 
