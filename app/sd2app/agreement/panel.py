@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QHBoxLayout, QWidget
 from sd2app.agreement.model import AgreementModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.widgets.inputs import action_button
-from sd2app.widgets.layouts import STRETCH, column, row
+from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import ElidedLabel, FactRows, rule, sentence, title
 from sd2app.widgets.text import counted
 from sd2core.labels.agreement import kappa_words
@@ -47,7 +47,7 @@ class AgreementPanel(QWidget):
         file = "compare_labels", "File…"
         top = _row(self._name, action, file, ("end_comparison", "End"))
         parts = top, self._nothing, self._result, STRETCH
-        self.setLayout(column(*parts, spacing_px=8, margins_px=(8, 6, 8, 6)))
+        self.setLayout(column_of(*parts, spacing_px=8, margins_px=(8, 6, 8, 6)))
         model.changed.connect(self._refresh)
         playback.frame_changed.connect(self._follow_cursor)
         self._refresh()
@@ -60,7 +60,7 @@ class AgreementPanel(QWidget):
             *(_row(title("Disagreements"), action, *buttons), self._where, rule()),
             *(self._facts, rule(), title("Kappa of each label"), self._labels),
         )
-        result.setLayout(column(*parts, spacing_px=8, margins_px=(0, 0, 0, 0)))
+        result.setLayout(column_of(*parts, spacing_px=8, margins_px=(0, 0, 0, 0)))
         return result
 
     def _refresh(self) -> None:
@@ -84,7 +84,7 @@ def _row(
     heading: QWidget, action: Callable[[str], QAction], *buttons: tuple[str, str]
 ) -> QHBoxLayout:
     made = [action_button(action(name), text, outlined=True) for name, text in buttons]
-    return row((heading, 1), *made, spacing_px=6)
+    return row_of((heading, 1), *made, spacing_px=6)
 
 
 def verdict(model: AgreementModel) -> str:

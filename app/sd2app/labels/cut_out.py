@@ -23,7 +23,7 @@ from sd2app.labels.model import LabelsModel
 from sd2app.session.session import Session
 from sd2app.session.tasks import ListedRunner
 from sd2app.widgets.inputs import Choice
-from sd2app.widgets.layouts import STRETCH, column, row
+from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import sentence
 from sd2app.widgets.text import counted
 from sd2core.cutouts.cutting import Cut, cut_out, plan_cuts
@@ -224,9 +224,9 @@ class CutOutDialog(QDialog):
         form.setHorizontalSpacing(16)
         form.setVerticalSpacing(8)
         form.addRow("Spans", self._which)
-        form.addRow("Parts", row(*self._parts.values(), STRETCH, spacing_px=16))
+        form.addRow("Parts", row_of(*self._parts.values(), STRETCH, spacing_px=16))
         content = form, self._size, sentence(_ABOUT), STRETCH, buttons
-        self.setLayout(column(*content, spacing_px=12, margins_px=(16, 16, 16, 16)))
+        self.setLayout(column_of(*content, spacing_px=12, margins_px=(16, 16, 16, 16)))
         self._refresh()
         self.setMinimumWidth(520)
 

@@ -14,7 +14,7 @@ from sd2app.labels.model import LabelsModel
 from sd2app.session.session import Session
 from sd2app.widgets.dialogs import ExportButtons
 from sd2app.widgets.inputs import Choice
-from sd2app.widgets.layouts import STRETCH, column
+from sd2app.widgets.layouts import STRETCH, column_of
 from sd2app.widgets.panel import rule, say, sentence
 from sd2app.widgets.text import counted
 from sd2core.errors import Sd2Error
@@ -80,7 +80,7 @@ class LabelExportDialog(QDialog):
         form.setHorizontalSpacing(12)
         form.addRow("For", self._format)
         parts = form, self._about, rule(), self._said, STRETCH, self._buttons
-        self.setLayout(column(*parts, spacing_px=8, margins_px=(16, 16, 16, 16)))
+        self.setLayout(column_of(*parts, spacing_px=8, margins_px=(16, 16, 16, 16)))
         self._look()
         self.resize(560, 300)
 

@@ -21,7 +21,7 @@ from sd2app.feature import Shell
 from sd2app.labels.edits import LabelEdits
 from sd2app.widgets.dialogs import LABEL_FILES, LABEL_SUFFIXES
 from sd2app.widgets.inputs import Choice
-from sd2app.widgets.layouts import column
+from sd2app.widgets.layouts import column_of
 from sd2app.widgets.panel import FactRows, rule, say, sentence, title
 from sd2app.widgets.text import counted
 from sd2core.labels.formats import FORMATS, format_for, read_labels
@@ -218,8 +218,8 @@ class LabelImportDialog(QDialog):
         form.addRow(self._observation_name, self._observation)
         take.addRow("Take them", self._way)
         content = form, rule(), self._said, self._facts, rule(), take, self._consequence
-        above = column(title(file.path.name), *content, spacing_px=8)
-        self.setLayout(column(above, buttons, spacing_px=16, margins_px=(16, 16, 16, 16)))
+        parts = title(file.path.name), *content, 8, buttons
+        self.setLayout(column_of(*parts, spacing_px=8, margins_px=(16, 16, 16, 16)))
         file.changed.connect(self._refresh)
         self._refresh()
         self.setMinimumWidth(560)

@@ -30,7 +30,7 @@ from sd2app.feature import Shell
 from sd2app.labels.label_set_model import CLASS, COLOUR, KEY, NAME, NO_CLASS, LabelSetModel
 from sd2app.widgets.icons import swatch_icon
 from sd2app.widgets.inputs import TypedLine
-from sd2app.widgets.layouts import STRETCH, column, row
+from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import ElidedLabel, outlined
 from sd2app.widgets.table import CellTable, Choosable, FramedCells, ListedEditor
 from sd2core.labels.files import read_label_set, write_label_set
@@ -61,10 +61,10 @@ class LabelSetPage(QWidget):
         file = outlined("File", "Share the set as a file, or take another", None, self)
         file.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         file.setMenu(self._file_menu())
-        top = row((self._name, 1), file, spacing_px=6)
-        below = row(self._add, self._less, self._up, self._down, STRETCH, spacing_px=6)
+        top = row_of((self._name, 1), file, spacing_px=6)
+        below = row_of(self._add, self._less, self._up, self._down, STRETCH, spacing_px=6)
         parts = top, (table, 1), self._warning, below
-        self.setLayout(column(*parts, spacing_px=6, margins_px=(0, 0, 0, 0)))
+        self.setLayout(column_of(*parts, spacing_px=6, margins_px=(0, 0, 0, 0)))
         model.modelReset.connect(self._refresh)
         model.dataChanged.connect(self._refresh)
         table.selectionModel().currentRowChanged.connect(self._refresh)

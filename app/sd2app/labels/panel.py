@@ -16,7 +16,7 @@ from sd2app.labels.table import SpanTable
 from sd2app.labels.table_model import SpanFilter, SpanTableModel
 from sd2app.session.session import Session
 from sd2app.widgets.inputs import Choice, SearchLine
-from sd2app.widgets.layouts import column, row
+from sd2app.widgets.layouts import column_of, row_of
 from sd2app.widgets.pages import InnerPage, InnerPages
 from sd2app.widgets.panel import ElidedLabel, outlined
 
@@ -42,10 +42,10 @@ class SpanPage(QWidget):
         columns.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         columns.setStyleSheet("QToolButton::menu-indicator { image: none; }")
         columns.setMenu(table.columns_menu)
-        filters = row(
+        filters = row_of(
             (self.search, 5), *((one, 4) for one in self._chosen.values()), columns, spacing_px=6
         )
-        self.setLayout(column(filters, (table, 1), spacing_px=6, margins_px=(0, 0, 0, 0)))
+        self.setLayout(column_of(filters, (table, 1), spacing_px=6, margins_px=(0, 0, 0, 0)))
         self.search.textChanged.connect(self._filter)
         self.search.returnPressed.connect(table.setFocus)
         labels.changed.connect(self._offer)
@@ -108,7 +108,7 @@ class LabelsPanel(QWidget):
             self._count,
             self,
         )
-        self.setLayout(column(self._pages, margins_px=(8, 6, 8, 6)))
+        self.setLayout(column_of(self._pages, margins_px=(8, 6, 8, 6)))
         for signal in (
             model.rowsInserted,
             model.rowsRemoved,

@@ -24,7 +24,7 @@ from sd2app.labels.autosave import LabelAutosave
 from sd2app.labels.edits import LabelEdits
 from sd2app.session.document import DocumentModel
 from sd2app.widgets.dialogs import may_delete
-from sd2app.widgets.layouts import column, row
+from sd2app.widgets.layouts import column_of, row_of
 from sd2app.widgets.panel import outlined, sentence, title
 from sd2app.widgets.text import clock_text, counted
 from sd2core.errors import Sd2Error
@@ -81,9 +81,9 @@ class LabelBar(QFrame):
             self._buttons[name] = outlined(text, tip, run, self)
         self._buttons["close"].setObjectName("")
         self._buttons["close"].setAccessibleName("Close this message")
-        buttons = row(*self._buttons.values(), spacing_px=8)
+        buttons = row_of(*self._buttons.values(), spacing_px=8)
         self.setLayout(
-            row(self._title, (self._text, 1), buttons, spacing_px=8, margins_px=(12, 4, 4, 4))
+            row_of(self._title, (self._text, 1), buttons, spacing_px=8, margins_px=(12, 4, 4, 4))
         )
         autosave.changed.connect(self._refresh)
         # What is offered is compared with what is there by now.
@@ -172,7 +172,7 @@ class RecoverLabelsDialog(QDialog):
         self._write.clicked.connect(self._write_file)
         self._discard.clicked.connect(self._give_up)
         buttons.rejected.connect(self.reject)
-        self.setLayout(column(self._said, self._list, self._notes, buttons))
+        self.setLayout(column_of(self._said, self._list, self._notes, buttons))
         self.resize(800, 320)
         self._fill()
 

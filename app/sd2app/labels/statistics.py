@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QAbstractItemView, QWidget
 from sd2app.labels.model import LabelsModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.widgets.icons import swatch_icon
-from sd2app.widgets.layouts import STRETCH, column, row
+from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import outlined
 from sd2app.widgets.record_table import Heading, RecordTableModel
 from sd2app.widgets.table import RecordTable
@@ -88,8 +88,8 @@ class StatisticsPage(QWidget):
                 ("Copy CSV", "Comma-separated values", ","),
             )
         )
-        buttons = row(STRETCH, to_paste, csv, spacing_px=6)
-        self.setLayout(column((table, 1), buttons, spacing_px=6, margins_px=(0, 0, 0, 0)))
+        buttons = row_of(STRETCH, to_paste, csv, spacing_px=6)
+        self.setLayout(column_of((table, 1), buttons, spacing_px=6, margins_px=(0, 0, 0, 0)))
 
     def _copy(self, separator: str) -> None:
         text = self._model.text(separator)

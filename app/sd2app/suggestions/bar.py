@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QLabel, QWidget
 
 from sd2app.suggestions.model import SuggestionsModel
 from sd2app.widgets.inputs import Choice, NumberBox, action_button
-from sd2app.widgets.layouts import row
+from sd2app.widgets.layouts import row_of
 from sd2app.widgets.panel import ElidedLabel, outlined
 
 _BUTTONS = (
@@ -44,12 +44,17 @@ class SuggestionBar(QWidget):
         self._threshold = NumberBox(0.0, 100.0, "", "")
         self._threshold.valueChanged.connect(model.set_threshold)
         buttons = [action_button(action(name), text, outlined=True) for name, text in _BUTTONS]
+        finding = self._by, self._source, self._threshold
+        margins_px = 8, 2, 8, 2
+        layout = row_of(
+            (self._text, 1), self._as, *buttons, 8, *finding, spacing_px=6, margins_px=margins_px
+        )
+        self.setLayout(layout)
+        # The last one for the keyboard too.
         close = outlined("✕", "Close; the suggestions stay", model.stop, self)
         close.setObjectName("")
         close.setAccessibleName("Close the suggestions")
-        deciding = row((self._text, 1), self._as, *buttons, spacing_px=6)
-        finding = row(self._by, self._source, self._threshold, close, spacing_px=6)
-        self.setLayout(row((deciding, 1), finding, spacing_px=14, margins_px=(8, 2, 8, 2)))
+        layout.addWidget(close)
         model.changed.connect(self._refresh)
         self._refresh()
 
