@@ -68,7 +68,7 @@ class MeshComparisonFeature(Feature):
             s,
             self._overlay,
             map_view=self._map_view,
-            ruler=TimeRuler(s.span, s.playback, s.display),
+            ruler=TimeRuler(s),
             keys=[shell.action(name) for name in _SHARED_KEYS],
             attempt=shell.attempt,
             parent=shell.dialog_parent,

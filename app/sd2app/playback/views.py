@@ -7,11 +7,11 @@ from typing import Protocol
 
 from PySide6.QtCore import QPointF, QRectF, QSignalBlocker, Qt, SignalInstance
 from PySide6.QtGui import QAction, QColor, QMouseEvent, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QSlider, QToolButton, QWidget
+from PySide6.QtWidgets import QLabel, QSlider, QToolButton, QWidget
 
-from sd2app.session.display import DisplayModel
 from sd2app.session.playback import PlaybackModel
-from sd2app.session.time_window import TimeWindow
+from sd2app.session.session import Session
+from sd2app.widgets.layouts import Part, row_of
 from sd2app.widgets.time_axis import (
     GUTTER_PX,
     MARGIN_PX,
@@ -52,11 +52,6 @@ class TransportBar(QWidget):
     ) -> None:
         super().__init__(parent)
         self._playback, self._looped = playback, looped
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(8, 4, 8, 4)
-        layout.setSpacing(4)
-        for name in _BUTTONS:
-            layout.addWidget(self._button(action(name)))
         self._stretch = self._button()
         self._stretch.setObjectName("outlined")
         self._stretch.setToolTip("Play on beyond the span (Esc)")
@@ -70,14 +65,12 @@ class TransportBar(QWidget):
         self._slider.valueChanged.connect(playback.seek_frame)
         self._speed = self._label("0.25× ")
         self._speed.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        layout.addWidget(self._stretch)
-        layout.addSpacing(8)
-        layout.addWidget(self._time)
-        layout.addWidget(self._frame)
-        layout.addWidget(self._slider, 1)
-        layout.addWidget(self._button(action("slower")))
-        layout.addWidget(self._speed)
-        layout.addWidget(self._button(action("faster")))
+        steps = [self._button(action(name)) for name in _BUTTONS]
+        speed = (self._button(action("slower")), self._speed, self._button(action("faster")))
+        parts: tuple[Part, ...] = (
+            *steps, self._stretch, 8, self._time, self._frame, (self._slider, 1), *speed,
+        )  # fmt: skip
+        self.setLayout(row_of(*parts, spacing_px=4, margins_px=(8, 4, 8, 4)))
         playback.frame_changed.connect(self._refresh)
         playback.speed_changed.connect(self._refresh)
         looped.changed.connect(self._show_stretch)
@@ -120,23 +113,16 @@ class TransportBar(QWidget):
 class TimeRuler(QWidget):
     """Seconds under the tracks; click or drag seeks."""
 
-    def __init__(
-        self,
-        span: TimeWindow,
-        playback: PlaybackModel,
-        display: DisplayModel,
-        parent: QWidget | None = None,
-    ) -> None:
-        super().__init__(parent)
-        self._span = span
-        self._playback = playback
-        self._display = display
+    def __init__(self, session: Session) -> None:
+        super().__init__()
+        self._span, self._playback = session.span, session.playback
+        self._display = session.display
         self.setFixedHeight(24)
         for signal in (
-            span.changed,
-            playback.frame_changed,
-            playback.stretch_changed,
-            display.theme_changed,
+            self._span.changed,
+            self._playback.frame_changed,
+            self._playback.stretch_changed,
+            self._display.theme_changed,
         ):
             signal.connect(self.update)
 
@@ -181,20 +167,13 @@ class TimeRuler(QWidget):
         band.setAlpha(60)
         painter.fillRect(QRectF(left, 0, right - left, self.height()), band)
         painter.setPen(QPen(QColor(self._display.palette.accent), 2))
-        for x, inwards in ((left + 1, 4), (right - 1, -4)):
-            painter.drawPolyline(
-                [
-                    QPointF(x + inwards, 1),
-                    QPointF(x, 1),
-                    QPointF(x, self.height() - 1),
-                    QPointF(x + inwards, self.height() - 1),
-                ]
-            )
+        bottom = self.height() - 1
+        for x, inner in ((left + 1, left + 5), (right - 1, right - 5)):
+            corners = ((inner, 1), (x, 1), (x, bottom), (inner, bottom))
+            painter.drawPolyline([QPointF(*corner) for corner in corners])
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         """Seek."""
         self._playback.seek(self.scale.time_of(event.position().x()))
 
-    def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        """Seek."""
-        self._playback.seek(self.scale.time_of(event.position().x()))
+    mouseMoveEvent = mousePressEvent

@@ -25,13 +25,8 @@ _VIEWS = ("view_three_quarter", "view_camera", "view_sensor", "view_side", "view
 class SceneBar(QWidget):
     """Bar with the mesh's colour, dots and ready-made views."""
 
-    def __init__(
-        self,
-        display: DisplayModel,
-        action: Callable[[str], QAction],
-        parent: QWidget | None = None,
-    ) -> None:
-        super().__init__(parent)
+    def __init__(self, display: DisplayModel, action: Callable[[str], QAction]) -> None:
+        super().__init__()
         self._display = display
         self._colour = Choice("What the colour of the mesh means (1 to 4)", self)
         for value, text in _COLOURS:

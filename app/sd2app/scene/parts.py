@@ -67,7 +67,7 @@ class Shape:
         lit: bool = False,
         line_px: float = 1.0,
     ) -> None:
-        self.points = np.zeros((0, 3), np.float32)
+        self.points = np.zeros((0, 3), np.float32)  # of its own frame, before :meth:`place`
         self._points = vtkPoints()
         self.data = vtkPolyData()
         self.data.SetPoints(self._points)
@@ -289,11 +289,6 @@ class GroundGrid:
             share = (strength * self._opacity)[:, None]
             blend = (1 - share) * rgb(colours.background) + share * rgb(colours.grid)
             shape.set_point_colours(np.rint(blend).astype(np.uint8))
-
-    def show(self, visible: bool) -> None:
-        """Show or hide it."""
-        for shape in self.shapes:
-            shape.show(visible)
 
 
 class Markers(Shape):

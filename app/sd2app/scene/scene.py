@@ -62,11 +62,6 @@ class Scene:
     # What is shown
 
     @property
-    def vertices_m(self) -> NDArray[np.float32]:
-        """Vertices on screen, (V, 3)."""
-        return self.body.points
-
-    @property
     def knows_hidden(self) -> bool:
         """True once the visibility of the vertices is known."""
         return self.colouring.visible is not None
@@ -275,7 +270,7 @@ class Scene:
         if box is None:
             return _DOTS_PX[0]
         area = (box[2] - box[0]) * (box[3] - box[1])
-        return float(np.clip(0.7 * np.sqrt(area / len(self.vertices_m)), *_DOTS_PX))
+        return float(np.clip(0.7 * np.sqrt(area / len(self.body.points)), *_DOTS_PX))
 
     def _colour_mesh(self) -> None:
         self._stale_colours = False
@@ -283,12 +278,12 @@ class Scene:
             return
         colouring = replace(self.colouring, as_dots=self.body.drawn_as_dots)
         if colouring.mode == "range":
-            offset = self.vertices_m - np.asarray(self.sensor.position_m, np.float32)
+            offset = self.body.points - np.asarray(self.sensor.position_m, np.float32)
             colouring = replace(colouring, range_m=np.sqrt(np.einsum("ij,ij->i", offset, offset)))
-        self.body.set_point_colours(mesh_colours(colouring, self.colours, len(self.vertices_m)))
+        self.body.set_point_colours(mesh_colours(colouring, self.colours, len(self.body.points)))
 
     def _of_this_mesh(self, values: NDArray | None) -> NDArray | None:
-        fits = values is not None and self.has_mesh and len(values) == len(self.vertices_m)
+        fits = values is not None and self.has_mesh and len(values) == len(self.body.points)
         return values if fits else None
 
     def _near_markers_m(self) -> NDArray[np.float64]:

@@ -208,5 +208,5 @@ def track_stack(
     features.denoise.put_buttons(maps)
     labels.let_drag_on(maps.views)
     below = [views[name] for name in ("classes", "suggestions", "labels", "other labels")]
-    ruler = TimeRuler(session.span, session.playback, session.display)
+    ruler = TimeRuler(session)
     return pane((maps, 1), *below, ruler, maps.overview), maps

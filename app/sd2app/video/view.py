@@ -104,10 +104,8 @@ class VideoView(QWidget):
 class VideoBar(QWidget):
     """Bar with the mesh's visibility, dots or surface, and opacity."""
 
-    def __init__(
-        self, overlay: OverlayModel, action: Callable[[str], QAction], parent: QWidget | None = None
-    ) -> None:
-        super().__init__(parent)
+    def __init__(self, overlay: OverlayModel, action: Callable[[str], QAction]) -> None:
+        super().__init__()
         self._overlay = overlay
         self._mesh = action("overlay")
         self._slider = QSlider(Qt.Orientation.Horizontal, self)

@@ -133,7 +133,7 @@ def test_another_frame_moves_the_vertices(stage: Stage) -> None:
     stage.view.grab()
     stage.playback.seek(0.4)
     stage.view.grab()
-    np.testing.assert_allclose(stage.view.scene.vertices_m[:, 2], 1.6, atol=1e-6)
+    np.testing.assert_allclose(stage.view.scene.body.points[:, 2], 1.6, atol=1e-6)
 
 
 def test_a_turn_of_the_event_loop_renders_once(stage: Stage) -> None:
@@ -199,7 +199,8 @@ def test_vtk_draws_where_the_projection_says(stage: Stage, preset: str) -> None:
     stage.open(mesh)
     stage.display.set_mesh_colour("visibility")
     stage.scatter(np.zeros(6), np.ones(6, bool))
-    stage.view.scene.ground.show(False)
+    for lines in stage.view.scene.ground.shapes:
+        lines.show(False)
     stage.view.scene.body.shadow.SetPosition(0.0, 9.0, 0.0)
     stage.view.set_view(preset)
     picture = as_array(stage.view.grab().toImage())
