@@ -92,3 +92,11 @@ def test_a_child_that_nobody_waits_for_is_not_alive() -> None:
         time.sleep(0.02)
     assert not ours.is_alive
     process.returncode = 0  # its exit code was taken by then
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="niceness is a Unix notion")
+def test_the_background_gives_way() -> None:
+    program = "from sd2core.processes import lower_priority"
+    script = f"import os; {program}; lower_priority(); print(os.nice(0))"
+    said = subprocess.run([sys.executable, "-c", script], capture_output=True, check=True).stdout
+    assert int(said) == min(os.nice(0) + 10, 19)

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QObject, QProcess, QProcessEnvironment, QTimer, Signal
 
-from sd2app.background.line_process import Ending, LineProcess
 from sd2app.background.run_command import COMMAND
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import remove
 from sd2core.recording.recording import is_recording, open_recording
+
+_PATIENCE_MS = 3000
+"""A process that does not end within this time when it is asked to is killed."""
 
 
 class PairMaker(QObject):
@@ -33,7 +36,9 @@ class PairMaker(QObject):
         super().__init__(parent)
         self._folder = folder
         self._command = tuple(command)
-        self._process: LineProcess | None = None
+        self._process: QProcess | None = None
+        self._patience = QTimer(self, singleShot=True, interval=_PATIENCE_MS)
+        self._patience.timeout.connect(self._kill)
         self._out: Path | None = None
         self._cancelled = False
 
@@ -61,38 +66,66 @@ class PairMaker(QObject):
         self._folder.mkdir(parents=True, exist_ok=True)
         self._out = _free(self._folder, place.stem)
         self._cancelled = False
-        self._process = LineProcess(self)
-        self._process.ended.connect(self._end)
-        words = ["pairs", "recordings", *map(str, recordings), "--out", str(self._out)]
-        self._process.start([*self._command, *words])
+        program, *words = self._command
+        words += ["pairs", "recordings", *map(str, recordings), "--out", str(self._out)]
+        environment = QProcessEnvironment.systemEnvironment()
+        environment.insert("PYTHONIOENCODING", "utf-8")
+        self._process = process = QProcess(self)
+        process.setProcessEnvironment(environment)
+        process.setStandardOutputFile(QProcess.nullDevice())
+        process.finished.connect(self._end)
+        process.errorOccurred.connect(self._refuse)
+        process.start(program, words)
+        process.closeWriteChannel()
         self.changed.emit()
 
     def cancel(self) -> None:
         """Cancel, and remove the unfinished pairs."""
         if self._process is not None and not self._cancelled:
             self._cancelled = True
-            self._process.stop()
+            if sys.platform == "win32":  # nothing there listens to a request
+                self._kill()
+            else:
+                self._process.terminate()
+                self._patience.start()
             self.changed.emit()
 
     def close(self) -> None:
         """End the process at once."""
         if self._process is not None:
-            self._process.close()
-            self._clear_up()
+            self._process.blockSignals(True)
+            self._kill()
+            self._process.waitForFinished(2000)
+            self._let_go()
 
-    def _end(self, ending: Ending) -> None:
-        out = self._out
+    def _kill(self) -> None:
+        if self._process is not None:
+            self._process.kill()
+
+    def _refuse(self, error: QProcess.ProcessError) -> None:
+        # Every other error is followed by `finished`.
+        if error == QProcess.ProcessError.FailedToStart and self._process is not None:
+            self._end(1, QProcess.ExitStatus.CrashExit)
+
+    def _end(self, code: int, status: QProcess.ExitStatus) -> None:
+        out, process = self._out, self._process
         assert out is not None
-        if ending.code == 0:
+        assert process is not None
+        if code == 0 and status == QProcess.ExitStatus.NormalExit:
             self._process, self._out = None, None
             self.made.emit(out)
         else:
-            self._clear_up()
+            errors = bytes(process.readAllStandardError().data()).decode("utf-8", "replace")
+            said = errors.strip().splitlines() or [f"{out.stem} could not be made."]
+            self._let_go()
             if not self._cancelled:
-                self.failed.emit(ending.reason(f"{out.stem} could not be made."))
+                self.failed.emit(said[-1].removeprefix("sd2: "))
+        self._patience.stop()
+        process.deleteLater()
         self.changed.emit()
 
-    def _clear_up(self) -> None:
+    def _let_go(self) -> None:
+        """Forget the process, and remove what it left."""
         out, self._process, self._out = self._out, None, None
         if out is not None and out.exists():
             remove(out)

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -62,3 +65,10 @@ def test_a_process_that_reuses_a_number_is_not_waited_for(qtbot, tmp_path) -> No
     qtbot.waitUntil(lambda: run.loaded, timeout=20_000)
     assert run.phase == "failed"
     run.close()
+
+
+def test_a_command_is_run_in_the_background() -> None:
+    words = [sys.executable, "-m", "sd2app.background.run_command", "--version"]
+    told = os.environ | {"PYTHONIOENCODING": "utf-8"}
+    made = subprocess.run(words, capture_output=True, check=True, encoding="utf-8", env=told)
+    assert made.stdout.startswith("SD² Studio")

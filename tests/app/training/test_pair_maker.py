@@ -90,3 +90,40 @@ def test_cancelling_leaves_nothing_and_says_nothing(made, qtbot, tmp_path) -> No
     qtbot.waitUntil(lambda: maker.out is None, timeout=10_000)
     assert maker.told == []
     assert not out.exists()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="nothing can refuse there")
+def test_one_that_will_not_stop_is_ended(made, qtbot, tmp_path) -> None:
+    maker = made(
+        "import signal; signal.signal(signal.SIGTERM, signal.SIG_IGN)\n"
+        "(out / 'deaf').touch(); time.sleep(3600)"
+    )
+    maker._patience.setInterval(50)
+    maker.make(recording(tmp_path / "a.sd2"))
+    qtbot.waitUntil((maker.out / "deaf").exists, timeout=10_000)
+    maker.cancel()
+    qtbot.waitUntil(lambda: maker.out is None, timeout=10_000)
+    assert maker.told == []
+
+
+def test_a_process_that_dies_or_does_not_start_is_told(made, qtbot, tmp_path) -> None:
+    place = recording(tmp_path / "a.sd2")
+    maker = made("import os; print('ü', file=sys.stderr, flush=True); os.abort()")
+    maker.make(place)
+    qtbot.waitUntil(lambda: maker.out is None, timeout=10_000)
+    assert maker.told == ["ü"]
+    maker._command = ("/no/such/program",)
+    maker.make(place)
+    qtbot.waitUntil(lambda: len(maker.told) == 2, timeout=10_000)
+    assert maker.told[1] == "a could not be made."
+
+
+def test_closing_ends_it_and_says_nothing(made, qtbot, tmp_path) -> None:
+    maker = made("time.sleep(3600)")
+    maker.make(recording(tmp_path / "a.sd2"))
+    out = maker.out
+    qtbot.waitUntil(lambda: (out / "recordings").exists(), timeout=10_000)
+    maker.close()
+    qtbot.wait(20)
+    assert maker.told == []
+    assert not out.exists()
