@@ -43,7 +43,7 @@ class BatchResults(RecordTableModel[Result]):
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__([Heading(text) for text in _COLUMNS], parent)
-        self._card = ""
+        self.card = ""  # of the exported data set, as Markdown; empty where there is none
         self._runner = LatestRunner("results", self)
         self._runner.finished.connect(self._take)
         # There may be none, or the disk is away.
@@ -53,11 +53,6 @@ class BatchResults(RecordTableModel[Result]):
     def rows(self) -> Sequence[Result]:
         """Results of the last run that reached its end."""
         return self._rows
-
-    @property
-    def card(self) -> str:
-        """Card of the exported data set as Markdown; empty where there is none."""
-        return self._card
 
     def read(self, folder: BatchFolder) -> None:
         """Read the results of a batch."""
@@ -74,7 +69,7 @@ class BatchResults(RecordTableModel[Result]):
 
     def _take(self, found: tuple[list[Result], str]) -> None:
         self.beginResetModel()
-        self._rows, self._card = found
+        self._rows, self.card = found
         self.endResetModel()
         self.changed.emit()
 

@@ -51,7 +51,7 @@ class BatchMonitor(RunMonitor[BatchFolder]):
         self, path: Path, parent: QObject | None = None, *, process: ProcessId | None = None
     ) -> None:
         self._start_and_last: list[Event] = []
-        self._failures: list[Failed] = []
+        self.failures: list[Failed] = []
         super().__init__(BatchFolder(path), parent, process=process)
 
     def on_events(self, events: Sequence[dict[str, Any]]) -> bool:
@@ -59,11 +59,11 @@ class BatchMonitor(RunMonitor[BatchFolder]):
         for event in events:
             kind = event["event"]
             if kind == "start":
-                self._start_and_last, self._failures = [event], []
+                self._start_and_last, self.failures = [event], []
             elif kind in ("progress", "end"):
                 self._start_and_last = [*self._start_and_last[:1], event]
-            elif kind == "failed" and len(self._failures) < _KEPT_FAILURES:
-                self._failures.append(_failed(event))
+            elif kind == "failed" and len(self.failures) < _KEPT_FAILURES:
+                self.failures.append(_failed(event))
         return bool(events)
 
     def inspect(self) -> _Facts:
@@ -97,11 +97,6 @@ class BatchMonitor(RunMonitor[BatchFolder]):
         """Steps of the plan, in order."""
         start = self._start_and_last[:1]
         return tuple(map(str, start[0].get("steps", ()))) if start else ()
-
-    @property
-    def failures(self) -> tuple[Failed, ...]:
-        """The first few hundred failures."""
-        return tuple(self._failures)
 
     @property
     def log(self) -> str:

@@ -59,11 +59,12 @@ class BatchSetupModel(QObject):
         self._settings = settings
         known = {"accuracy": ACCURACIES, "format": FORMATS, "subjects": SUBJECTS}
         self._values = StoredChoices(settings, "batch", _DEFAULTS, known)
-        self._entries = tuple(Entry(path) for path in settings.paths("batch/recordings"))
+        # Recordings, videos and meshes to work on.
+        self.entries = tuple(Entry(path) for path in settings.paths("batch/recordings"))
         out = settings.stored("batch/out", "")
         self._out = Path(out) if out else None
-        self._placements: Placements | None = None
-        self._placed = ""
+        self.placements: Placements | None = None  # None: each recording's own
+        self.placed = ""  # where the placements are from, in words
         self._runner = LatestRunner("batch files", self)
         self._runner.finished.connect(self._take)
         self._look()
@@ -71,28 +72,13 @@ class BatchSetupModel(QObject):
     # --- what is chosen -------------------------------------------------------------------
 
     @property
-    def entries(self) -> tuple[Entry, ...]:
-        """Recordings, videos and meshes to work on."""
-        return self._entries
-
-    @property
-    def placements(self) -> Placements | None:
-        """Placements of sensors; None: each recording's own."""
-        return self._placements
-
-    @property
-    def placed(self) -> str:
-        """Source of the placements in words."""
-        return self._placed
-
-    @property
     def out(self) -> Path | None:
         """Folder of the results; one beside the first recording until another is chosen."""
         if self._out is not None:
             return self._out
-        if not self._entries:
+        if not self.entries:
             return None
-        first = self._entries[0].path
+        first = self.entries[0].path
         return first.parent / f"{first.stem} batch"
 
     @property
@@ -122,21 +108,21 @@ class BatchSetupModel(QObject):
 
     def set_placements(self, placements: Placements | None, placed: str = "") -> None:
         """Put sensors elsewhere; ``placed`` says where that is from."""
-        self._placements, self._placed = placements, placed
+        self.placements, self.placed = placements, placed
         self.changed.emit()
 
     def add(self, paths: Sequence[Path]) -> None:
         """Work on these as well: recordings, videos, meshes, or folders of some."""
-        known = {entry.path for entry in self._entries}
+        known = {entry.path for entry in self.entries}
         new = [path for path in dict.fromkeys(map(plain_path, paths)) if path not in known]
         if new:
-            self._entries += tuple(map(Entry, new))
+            self.entries += tuple(map(Entry, new))
             self._keep()
             self._look()
 
     def remove(self, paths: Sequence[Path]) -> None:
         """Remove recordings, videos, meshes or folders."""
-        self._entries = tuple(entry for entry in self._entries if entry.path not in paths)
+        self.entries = tuple(entry for entry in self.entries if entry.path not in paths)
         self._keep()
 
     def close(self) -> None:
@@ -148,19 +134,19 @@ class BatchSetupModel(QObject):
     @property
     def problem(self) -> str:
         """Reason why there is no plan; empty when there is one."""
-        if not self._entries:
+        if not self.entries:
             return "Add recordings to work on."
-        bad = [entry.problem for entry in self._entries if entry.problem]
+        bad = [entry.problem for entry in self.entries if entry.problem]
         if bad:
             return bad[0]
-        if any(entry.count is None for entry in self._entries):
+        if any(entry.count is None for entry in self.entries):
             return "Looking for recordings…"
         return ""
 
     @property
     def files(self) -> int:
         """Number of recordings that were found."""
-        return sum(entry.count or 0 for entry in self._entries)
+        return sum(entry.count or 0 for entry in self.entries)
 
     def plan(self) -> BatchPlan:
         """Plan in the form that the library takes; Sd2Error if something is missing."""
@@ -169,11 +155,11 @@ class BatchSetupModel(QObject):
         assert self.out is not None
         values = self._values
         tolerance = self.tolerance if values["accuracy"] == "tolerance" else None
-        where = {"kind": "recording"} if self._placements is None else self._placements.as_dict()
+        where = {"kind": "recording"} if self.placements is None else self.placements.as_dict()
         return BatchPlan(
             out=str(self.out),
             recordings=Recordings(
-                files=tuple(pattern for entry in self._entries for pattern in entry.patterns),
+                files=tuple(pattern for entry in self.entries for pattern in entry.patterns),
                 subjects=values["subjects"],
             ),
             placements=where,
@@ -186,16 +172,16 @@ class BatchSetupModel(QObject):
     # --- looking --------------------------------------------------------------------------
 
     def _keep(self) -> None:
-        self._settings.set_paths("batch/recordings", [entry.path for entry in self._entries])
+        self._settings.set_paths("batch/recordings", [entry.path for entry in self.entries])
         self.changed.emit()
 
     def _look(self) -> None:
-        paths = [entry.path for entry in self._entries if entry.count is None]
+        paths = [entry.path for entry in self.entries if entry.count is None]
         if paths:
             self._runner.submit(lambda emit: {path: _looked_at(path) for path in paths})
 
     def _take(self, found: dict[Path, Entry]) -> None:
-        self._entries = tuple(found.get(entry.path, entry) for entry in self._entries)
+        self.entries = tuple(found.get(entry.path, entry) for entry in self.entries)
         self.changed.emit()
 
 

@@ -208,12 +208,13 @@ class ExportDialog(QDialog):
 
     def _show_writing(self) -> None:
         model = self._model
-        done, total = model.progress
+        run = model.run
+        done, total = (0, 0) if run is None else (run.done, run.total)
         self._bar.setVisible(model.exporting)
         self._bar.setRange(0, total)
         self._bar.setValue(done)
         self._stop.setVisible(model.exporting)
-        self._stop.setEnabled(not model.stopping)
+        self._stop.setEnabled(run is None or run.phase != "stopping")
         self._export.setEnabled(model.ready)
         result = model.result
         written = result is not None and not model.exporting

@@ -54,6 +54,11 @@ class ExportChoice:
         return tuple(kind for name, kinds in MAPS.items() if name in self.maps for kind in kinds)
 
     @property
+    def making(self) -> Making:
+        """Options for the maps."""
+        return Making(kinds=self.kinds, placements="planned" if self.planned else None)
+
+    @property
     def sources(self) -> tuple[object, ...]:
         """Choices that decide which sources there are."""
         return self.place, self.maps, self.planned, self.subjects
@@ -89,7 +94,6 @@ class _Counted(NamedTuple):
     sources: tuple[object, ...]
     counting: Counting
     forecast: Forecast
-    each_s: float | None  # per segment, as this machine has measured such maps
 
 
 class ExportModel(QObject):
@@ -113,22 +117,17 @@ class ExportModel(QObject):
         super().__init__(parent)
         self._jobs, self._command = jobs, tuple(command)
         self._folder = folder or user_exports_folder()
-        self._choice = ExportChoice()
+        self.choice = ExportChoice()
+        self.problem = ""  # why these choices cannot be exported
+        self.places = 0  # planned besides the recordings' own sensors, the most of any
+        self.result: Exported | None = None  # written last, until something else is chosen
+        self.run: ExportRun | None = None  # under way
         self._counted: _Counted | None = None
-        self._problem = ""
-        self._places = 0
         self._runner = LatestRunner("count segments", self)
         self._runner.finished.connect(self._receive)
         self._runner.failed.connect(self._refuse)
-        self._run: ExportRun | None = None
         self._job: Job | None = None
-        self._result: Exported | None = None
         self._over: set[Path] = set()
-
-    @property
-    def choice(self) -> ExportChoice:
-        """Current choices."""
-        return self._choice
 
     @property
     def forecast(self) -> Forecast | None:
@@ -138,12 +137,13 @@ class ExportModel(QObject):
     @property
     def time(self) -> str:
         """Time of the whole export before it starts, and what is left of it while it runs."""
-        if self._run is not None:
-            left_s = self._run.left_s
+        if self.run is not None:
+            left_s = self.run.left_s
             return "" if left_s is None else f"{about(left_s)} left"
-        if self._counted is None or self._counted.each_s is None:
+        each_s = known_pace_s(self.choice.making.pace_kind)
+        if each_s is None or self.forecast is None:
             return "the first view tells how long it takes"
-        return about(self._counted.each_s * self._counted.forecast.segments)
+        return about(each_s * self.forecast.segments)
 
     @property
     def counting(self) -> bool:
@@ -151,29 +151,9 @@ class ExportModel(QObject):
         return self._runner.busy
 
     @property
-    def problem(self) -> str:
-        """Reason why these choices cannot be exported; empty where they can."""
-        return self._problem
-
-    @property
-    def places(self) -> int:
-        """Places that the recordings plan besides their own sensors, the most of any."""
-        return self._places
-
-    @property
     def exporting(self) -> bool:
         """True while a data set is written."""
-        return self._run is not None
-
-    @property
-    def progress(self) -> tuple[int, int]:
-        """Steps done, and of how many; 0 where that is not known."""
-        return (0, 0) if self._job is None else (self._job.done, self._job.total)
-
-    @property
-    def result(self) -> Exported | None:
-        """Data set that was written last, until something else is chosen."""
-        return self._result
+        return self.run is not None
 
     @property
     def ready(self) -> bool:
@@ -181,27 +161,22 @@ class ExportModel(QObject):
         forecast = self.forecast
         return forecast is not None and forecast.segments > 0 and not self.exporting
 
-    @property
-    def stopping(self) -> bool:
-        """True once the export has been asked to stop."""
-        return self._run is not None and self._run.phase == "stopping"
-
     def begin(self, place: Path | None) -> None:
         """Choose a recording or a folder and read it again; other choices stay."""
         self._counted = None
-        self._places = _places(place)
-        planned = self._choice.planned and self._places > 0
-        self._result = None
-        self._choice = replace(self._choice, place=place, planned=planned, subjects=())
+        self.places = _places(place)
+        planned = self.choice.planned and self.places > 0
+        self.result = None
+        self.choice = replace(self.choice, place=place, planned=planned, subjects=())
         self._count()
 
     def choose(self, **changes: object) -> None:
         """Choose something else."""
-        choice = replace(self._choice, **changes)  # type: ignore[arg-type]
-        if choice == self._choice:
+        choice = replace(self.choice, **changes)  # type: ignore[arg-type]
+        if choice == self.choice:
             return
-        same = replace(choice, ending=self._choice.ending) == self._choice
-        self._choice, self._result = choice, None
+        same = replace(choice, ending=self.choice.ending) == self.choice
+        self.choice, self.result = choice, None
         if same:  # the format changes no count
             self.changed.emit()
         else:
@@ -209,9 +184,9 @@ class ExportModel(QObject):
 
     def start(self, out: Path) -> None:
         """Have the data set written, in a process of its own; goes on with one begun there."""
-        if not self.ready or self._choice.place is None:
+        if not self.ready or self.choice.place is None:
             return
-        choice = self._choice
+        choice = self.choice
         words = [
             "export", str(choice.place), "--out", str(out), "--kinds", ",".join(choice.kinds),
             "--length", str(choice.length), "--overlap", str(choice.overlap), "--progress-json",
@@ -227,13 +202,13 @@ class ExportModel(QObject):
             CommandFolder(path).discard()
             self.failed.emit(str(error))
             return
-        self._result = None
+        self.result = None
         self._follow(ExportRun(path, self, process=process))
 
     def stop(self) -> None:
         """Stop writing; what is complete stays, and the same export goes on from there."""
-        if self._run is not None:
-            self._run.stop()
+        if self.run is not None:
+            self.run.stop()
 
     def look_for_export(self) -> None:
         """At the start of the program: find what is being written, or has been meanwhile."""
@@ -244,11 +219,11 @@ class ExportModel(QObject):
             return
         run = ExportRun(one.path, self)
         try:
-            self._choice = ExportChoice.from_json(run.choice)
+            self.choice = ExportChoice.from_json(run.choice)
         except (KeyError, TypeError, ValueError):
             pass  # of another version: it is followed all the same
         else:
-            self._places = _places(self._choice.place)
+            self.places = _places(self.choice.place)
             self._count()
         self._follow(run)
         if one.live:
@@ -259,18 +234,18 @@ class ExportModel(QObject):
     def close(self) -> None:
         """Stop polling; a running export goes on."""
         self._runner.close()
-        if self._run is not None:
-            self._run.close()
+        if self.run is not None:
+            self.run.close()
 
     # --- inside ---------------------------------------------------------------------------
 
     def _count(self) -> None:
-        choice, known = self._choice, self._counted
-        self._problem = ""
+        choice, known = self.choice, self._counted
+        self.problem = ""
         if choice.place is None or not choice.maps:
             self._runner.cancel()
             self._counted = None
-            self._problem = "" if choice.place is None else "No map is chosen."
+            self.problem = "" if choice.place is None else "No map is chosen."
             self.changed.emit()
             return
         place = choice.place
@@ -279,15 +254,13 @@ class ExportModel(QObject):
             options = DatasetOptions(
                 kinds=choice.kinds, length=choice.length, overlap=choice.overlap
             )
-            making = Making(kinds=choice.kinds, placements="planned" if choice.planned else None)
             if known is not None and known.sources == choice.sources:
                 counting = known.counting
             else:
-                sources = gather([place], making, subjects=choice.subjects or None)
+                sources = gather([place], choice.making, subjects=choice.subjects or None)
                 counting = Counting.of(sources, lambda done, total: emit(None))
             forecast = counting.forecast(options, VelocityAxis().bins)
-            each_s = known_pace_s(making.pace_kind)
-            return _Counted(choice.sources, counting, forecast, each_s)
+            return _Counted(choice.sources, counting, forecast)
 
         self._runner.submit(count)
         self.changed.emit()
@@ -295,14 +268,14 @@ class ExportModel(QObject):
     def _receive(self, counted: _Counted) -> None:
         self._counted = counted
         if not counted.forecast.segments:
-            self._problem = f"No recording has {self._choice.length} frames on end with a person."
+            self.problem = f"No recording has {self.choice.length} frames on end with a person."
         self.changed.emit()
 
     def _refuse(self, error: Exception) -> None:
         if isinstance(error, Cancelled):
             return
         self._counted = None
-        self._problem = str(error)
+        self.problem = str(error)
         self.changed.emit()
 
     def _new_folder(self, out: Path) -> Path:
@@ -313,22 +286,22 @@ class ExportModel(QObject):
         return path
 
     def _follow(self, run: ExportRun) -> None:
-        self._run = run
+        self.run = run
         self._job = self._jobs.start(f"Exporting {run.out.name}", self.stop)
         run.changed.connect(self._tell)
         run.ended.connect(self._end)
         self.changed.emit()
 
     def _tell(self) -> None:
-        if self._run is not None and self._job is not None:
-            self._jobs.report(self._job, self._run.done, self._run.total)
+        if self.run is not None and self._job is not None:
+            self._jobs.report(self._job, self.run.done, self.run.total)
             self.changed.emit()
 
     def _end(self) -> None:
-        run = self._run
+        run = self.run
         if run is None:
             return
-        self._run = None
+        self.run = None
         if self._job is not None:
             self._jobs.finish(self._job)
             self._job = None
@@ -341,7 +314,7 @@ class ExportModel(QObject):
         self.look_for_export()  # several may have ended while no window was there
 
     def _say_ended(self, run: ExportRun) -> None:
-        self._result = result = run.written
+        self.result = result = run.written
         if result is not None:
             self.noted.emit(
                 f"{result.segments:,} segment{'s' * (result.segments != 1)} from {result.sources:,}"

@@ -165,7 +165,7 @@ def test_it_can_be_stopped(made, people, qtbot) -> None:
     said: list[str] = []
     model.failed.connect(said.append)
     model.start(people / "set.zarr")
-    qtbot.waitUntil(lambda: model.progress == (500, 2000), timeout=20_000)
+    qtbot.waitUntil(lambda: model.run is not None and model.run.done == 500, timeout=20_000)
     model.stop()
     qtbot.waitUntil(lambda: not model.exporting, timeout=20_000)
     assert not said
@@ -177,7 +177,7 @@ def begun(model: ExportModel, people: Path, qtbot) -> None:
     model.choose(length=30, overlap=5, maps=frozenset({"synthetic"}), subjects=("a", "b"))
     counted(model, qtbot)
     model.start(people / "set.h5")
-    qtbot.waitUntil(lambda: model.progress == (500, 2000), timeout=20_000)
+    qtbot.waitUntil(lambda: model.run is not None and model.run.done == 500, timeout=20_000)
 
 
 def test_it_outlives_the_window_and_is_found_by_the_next(made, people, qtbot) -> None:
@@ -190,7 +190,7 @@ def test_it_outlives_the_window_and_is_found_by_the_next(made, people, qtbot) ->
     assert noted.args[0].startswith("set.h5 is being written.")
     assert second.exporting
     assert second.choice == choice
-    qtbot.waitUntil(lambda: second.progress == (500, 2000), timeout=20_000)
+    qtbot.waitUntil(lambda: second.run is not None and second.run.done == 500, timeout=20_000)
     counted(second, qtbot)
     assert second.forecast is not None
     assert not second.ready
@@ -219,7 +219,7 @@ def test_what_was_written_meanwhile_is_said(made, people, qtbot, tmp_path) -> No
 def test_one_that_was_killed_is_said(made, people, qtbot) -> None:
     model = made("slow")
     begun(model, people, qtbot)
-    os.kill(model._run._launched.pid, signal.SIGKILL)
+    os.kill(model.run._launched.pid, signal.SIGKILL)
     with qtbot.waitSignal(model.failed, timeout=20_000) as failed:
         pass
     assert failed.args[0].startswith("set.h5 was not written to its end")
