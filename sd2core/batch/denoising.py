@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,18 +15,6 @@ from sd2core.mesh.presence import Presence
 
 if TYPE_CHECKING:
     from sd2core.denoise.live import TrainedDenoiser
-
-
-@dataclass
-class _Kept:
-    """Model that a process keeps from one task to the next."""
-
-    path: str = ""
-    digest: str = ""
-    model: TrainedDenoiser | None = None
-
-
-_kept = _Kept()
 
 
 def denoise(maps: Sequence[Path], model: str, digest: str, outs: Sequence[Path]) -> None:
@@ -132,14 +120,12 @@ class _Writer:
         return np.zeros((high - low, self._trained.card.axis.bins), np.float32)
 
 
+@lru_cache(maxsize=1)
 def _model(path: str, digest: str) -> TrainedDenoiser:
+    """Load a model, which the process keeps from one task to the next."""
     from sd2core.denoise.files import load_model
     from sd2core.denoise.threads import use_one_thread
 
-    if _kept.model is None or (_kept.path, _kept.digest) != (path, digest):
-        # There are as many processes as cores.
-        use_one_thread()
-        _kept.model = None
-        _kept.model = load_model(Path(path))
-        _kept.path, _kept.digest = path, digest
-    return _kept.model
+    # There are as many processes as cores.
+    use_one_thread()
+    return load_model(Path(path))

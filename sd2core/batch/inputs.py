@@ -10,6 +10,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
+from pydantic import TypeAdapter
+
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.keys import code_digest, key_of
 from sd2core.batch.plan import Recordings
@@ -70,16 +72,8 @@ class Inspection:
     video: VideoInput | None = None
     about: str = ""  # hash of what else a data set takes from it: labels, and what its radar saw
 
-    @classmethod
-    def from_dict(cls, content: Mapping[str, Any]) -> Inspection:
-        """Rebuild from ``dataclasses.asdict``, also after JSON."""
-        mesh, video = content["mesh"], content["video"]
-        return cls(
-            VirtualSensor(**{**content["sensor"]}),
-            None if mesh is None else mesh_input(mesh),
-            None if video is None else VideoInput(**video),
-            content["about"],
-        )
+
+_INSPECTION = TypeAdapter(Inspection)
 
 
 def mesh_input(content: Mapping[str, Any]) -> MeshInput:
@@ -137,7 +131,7 @@ def known_inspection(folder: BatchFolder, origin: Origin) -> Inspection | None:
     record = _record(folder, origin)
     if record is None or signature(entry[0] for entry in record["files"]) != record["files"]:
         return None
-    found = Inspection.from_dict(record["inspection"])
+    found = _INSPECTION.validate_python(record["inspection"])
     # A mesh of ours may have been deleted.
     return found if found.mesh is None or is_there(Path(found.mesh.path)) else None
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -38,15 +38,21 @@ def write_card(path: Path) -> dict[str, Any]:
 
 
 def describe_dataset(dataset: Dataset) -> dict[str, Any]:
-    """Return the card as JSON can hold it; arrays are read in parts."""
-    header = dataset.header
-    counts = _Counts(len(header.labels), len(header.subjects))
-    for rows in _parts(dataset):
-        counts.add(rows)
+    """Return the card as JSON can hold it; labels of frames are read in parts."""
+    header, labels = dataset.header, len(dataset.header.labels)
+    column = {name: np.asarray(dataset[name][:]) for name in _COLUMNS}
+    segments = np.zeros((labels, len(SPLITS)), np.int64)  # of each label in each split
+    np.add.at(segments, (column["segment_label"], column["split"]), 1)
+    frames = np.zeros(labels, np.int64)
+    for start in range(0, len(dataset), _ROWS):
+        part = np.asarray(dataset["label"][start : start + _ROWS])
+        frames += np.bincount(part.ravel(), minlength=labels)
+    of_subject = np.bincount(column["subject"], minlength=len(header.subjects))
+    available = column["available"].sum(axis=0)
     sources = _Sources()
     for entry in dataset.sources():
         sources.add(entry)
-    by_label = dict(zip(header.labels, counts.label.tolist(), strict=True))
+    by_label = _named(header.labels, segments.sum(axis=1))
     return {
         "format": CARD_FORMAT,
         "version": 1,
@@ -57,23 +63,23 @@ def describe_dataset(dataset: Dataset) -> dict[str, Any]:
         "sources": sources.count,
         "recordings": sources.recordings,
         "minutes": sources.minutes,
-        "segments_of_split": _named(SPLITS, counts.split),
+        "segments_of_split": _named(SPLITS, segments.sum(axis=0)),
         "segments_of_label": by_label,
-        "frames_of_label": _named(header.labels, counts.frames),
+        "frames_of_label": _named(header.labels, frames),
         "segments_of_class": _of_class(by_label, header.classes),
         "segments_of_label_and_split": {
-            label: _named(SPLITS, counts.label_split[number])
+            label: _named(SPLITS, segments[number])
             for number, label in enumerate(header.labels)
         },
-        "segments_of_subject": _named(header.subjects, counts.subject),
+        "segments_of_subject": _named(header.subjects, of_subject),
         "segments_of_kind": {
-            kind: int(counts.kind[KINDS.index(kind)]) for kind in header.kinds
+            kind: int(available[KINDS.index(kind)]) for kind in header.kinds
         },
-        "purity_mean": counts.purity / max(len(dataset), 1),
+        "purity_mean": float(column["purity"].sum(dtype=np.float64)) / max(len(dataset), 1),
         "placements": sources.placements,
-        **{name: counts.extent(name) for name in _EXTENTS},
+        **{name: _extent(column[name]) for name in _EXTENTS},
         "frames_without_person": sources.frames_without_person,
-        "resampled_segments": counts.resampled,
+        "resampled_segments": int(column["resampled"].sum()),
         "sources_without_segments": sources.empty,
         "simulated_recordings": sources.simulated,
         "how": sources.how(),
@@ -82,40 +88,13 @@ def describe_dataset(dataset: Dataset) -> dict[str, Any]:
 
 _NOT_ON_CARD = {"format", "version", "all_kinds"}
 _EXTENTS = ("range_m", "azimuth_deg", "elevation_deg")
-_READ = ("segment_label", "purity", "subject", "split", "available", "resampled", *_EXTENTS)
+_COLUMNS = ("segment_label", "purity", "subject", "split", "available", "resampled", *_EXTENTS)
 
 
-class _Counts:
-    """Counts of segments, part by part."""
-
-    def __init__(self, labels: int, subjects: int) -> None:
-        self.label = np.zeros(labels, np.int64)
-        self.frames = np.zeros(labels, np.int64)
-        self.subject = np.zeros(subjects, np.int64)
-        self.split = np.zeros(len(SPLITS), np.int64)
-        self.label_split = np.zeros((labels, len(SPLITS)), np.int64)
-        self.kind = np.zeros(len(KINDS), np.int64)
-        self.purity = 0.0
-        self.resampled = 0
-        self._extents: dict[str, list[float]] = {name: [] for name in _EXTENTS}
-
-    def add(self, rows: dict[str, np.ndarray]) -> None:
-        np.add.at(self.label, rows["segment_label"], 1)
-        np.add.at(self.subject, rows["subject"], 1)
-        np.add.at(self.split, rows["split"], 1)
-        np.add.at(self.label_split, (rows["segment_label"], rows["split"]), 1)
-        self.frames += np.bincount(rows["label"].ravel(), minlength=len(self.frames))
-        self.kind += rows["available"].sum(axis=0)
-        self.resampled += int(rows["resampled"].sum())
-        self.purity += float(rows["purity"].sum(dtype=np.float64))
-        for name, known in self._extents.items():
-            values = rows[name][np.isfinite(rows[name])].astype(float)
-            if len(values):
-                known[:] = [min([*known, values.min()]), max([*known, values.max()])]
-
-    def extent(self, name: str) -> list[float] | None:
-        """Smallest and largest value, or None where none is known."""
-        return [round(float(value), 4) for value in self._extents[name]] or None
+def _extent(values: np.ndarray) -> list[float] | None:
+    """Smallest and largest value, or None where none is known."""
+    known = values[np.isfinite(values)]
+    return [round(float(one), 4) for one in (known.min(), known.max())] if len(known) else None
 
 
 class _Sources:
@@ -194,12 +173,6 @@ def made_text(kind: str, made: dict[str, Any], provenance: dict[str, Any]) -> st
     return ("a computed radar signal" if kind == "simulated" else "a radar capture") + (
         f": {name}" if name else ""
     )
-
-
-def _parts(dataset: Dataset) -> Iterator[dict[str, np.ndarray]]:
-    for start in range(0, len(dataset), _ROWS):
-        names = (*_READ, "label")
-        yield {name: np.asarray(dataset[name][start : start + _ROWS]) for name in names}
 
 
 def _named(names: tuple[str, ...], counts: np.ndarray) -> dict[str, int]:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Literal
+
+from pydantic import TypeAdapter
 
 from sd2core.datasets.options import LabelRule
 from sd2core.datasets.source import KINDS
@@ -80,58 +82,26 @@ class Header:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the header as JSON can hold it."""
-        return {
-            "format": FORMAT,
-            "version": VERSION,
-            "length": self.length,
-            "overlap": self.overlap,
-            "bins": self.axis.bins,
-            "v_max_mps": self.axis.v_max_mps,
-            "null_bins": list(self.null_bins),
-            "frame_rate_hz": self.frame_rate_hz,
-            "label_rule": self.label_rule,
-            "min_share": self.min_share,
-            "kinds_wanted": list(self.kinds_wanted),
-            "kinds": list(self.kinds),
-            "all_kinds": list(KINDS),
-            "labels": list(self.labels),
-            "classes": dict(self.classes),
-            "subjects": list(self.subjects),
-            "splits": {name: list(subjects) for name, subjects in self.splits.items()},
-            "units": {name: list(units) for name, units in self.units.items()},
-            "title": self.title,
-            "made_by": self.made_by,
-            "provenance": self.provenance,
-        }
+        content = _HEADER.dump_python(self, mode="json")
+        axis = content.pop("axis")
+        return {"format": FORMAT, "version": VERSION, **axis, "all_kinds": list(KINDS), **content}
 
     @classmethod
     def from_dict(cls, entry: dict[str, Any], path: Path) -> Header:
         """Parse :meth:`as_dict`; ``path`` is for messages."""
         check_format(entry, path)
         try:
-            return cls(
-                length=int(entry["length"]),
-                overlap=int(entry["overlap"]),
-                axis=VelocityAxis(int(entry["bins"]), float(entry["v_max_mps"])),
-                null_bins=tuple(entry["null_bins"]),
-                frame_rate_hz=float(entry["frame_rate_hz"]),
-                label_rule=entry["label_rule"],
-                min_share=float(entry["min_share"]),
-                kinds_wanted=tuple(entry["kinds_wanted"]),
-                kinds=tuple(entry["kinds"]),
-                labels=tuple(entry["labels"]),
-                classes=dict(entry["classes"]),
-                subjects=tuple(entry["subjects"]),
-                splits={name: tuple(subjects) for name, subjects in entry["splits"].items()},
-                units={name: tuple(units) for name, units in entry["units"].items()},
-                title=str(entry["title"]),
-                made_by=str(entry["made_by"]),
-                provenance=dict(entry["provenance"]),
-            )
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            axis = VelocityAxis(int(entry["bins"]), float(entry["v_max_mps"]))
+            names = (one.name for one in fields(cls) if one.name != "axis")
+            content = {name: entry[name] for name in names}
+            return _HEADER.validate_python({**content, "axis": axis})
+        except (KeyError, TypeError, ValueError) as error:
             raise Sd2Error(
                 f"{path}: its description is damaged ({error!r})", f"{FORMAT} {VERSION}"
             ) from error
+
+
+_HEADER = TypeAdapter(Header)
 
 
 def check_format(entry: Any, path: Path) -> None:
