@@ -14,7 +14,6 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QListWidget,
     QListWidgetItem,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -30,11 +29,13 @@ from sd2app.batch.setup import (
 )
 from sd2app.batch.text import entry_text, estimate_facts, estimate_headline, unusable_text
 from sd2app.widgets.inputs import Choice, NumberBox
+from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import (
     ElidedLabel,
     FactRows,
     outlined,
     rule,
+    say,
     sentence,
     side_by_side,
     title,
@@ -66,34 +67,27 @@ class BatchSetupView(QWidget):
     ) -> None:
         super().__init__(parent)
         self._batch, self._setup, self._asks = batch, batch.setup, asks
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(8)
-        self._add_recordings(layout)
-        layout.addLayout(self._form())
-        layout.addWidget(rule())
-        self._add_estimate(layout)
-        layout.addStretch(1)
-        layout.addLayout(self._buttons())
+        self._list = _Paths(self._drop, self)
+        self._list.itemSelectionChanged.connect(self._follow_selection)
+        self._total = title("")
+        self._total.setWordWrap(True)
+        self._total.setAccessibleName("What the batch would take")
+        self._facts = FactRows(_MOST_FACTS, at_the_edge=False, parent=self)
+        self._problem = sentence("")
+        estimate = (rule(), self._total, self._facts, self._problem, STRETCH)
+        parts = (self._recordings_row(), (self._list, 1), self._form(), *estimate, self._buttons())
+        self.setLayout(column_of(*parts, spacing_px=8, margins_px=(0, 0, 0, 0)))
         batch.changed.connect(self.refresh)
         self.refresh()
 
     # --- building -------------------------------------------------------------------------
 
-    def _add_recordings(self, layout: QVBoxLayout) -> None:
+    def _recordings_row(self) -> QHBoxLayout:
         asks = self._asks
         add = outlined("Add files…", "Recordings, videos or meshes", asks.add_files, self)
         folder = outlined("Add folder…", "All recordings below a folder", asks.add_folder, self)
         self._remove = outlined("Remove", "Do not work on what is selected", self._drop, self)
-        head = QHBoxLayout()
-        head.setSpacing(6)
-        head.addWidget(title("Recordings"), 1)
-        for button in (add, folder, self._remove):
-            head.addWidget(button)
-        layout.addLayout(head)
-        self._list = _Paths(self._drop, self)
-        self._list.itemSelectionChanged.connect(self._follow_selection)
-        layout.addWidget(self._list, 1)
+        return row_of((title("Recordings"), 1), add, folder, self._remove, spacing_px=6)
 
     def _form(self) -> QFormLayout:
         form = QFormLayout()
@@ -124,11 +118,7 @@ class BatchSetupView(QWidget):
         form.addRow("", side_by_side(self._steps["export"], self._format))
         self._out = ElidedLabel(self)
         choose = outlined("Choose…", "Put the results elsewhere", self._asks.choose_out, self)
-        row = QHBoxLayout()
-        row.setSpacing(8)
-        row.addWidget(self._out, 1)
-        row.addWidget(choose)
-        form.addRow("Results in", row)
+        form.addRow("Results in", row_of((self._out, 1), choose, spacing_px=8))
         self._workers = NumberBox(
             1, most_workers(), "", "Processes that share the work", decimals=0, step=1.0
         )
@@ -149,26 +139,12 @@ class BatchSetupView(QWidget):
         choice.currentIndexChanged.connect(lambda index: self._setup.set_value(name, values[index]))
         return choice
 
-    def _add_estimate(self, layout: QVBoxLayout) -> None:
-        self._total = title("")
-        self._total.setWordWrap(True)
-        self._total.setAccessibleName("What the batch would take")
-        self._facts = FactRows(_MOST_FACTS, at_the_edge=False, parent=self)
-        self._problem = sentence("")
-        for widget in (self._total, self._facts, self._problem):
-            layout.addWidget(widget)
-
     def _buttons(self) -> QHBoxLayout:
         asks = self._asks
         self._save = outlined("Save plan…", "As a file for sd2 batch", asks.save_plan, self)
         self._start = outlined("Start", "In background processes", asks.start, self)
         self._start.setObjectName("primary")
-        row = QHBoxLayout()
-        row.setSpacing(6)
-        row.addStretch(1)
-        row.addWidget(self._save)
-        row.addWidget(self._start)
-        return row
+        return row_of(STRETCH, self._save, self._start, spacing_px=6)
 
     # --- showing --------------------------------------------------------------------------
 
@@ -211,12 +187,7 @@ class BatchSetupView(QWidget):
         text = why_not if made is None else unusable_text(made)
         bad = made is not None or batch.refused
         bad |= any(entry.problem for entry in self._setup.entries)
-        role = "warning" if bad else "muted"
-        if self._problem.objectName() != role:
-            self._problem.setObjectName(role)
-            self._problem.style().unpolish(self._problem)
-            self._problem.style().polish(self._problem)
-        self._problem.setText(text)
+        say(self._problem, text, "warning" if bad else "muted")
         self._problem.setVisible(bool(text))
         self._start.setEnabled(not why_not)
         self._save.setEnabled(not self._setup.problem)

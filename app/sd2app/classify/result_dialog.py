@@ -12,7 +12,6 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
     QSizePolicy,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -20,6 +19,7 @@ from sd2app.classify.result import ClassResult, Matrix
 from sd2app.session.display import DisplayModel
 from sd2app.widgets.chart import Chart, ChartView, Curve, Mark, Scale
 from sd2app.widgets.inputs import Choice
+from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import sentence, title
 
 _WIDTH_PX = 860
@@ -134,13 +134,11 @@ class ClassResultDialog(QDialog):
         self._result = result
         self.setWindowTitle(f"Classifiers: {result.path.parent.name or result.path.name}")
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        layout = QVBoxLayout(self)
-        layout.addWidget(title(result.heading))
+        layout = column_of(title(result.heading))
         if result.summary:
             layout.addWidget(sentence(result.summary))
-        row = QHBoxLayout()
-        row.setSpacing(24)
         first = result.matrices[0]
+        row = row_of(spacing_px=24)
         self._left = _MatrixColumn(display, self)
         self._left.heading.addWidget(QLabel(first.title, self))
         self._left.heading.addStretch(1)
@@ -161,6 +159,7 @@ class ClassResultDialog(QDialog):
         buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close, self)
         buttons.rejected.connect(self.reject)
         layout.addWidget(buttons)
+        self.setLayout(layout)
         self.resize(_WIDTH_PX, self.sizeHint().height())
 
     def _what_else(self, matrices: tuple[Matrix, ...]) -> QWidget:
@@ -187,12 +186,8 @@ class _MatrixColumn(QWidget):
         self.heading.addStrut(28)
         self._view = ConfusionView(display, self)
         self._recall = sentence("", "plain")
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addLayout(self.heading)
-        column.addWidget(self._view)
-        column.addWidget(self._recall)
-        column.addStretch(1)
+        parts = (self.heading, self._view, self._recall, STRETCH)
+        self.setLayout(column_of(*parts, margins_px=(0, 0, 0, 0)))
 
     def show_matrix(self, matrix: Matrix, result: ClassResult) -> None:
         self._view.show_matrix(matrix, result.classes)

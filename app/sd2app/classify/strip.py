@@ -16,7 +16,7 @@ from PySide6.QtGui import (
     QPaintEvent,
     QWheelEvent,
 )
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLabel, QSizePolicy, QWidget
 
 from sd2app.classify.model import ClassifyModel
 from sd2app.classify.text import ago_text, delay_text, reading_text
@@ -26,6 +26,7 @@ from sd2app.session.display import DisplayModel
 from sd2app.session.session import Session
 from sd2app.widgets.cached_paint import CachedPaint
 from sd2app.widgets.inputs import Choice
+from sd2app.widgets.layouts import column_of, row_of
 from sd2app.widgets.model_menu import ModelButton
 from sd2app.widgets.panel import ElidedLabel
 from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, TimeScale, paint_cursor, turn_wheel
@@ -66,18 +67,10 @@ class ClassStrip(QWidget):
         self._status = ElidedLabel(self)
         self._status.setObjectName("muted")
         self.readout = ClassReadout(session.display, classify, labels, self)
-        row = QHBoxLayout()
-        row.setContentsMargins(8, 2, MARGIN_PX, 2)
-        row.setSpacing(8)
-        for widget in (title, button, self._source):
-            row.addWidget(widget)
-        row.addWidget(self._status, 1)
-        row.addWidget(self.readout)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(0)
-        column.addLayout(row)
-        column.addWidget(ClassPlot(session, classify, labels, self))
+        parts = (title, button, self._source, (self._status, 1), self.readout)
+        head = row_of(*parts, spacing_px=8, margins_px=(8, 2, MARGIN_PX, 2))
+        plot = ClassPlot(session, classify, labels, self)
+        self.setLayout(column_of(head, plot, spacing_px=0, margins_px=(0, 0, 0, 0)))
         classify.changed.connect(self._refresh)
         classify.moved.connect(self._say)
         self._refresh()

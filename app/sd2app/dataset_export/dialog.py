@@ -11,18 +11,17 @@ from PySide6.QtWidgets import (
     QDialog,
     QFileDialog,
     QFormLayout,
-    QHBoxLayout,
     QLabel,
     QLineEdit,
     QProgressBar,
     QScrollArea,
-    QVBoxLayout,
     QWidget,
 )
 
 from sd2app.dataset_export.model import ENDINGS, MAPS, ExportModel
 from sd2app.dataset_export.text import label_words, size_words, split_words
 from sd2app.widgets.inputs import Choice, NumberBox
+from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import ElidedLabel, outlined, rule, sentence, side_by_side
 from sd2core.recording.recording import is_recording
 
@@ -45,17 +44,9 @@ class ExportDialog(QDialog):
         self.setWindowTitle("Export data set")
         self._build_form()
         self._build_foot()
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(16, 16, 16, 16)
-        layout.setSpacing(12)
-        layout.addLayout(self._form)
-        layout.addWidget(rule())
-        for words in (self._size, self._labels, self._splits, self._message):
-            layout.addWidget(words)
-        layout.addWidget(self._sheet, 1)
-        layout.addStretch(0)
-        layout.addWidget(self._bar)
-        layout.addLayout(self._foot)
+        words = (self._size, self._labels, self._splits, self._message)
+        parts = (self._form, rule(), *words, (self._sheet, 1), (None, 0), self._bar, self._foot)
+        self.setLayout(column_of(*parts, spacing_px=12, margins_px=(16, 16, 16, 16)))
         model.changed.connect(self._refresh)
         self._refresh()
         self.resize(*_SIZE_PX)
@@ -96,11 +87,7 @@ class ExportDialog(QDialog):
         self._format.currentIndexChanged.connect(
             lambda at: model.choose(ending=self._format.itemData(at))
         )
-        where = QHBoxLayout()
-        where.setSpacing(8)
-        where.addWidget(self._place, 1)
-        where.addWidget(self._this)
-        where.addWidget(self._other)
+        where = row_of((self._place, 1), self._this, self._other, spacing_px=8)
         self._form = QFormLayout()
         self._form.setHorizontalSpacing(16)
         self._form.setVerticalSpacing(8)
@@ -133,12 +120,8 @@ class ExportDialog(QDialog):
         )
         self._open = outlined("Open folder", "Show the data set's folder", self._show_folder, self)
         self._close = outlined("Close", "An export under way goes on", self.close, self)
-        self._foot = QHBoxLayout()
-        self._foot.setSpacing(8)
-        self._foot.addWidget(self._open)
-        self._foot.addStretch(1)
-        for button in (self._stop, self._export, self._close):
-            self._foot.addWidget(button)
+        buttons = (self._stop, self._export, self._close)
+        self._foot = row_of(self._open, STRETCH, *buttons, spacing_px=8)
 
     def _frames(self, tip: str, low: int) -> NumberBox:
         return NumberBox(low, 10_000, " frames", tip, decimals=0, step=1.0, parent=self)
@@ -182,11 +165,7 @@ class ExportDialog(QDialog):
     def _may(self, field: QWidget) -> bool:
         """True if a field can be changed now."""
         model = self._model
-        if model.exporting:
-            return False
-        if field is self._sensors:
-            return model.places > 0
-        return True
+        return not model.exporting and (field is not self._sensors or model.places > 0)
 
     def _show_counts(self) -> None:
         model, forecast = self._model, self._model.forecast
