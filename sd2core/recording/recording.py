@@ -53,6 +53,8 @@ SUFFIX = ".sd2"
 _PLACED_BY_VIDEO = {".pkl", ".pickle", ".joblib"}
 """Outputs of body models, which know their place only in the picture's pixels."""
 
+_SENSOR = ("position_m", "azimuth_deg", "elevation_deg", "field_of_view_deg")
+
 _AIDS: set[Role] = {"faces", "denoiser"}
 """Files that are nothing to look at by themselves."""
 
@@ -284,7 +286,7 @@ class Recording:
         document.bundled_denoiser = self.bundled_denoiser
         document.placements = None if self.placements is None else self.placements.as_dict()
         document.spans = tuple(self.spans)
-        for name in ("position_m", "azimuth_deg", "elevation_deg", "field_of_view_deg"):
+        for name in _SENSOR:
             setattr(document.sensor, name, getattr(self.sensor, name))
         for role in ROLES:
             path = getattr(self, role)
@@ -404,18 +406,21 @@ def open_recording(path: Path) -> Recording:
     path = Path(path)
     folder = plain_path(path.parent if path.name == FILE_NAME else path)
     document = read_document(folder / FILE_NAME)
+    planned = document.placements
+    try:
+        sensor = VirtualSensor(**{name: getattr(document.sensor, name) for name in _SENSOR})
+        placements = None if planned is None else placements_from_dict(planned)
+    except Sd2Error as error:
+        file = folder / FILE_NAME
+        raise Sd2Error(f"{file}: {error.found}", error.expected, error.remedy) from error
     recording = Recording(
         folder,
-        video=located_path(document.video, folder),
-        mesh=located_path(document.mesh, folder),
-        faces=located_path(document.faces, folder),
-        radar=located_path(document.radar, folder),
-        denoiser=located_path(document.denoiser, folder),
+        **{role: located_path(getattr(document, role), folder) for role in ROLES},  # type: ignore[arg-type]
         bundled_denoiser=document.bundled_denoiser,
         mesh_reading=document.mesh_reading,
         radar_offset_s=document.radar_offset_s,
-        sensor=_sensor(document, folder / FILE_NAME),
-        placements=_placements(document, folder / FILE_NAME),
+        sensor=sensor,
+        placements=placements,
         spans=document.spans,
         title=document.title or folder.stem,
         simulated=document.simulated,
@@ -424,28 +429,6 @@ def open_recording(path: Path) -> Recording:
     )
     recording.read_labels_again()
     return recording
-
-
-def _sensor(document: Document, file: Path) -> VirtualSensor:
-    entry = document.sensor
-    try:
-        return VirtualSensor(
-            position_m=entry.position_m,
-            azimuth_deg=entry.azimuth_deg,
-            elevation_deg=entry.elevation_deg,
-            field_of_view_deg=entry.field_of_view_deg,
-        )
-    except Sd2Error as error:
-        raise Sd2Error(f"{file}: {error.found}", error.expected, error.remedy) from error
-
-
-def _placements(document: Document, file: Path) -> Placements | None:
-    if document.placements is None:
-        return None
-    try:
-        return placements_from_dict(document.placements)
-    except Sd2Error as error:
-        raise Sd2Error(f"{file}: {error.found}", error.expected, error.remedy) from error
 
 
 def _new_folder(folder: Path) -> Path:
