@@ -74,7 +74,8 @@ class NewFromVideoDialog(QDialog):
         self._folder = ElidedLabel(self)
         self._other_video = self._button("Choose…", "Take another video", self._ask_video)
         self._other_folder = self._button("Choose…", "Save elsewhere", self._ask_folder)
-        self._person = sentence("", "")
+        self._person = QLabel(self)
+        self._person.setWordWrap(True)
         self._clear = self._button(
             "Clear", "Have the person chosen", lambda: setup.change(person=None)
         )
@@ -113,11 +114,11 @@ class NewFromVideoDialog(QDialog):
         form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
         form.addRow("Video", row_of((self._video, 1), self._other_video, spacing_px=8))
         form.addRow("Person", row_of((self._person, 1), self._clear, spacing_px=8))
-        form.addRow("", sentence("Drag a rectangle around the person, where there are several."))
+        form.addRow("", _hint("Drag a rectangle around the person, where there are several."))
         form.addRow("Body height", side_by_side(self._known, self._stature))
         form.addRow(
             "",
-            sentence(
+            _hint(
                 f"{DEFAULT_STATURE_M:g} m where it is not known. It fixes the scale: all distances"
                 " and velocities are proportional to it."
             ),
@@ -193,3 +194,10 @@ class NewFromVideoDialog(QDialog):
         )
         if name:
             self._setup.change(folder=Path(name))
+
+
+def _hint(text: str) -> QLabel:
+    label = QLabel(text)
+    label.setObjectName("muted")
+    label.setWordWrap(True)
+    return label
