@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from sd2core.accuracy.plans import AccuracyPlan, Family
-from sd2core.accuracy.results import Cost, Errors, Machine, Measurement, PlanResult, Spread
+from sd2core.accuracy.plans import Family
+from sd2core.accuracy.results import Machine, Measurement
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
@@ -81,9 +81,8 @@ def cached_measurement(
     machine or version.
     """
     try:
-        content = json.loads(_place(mesh, family).read_text(encoding="utf-8"))
-        measurement = _from_json(content)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, Sd2Error):
+        measurement = _from_json(_place(mesh, family).read_text(encoding="utf-8"))
+    except (OSError, ValueError, KeyError, TypeError, Sd2Error):
         # A cache: what cannot be read is measured again.
         return None
     same = (
@@ -115,42 +114,9 @@ def _place(mesh: MeshSequence, family: Family) -> Path:
     return folder / f"{family}-{clip_fingerprint(mesh)}.json"
 
 
-def _from_json(content: dict[str, Any]) -> Measurement:
-    if content["format"] != _FORMAT:
-        raise ValueError(f"format {content['format']}")
-    return Measurement(
-        family=content["family"],
-        reference=AccuracyPlan.from_json(content["reference"]),
-        results=tuple(_result(entry) for entry in content["results"]),
-        scene=content["scene"],
-        machine=Machine(**content["machine"]),
-        frames=tuple(content["frames"]),
-        source=content["source"],
-        convergence=tuple(
-            (int(pieces), float(change)) for pieces, change in content["convergence"]
-        ),
-    )
+def _from_json(text: str) -> Measurement:
+    from pydantic import TypeAdapter
 
-
-def _result(content: dict[str, Any]) -> PlanResult:
-    return PlanResult(
-        AccuracyPlan.from_json(content["plan"]),
-        Errors(**_with_spreads(content["errors"])),
-        Cost(**_with_spreads(content["cost"])),
-    )
-
-
-def _with_spreads(content: dict[str, Any]) -> dict[str, Any]:
-    return {
-        name: Spread(_number(value["median"]), _number(value["p95"]))
-        if isinstance(value, dict)
-        else _number(value)
-        for name, value in content.items()
-    }
-
-
-def _number(value: Any) -> Any:
-    # Integers stay integers.
-    if not isinstance(value, int | float):
-        raise TypeError(f"{value!r} is not a number")
-    return value
+    if (found := json.loads(text)["format"]) != _FORMAT:
+        raise ValueError(f"format {found}")
+    return TypeAdapter(Measurement).validate_json(text, strict=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 import tracemalloc
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Literal
@@ -129,13 +129,25 @@ def measure(
             plans, errors, costs, memory, strict=True
         )
     ]
+    reference = reference_plan(family, options.weight, surface=surface)
+    return _measurement(reference, results, all_frames(runs), mesh, sensor, options)
+
+
+def _measurement(
+    reference: AccuracyPlan,
+    results: Sequence[PlanResult],
+    frames: tuple[int, ...],
+    mesh: MeshSequence,
+    sensor: VirtualSensor,
+    options: SynthesisOptions,
+) -> Measurement:
     return Measurement(
-        family=family,
-        reference=reference_plan(family, options.weight, surface=surface),
+        family=reference.family,
+        reference=reference,
         results=tuple(sorted(results, key=lambda result: result.cost.all_cores_ms.median)),
-        scene=scene_fingerprint(mesh, sensor, options, family),
+        scene=scene_fingerprint(mesh, sensor, options, reference.family),
         machine=this_machine(),
-        frames=all_frames(runs),
+        frames=frames,
         source=Path(mesh.source).name,
     )
 
@@ -301,16 +313,8 @@ def measure_waves(
         PlanResult(plan, error, Cost(one, every, most, trial.setup_s(plan)))
         for plan, error, (one, every), most in zip(plans, errors, costs, memory, strict=True)
     ]
-    return Measurement(
-        family="fmcw",
-        reference=reference_plan("fmcw"),
-        results=tuple(sorted(results, key=lambda result: result.cost.all_cores_ms.median)),
-        scene=scene_fingerprint(mesh, sensor, options, "fmcw"),
-        machine=this_machine(),
-        frames=trial.frames,
-        source=Path(mesh.source).name,
-        convergence=_convergence(converged),
-    )
+    made = _measurement(reference_plan("fmcw"), results, trial.frames, mesh, sensor, options)
+    return replace(made, convergence=_convergence(converged))
 
 
 def _milliseconds(trial: WaveTrial, plan: AccuracyPlan) -> tuple[float, float]:

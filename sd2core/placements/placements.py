@@ -12,7 +12,7 @@ import json
 import math
 import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import MISSING, dataclass, fields
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -66,6 +66,8 @@ class Place:
 class _Spec:
     """Base class of grid and cloud."""
 
+    kind: ClassVar[str]
+
     def places(self) -> tuple[Place, ...]:
         """Distinct places."""
         raise NotImplementedError
@@ -73,6 +75,13 @@ class _Spec:
     def sensors(self, target_m: Vector) -> tuple[VirtualSensor, ...]:
         """A sensor per place, aimed at a point in the camera frame, in metres."""
         return tuple(place.sensor(target_m) for place in self.places())
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values for JSON and TOML that :func:`placements_from_dict` reads."""
+        return {"kind": self.kind} | {
+            name: list(value) if isinstance(value, tuple) else value
+            for name, value in vars(self).items()
+        }
 
 
 @dataclass(frozen=True)
@@ -94,7 +103,7 @@ class PlacementGrid(_Spec):
         When a list is empty, a number is out of bounds, or there are more than 10000 places.
     """
 
-    kind: ClassVar[str] = "grid"
+    kind = "grid"
 
     ranges_m: tuple[float, ...]
     azimuths_deg: tuple[float, ...] = (0.0,)
@@ -119,15 +128,6 @@ class PlacementGrid(_Spec):
             for elevation_deg in self.elevations_deg
         )
 
-    def as_dict(self) -> dict[str, Any]:
-        """Plain values for JSON and TOML that :func:`placements_from_dict` reads."""
-        return {
-            "kind": self.kind,
-            "ranges_m": list(self.ranges_m),
-            "azimuths_deg": list(self.azimuths_deg),
-            "elevations_deg": list(self.elevations_deg),
-        }
-
 
 @dataclass(frozen=True)
 class PlacementCloud(_Spec):
@@ -149,7 +149,7 @@ class PlacementCloud(_Spec):
         When a number is out of bounds or an interval the wrong way round.
     """
 
-    kind: ClassVar[str] = "cloud"
+    kind = "cloud"
 
     count: int
     range_m: Interval
@@ -190,17 +190,6 @@ class PlacementCloud(_Spec):
             zip(range_m.tolist(), azimuth_deg.tolist(), elevation_deg.tolist(), strict=True)
         )
 
-    def as_dict(self) -> dict[str, Any]:
-        """Plain values for JSON and TOML that :func:`placements_from_dict` reads."""
-        return {
-            "kind": self.kind,
-            "count": self.count,
-            "range_m": list(self.range_m),
-            "azimuth_deg": list(self.azimuth_deg),
-            "elevation_deg": list(self.elevation_deg),
-            "seed": self.seed,
-        }
-
 
 Placements = PlacementGrid | PlacementCloud
 
@@ -214,21 +203,19 @@ def placements_from_dict(content: object) -> Placements:
     if not isinstance(content, Mapping):
         raise Sd2Error(f"The placements are {content!r}", 'a table with kind = "grid" or "cloud"')
     given = dict(content)
-    kind = given.pop("kind", None)
-    if kind == PlacementGrid.kind:
-        wanted, needed = {"ranges_m", "azimuths_deg", "elevations_deg"}, {"ranges_m"}
-    elif kind == PlacementCloud.kind:
-        wanted = {"count", "range_m", "azimuth_deg", "elevation_deg", "seed"}
-        needed = {"count", "range_m"}
-    else:
-        raise Sd2Error(f"The kind of the placements is {kind!r}", '"grid" or "cloud"')
+    name = given.pop("kind", None)
+    kind = next((kind for kind in (PlacementGrid, PlacementCloud) if kind.kind == name), None)
+    if kind is None:
+        raise Sd2Error(f"The kind of the placements is {name!r}", '"grid" or "cloud"')
+    wanted = {field.name for field in fields(kind)}
+    needed = {field.name for field in fields(kind) if field.default is MISSING}
     for problem, keys in (("no", needed - given.keys()), ("an unknown", given.keys() - wanted)):
         if keys:
             raise Sd2Error(
                 f"The placements have {problem} {sorted(map(str, keys))[0]}",
-                f"for a {kind}: {', '.join(sorted(wanted))}",
+                f"for a {name}: {', '.join(sorted(wanted))}",
             )
-    return PlacementGrid(**given) if kind == PlacementGrid.kind else PlacementCloud(**given)
+    return kind(**given)
 
 
 def read_placements(file: Path) -> Placements:

@@ -16,7 +16,7 @@ from sd2app.widgets.plot import LogAxis, PointPlot, tick_text
 from sd2app.widgets.text import percent
 
 if TYPE_CHECKING:
-    from sd2core.accuracy.results import PlanResult
+    from sd2core.accuracy.results import Measurement, PlanResult
 
 _FLOOR_PERCENT = 0.01
 _REACH_PX = 8.0
@@ -41,21 +41,24 @@ class AccuracyPlot(PointPlot):
     KEYS = frozenset({Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Escape, *_STEPS})
 
     def __init__(
-        self, trade: AccuracyModel, display: DisplayModel, parent: QWidget | None = None
+        self, accuracy: AccuracyModel, display: DisplayModel, parent: QWidget | None = None
     ) -> None:
         super().__init__(display, "Error against cost of every plan", parent)
-        self._trade = trade
-        trade.changed.connect(self._refresh)
-        trade.plan_changed.connect(self._refresh)
+        self._accuracy = accuracy
+        accuracy.changed.connect(self._refresh)
+        accuracy.plan_changed.connect(self._refresh)
+
+    @property
+    def _measurement(self) -> Measurement | None:
+        return self._accuracy.measured.measurement
 
     def points(self) -> tuple[PlanResult, ...]:
         """All plans that were measured."""
-        measurement = self._trade.measured.measurement
-        return measurement.results if measurement is not None else ()
+        return self._measurement.results if self._measurement is not None else ()
 
     def first_point(self) -> PlanResult | None:
         """The plan in use."""
-        return self._trade.current_point
+        return self._accuracy.current_point
 
     def tip_place(self, point: PlanResult) -> QPointF:
         """Pixel of the plan."""
@@ -67,7 +70,7 @@ class AccuracyPlot(PointPlot):
 
     def tip_of(self, point: PlanResult) -> str:
         """The same, and whether it can be used."""
-        if point is self._trade.current_point:
+        if point is self._accuracy.current_point:
             return f"In use\n{point_text(point)}"
         if point.plan.family != "histogram":
             return f"For comparison\n{point_text(point)}"
@@ -85,7 +88,7 @@ class AccuracyPlot(PointPlot):
     def _axes(self) -> tuple[LogAxis, LogAxis]:
         plot, results = self.plot_rect(), self.points()
         costs = [result.cost.all_cores_ms.median for result in results]
-        errors = [100 * self._trade.tolerance, *(100 * result.errors.l1 for result in results)]
+        errors = [100 * self._accuracy.tolerance, *(100 * result.errors.l1 for result in results)]
         return (
             LogAxis.around(costs, plot.left(), plot.right()),
             LogAxis.around(errors, plot.bottom(), plot.top(), floor=_FLOOR_PERCENT),
@@ -100,62 +103,57 @@ class AccuracyPlot(PointPlot):
 
     def paint_plot(self, painter: QPainter) -> None:
         """Axes, tolerance, points, front, what is in use."""
-        measurement = self._trade.measured.measurement
+        measurement = self._measurement
         if measurement is None or not measurement.results:
             return
-        colours, plot = self._display.palette, self.plot_rect()
-        costs, errors = self._axes()
-        self._paint_axes(painter, plot, costs, errors)
-        self._paint_tolerance(painter, plot, errors)
-        accent = QColor(colours.synthetic if measurement.family == "histogram" else colours.real)
+        colours, (costs, errors) = self._display.palette, self._axes()
+        counting = measurement.family == "histogram"
+        self._paint_scales(painter, costs, errors)
+        if counting:
+            self._paint_tolerance(painter, errors)
+        accent = QColor(colours.synthetic if counting else colours.real)
         if measurement.stale:
             accent = QColor(colours.muted)
         front = front_at_rest(measurement)
         for result in measurement.results:
             if result not in front:
                 self._paint_point(painter, result, QColor(colours.muted), 2.0)
-        self._paint_front(painter, plot, front, accent)
+        self._paint_front(painter, front, accent)
         for result in front:
             self._paint_point(painter, result, accent, 3.5)
-        self._paint_tolerance_text(painter, plot, errors)
+        if counting:
+            self._paint_tolerance_text(painter, errors)
         self._paint_in_use(painter, costs, errors)
         painter.setBrush(Qt.BrushStyle.NoBrush)
         if self._pointed is not None:
             painter.setPen(QPen(QColor(colours.accent), 1.5))
             painter.drawEllipse(self.point_of(self._pointed), 5.5, 5.5)
 
-    def _paint_axes(self, painter: QPainter, plot: QRectF, costs: LogAxis, errors: LogAxis) -> None:
+    def _paint_scales(self, painter: QPainter, costs: LogAxis, errors: LogAxis) -> None:
+        width = self.plot_rect().width()
+        across = costs.ticks(max(int(width / 44), 2))
+        upwards = errors.ticks(self.most_upwards(painter))
         self.paint_axes(
             painter,
-            [
-                (costs.px(value), tick_text(value))
-                for value in costs.ticks(max(int(plot.width() / 44), 2))
-            ],
-            [
-                (errors.px(value), _error_text(value))
-                for value in errors.ticks(self.most_upwards(painter))
-            ],
+            [(costs.px(value), tick_text(value)) for value in across],
+            [(errors.px(value), _error_text(value)) for value in upwards],
             "cost (ms per frame)",
         )
-        box = QRectF(4, 0, plot.width(), painter.fontMetrics().height() + 2)
+        box = QRectF(4, 0, width, painter.fontMetrics().height() + 2)
         painter.drawText(box, Qt.AlignmentFlag.AlignVCenter, "error (%)")
 
-    def _paint_tolerance(self, painter: QPainter, plot: QRectF, errors: LogAxis) -> None:
-        if self._trade.measured.family != "histogram":
-            return
-        colours, y = self._display.palette, errors.px(100 * self._trade.tolerance)
-        below = QColor(colours.accent)
+    def _paint_tolerance(self, painter: QPainter, errors: LogAxis) -> None:
+        colours, plot = self._display.palette, self.plot_rect()
+        y, below = errors.px(100 * self._accuracy.tolerance), QColor(colours.accent)
         below.setAlpha(18)
         painter.fillRect(QRectF(plot.left(), y, plot.width(), plot.bottom() - y), below)
         painter.setPen(QPen(QColor(colours.accent), 1.5, Qt.PenStyle.DashLine))
         painter.drawLine(QPointF(plot.left(), y), QPointF(plot.right(), y))
 
-    def _paint_tolerance_text(self, painter: QPainter, plot: QRectF, errors: LogAxis) -> None:
-        if self._trade.measured.family != "histogram":
-            return
-        colours, metrics = self._display.palette, painter.fontMetrics()
-        text, line_px = f"tolerance {percent(self._trade.tolerance)}", metrics.height()
-        y, width = errors.px(100 * self._trade.tolerance), metrics.horizontalAdvance(text) + 6
+    def _paint_tolerance_text(self, painter: QPainter, errors: LogAxis) -> None:
+        colours, metrics, plot = self._display.palette, painter.fontMetrics(), self.plot_rect()
+        text, line_px = f"tolerance {percent(self._accuracy.tolerance)}", metrics.height()
+        y, width = errors.px(100 * self._accuracy.tolerance), metrics.horizontalAdvance(text) + 6
         above = y - line_px - 1 if y - line_px > plot.top() else y + 1
         box = QRectF(plot.right() - width, above, width, line_px)
         ground = QColor(colours.panel)
@@ -166,8 +164,8 @@ class AccuracyPlot(PointPlot):
 
     def _paint_in_use(self, painter: QPainter, costs: LogAxis, errors: LogAxis) -> None:
         """Mark the plan in use where it was measured, otherwise where it was estimated."""
-        in_use, current = self._trade.in_use, self._trade.current_point
-        if in_use is None or self._trade.measured.family != in_use.plan.family:
+        in_use, current = self._accuracy.in_use, self._accuracy.current_point
+        if in_use is None or self._accuracy.measured.family != in_use.plan.family:
             return
         place = QPointF(costs.px(in_use.cost_ms), errors.px(100 * in_use.error))
         if current is not None:
@@ -181,7 +179,7 @@ class AccuracyPlot(PointPlot):
         painter.drawEllipse(place, 7.0, 7.0)
 
     def _paint_front(
-        self, painter: QPainter, plot: QRectF, front: tuple[PlanResult, ...], colour: QColor
+        self, painter: QPainter, front: tuple[PlanResult, ...], colour: QColor
     ) -> None:
         """Paint the front in steps: between two points holds the error of the cheaper."""
         line: list[QPointF] = []
@@ -190,7 +188,7 @@ class AccuracyPlot(PointPlot):
             if line:
                 line.append(QPointF(place.x(), line[-1].y()))
             line.append(place)
-        line.append(QPointF(plot.right(), line[-1].y()))
+        line.append(QPointF(self.plot_rect().right(), line[-1].y()))
         painter.setBrush(Qt.BrushStyle.NoBrush)
         painter.setPen(QPen(colour, 1.5))
         painter.drawPolyline(QPolygonF(line))
@@ -207,15 +205,9 @@ class AccuracyPlot(PointPlot):
             radius_px = 3.0
         if errors.is_below(100 * result.errors.l1):
             # On the edge: an arrow down, its value is off the axis.
-            painter.drawPolygon(
-                QPolygonF(
-                    [
-                        place + QPointF(-radius_px - 1, -radius_px),
-                        place + QPointF(radius_px + 1, -radius_px),
-                        place + QPointF(0, radius_px + 1),
-                    ]
-                )
-            )
+            wide = radius_px + 1
+            corners = ((-wide, -radius_px), (wide, -radius_px), (0, wide))
+            painter.drawPolygon(QPolygonF([place + QPointF(*corner) for corner in corners]))
         else:
             painter.drawEllipse(place, radius_px, radius_px)
 
@@ -233,7 +225,7 @@ class AccuracyPlot(PointPlot):
         """Use the point."""
         result = self._near(event.position())
         if event.button() == Qt.MouseButton.LeftButton and result is not None:
-            self._trade.use(result)
+            self._accuracy.use(result)
 
     def leaveEvent(self, event: QEvent) -> None:
         """Remove the mark of the pointed point."""
@@ -241,7 +233,7 @@ class AccuracyPlot(PointPlot):
 
     def _near(self, place: QPointF) -> PlanResult | None:
         """The nearest plan within reach; one on the front before others as near."""
-        measurement = self._trade.measured.measurement
+        measurement = self._measurement
         if measurement is None:
             return None
         front = set(map(id, front_at_rest(measurement)))
@@ -259,14 +251,14 @@ class AccuracyPlot(PointPlot):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Go from point to point; Return uses one."""
-        measurement, key = self._trade.measured.measurement, event.key()
+        measurement, key = self._measurement, event.key()
         if measurement is None or key not in self.KEYS:
             super().keyPressEvent(event)
         elif key == Qt.Key.Key_Escape:
             self.clearFocus()
         elif key in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
             if self._pointed is not None:
-                self._trade.use(self._pointed)
+                self._accuracy.use(self._pointed)
         else:
             along = list(front_at_rest(measurement))
             if key in (Qt.Key.Key_Up, Qt.Key.Key_Down):
@@ -276,7 +268,7 @@ class AccuracyPlot(PointPlot):
 
     def _next(self, along: list[PlanResult], step: int) -> PlanResult:
         """The neighbour of the point the keyboard is at; from elsewhere, the nearest."""
-        here = self._pointed or self._trade.current_point
+        here = self._pointed or self._accuracy.current_point
         if here is None:
             return along[0]
         if here in along:

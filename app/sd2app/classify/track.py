@@ -12,7 +12,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 
 from sd2app.background.latest import Emit, LatestRunner
 from sd2app.classify.library import Classifier, LiveClasses
-from sd2app.denoise.map import AT_ONCE, cut_out, known_frames
+from sd2app.denoise.map import AT_ONCE, cut_out
 from sd2app.session.maps import MapModel
 from sd2core.denoise.resample_to_model import check_bins, is_regular, stretches
 from sd2core.errors import Sd2Error
@@ -224,7 +224,7 @@ class ClassTrack(QObject):
         except Sd2Error as error:
             self._fail(error)
             return
-        self._take(source.map, known_frames(source.map, source.covered))
+        self._take(source.map, source.known)
         if self._again:
             return
         if np.count_nonzero(self._known & ~self._done) <= AT_ONCE:

@@ -41,24 +41,11 @@ class DenoiseFeature(Feature):
         library: DenoiserLibrary,
         parent: QObject,
     ) -> None:
-        self._shell, s = shell, session
-        self._session = session
-        maps = s.maps
-        self.model = DenoiseModel(
-            s.document,
-            synthesis,
-            s.span,
-            maps.synthetic,
-            maps.denoised,
-            maps.before,
-            s.jobs,
-            library,
-            s.edits.choose_denoiser,
-            parent,
-        )
+        self._session, self._shell = session, shell
+        self.model = DenoiseModel(session, synthesis, library, parent)
         self.model.failed.connect(shell.warn)
         self.model.noted.connect(shell.note)
-        self.live = LiveDenoiseModel(s.playback, maps.synthetic, self.model, s.settings, parent)
+        self.live = LiveDenoiseModel(session, self.model, parent)
         self._menu: ModelMenu | None = None
 
     @property

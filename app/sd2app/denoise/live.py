@@ -11,10 +11,9 @@ from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.latest import LatestRunner
 from sd2app.denoise.library import Denoiser, LiveSession
+from sd2app.denoise.map import presence
 from sd2app.denoise.model import DenoiseModel
-from sd2app.session.maps import MapModel
-from sd2app.session.playback import PlaybackModel
-from sd2app.settings import Settings
+from sd2app.session.session import Session
 from sd2core.denoise.resample_to_model import is_regular
 
 _WANTED = "denoise_live"
@@ -38,35 +37,23 @@ class LiveDenoiseModel(QObject):
     changed = Signal()
 
     def __init__(
-        self,
-        playback: PlaybackModel,
-        synthetic: MapModel,
-        denoise: DenoiseModel,
-        settings: Settings,
-        parent: QObject | None = None,
+        self, session: Session, denoise: DenoiseModel, parent: QObject | None = None
     ) -> None:
         super().__init__(parent)
-        self._playback = playback
-        self._synthetic = synthetic
-        self._denoise = denoise
-        self._settings = settings
-        self._wanted = settings.flag(_WANTED, False)
+        self._playback, self._synthetic = session.playback, session.maps.synthetic
+        self._settings, self._denoise = session.settings, denoise
+        self.wanted = session.settings.flag(_WANTED, False)  # by the user
         self._denoiser: Denoiser | None = None
         self._session: LiveSession | None = None
         self._next = 0
         self._fresh = True
         self._runner = LatestRunner("live", self)
         self._runner.finished.connect(self._receive)
-        self._runner.failed.connect(lambda _: self._end())
-        playback.playing_changed.connect(lambda _: self._follow())
-        playback.frame_changed.connect(lambda _: self._advance())
+        self._runner.failed.connect(self._end)
+        self._playback.playing_changed.connect(self._follow)
+        self._playback.frame_changed.connect(self._advance)
         denoise.changed.connect(self._follow)
-        synthetic.changed.connect(self._watch)
-
-    @property
-    def wanted(self) -> bool:
-        """True if the user wants denoising to follow playback."""
-        return self._wanted
+        self._synthetic.changed.connect(self._watch)
 
     @property
     def running(self) -> bool:
@@ -75,8 +62,8 @@ class LiveDenoiseModel(QObject):
 
     def set_wanted(self, wanted: bool) -> None:
         """Denoise frame by frame while playing, or the whole map."""
-        if wanted != self._wanted:
-            self._wanted = wanted
+        if wanted != self.wanted:
+            self.wanted = wanted
             self._settings.set_value(_WANTED, wanted)
             self._follow()
             self.changed.emit()
@@ -88,7 +75,7 @@ class LiveDenoiseModel(QObject):
 
     def _follow(self) -> None:
         denoiser = self._denoise.map.denoiser
-        live = self._wanted and self._playback.playing and self._synthetic.map is not None
+        live = self.wanted and self._playback.playing and self._synthetic.map is not None
         if not live or denoiser is None:
             self._end()
         elif denoiser is not self._denoiser:
@@ -132,9 +119,7 @@ class LiveDenoiseModel(QObject):
         if stop <= start or (covered is not None and not covered[start:stop].all()):
             return
         values, session = source.values[:, start:stop].copy(), self._session
-        present = np.ones(stop - start, bool)
-        if source.present is not None:
-            present = source.present[start:stop]
+        present = presence(source, start, stop)
 
         def work(emit: object) -> _Stepped:
             live = session or denoiser.live()

@@ -6,7 +6,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,16 +50,13 @@ class Swept(NamedTuple):
 
 
 class _Answer(NamedTuple):
-    piece: View
-    revision: int
-    doppler: DopplerMap
-    offset: int
+    """Denoised piece of the map."""
 
-
-class _InOrder(NamedTuple):
     piece: View
-    session: LiveSession
-    values: NDArray[np.float32]
+    values: NDArray[np.float32]  # (bins, n)
+    like: DopplerMap  # map with their unit and axis
+    revision: int  # of the synthetic map that they were made from
+    session: LiveSession | None = None  # at the end of the piece, where pieces follow in order
 
 
 class DenoisedMap(QObject):
@@ -89,7 +86,7 @@ class DenoisedMap(QObject):
         self._view = view
         self._jobs = jobs
         self._job: Job | None = None
-        self._denoiser: Denoiser | None = None
+        self.denoiser: Denoiser | None = None  # the model in use
         self.words = ""
         self._held = False
         self._runner = LatestRunner("denoise", self)
@@ -129,11 +126,6 @@ class DenoisedMap(QObject):
     # --- what is known --------------------------------------------------------------------
 
     @property
-    def denoiser(self) -> Denoiser | None:
-        """The model in use."""
-        return self._denoiser
-
-    @property
     def busy(self) -> bool:
         """True while something is being denoised or about to be."""
         return self._runner.busy or self._again.isActive()
@@ -155,7 +147,7 @@ class DenoisedMap(QObject):
         """Denoise with another model, called ``words`` on the track, or not at all."""
         self._stop()
         self._took_s.clear()
-        self._denoiser = denoiser
+        self.denoiser = denoiser
         self.words = words
         self.track.set_status(words)
         self._needs_reference = True
@@ -184,9 +176,6 @@ class DenoisedMap(QObject):
         if not self._held:
             self.track.set_status(self.words)
         self._follow(source, known, sensor)
-        self._stands = False
-        self._begin_order()
-        self._revision += 1
         self._changed_at[touched(piece, known.size)] = self._revision
         if not self._again.isActive():
             self._go_on()
@@ -199,7 +188,7 @@ class DenoisedMap(QObject):
 
     def companion(self) -> Companion | None:
         """Function that denoises a preview in the same background task; None without a model."""
-        denoiser, source = self._denoiser, self._source
+        denoiser, source = self.denoiser, self._source
         if denoiser is None or source is None or self._held or not self.keeps_up:
             return None
 
@@ -227,16 +216,13 @@ class DenoisedMap(QObject):
         self._runner.cancel()
         self._again.stop()
         self._follow(source, known, sensor)
-        self._stands = False
-        self._begin_order()
-        self._revision += 1
         self._changed_at[:] = self._revision
         self._shown[:] = False
-        if self._denoiser is None or self._held:
+        if self.denoiser is None or self._held:
             return
-        if swept is not None and swept.denoiser is self._denoiser:
+        if swept is not None and swept.denoiser is self.denoiser:
             stop = start + swept.doppler.values.shape[1]
-            self._paint(swept.doppler, 0, (start, stop))
+            self._paint(swept.doppler.values, (start, stop), swept.doppler)
             self._done_at[start:stop] = self._revision
         else:
             self.track.set_status(f"{self.words} · {_WAITS}")
@@ -261,12 +247,8 @@ class DenoisedMap(QObject):
             return
         if fresh:
             self._shown[:] = False
-        if self._made is None:
-            self._blank(replace(self._source, kind="denoised", meta={}, uncertainty=None))
-        stop = start + values.shape[1]
-        assert self._made is not None
-        self._made.values[:, start:stop] = values
-        self._shown[start:stop] = True
+        like = replace(self._source, kind="denoised", meta={}, uncertainty=None)
+        self._paint(values, (start, start + values.shape[1]), like)
         self._publish()
 
     def close(self) -> None:
@@ -284,9 +266,12 @@ class DenoisedMap(QObject):
             self._sensor = sensor
             self._shown[:] = False  # of another place; on screen until there is better
             self._changed_at[:] = self._revision + 1
+        self._revision += 1
+        self._stands = False
+        self._begin_order()
 
     def _go_on(self) -> None:
-        if self._source is None or self._denoiser is None or self._held or self._runner.busy:
+        if self._source is None or self.denoiser is None or self._held or self._runner.busy:
             return
         wanted = self._known & (self._done_at < self._changed_at)
         piece = next_piece(wanted, self._view())
@@ -298,16 +283,20 @@ class DenoisedMap(QObject):
         self._report(int(wanted.sum()))
         first, last = piece
         begin, end = with_context(self._known, piece)
-        source, denoiser, revision = self._source, self._denoiser, self._revision
+        source, denoiser, revision = self._source, self.denoiser, self._revision
         # Copied: the values go on changing while the model works.
         doppler = cut_out(source, begin, source.values[:, begin:end].copy())
-        self._runner.submit(
-            lambda emit: _Answer((first, last), revision, denoiser.denoise(doppler), begin)
-        )
+
+        def work(emit: object) -> _Answer:
+            denoised = denoiser.denoise(doppler)
+            values = denoised.values[:, first - begin : last - begin]
+            return _Answer((first, last), values, denoised, revision)
+
+        self._runner.submit(work)
 
     def _go_on_in_order(self) -> bool:
         """Denoise the next piece with what the model remembers of those before, if need be."""
-        source, denoiser, frames = self._source, self._denoiser, self._known.size
+        source, denoiser, frames = self._source, self.denoiser, self._known.size
         if not self._stands or frames <= AT_ONCE or self._in_order >= frames:
             return False
         assert source is not None
@@ -318,65 +307,55 @@ class DenoisedMap(QObject):
         self._report(frames - self._in_order)
         start, session = self._in_order, self._session
         stop = min(start + AT_ONCE, frames)
-        values = source.values[:, start:stop].T.copy()
-        present = np.ones(stop - start, bool)
-        if source.present is not None:
-            present = source.present[start:stop]
+        values, present = source.values[:, start:stop].T.copy(), presence(source, start, stop)
+        revision = self._revision
 
-        def work(emit: object) -> _InOrder:
+        def work(emit: object) -> _Answer:
             live = session or denoiser.live()
-            return _InOrder((start, stop), live, live.advance(values, present).T)
+            return _Answer((start, stop), live.advance(values, present).T, source, revision, live)
 
         self._runner.submit(work)
         return True
 
-    def _receive(self, answer: _Answer | _InOrder) -> None:
-        if isinstance(answer, _InOrder):
-            self._session, self._in_order = answer.session, answer.piece[1]
-            self._paint_values(answer.values, answer.piece)
-            whole = self._in_order == self._known.size
-            share = 100 * self._in_order // self._known.size
-            self.track.set_status(
-                self.words if whole else f"{self.words} · preview, {share} % final"
-            )
-            self._publish()
-            self._go_on()
-            return
+    def _receive(self, answer: _Answer) -> None:
         first, last = answer.piece
-        self._paint(answer.doppler, first - answer.offset, answer.piece)
-        self._done_at[first:last] = answer.revision
-        self._publish()
-        # Pieces of a long clip follow each other at once; a short one begins again.
-        if self._shown.size > AT_ONCE:
-            self.track.set_status(f"{self.words} · preview")
-            self._go_on()
-        elif (self._done_at < self._changed_at)[self._known].any():
-            self._again.start()
-        else:
-            self._report(0)
-            self.idle.emit()
+        if answer.session is None:
+            self._paint(answer.values, answer.piece, answer.like)
+            self._done_at[first:last] = answer.revision
+            self._publish()
+            # Pieces of a long clip follow each other at once; a short one begins again.
+            if self._shown.size > AT_ONCE:
+                self.track.set_status(f"{self.words} · preview")
+                self._go_on()
+            elif (self._done_at < self._changed_at)[self._known].any():
+                self._again.start()
+            else:
+                self._report(0)
+                self.idle.emit()
+            return
+        if answer.revision == self._revision:  # else the order has begun again
+            self._session, self._in_order = answer.session, last
+            self._paint(answer.values, answer.piece, answer.like)
+            share = 100 * last // self._known.size
+            done = "" if share == 100 else f" · preview, {share} % final"
+            self.track.set_status(f"{self.words}{done}")
+            self._publish()
+        self._go_on()
 
-    def _paint(self, doppler: DopplerMap, offset: int, piece: View) -> None:
+    def _paint(self, values: NDArray[np.float32], piece: View, like: DopplerMap) -> None:
+        """Take over a piece (bins, n); a map like another is begun where there is none."""
         if self._made is None:
-            self._blank(doppler)
-        first, last = piece
-        self._paint_values(doppler.values[:, offset : offset + last - first], piece)
-
-    def _paint_values(self, values: NDArray[np.float32], piece: View) -> None:
-        assert self._made is not None
-        first, last = piece
-        self._made.values[:, first:last] = values
+            assert self._source is not None
+            self._made = replace(
+                like,
+                values=np.zeros_like(self._source.values),
+                timebase=self._source.timebase,
+                present=self._source.present,
+            )
+        inside = slice(*piece)
+        self._made.values[:, inside] = values
         self._strongest = max(self._strongest, float(values.max(initial=0.0)))
-        self._shown[first:last] = self._known[first:last]
-
-    def _blank(self, like: DopplerMap) -> None:
-        assert self._source is not None
-        self._made = replace(
-            like,
-            values=np.zeros_like(self._source.values),
-            timebase=self._source.timebase,
-            present=self._source.present,
-        )
+        self._shown[inside] = self._known[inside]
 
     def _publish(self) -> None:
         if self._made is None:
@@ -408,7 +387,7 @@ class DenoisedMap(QObject):
 
     def _fail(self, words: str) -> None:
         self._stop()
-        self._denoiser = None
+        self.denoiser = None
         self._made = None
         self.track.set_map(None)
         self.failed.emit(words)
@@ -474,6 +453,8 @@ def cut_out(doppler: DopplerMap, start: int, values: NDArray[np.float32]) -> Dop
     )
 
 
-def known_frames(doppler: DopplerMap, covered: Any) -> NDArray[np.bool_]:
-    """Frames of a track that hold something, (T,)."""
-    return np.ones(len(doppler.timebase), bool) if covered is None else np.asarray(covered, bool)
+def presence(doppler: DopplerMap, start: int, stop: int) -> NDArray[np.bool_]:
+    """Frames of a stretch with a person, (stop - start,)."""
+    if doppler.present is None:
+        return np.ones(stop - start, bool)
+    return doppler.present[start:stop]

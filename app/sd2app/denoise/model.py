@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,16 +11,13 @@ from PySide6.QtCore import QObject, QTimer, Signal
 
 from sd2app.background.latest import LatestRunner
 from sd2app.denoise.library import Denoiser, DenoiserLibrary
-from sd2app.denoise.map import DenoisedMap, known_frames
+from sd2app.denoise.map import DenoisedMap
 from sd2app.denoise.text import origin_words, track_words
 from sd2app.maps.model import SynthesisModel
 from sd2app.maps.partial_map import Part, View
 from sd2app.maps.quality import Companion
 from sd2app.session.denoiser_choice import NO_MODEL, UNSAID, DenoiserChoice
-from sd2app.session.document import DocumentModel
-from sd2app.session.maps import MapModel
-from sd2app.session.tasks import TaskList
-from sd2app.session.time_window import TimeWindow
+from sd2app.session.session import Session
 from sd2core.denoise.files import DEFAULT_NAME
 from sd2core.errors import Sd2Error
 
@@ -48,32 +45,22 @@ class DenoiseModel(QObject):
 
     def __init__(
         self,
-        document: DocumentModel,
+        session: Session,
         synthesis: SynthesisModel,
-        span: TimeWindow,
-        synthetic: MapModel,
-        track: MapModel,
-        before: MapModel,
-        jobs: TaskList,
         library: DenoiserLibrary,
-        choose: Callable[[DenoiserChoice], None],
         parent: QObject | None = None,
     ) -> None:
         super().__init__(parent)
-        self._document = document
-        self._synthesis = synthesis
-        self._span = span
-        self._synthetic = synthetic
-        self._library = library
-        self._choose = choose
-        self.map = DenoisedMap(track, self._view, jobs, self)
-        self.before_map = DenoisedMap(before, self._view, jobs, self)
+        self._session, self._synthesis, self._library = session, synthesis, library
+        self._document, self._synthetic = session.document, session.maps.synthetic
+        self.map = DenoisedMap(session.maps.denoised, self._view, session.jobs, self)
+        self.before_map = DenoisedMap(session.maps.before, self._view, session.jobs, self)
+        self.path: Path | None = None  # of the model that is in use or being loaded
+        self.problem = ""  # why the chosen model is not in use; empty where it is
         self._choice = UNSAID
-        self._path: Path | None = None
         self._loaded: Loaded | None = None
         self._before: Loaded | None = None
         self._comparing = False
-        self._problem = ""
         self._awake = False
         self._runner = LatestRunner("denoiser", self)
         self._runner.finished.connect(self._set_model)
@@ -85,25 +72,15 @@ class DenoiseModel(QObject):
         self.map.failed.connect(self._say_problem)
         self.map.idle.connect(self.changed)
         self.before_map.failed.connect(lambda _: self.set_comparing(False))
-        document.opened.connect(self._open)
-        document.changed.connect(self._follow)
+        self._document.opened.connect(self._open)
+        self._document.changed.connect(self._follow)
         synthesis.accompany(self._companion)
         synthesis.painted.connect(self._take)
         synthesis.completed.connect(self._wake)
         synthesis.completed.connect(self._finish)
-        synthetic.changed.connect(self._watch)
+        self._synthetic.changed.connect(self._watch)
 
     # --- what is known --------------------------------------------------------------------
-
-    @property
-    def choice(self) -> DenoiserChoice:
-        """Choice stored in the recording."""
-        return self._choice
-
-    @property
-    def path(self) -> Path | None:
-        """File of the model that is in use or being loaded."""
-        return self._path
 
     @property
     def card(self) -> ModelCard | None:
@@ -128,13 +105,8 @@ class DenoiseModel(QObject):
     @property
     def busy(self) -> bool:
         """True while a model is being loaded or a map denoised."""
-        waiting = self._path is not None and self._patience.isActive()
+        waiting = self.path is not None and self._patience.isActive()
         return waiting or self.loading or self.map.busy or self.before_map.busy
-
-    @property
-    def problem(self) -> str:
-        """Reason why the chosen model is not in use; empty where it is."""
-        return self._problem
 
     @property
     def can_export(self) -> bool:
@@ -169,9 +141,9 @@ class DenoiseModel(QObject):
             self._library.describe(path)
         choice = NO_MODEL if path is None else DenoiserChoice.of_file(path)
         if choice == self._choice and self._loaded is None:
-            self._problem = ""
+            self.problem = ""
             self._load()  # once more, after it failed
-        self._choose(choice)
+        self._session.edits.choose_denoiser(choice)
 
     def set_comparing(self, comparing: bool) -> None:
         """Show the map of the model before beside that of this one, or not."""
@@ -206,7 +178,7 @@ class DenoiseModel(QObject):
         self._comparing = False
         self._show_before()
         self._follow(fresh=True)
-        if previous is not None and previous.card.path == self._path:
+        if previous is not None and previous.card.path == self.path:
             self._loaded = previous
         else:
             self.map.use(None)
@@ -216,10 +188,10 @@ class DenoiseModel(QObject):
         if choice == self._choice and not fresh:
             return
         self._choice = choice
-        self._problem = ""
+        self.problem = ""
         path = self._path_of(choice)
-        if path != self._path or path is None:
-            self._path = path
+        if path != self.path or path is None:
+            self.path = path
             self._load()
         self.changed.emit()
 
@@ -229,7 +201,7 @@ class DenoiseModel(QObject):
         if choice.path is not None:
             # What is missing was said when the recording was opened.
             there = choice.path.is_file()
-            self._problem = "" if there else f"The model {choice.path} is not there"
+            self.problem = "" if there else f"The model {choice.path} is not there"
             return choice.path if there else None
         card = self._library.named(choice.bundled or DEFAULT_NAME)
         if card is None and choice.bundled:
@@ -242,7 +214,7 @@ class DenoiseModel(QObject):
     def _load(self) -> None:
         """Load what is chosen, once it can be used."""
         self._runner.cancel()
-        path = self._path
+        path = self.path
         if path is None:
             self._set_model(None)
         elif self._before is not None and self._before.card.path == path:
@@ -267,7 +239,7 @@ class DenoiseModel(QObject):
             return
         self._awake = True
         loaded = self._loaded.card.path if self._loaded else None
-        if self._path is not None and loaded != self._path:
+        if self.path is not None and loaded != self.path:
             self._load()
         self.changed.emit()
 
@@ -297,7 +269,7 @@ class DenoiseModel(QObject):
         self._say_problem(str(error))
 
     def _say_problem(self, words: str) -> None:
-        self._problem = words
+        self.problem = words
         if self._loaded is not None:
             self._loaded = None
         # The user did not ask for the default; that it cannot be used here is no failure.
@@ -323,7 +295,7 @@ class DenoiseModel(QObject):
         source = self._synthetic.map
         if source is None:
             return
-        known = known_frames(source, self._synthetic.covered)
+        known = self._synthetic.known
         piece = (part.start, part.start + part.stretch.values.shape[1])
         for number, one in enumerate((self.map, self.before_map)):
             if self._synthesis.moving:
@@ -336,4 +308,4 @@ class DenoiseModel(QObject):
         source = self._synthetic.map
         if source is None:
             return (0, 0)
-        return source.timebase.frames_between(self._span.start_s, self._span.end_s)
+        return source.timebase.frames_between(self._session.span.start_s, self._session.span.end_s)

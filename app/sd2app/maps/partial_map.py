@@ -24,21 +24,13 @@ final for another plan), what the plan in use gives. 0 is not computed."""
 View = tuple[int, int]
 
 
-@dataclass(eq=False)
 class PartialMap:
-    """Doppler map of which some frames are computed."""
+    """Doppler map of which some frames are computed, none of them at first."""
 
-    values: NDArray[np.float32]  # (bins, T)
-    quality: NDArray[np.uint8]  # (T,), see FINAL
-    sensor: VirtualSensor | None = None  # placement that all of it is for
-
-    @classmethod
-    def blank(cls, bins: int, frames: int) -> PartialMap:
-        """Map without computed frames."""
-        return cls(
-            np.zeros((bins, frames), np.float32),
-            np.zeros(frames, np.uint8),
-        )
+    def __init__(self, bins: int, frames: int) -> None:
+        self.values = np.zeros((bins, frames), np.float32)
+        self.quality = np.zeros(frames, np.uint8)  # see FINAL
+        self.sensor: VirtualSensor | None = None  # placement that all of it is for
 
     @property
     def frames(self) -> int:
@@ -99,7 +91,7 @@ class ShownMap:
 
     def forget(self) -> None:
         """Remove the map."""
-        self.partial = PartialMap.blank(2, 0)
+        self.partial = PartialMap(2, 0)
         self._scene: tuple[SynthesisOptions, MeshSequence] | None = None
         self._words: dict[int, str] = {}
         self._needs_reference = True
@@ -108,7 +100,7 @@ class ShownMap:
         """Begin an empty map of another mesh."""
         self.forget()
         self._scene = options, mesh
-        self.partial = PartialMap.blank(options.axis.bins, mesh.frame_count)
+        self.partial = PartialMap(options.axis.bins, mesh.frame_count)
 
     def mark_stale(self) -> None:
         """Lower final frames to previews; they stay on screen until they are replaced."""

@@ -11,7 +11,6 @@ from sd2app.accuracy.model import AccuracyModel
 from sd2app.feature import Action, Feature, Shell
 from sd2app.maps.model import SynthesisModel
 from sd2app.sensor.panel import SensorPanel
-from sd2app.sensor.placement_dialogs import PlacementDialogs
 from sd2app.sensor.placements import PlacementsModel
 from sd2app.sensor.placements_page import PlacementsPage
 from sd2app.session.session import Session
@@ -32,9 +31,7 @@ class SensorFeature(Feature):
     ) -> None:
         self._session, self._shell, self._accuracy = session, shell, accuracy
         self._synthesis, self._make_batch = synthesis, make_batch
-        self.placements = PlacementsModel(
-            session.document, session.sensor, accuracy, session.edits, parent
-        )
+        self.placements = PlacementsModel(session, accuracy, parent)
         self.placements.failed.connect(shell.warn)
 
     @property
@@ -79,13 +76,10 @@ class SensorFeature(Feature):
 
     def panels(self) -> Mapping[str, QWidget]:
         """The panel at the side, of two pages."""
-        s, shell = self._session, self._shell
-        asks = PlacementDialogs(shell, self.placements)
+        shell = self._shell
         to_camera, aim = shell.action("sensor_to_camera"), shell.action("aim_sensor")
-        sensor = SensorPanel(s.sensor, s.document, self._synthesis, s.edits, to_camera, aim)
-        placements = PlacementsPage(
-            self.placements, self._accuracy, asks.take, asks.export, self._make_batch
-        )
+        sensor = SensorPanel(self._session, self._synthesis, to_camera, aim)
+        placements = PlacementsPage(self.placements, self._accuracy, shell, self._make_batch)
         return {
             "Sensor": paged_panel(
                 InnerPage("Sensor", "Where the sensor is and what it sees", sensor),

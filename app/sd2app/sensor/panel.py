@@ -2,28 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
 from PySide6.QtCore import QSignalBlocker, Qt
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import (
-    QComboBox,
-    QFormLayout,
-    QGridLayout,
-    QHBoxLayout,
-    QLabel,
-    QToolButton,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QComboBox, QFormLayout, QGridLayout, QLabel, QWidget
 
 from sd2app.maps.model import SynthesisModel
 from sd2app.session.content import CLUTTER_CHOICES
-from sd2app.session.document import DocumentModel
-from sd2app.session.sensor import SensorModel
-from sd2app.session.undo import Edits
+from sd2app.session.session import Session
 from sd2app.widgets.inputs import Choice, NumberBox
-from sd2app.widgets.panel import rule, title
+from sd2app.widgets.layouts import STRETCH, column_of, row_of
+from sd2app.widgets.panel import outlined, rule, sentence, title
+from sd2core.radar_config import RadarConfig
 from sd2core.sensor import aimed_at, position_from_spherical, spherical_from_position
 
 _CLUTTER_TEXT = {
@@ -31,6 +24,20 @@ _CLUTTER_TEXT = {
     "moving": "moving average over frames",
     "none": "keep",
 }
+_LIMITS: dict[str, tuple[str, Callable[[RadarConfig], str]]] = {
+    "λ": (
+        "Wavelength at the centre frequency",
+        lambda radar: f"{1e3 * radar.wavelength_m:.2f} mm",
+    ),
+    "v max": (
+        "Largest unambiguous velocity, λ / 4 T_c",
+        lambda radar: f"±{radar.v_max_mps:.2f} m/s",
+    ),
+    "Δv": ("Velocity resolution", lambda radar: f"{radar.velocity_resolution_mps:.3f} m/s"),
+    "ΔR": ("Range resolution, c / 2 B", lambda radar: f"{radar.range_resolution_m:.2f} m"),
+    "R max": ("Largest unambiguous range", lambda radar: f"{radar.range_max_m:.1f} m"),
+}
+"""Limits of a radar: their meaning and value."""
 
 
 class SensorPanel(QWidget):
@@ -38,53 +45,45 @@ class SensorPanel(QWidget):
 
     def __init__(
         self,
-        sensor: SensorModel,
-        document: DocumentModel,
+        session: Session,
         synthesis: SynthesisModel,
-        edits: Edits,
         to_camera: QAction,
         aim: QAction,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
         self.setObjectName("page")
-        self._sensor = sensor
-        self._document = document
-        self._synthesis = synthesis
-        self._edits = edits
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(8, 4, 8, 4)
-        layout.setSpacing(5)
-        head = QHBoxLayout()
-        head.addWidget(title("Placement"))
-        head.addStretch(1)
-        for action, text in ((aim, "Aim at body"), (to_camera, "To camera")):
-            button = QToolButton(self)
-            button.setObjectName("outlined")
-            button.setText(text)
-            button.setToolTip(action.toolTip())
-            button.clicked.connect(action.trigger)
-            button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-            button.setEnabled(action.isEnabled())
-            action.enabledChanged.connect(button.setEnabled)
-            head.addWidget(button)
-        layout.addLayout(head)
-        layout.addLayout(self._placement_form())
-        layout.addWidget(rule())
-        layout.addWidget(title("What it sees"))
-        layout.addLayout(self._readout_form())
+        self._session, self._synthesis = session, synthesis
         self._capture = self._capture_part()
-        layout.addWidget(self._capture)
-        layout.addStretch(1)
-        sensor.changed.connect(self._refresh_placement)
+        buttons = (self._button(aim, "Aim at body"), self._button(to_camera, "To camera"))
+        self.setLayout(
+            column_of(
+                row_of(title("Placement"), STRETCH, *buttons),
+                self._placement_form(),
+                rule(),
+                title("What it sees"),
+                self._readout_form(),
+                self._capture,
+                STRETCH,
+                spacing_px=5,
+                margins_px=(8, 4, 8, 4),
+            )
+        )
+        session.sensor.changed.connect(self._refresh_placement)
         synthesis.frame_changed.connect(self._refresh_placement)
         synthesis.readout_changed.connect(self._refresh_readout)
-        document.changed.connect(self._refresh_capture)
+        session.document.changed.connect(self._refresh_capture)
         self._refresh_placement()
-        self._refresh_readout()
         self._refresh_capture()
 
     # --- building -------------------------------------------------------------------------
+
+    def _button(self, action: QAction, text: str) -> QWidget:
+        button = outlined(text, action.toolTip(), action.trigger, self)
+        button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        button.setEnabled(action.isEnabled())
+        action.enabledChanged.connect(button.setEnabled)
+        return button
 
     def _placement_form(self) -> QGridLayout:
         grid = QGridLayout()
@@ -106,53 +105,46 @@ class SensorPanel(QWidget):
                 decimals=1, step=1.0,
             ),
         ]  # fmt: skip
-        names = (("x", "range"), ("y", "azim."), ("z", "elev."))
-        for row, (left, right) in enumerate(names):
-            for column, (name, box) in enumerate(
-                ((left, self._xyz[row]), (right, self._spherical[row]))
-            ):
+        for left, names, boxes, place in (
+            (0, ("x", "y", "z"), self._xyz, self._place_by_xyz),
+            (2, ("range", "azim.", "elev."), self._spherical, self._place_by_angles),
+        ):
+            grid.setColumnStretch(left + 1, 1)
+            for line, (name, box) in enumerate(zip(names, boxes, strict=True)):
                 label = QLabel(name, self)
                 label.setObjectName("muted")
                 label.setToolTip(box.toolTip())
-                grid.addWidget(label, row, 2 * column)
-                grid.addWidget(box, row, 2 * column + 1)
-                grid.setColumnStretch(2 * column + 1, 1)
-        for box in self._xyz:
-            box.valueChanged.connect(self._place_by_xyz)
-        for box in self._spherical:
-            box.valueChanged.connect(self._place_by_angles)
+                grid.addWidget(label, line, left)
+                grid.addWidget(box, line, left + 1)
+                box.valueChanged.connect(place)
         return grid
 
     def _readout_form(self) -> QFormLayout:
-        form = _form()
-        self._torso = _value(self, "Distance from the sensor to the body's median vertex")
-        self._visible = _value(self, "Share of the vertices that the sensor sees in this frame")
-        self._beyond = _value(
-            self, "Share of what the sensor sees in this frame that is faster than the axis"
+        self._torso, self._visible, self._beyond, field = (
+            _value(self, tip)
+            for tip in (
+                "Distance from the sensor to the body's median vertex",
+                "Share of the vertices that the sensor sees in this frame",
+                "Share of what the sensor sees in this frame that is faster than the axis",
+                "The cone is drawn for orientation; every direction counts alike",
+            )
         )
+        field.setText("drawn, not applied")
+        self._beyond_name = QLabel(self)
+        form = _form()
         form.addRow("Range to torso", self._torso)
         form.addRow("Visible", self._visible)
-        self._beyond_name = QLabel(self)
         form.addRow(self._beyond_name, self._beyond)
-        field = _value(self, "The cone is drawn for orientation; every direction counts alike")
-        field.setText("drawn, not applied")
         form.addRow("Field of view", field)
         return form
 
     def _capture_part(self) -> QWidget:
-        part = QWidget(self)
-        layout = QVBoxLayout(part)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(5)
-        layout.addWidget(rule())
+        edits, part = self._session.edits, QWidget(self)
         self._capture_title = title("Radar capture")
-        layout.addWidget(self._capture_title)
-        form = _form()
         self._offset = NumberBox(
             -1e5, 1e5, " s", "Time of the first radar frame here", decimals=3, step=0.01
         )
-        self._offset.valueChanged.connect(self._edits.set_radar_offset)
-        form.addRow("Offset", self._offset)
+        self._offset.valueChanged.connect(edits.set_radar_offset)
         self._clutter = Choice("How echoes that do not move are removed", self)
         for choice in CLUTTER_CHOICES:
             self._clutter.addItem(_CLUTTER_TEXT[choice], choice)
@@ -161,112 +153,92 @@ class SensorPanel(QWidget):
             QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
         )
         self._clutter.currentIndexChanged.connect(
-            lambda _: self._edits.set_clutter(self._clutter.currentData())
+            lambda _: edits.set_clutter(self._clutter.currentData())
         )
+        form = _form()
+        form.addRow("Offset", self._offset)
         form.addRow("Clutter", self._clutter)
-        self._limits = {
-            name: _value(self, tip)
-            for name, tip in (
-                ("λ", "Wavelength at the centre frequency"),
-                ("v max", "Largest unambiguous velocity, λ / 4 T_c"),
-                ("Δv", "Velocity resolution"),
-                ("ΔR", "Range resolution, c / 2 B"),
-                ("R max", "Largest unambiguous range"),
-            )
-        }
-        layout.addLayout(form)
         limits = QGridLayout()
         limits.setHorizontalSpacing(12)
         limits.setVerticalSpacing(3)
+        self._limits = {name: _value(self, tip) for name, (tip, _) in _LIMITS.items()}
         for place, (name, label) in enumerate(self._limits.items()):
-            row, column = divmod(place, 2)
-            limits.addWidget(QLabel(name, self), row, 2 * column)
-            limits.addWidget(label, row, 2 * column + 1)
-            limits.setColumnStretch(2 * column + 1, 1)
-        layout.addLayout(limits)
-        self._warning = QLabel(part)
-        self._warning.setObjectName("warning")
-        self._warning.setWordWrap(True)
-        layout.addWidget(self._warning)
+            line, left = divmod(place, 2)
+            limits.addWidget(QLabel(name, self), line, 2 * left)
+            limits.addWidget(label, line, 2 * left + 1)
+            limits.setColumnStretch(2 * left + 1, 1)
+        self._warning = sentence("", "warning")
+        part.setLayout(
+            column_of(
+                rule(), self._capture_title, form, limits, self._warning,
+                spacing_px=5, margins_px=(0, 0, 0, 0),
+            )
+        )  # fmt: skip
         return part
 
     # --- typing ---------------------------------------------------------------------------
 
     def _place_by_xyz(self) -> None:
         x, y, z = (box.value() for box in self._xyz)
-        now = self._sensor.sensor
-        if any(abs(a - b) > 5e-3 for a, b in zip((x, y, z), now.position_m, strict=True)):
-            self._edits.place_sensor(replace(now, position_m=(x, y, z)))
+        now = self._session.sensor.sensor
+        if not np.allclose((x, y, z), now.position_m, rtol=0, atol=5e-3):
+            self._session.edits.place_sensor(replace(now, position_m=(x, y, z)))
 
     def _place_by_angles(self) -> None:
         target = self._synthesis.torso_m
         if target is None:
             return
+        sensor = self._session.sensor.sensor
         range_m, azimuth_deg, elevation_deg = wanted = [box.value() for box in self._spherical]
-        now = spherical_from_position(target, self._sensor.sensor.position_m)
-        if any(
-            abs(a - b) > tolerance
-            for a, b, tolerance in zip(wanted, now, (5e-3, 0.05, 0.05), strict=True)
-        ):
+        now = spherical_from_position(target, sensor.position_m)
+        if not np.allclose(wanted, now, rtol=0, atol=(5e-3, 0.05, 0.05)):
             position = position_from_spherical(target, range_m, azimuth_deg, elevation_deg)
-            moved = replace(self._sensor.sensor, position_m=position)
-            self._edits.place_sensor(aimed_at(moved, target))
+            self._session.edits.place_sensor(aimed_at(replace(sensor, position_m=position), target))
 
     # --- showing --------------------------------------------------------------------------
 
     def _refresh_placement(self) -> None:
-        position = self._sensor.sensor.position_m
-        target = self._synthesis.torso_m
+        position, target = self._session.sensor.sensor.position_m, self._synthesis.torso_m
+        for box, value in zip(self._xyz, position, strict=True):
+            box.show_value(value)
         for box in self._spherical:
             box.setEnabled(target is not None)
-        shown = [*zip(self._xyz, position, strict=True)]
         if target is not None:
             spherical = spherical_from_position(target, position)
-            shown += [*zip(self._spherical, spherical, strict=True)]
-        for box, value in shown:
-            box.show_value(value)
+            for box, value in zip(self._spherical, spherical, strict=True):
+                box.show_value(value)
         self._refresh_readout()
 
     def _refresh_readout(self) -> None:
-        readout = self._synthesis.readout()
+        readout, texts = self._synthesis.readout(), ("–", "–", "–")
+        if readout is not None:
+            texts = (
+                f"{readout.torso_range_m:.2f} m",
+                f"{100 * readout.visible_share:.1f} %",
+                f"{100 * readout.beyond_share:.1f} %",
+            )
         self._beyond_name.setText(f"Beyond ±{self._synthesis.v_max_mps:g} m/s")
-        for label, text in (
-            (self._torso, f"{readout.torso_range_m:.2f} m" if readout else "–"),
-            (self._visible, _percent(readout.visible_share) if readout else "–"),
-            (self._beyond, _percent(readout.beyond_share) if readout else "–"),
-        ):
+        for label, text in zip((self._torso, self._visible, self._beyond), texts, strict=True):
             label.setText(text)
 
     def _refresh_capture(self) -> None:
-        capture, recording = self._document.capture, self._document.recording
+        document = self._session.document
+        capture, recording, radar_map = document.capture, document.recording, document.radar_map
         self._capture.setVisible(capture is not None)
         if capture is None or recording is None:
             return
-        kind = "Simulated radar" if capture.simulated else "Real radar"
-        self._capture_title.setText(kind)
+        self._capture_title.setText("Simulated radar" if capture.simulated else "Real radar")
         self._capture_title.setToolTip(capture.config.name)
         self._offset.show_value(recording.radar_offset_s)
         with QSignalBlocker(self._clutter):
-            self._clutter.setCurrentIndex(CLUTTER_CHOICES.index(self._document.clutter))
-        config = capture.config
-        for name, text in (
-            ("λ", f"{1e3 * config.wavelength_m:.2f} mm"),
-            ("v max", f"±{config.v_max_mps:.2f} m/s"),
-            ("Δv", f"{config.velocity_resolution_mps:.3f} m/s"),
-            ("ΔR", f"{config.range_resolution_m:.2f} m"),
-            ("R max", f"{config.range_max_m:.1f} m"),
-        ):
-            self._limits[name].setText(text)
-        radar_map = self._document.radar_map
+            self._clutter.setCurrentIndex(CLUTTER_CHOICES.index(document.clutter))
+        for name, (_, text_of) in _LIMITS.items():
+            self._limits[name].setText(text_of(capture.config))
         blind = len(radar_map.unseen_bins) if radar_map is not None else 0
         self._warning.setVisible(blind > 0)
         self._warning.setText(
             f"The axis goes beyond this radar's v max: it cannot see {blind} of the bins."
         )
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.1f} %"
 
 
 def _form() -> QFormLayout:

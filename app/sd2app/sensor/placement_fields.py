@@ -38,7 +38,7 @@ class PlacementFields(QObject):
         self._last = dict(_FIRST)
         self._plan: Placements | None = None
         self._texts: dict[Name, str] = {}
-        self._problem = ""
+        self.problem = ""  # why the typed values are no plan; empty when they are
         placements.changed.connect(self._follow)
         self._follow()
 
@@ -51,11 +51,6 @@ class PlacementFields(QObject):
     def names(self) -> tuple[Name, ...]:
         """Fields that this kind has."""
         return tuple(self._texts)
-
-    @property
-    def problem(self) -> str:
-        """Reason why the typed values are no plan; empty when they are."""
-        return self._problem
 
     def text(self, name: Name) -> str:
         """Text of a field."""
@@ -74,10 +69,10 @@ class PlacementFields(QObject):
         try:
             plan = _plan_of(self.kind, self._texts)
         except Sd2Error as error:
-            self._problem = str(error)
+            self.problem = str(error)
             self.changed.emit()
             return
-        self._problem = ""
+        self.problem = ""
         # What was typed stays as it was typed.
         self._plan = self._last[self.kind] = plan
         self._placements.edits.type_placements(plan)
@@ -92,7 +87,7 @@ class PlacementFields(QObject):
         if plan == self._plan:
             return
         self._plan = plan
-        self._problem = ""
+        self.problem = ""
         self._texts = {} if plan is None else _texts_of(plan)
         if plan is not None:
             self._last[_kind(plan)] = plan

@@ -1,21 +1,25 @@
-"""Planned placements of further sensors: positions, coverage, cost of their maps."""
+"""Planned placements of further sensors: positions, coverage, cost of their maps; in words."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.accuracy.model import AccuracyModel
+from sd2app.accuracy.text import InUse
 from sd2app.background.latest import Emit, LatestRunner
-from sd2app.session.document import DocumentModel
-from sd2app.session.sensor import SensorModel
+from sd2app.session.session import Session
+from sd2app.widgets.text import bytes_text, counted, duration_text, seconds
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.placements.body_extent import BodyExtent, SensorCoverage
 from sd2core.placements.placements import Place, PlacementCost, Placements
 from sd2core.radar_config import PAPER_RADAR, RadarConfig
 from sd2core.sensor import VelocityAxis, VirtualSensor
+
+_SHORT_S = 10.0
+"""Time up to which the cost of all maps is said exactly."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,22 +29,6 @@ class Planned:
     places: tuple[Place, ...] = ()
     sensors: tuple[VirtualSensor, ...] = ()
     coverage: SensorCoverage | None = None  # what each sees; None while it is computed
-
-
-class PlanEdits(Protocol):
-    """Undoable edits of the plan."""
-
-    def plan_placements(self, placements: Placements | None) -> None:
-        """Plan other places, or none."""
-
-    def type_placements(self, placements: Placements | None) -> None:
-        """Plan other places while they are typed."""
-
-    def end_typing_placements(self) -> None:
-        """End typing: all of it is one step in the history."""
-
-    def place_sensor(self, sensor: VirtualSensor, text: str) -> None:
-        """Place the sensor."""
 
 
 class _Wish(NamedTuple):
@@ -56,30 +44,24 @@ class PlacementsModel(QObject):
     failed = Signal(str)
 
     def __init__(
-        self,
-        document: DocumentModel,
-        sensor: SensorModel,
-        trade: AccuracyModel,
-        edits: PlanEdits,
-        parent: QObject | None = None,
+        self, session: Session, accuracy: AccuracyModel, parent: QObject | None = None
     ) -> None:
         super().__init__(parent)
-        self._document = document
-        self._sensor = sensor
-        self._trade = trade
-        self.edits = edits
-        self._shown = True
+        self._document, self._sensor = session.document, session.sensor
+        self._accuracy = accuracy
+        self.edits = session.edits
+        self.planned = Planned()  # empty until the places are computed
+        self.shown = True  # in the scene
         self._wish: _Wish | None = None
         self._body: tuple[MeshSequence, BodyExtent] | None = None
-        self._planned = Planned()
         self._runner = LatestRunner("placements", self)
         self._runner.partial.connect(self._receive)
         self._runner.finished.connect(self._receive)
         self._runner.failed.connect(self._fail)
-        document.opened.connect(self._follow)
-        document.changed.connect(self._follow)
-        sensor.changed.connect(self.current_changed)
-        trade.plan_changed.connect(self.changed)
+        self._document.opened.connect(self._follow)
+        self._document.changed.connect(self._follow)
+        self._sensor.changed.connect(self.current_changed)
+        accuracy.plan_changed.connect(self.changed)
 
     # --- what is planned ------------------------------------------------------------------
 
@@ -100,11 +82,6 @@ class PlacementsModel(QObject):
         return self._runner.busy
 
     @property
-    def planned(self) -> Planned:
-        """Placements of the plan; empty until they are computed."""
-        return self._planned
-
-    @property
     def radar(self) -> RadarConfig:
         """Radar whose limits hold: that of the recording's capture, or the paper's."""
         capture = self._document.capture
@@ -114,7 +91,7 @@ class PlacementsModel(QObject):
     def current(self) -> int | None:
         """Index of the placement that the sensor is at; None elsewhere."""
         position = self._sensor.sensor.position_m
-        for number, sensor in enumerate(self._planned.sensors):
+        for number, sensor in enumerate(self.planned.sensors):
             if sensor.position_m == position:
                 return number
         return None
@@ -122,29 +99,24 @@ class PlacementsModel(QObject):
     @property
     def cost(self) -> PlacementCost | None:
         """Cost of one map per placement with the plan in use; None while there is no plan."""
-        in_use = self._trade.in_use
-        if in_use is None or not self._planned.sensors:
+        in_use = self._accuracy.in_use
+        if in_use is None or not self.planned.sensors:
             return None
         return PlacementCost(
-            len(self._planned.sensors), self._trade.frames, in_use.cost_ms, VelocityAxis().bins
+            len(self.planned.sensors), self._accuracy.frames, in_use.cost_ms, VelocityAxis().bins
         )
-
-    @property
-    def shown(self) -> bool:
-        """True while the placements are drawn in the scene."""
-        return self._shown
 
     # --- requests -------------------------------------------------------------------------
 
     def set_shown(self, shown: bool) -> None:
         """Draw the places in the scene, or not."""
-        if shown != self._shown:
-            self._shown = shown
+        if shown != self.shown:
+            self.shown = shown
             self.changed.emit()
 
     def use(self, number: int) -> None:
         """Put the sensor at one of the places."""
-        sensors = self._planned.sensors
+        sensors = self.planned.sensors
         if 0 <= number < len(sensors):
             view_deg = self._sensor.sensor.field_of_view_deg
             sensor = replace(sensors[number], field_of_view_deg=view_deg)
@@ -152,7 +124,7 @@ class PlacementsModel(QObject):
 
     def step(self, by: int) -> None:
         """Put the sensor at the next place, or the one before; from elsewhere at the first."""
-        count = len(self._planned.sensors)
+        count = len(self.planned.sensors)
         if count:
             current = self.current
             self.use(0 if current is None else (current + by) % count)
@@ -169,7 +141,7 @@ class PlacementsModel(QObject):
         if wish == self._wish:
             return
         if wish is None or self._wish is None or wish.mesh is not self._wish.mesh:
-            self._planned = Planned()  # places of another body say nothing of this one
+            self.planned = Planned()  # places of another body say nothing of this one
         self._wish = wish
         if wish is None:
             self._runner.cancel()
@@ -179,11 +151,11 @@ class PlacementsModel(QObject):
         self.changed.emit()
 
     def _receive(self, result: Any) -> None:
-        self._body, self._planned = result
+        self._body, self.planned = result
         self.changed.emit()
 
     def _fail(self, error: Exception) -> None:
-        self._planned = Planned()
+        self.planned = Planned()
         self.failed.emit(str(error))
         self.changed.emit()
 
@@ -200,3 +172,57 @@ def _compute_view(
     emit((body, Planned(places, sensors)))
     coverage = body[1].coverage(sensors, lambda done, total: emit(None))
     return body, Planned(places, sensors, coverage)
+
+
+def count_text(model: PlacementsModel) -> str:
+    """Number of placements."""
+    if model.plan is None:
+        return ""
+    count = len(model.planned.places)
+    return counted(count, "placement") if count else "Computing the placements…"
+
+
+def limit_facts(model: PlacementsModel) -> list[tuple[str, str]]:
+    """Number of placements with each problem."""
+    coverage, radar = model.planned.coverage, model.radar
+    if coverage is None:
+        return []
+    facts = (
+        ("In the body", coverage.inside),
+        (f"Beyond R max {radar.range_max_m:.1f} m", coverage.out_of_range(radar)),
+        (f"Faster than ±{radar.v_max_mps:.2f} m/s", coverage.aliasing(radar)),
+    )
+    return [(name, f"{int(some.sum()):,}") for name, some in facts if some.any()]
+
+
+def limits_text(model: PlacementsModel) -> str:
+    """Limits of the radar, and if the placements keep within them."""
+    coverage, radar = model.planned.coverage, model.radar
+    if coverage is None:
+        return "Looking at what they see…" if model.planned.places else ""
+    where = f"{radar.name}: {radar.range_max_m:.1f} m, ±{radar.v_max_mps:.2f} m/s."
+    if not coverage.beyond(radar).any():
+        return f"All within the limits of the radar. {where}"
+    return f"Beyond the radar, part of the body is seen at another range or velocity. {where}"
+
+
+def current_text(model: PlacementsModel) -> str:
+    """Number of the placement that the sensor is at."""
+    current, places = model.current, model.planned.places
+    if current is None:
+        return "The sensor is elsewhere"
+    return f"{current + 1:,} of {len(places):,}: {places[current].words}"
+
+
+def cost_text(cost: PlacementCost) -> str:
+    """Cost in one line."""
+    time = seconds(cost.total_s) if cost.total_s < _SHORT_S else duration_text(cost.total_s)
+    return f"{counted(cost.maps, 'map')} in about {time}, {bytes_text(cost.total_bytes)}"
+
+
+def cost_source_text(cost: PlacementCost, in_use: InUse) -> str:
+    """Explanation of the estimated cost."""
+    return (
+        f"{counted(cost.frames, 'frame')} each, with the plan in use on this machine: {in_use}."
+        " Bytes before compression."
+    )

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 from PySide6.QtCore import QRectF, QSignalBlocker, QSize, Qt
 from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent
-from PySide6.QtWidgets import QCheckBox, QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QCheckBox, QFileDialog, QGridLayout, QLabel, QWidget
 
 from sd2app.accuracy.model import AccuracyModel
+from sd2app.feature import Shell
 from sd2app.sensor.placement_fields import KINDS, NAMES, Kind, Name, PlacementFields
-from sd2app.sensor.placement_text import (
+from sd2app.sensor.placements import (
+    PlacementsModel,
     cost_source_text,
     cost_text,
     count_text,
@@ -19,26 +23,23 @@ from sd2app.sensor.placement_text import (
     limit_facts,
     limits_text,
 )
-from sd2app.sensor.placements import PlacementsModel
 from sd2app.widgets.inputs import Choice, TypedLine
-from sd2app.widgets.panel import FactRows, outlined, rule, sentence, side_by_side, title
+from sd2app.widgets.layouts import STRETCH, column_of, row_of
+from sd2app.widgets.panel import FactRows, outlined, rule, sentence, title
 from sd2core.figures.colours import SEQUENTIAL
+from sd2core.placements.placements import read_placements, write_placements
 
+_READ = "Placements (*.json *.toml);;All files (*)"
+_WRITTEN = "Placements (*.json)"
 _KIND_TEXT: dict[Kind, str] = {"none": "None", "grid": "Grid", "cloud": "Random cloud"}
-_LABELS: dict[Name, str] = {
-    "range": "Ranges, m",
-    "azimuth": "Azimuths, °",
-    "elevation": "Elevations, °",
-    "count": "Count",
-    "seed": "Seed",
+_FIELDS: dict[Name, tuple[str, str]] = {
+    "range": ("Ranges, m", "Distance from the body's centre"),
+    "azimuth": ("Azimuths, °", "0 is between body and camera, positive to the right"),
+    "elevation": ("Elevations, °", "Positive is above the body's centre"),
+    "count": ("Count", "How many places"),
+    "seed": ("Seed", "Another number gives other places, the same one the same"),
 }
-_MEANINGS: dict[Name, str] = {
-    "range": "Distance from the body's centre",
-    "azimuth": "0 is between body and camera, positive to the right",
-    "elevation": "Positive is above the body's centre",
-    "count": "How many places",
-    "seed": "Another number gives other places, the same one the same",
-}
+"""Label and meaning of a field."""
 _HOW: dict[Kind, str] = {
     "none": "",
     "grid": "Numbers such as 1, 2.5, or from:to:step",
@@ -52,84 +53,87 @@ _NO_BODY = "There is no body in this recording to place sensors around."
 
 
 class PlacementsPage(QWidget):
-    """A view of :class:`PlacementsModel`.
-
-    ``take`` asks for a file with a plan, ``export`` where to write one; ``batch`` sets up a
-    batch with it.
-    """
+    """A view of :class:`PlacementsModel`; ``batch`` sets up a batch with the plan."""
 
     def __init__(
         self,
         placements: PlacementsModel,
-        trade: AccuracyModel,
-        take: Callable[[], None],
-        export: Callable[[], None],
+        accuracy: AccuracyModel,
+        shell: Shell,
         batch: Callable[[], None],
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
         self.setObjectName("page")
-        self._model, self._trade = placements, trade
+        self._model, self._accuracy, self._shell = placements, accuracy, shell
         self._fields = PlacementFields(placements, self)
         self._kind = Choice("What is planned", self)
         for kind in KINDS:
             self._kind.addItem(_KIND_TEXT[kind], kind)
         self._kind.currentIndexChanged.connect(lambda index: self._fields.set_kind(KINDS[index]))
-        head = QHBoxLayout()
-        head.addWidget(title("Plan"))
-        head.addStretch(1)
-        head.addWidget(self._kind)
         self._nothing = sentence("")
-        self._planned = QWidget(self)
-        self._lay_out_plan(QVBoxLayout(self._planned))
-        self._take = outlined("Import…", "Take a plan from a file", take, self)
-        self._export = outlined("Export…", "Write the plan, as for sd2 placements", export, self)
-        self._batch = outlined("Batch…", "Make the maps, of many recordings", batch, self)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(8, 4, 8, 4)
-        layout.setSpacing(6)
-        layout.addLayout(head)
-        layout.addWidget(self._nothing)
-        layout.addWidget(self._planned)
-        layout.addLayout(side_by_side(self._take, self._export, self._batch, spacing_px=6))
-        layout.addStretch(1)
+        self._planned = self._plan_part()
+        self._take = outlined("Import…", "Take a plan from a file", self._import_plan, self)
+        self._export = outlined(
+            "Export…", "Write the plan, as for sd2 placements", self._export_plan, self
+        )
+        make = outlined("Batch…", "Make the maps, of many recordings", batch, self)
+        self.setLayout(
+            column_of(
+                row_of(title("Plan"), STRETCH, self._kind),
+                self._nothing,
+                self._planned,
+                row_of(self._take, self._export, make, STRETCH, spacing_px=6),
+                STRETCH,
+                spacing_px=6,
+                margins_px=(8, 4, 8, 4),
+            )
+        )
         placements.current_changed.connect(self._show_current)
-        for signal in (placements.changed, trade.changed, self._fields.changed):
+        for signal in (placements.changed, accuracy.changed, self._fields.changed):
             signal.connect(self._refresh)
         self._refresh()
 
     # --- building -------------------------------------------------------------------------
 
-    def _lay_out_plan(self, layout: QVBoxLayout) -> None:
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(6)
-        layout.addLayout(self._form())
+    def _plan_part(self) -> QWidget:
+        model, part = self._model, QWidget(self)
         self._how, self._problem = sentence(""), sentence("", "warning")
-        self._count = title("")
+        self._count, self._cost = title(""), title("")
         self._count.setAccessibleName("How many placements")
-        self._scale = RangeScale(self)
-        self._limits = FactRows(3, at_the_edge=True, parent=self)
-        self._radar = sentence("")
-        self._cost = title("")
         self._cost.setWordWrap(True)
         self._cost.setAccessibleName("What the maps cost")
-        self._source = sentence("")
+        self._scale = RangeScale(self)
+        self._limits = FactRows(3, at_the_edge=True, parent=self)
+        self._radar, self._source = sentence(""), sentence("")
         self._shown = QCheckBox("In the scene", self)
         self._shown.setToolTip("Draw them in the scene")
         self._shown.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-        self._shown.toggled.connect(self._model.set_shown)
+        self._shown.toggled.connect(model.set_shown)
         self._current = sentence("", "plain")
-        model = self._model
-        back = outlined("Previous", "Put the sensor there", lambda: model.step(-1), self)
-        on = outlined("Next", "Put the sensor there", lambda: model.step(1), self)
-        for above in (self._how, self._problem, rule()):
-            layout.addWidget(above)
-        layout.addLayout(_apart(self._count, self._shown))
-        for fact in (self._scale, self._limits, self._radar):
-            layout.addWidget(fact)
-        layout.addLayout(_apart(self._current, back, on))
-        for below in (rule(), self._cost, self._source):
-            layout.addWidget(below)
+        back, on = (
+            outlined(text, "Put the sensor there", partial(model.step, by), self)
+            for text, by in (("Previous", -1), ("Next", 1))
+        )
+        part.setLayout(
+            column_of(
+                self._form(),
+                self._how,
+                self._problem,
+                rule(),
+                row_of((self._count, 1), self._shown, spacing_px=6),
+                self._scale,
+                self._limits,
+                self._radar,
+                row_of((self._current, 1), back, on, spacing_px=6),
+                rule(),
+                self._cost,
+                self._source,
+                spacing_px=6,
+                margins_px=(0, 0, 0, 0),
+            )
+        )
+        return part
 
     def _form(self) -> QGridLayout:
         grid = QGridLayout()
@@ -137,17 +141,46 @@ class PlacementsPage(QWidget):
         grid.setVerticalSpacing(3)
         grid.setColumnStretch(1, 1)
         self._rows: dict[Name, tuple[QLabel, TypedLine]] = {}
-        for row, name in enumerate(NAMES):
-            label = QLabel(_LABELS[name], self)
+        for number, name in enumerate(NAMES):
+            text, meaning = _FIELDS[name]
+            label, line = QLabel(text, self), TypedLine(text, meaning, self)
             label.setObjectName("muted")
-            label.setToolTip(_MEANINGS[name])
-            line = TypedLine(_LABELS[name], _MEANINGS[name], self)
+            label.setToolTip(meaning)
             line.typed.connect(lambda text, name=name: self._fields.set_text(name, text))
             line.ended.connect(self._fields.end)
-            grid.addWidget(label, row, 0)
-            grid.addWidget(line, row, 1)
+            grid.addWidget(label, number, 0)
+            grid.addWidget(line, number, 1)
             self._rows[name] = (label, line)
         return grid
+
+    # --- files ----------------------------------------------------------------------------
+
+    def _import_plan(self) -> None:
+        parent = self._shell.dialog_parent
+        name, _ = QFileDialog.getOpenFileName(parent, "Take placements", "", _READ)
+        if name:
+            self._shell.attempt(
+                lambda: self._model.edits.plan_placements(read_placements(Path(name)))
+            )
+
+    def _export_plan(self) -> None:
+        plan = self._model.plan
+        if plan is None:
+            return
+        name, _ = QFileDialog.getSaveFileName(
+            self._shell.dialog_parent, "Export placements", "placements.json", _WRITTEN
+        )
+        if not name:
+            return
+        path = Path(name)
+        if path.suffix.lower() != ".json":
+            path = path.with_name(path.name + ".json")
+        try:
+            write_placements(path, plan)
+        except OSError as error:
+            self._shell.warn(f"{path} cannot be written ({error.strerror}).")
+        else:
+            self._shell.note(f"The placements are in {path}.")
 
     # --- showing --------------------------------------------------------------------------
 
@@ -177,7 +210,7 @@ class PlacementsPage(QWidget):
         self._show_current()
         with QSignalBlocker(self._shown):
             self._shown.setChecked(model.shown)
-        cost, in_use = model.cost, self._trade.in_use
+        cost, in_use = model.cost, self._accuracy.in_use
         self._cost.setText("Their cost is being computed…" if cost is None else cost_text(cost))
         known = cost is not None and in_use is not None
         _say(self._source, cost_source_text(cost, in_use) if known else "")  # type: ignore[arg-type]
@@ -230,16 +263,6 @@ class RangeScale(QWidget):
         )
         top = (self.height() - self._BAR) / 2
         painter.drawImage(QRectF(left, top, self.width() - left - right, self._BAR), image)
-
-
-def _apart(wide: QWidget, *others: QWidget) -> QHBoxLayout:
-    """Row with one widget that stretches and others at the right edge."""
-    row = QHBoxLayout()
-    row.setSpacing(6)
-    row.addWidget(wide, 1)
-    for widget in others:
-        row.addWidget(widget)
-    return row
 
 
 def _say(label: QLabel, text: str) -> None:

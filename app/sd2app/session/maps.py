@@ -68,6 +68,13 @@ class MapModel(QObject):
         self._strongest: float | None = None
 
     @property
+    def known(self) -> NDArray[np.bool_]:
+        """Frames that hold something, (frames,)."""
+        if self.covered is not None:
+            return self.covered
+        return np.ones(0 if self.map is None else len(self.map.timebase), bool)
+
+    @property
     def gaps_s(self) -> tuple[tuple[float, float], ...]:
         """Stretches without a person, half-open on the recording's clock."""
         return self._seconds(self._gaps)
@@ -75,10 +82,7 @@ class MapModel(QObject):
     @property
     def covered_s(self) -> tuple[tuple[float, float], ...]:
         """Stretches that are computed already, half-open on the recording's clock."""
-        if self.map is None:
-            return ()
-        whole = ((0, len(self.map.timebase)),)
-        return self._seconds(whole if self.covered is None else runs(self.covered))
+        return self._seconds(runs(self.known))
 
     def _seconds(self, stretches: Iterable[tuple[int, int]]) -> tuple[tuple[float, float], ...]:
         if self.map is None:

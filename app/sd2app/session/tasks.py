@@ -75,14 +75,16 @@ class ListedRunner(LatestRunner):
         self._tasks = tasks
         self.job: Job | None = None
         self.partial.connect(self._report)
-        self.idle_changed.connect(self._end)
+        self.idle_changed.connect(lambda idle: self._end() if idle else None)
 
     def submit(self, task: Task, title: str = "") -> int:
         """Ask for ``task(emit)`` in the background, in place of the one before."""
         self._end()
-        revision = super().submit(task)
-        if title and self.busy:
+        if title:
             self.job = self._tasks.start(title, self._cancel)
+        revision = super().submit(task)
+        if not self.busy:
+            self._end()  # closed
         return revision
 
     def _report(self, result: object) -> None:

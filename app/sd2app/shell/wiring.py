@@ -103,14 +103,7 @@ def build_features(session: Session, shell: Shell, parts: Parts, parent: QObject
     classify = ClassifyFeature(
         session,
         shell,
-        MapValidity(
-            session.sensor,
-            maps.synthesis,
-            denoise.model,
-            session.maps.synthetic,
-            session.maps.denoised,
-            parent,
-        ),
+        MapValidity(session, maps.synthesis, denoise.model, parent),
         labels.model,
         labels.edits,
         parts.classifiers or core_classifiers(process),

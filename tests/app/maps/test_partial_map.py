@@ -35,7 +35,7 @@ def test_pieces_cover_what_is_below_once_and_nothing_else(ranks, below, size, da
 
 
 def test_a_new_placement_forgets_the_old_one():
-    partial = PartialMap.blank(2, 10)
+    partial = PartialMap(2, 10)
     here, there = VirtualSensor(), VirtualSensor(position_m=(1, 0, 0))
     partial.paint(here, 0, stretch_of(10, 1.0), FINAL)
     assert partial.final
@@ -47,7 +47,7 @@ def test_a_new_placement_forgets_the_old_one():
 
 
 def test_ranks_rise_to_final():
-    partial = PartialMap.blank(2, 4)
+    partial = PartialMap(2, 4)
     assert not partial.full
     partial.paint(VirtualSensor(), 0, stretch_of(4, 1.0), ROUGH)
     assert partial.full
@@ -57,7 +57,7 @@ def test_ranks_rise_to_final():
 
 
 def test_another_plan_leaves_the_values_until_they_are_replaced():
-    partial, here = PartialMap.blank(2, 4), VirtualSensor()
+    partial, here = PartialMap(2, 4), VirtualSensor()
     partial.paint(here, 0, stretch_of(3, 1.0), FINAL)
     partial.mark_stale()
     assert partial.quality.tolist() == [PREVIEW] * 3 + [0]

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.accuracy.text import InUse
 from sd2app.sensor.placement_fields import PlacementFields
-from sd2app.sensor.placement_text import (
+from sd2app.sensor.placements import (
+    PlacementsModel,
     cost_text,
     count_text,
     current_text,
     limit_facts,
     limits_text,
 )
-from sd2app.sensor.placements import PlacementsModel
 from sd2app.session.sensor import SensorModel
 from sd2app.widgets.text import bytes_text
 from sd2core.accuracy.plans import AccuracyPlan
@@ -80,7 +82,7 @@ def a_cube(fast=False):
 def stage(qtbot):
     document, sensor, trade = Document(), SensorModel(), Trade()
     edits = Edits(document, sensor)
-    model = PlacementsModel(document, sensor, trade, edits)
+    model = PlacementsModel(SimpleNamespace(document=document, sensor=sensor, edits=edits), trade)
     model.test = (document, sensor, trade, edits)
     yield model
     model.close()
