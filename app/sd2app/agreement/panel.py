@@ -28,13 +28,9 @@ class AgreementPanel(QWidget):
     """A view of :class:`AgreementModel`."""
 
     def __init__(
-        self,
-        model: AgreementModel,
-        playback: PlaybackModel,
-        action: Callable[[str], QAction],
-        parent: QWidget | None = None,
+        self, model: AgreementModel, playback: PlaybackModel, action: Callable[[str], QAction]
     ) -> None:
-        super().__init__(parent)
+        super().__init__()
         self.setObjectName("page")
         self._model = model
         self._name = ElidedLabel(self)

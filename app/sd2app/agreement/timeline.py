@@ -20,10 +20,8 @@ class OtherTimeline(QWidget):
     A click goes to that time.
     """
 
-    def __init__(
-        self, session: Session, model: AgreementModel, parent: QWidget | None = None
-    ) -> None:
-        super().__init__(parent)
+    def __init__(self, session: Session, model: AgreementModel) -> None:
+        super().__init__()
         self._session, self._model = session, model
         self._rows = LabelRows((), ())
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)

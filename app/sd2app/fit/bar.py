@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from PySide6.QtWidgets import QFrame, QLabel, QProgressBar, QToolButton, QWidget
+from PySide6.QtWidgets import QFrame, QLabel, QProgressBar, QToolButton
 
 from sd2app.fit.model import FitModel
 from sd2app.fit.on_screen import FitOnScreen
@@ -31,9 +31,8 @@ class FitBar(QFrame):
         begin: Callable[[], None],
         open_result: Callable[[], None],
         resume: Callable[[], None],
-        parent: QWidget | None = None,
     ) -> None:
-        super().__init__(parent)
+        super().__init__()
         self.setObjectName("panel")
         self.setAccessibleName("Fit of a body")
         self.setMinimumHeight(_HEIGHT)

@@ -87,10 +87,8 @@ _PAGES = (
 class LabelsPanel(QWidget):
     """One page at a time; a button for each."""
 
-    def __init__(
-        self, session: Session, edits: LabelEdits, shell: Shell, parent: QWidget | None = None
-    ) -> None:
-        super().__init__(parent)
+    def __init__(self, session: Session, edits: LabelEdits, shell: Shell) -> None:
+        super().__init__()
         self.setObjectName("page")
         labels = edits.labels
         self.model = model = SpanTableModel(labels, edits.playback, edits.apply, self)

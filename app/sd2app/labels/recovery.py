@@ -51,14 +51,9 @@ class LabelBar(QFrame):
     """Offers what the user has to decide about the labels; hidden when there is nothing."""
 
     def __init__(
-        self,
-        autosave: LabelAutosave,
-        edits: LabelEdits,
-        document: DocumentModel,
-        shell: Shell,
-        parent: QWidget | None = None,
+        self, autosave: LabelAutosave, edits: LabelEdits, document: DocumentModel, shell: Shell
     ) -> None:
-        super().__init__(parent)
+        super().__init__()
         self.setObjectName("panel")
         self.setAccessibleName("State of the labels")
         self.setMinimumHeight(_BAR_PX)

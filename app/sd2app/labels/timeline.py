@@ -51,14 +51,9 @@ class LabelTimeline(QWidget):
     """
 
     def __init__(
-        self,
-        session: Session,
-        edits: LabelEdits,
-        dragging: LabelDragging,
-        loop: SpanLoop,
-        parent: QWidget | None = None,
+        self, session: Session, edits: LabelEdits, dragging: LabelDragging, loop: SpanLoop
     ) -> None:
-        super().__init__(parent)
+        super().__init__()
         self._session, self._edits, self._dragging, self._loop = session, edits, dragging, loop
         self._labels = labels = edits.labels
         self._span, self._playback = session.span, session.playback
@@ -288,10 +283,8 @@ class LabelArea(QScrollArea):
     The scroll bar stands in the margin beside the tracks, so the time axis keeps its width.
     """
 
-    def __init__(
-        self, timeline: LabelTimeline, labels: LabelsModel, parent: QWidget | None = None
-    ) -> None:
-        super().__init__(parent)
+    def __init__(self, timeline: LabelTimeline, labels: LabelsModel) -> None:
+        super().__init__()
         self._timeline, self._labels = timeline, labels
         self.setFrameShape(QFrame.Shape.NoFrame)
         self.setWidgetResizable(True)

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QImage, QPainter
-from PySide6.QtWidgets import QWidget
 
 from sd2app.maps.difference import DifferenceModel
 from sd2app.maps.heatmap import HeatmapView
@@ -27,13 +26,9 @@ class DifferenceView(HeatmapView):
     """
 
     def __init__(
-        self,
-        difference: DifferenceModel,
-        session: Session,
-        overlays: Sequence[Overlay] = (),
-        parent: QWidget | None = None,
+        self, difference: DifferenceModel, session: Session, overlays: Sequence[Overlay] = ()
     ) -> None:
-        super().__init__(difference.denoised, session, overlays, parent=parent)
+        super().__init__(difference.denoised, session, overlays)
         self._difference = difference
         difference.changed.connect(self.invalidate)
 

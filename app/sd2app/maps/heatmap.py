@@ -43,9 +43,8 @@ class HeatmapView(MapWidget):
         overlays: Sequence[Overlay] = (),
         *,
         alignable: bool = False,
-        parent: QWidget | None = None,
     ) -> None:
-        super().__init__(track, session, overlays, parent)
+        super().__init__(track, session, overlays)
         self._pointer = session.pointer
         self._alignable = alignable
         if alignable:

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QBrush, QColor, QImage, QPainter, QResizeEvent
-from PySide6.QtWidgets import QWidget
 
 from sd2app.maps.difference import DifferenceModel
 from sd2app.session.display import HeatmapLevels
@@ -177,14 +176,8 @@ class MapWidget(TimePlot):
     TOP_PX: ClassVar[int]
     """Room above the map."""
 
-    def __init__(
-        self,
-        track: MapModel,
-        session: Session,
-        overlays: Sequence[Overlay] = (),
-        parent: QWidget | None = None,
-    ) -> None:
-        super().__init__(parent)
+    def __init__(self, track: MapModel, session: Session, overlays: Sequence[Overlay] = ()) -> None:
+        super().__init__()
         self._track = track
         self._session = session
         self._span, self._playback = session.span, session.playback

@@ -49,8 +49,8 @@ class _ColourStrip(QWidget):
 class LevelBar(QWidget):
     """Colour strip with its two ends, scale, colour map, and what 0 dB means."""
 
-    def __init__(self, session: Session, uncertain: QAction, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, session: Session, uncertain: QAction) -> None:
+        super().__init__()
         self._display, self._tracks = session.display, session.maps.all
         set_levels = session.display.set_levels
         self._low, self._high = (

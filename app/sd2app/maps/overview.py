@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QWidget
 
 from sd2app.maps.heatmap_image import MapWidget
 from sd2app.session.maps import MapModel
@@ -23,10 +22,8 @@ class Overview(MapWidget):
 
     TOP_PX = 2
 
-    def __init__(
-        self, session: Session, overlays: Sequence[Overlay] = (), parent: QWidget | None = None
-    ) -> None:
-        super().__init__(session.maps.synthetic, session, overlays, parent)
+    def __init__(self, session: Session, overlays: Sequence[Overlay] = ()) -> None:
+        super().__init__(session.maps.synthetic, session, overlays)
         self.setFixedHeight(40)
         self._span.changed.connect(self.update)
 

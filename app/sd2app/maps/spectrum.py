@@ -39,8 +39,8 @@ class _Curve:
 class SpectrumView(QWidget):
     """Level to the right, velocity upwards like in the heatmaps beside it."""
 
-    def __init__(self, session: Session, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, session: Session) -> None:
+        super().__init__()
         self._maps, self._playback = session.maps, session.playback
         self._display, self._pointer = session.display, session.pointer
         self.setMinimumSize(180, 160)

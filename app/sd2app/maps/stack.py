@@ -27,9 +27,8 @@ class MapStack(QWidget):
         difference: DifferenceModel,
         over_maps: Sequence[Overlay],
         over_all: Sequence[Overlay],
-        parent: QWidget | None = None,
     ) -> None:
-        super().__init__(parent)
+        super().__init__()
         self._session, self._difference, maps = session, difference, session.maps
         self.synthetic = HeatmapView(maps.synthetic, session, over_maps)
         self.denoised = HeatmapView(maps.denoised, session, over_maps)

@@ -50,8 +50,8 @@ class ComparisonModel(QObject):
 
     changed = Signal()  # result, reference, joint, or computing began or ended
 
-    def __init__(self, session: Session, other: Path, parent: QObject | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, session: Session, other: Path) -> None:
+        super().__init__()
         self._session, self._other = session, other
         self.reference = 0  # number of the mesh that the other is measured against
         self.joint = JOINT  # the one whose velocity is shown

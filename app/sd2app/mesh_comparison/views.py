@@ -187,10 +187,8 @@ _HEADS = (
 class JointTable(QTableWidget):
     """A row per joint; the current one is drawn."""
 
-    def __init__(
-        self, comparison: ComparisonModel, display: DisplayModel, parent: QWidget | None = None
-    ) -> None:
-        super().__init__(0, len(_HEADS), parent)
+    def __init__(self, comparison: ComparisonModel, display: DisplayModel) -> None:
+        super().__init__(0, len(_HEADS))
         self._comparison = comparison
         self._display = display
         self.setHorizontalHeaderLabels([text for text, _ in _HEADS])

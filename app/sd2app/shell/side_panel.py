@@ -23,8 +23,8 @@ class Paged(Protocol):
 class SidePanel(QTabWidget):
     """Tabs by name; what does not fit is scrolled."""
 
-    def __init__(self, pages: dict[str, QWidget], parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, pages: dict[str, QWidget]) -> None:
+        super().__init__()
         self.setDocumentMode(True)
         self.tabBar().setDrawBase(False)
         self.tabBar().setFocusPolicy(Qt.FocusPolicy.TabFocus)

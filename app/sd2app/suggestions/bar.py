@@ -24,13 +24,8 @@ _BUTTONS = (
 class SuggestionBar(QWidget):
     """View of :class:`SuggestionsModel`; hidden until suggestions are asked for."""
 
-    def __init__(
-        self,
-        model: SuggestionsModel,
-        action: Callable[[str], QAction],
-        parent: QWidget | None = None,
-    ) -> None:
-        super().__init__(parent)
+    def __init__(self, model: SuggestionsModel, action: Callable[[str], QAction]) -> None:
+        super().__init__()
         self._model = model
         self._text = ElidedLabel(self)
         self._text.setAccessibleName("Suggestions")

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from PySide6.QtCore import QObject, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QFont
 
 from sd2app.labels.model import LabelsModel
@@ -41,9 +41,8 @@ class KeyListModel(RecordTableModel[KeyRow]):
         labels: LabelsModel,
         mouse: Sequence[tuple[str, str]],
         apply: Callable[[Change], bool],
-        parent: QObject | None = None,
     ) -> None:
-        super().__init__(_HEADINGS, parent)
+        super().__init__(_HEADINGS)
         self._bindings, self._labels, self._mouse, self._apply = bindings, labels, mouse, apply
         self._search = ""
         self._rows = self._listed()
