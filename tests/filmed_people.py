@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from sd2core.body.keypoints import KeypointSpace
 from sd2core.body.model import Body
 from sd2core.body.shape import BodyShape, ShapeSpace
-from sd2core.simulate.gestures import swipes
-from sd2core.simulate.render import Camera, Renderer
+from tools.build_sample.render import Camera, Renderer
+from tools.build_sample.swipes import swipes
 
 CAMERA = Camera(320, 240, 300.0)
 DISTANCE_M = 2.6

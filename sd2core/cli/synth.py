@@ -20,7 +20,7 @@ from sd2core.cli.options import (
     positive_int,
 )
 from sd2core.cli.output import progress_bar
-from sd2core.cli.simulate.radar import add_radar_choice, simulate_with_bar
+from sd2core.cli.simulate import add_radar_choice, simulate_with_bar
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:

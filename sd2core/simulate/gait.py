@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from sd2core.body.model import Skeleton
 from sd2core.body.rotations import Floats, about, applied, product, transposed
-from sd2core.simulate.gestures import (
+from sd2core.simulate.limbs import (
     HANGING,
     Motion,
     bend,
@@ -60,31 +60,6 @@ class Step(NamedTuple):
     yaw_deg: float
 
 
-def straight(start_s: float, distance_m: float, speed_mps: float, ramp_s: float = 0.7) -> Path:
-    """Stand, walk a distance towards the camera, stand."""
-    cruise_s = distance_m / speed_mps - ramp_s
-    if cruise_s <= 0:
-        raise ValueError("too short a way to reach this speed")
-    fine = np.arange(0.0, cruise_s + 2 * ramp_s + 1.0 / _GRID_HZ, 1.0 / _GRID_HZ)
-    share = minimum_jerk(fine / ramp_s) - minimum_jerk((fine - ramp_s - cruise_s) / ramp_s)
-    way = np.concatenate([[0.0], np.cumsum(0.5 * (share[1:] + share[:-1]))])
-    way *= distance_m / way[-1]
-    return Path(lambda t: np.interp(t, start_s + fine, way), np.zeros_like)
-
-
-def turning(turns: tuple[tuple[float, float, float], ...]) -> Path:
-    """Turn on the spot: ``(start_s, end_s, to_deg)`` one after another."""
-
-    def yaw_deg(times: Floats) -> Floats:
-        yaw, before = np.zeros(len(times)), 0.0
-        for start_s, end_s, to_deg in turns:
-            yaw += (to_deg - before) * minimum_jerk((times - start_s) / (end_s - start_s))
-            before = to_deg
-        return yaw
-
-    return Path(np.zeros_like, yaw_deg)
-
-
 def plan_steps(path: Path, duration_s: float, half_base_m: float) -> list[Step]:
     """Steps, left and right in turn, wherever standing still would leave a foot behind."""
     steps: list[Step] = []
@@ -110,7 +85,7 @@ def gait(skeleton: Skeleton, times_s: Floats, path: Path, arm_scale: float = 1.0
     """Motion of the whole body along a path.
 
     The translation moves the body from the origin; its floor is at y = 0. ``arm_scale`` is as for
-    :func:`sd2core.simulate.gestures.reach`.
+    :func:`sd2core.simulate.limbs.reach`.
     """
     duration_s = float(times_s[-1]) + 1.0
     fine = np.arange(0.0, duration_s, 1.0 / _GRID_HZ)

@@ -22,7 +22,7 @@ from sd2core.body.objective import Objective, Residuals, cost
 from sd2core.body.rig import Rig
 from sd2core.body.shape import ShapeSpace
 from sd2core.body.track import TORSO_CORNERS
-from sd2core.simulate.gestures import swipes
+from tools.build_sample.swipes import swipes
 
 FRAMES = 150
 PATIENCE_S = 60.0

@@ -24,9 +24,9 @@ from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.body.track import LANDMARKS
 from sd2core.files.resources import resource_path
 from sd2core.io.video import VideoReader, open_video
-from sd2core.simulate.gestures import swipes
-from sd2core.simulate.render import Camera
-from sd2core.simulate.sample import _PLACE_ACROSS_M, DISTANCE_M
+from tools.build_sample.render import Camera
+from tools.build_sample.sample import _PLACE_ACROSS_M, DISTANCE_M
+from tools.build_sample.swipes import swipes
 
 TRUNK = [LANDMARKS.index(f"{name}.{side}") for name in ("shoulder", "hip", "knee") for side in "LR"]
 WRISTS = [LANDMARKS.index(f"wrist.{side}") for side in "LR"]

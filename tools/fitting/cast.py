@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from sd2core.body.shape import BodyShape, ShapeSpace
-from sd2core.simulate.clothing import Outfit
-from sd2core.simulate.render import Studio
+from tools.build_sample.clothing import Outfit
+from tools.build_sample.render import Studio
 
 
 @dataclass(frozen=True)

@@ -29,12 +29,13 @@ from sd2core.io.video_writing import write_video
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics.compiled import worker_count, workers
 from sd2core.progress import Progress, silent
-from sd2core.simulate.clothing import Clothes
-from sd2core.simulate.gestures import GestureSpan, arm_length_m
-from sd2core.simulate.render import Camera, Renderer
-from sd2core.simulate.sample import write_compact_mesh
+from sd2core.simulate.limbs import arm_length_m
 from sd2core.timebase import Timebase
 from sd2core.version import __version__
+from tools.build_sample.clothing import Clothes
+from tools.build_sample.render import Camera, Renderer
+from tools.build_sample.sample import write_compact_mesh
+from tools.build_sample.swipes import GestureSpan
 from tools.fitting.cast import PEOPLE, ROOMS
 from tools.fitting.motions import Action, duration_s, perform
 from tools.fitting.truth import FORMAT, VERSION, read_truth

@@ -15,18 +15,17 @@ import numpy as np
 from sd2core.body.model import Skeleton
 from sd2core.body.rotations import Floats, about
 from sd2core.errors import Sd2Error
-from sd2core.simulate.gait import gait, straight, turning
-from sd2core.simulate.gestures import (
+from sd2core.simulate.gait import Path, gait
+from sd2core.simulate.limbs import (
     HANGING,
     ArmPose,
-    GestureSpan,
     Motion,
-    Move,
-    arm_poses,
+    minimum_jerk,
     reach,
     relax_fingers,
     turn_torso,
 )
+from tools.build_sample.swipes import GestureSpan, Move, arm_poses
 
 Kind = Literal["swipes", "still", "walk", "turn"]
 Speed = Literal["slow", "normal", "fast"]
@@ -37,6 +36,8 @@ STROKE_S: dict[Speed, float] = {"slow": 1.25, "normal": 0.72, "fast": 0.42}
 
 _RAISE_S, _LOWER_S, _HOLD_S = 0.65, 0.7, 0.2
 _START_S = 0.25
+_GRID_HZ = 240.0
+"""Rate at which the way of a walk is summed."""
 
 # Written for the right arm of the bundled body; see ArmPose. Other places than the
 # bundled sample's: wider strokes, higher and lower.
@@ -114,15 +115,40 @@ def perform(
     rng = np.random.default_rng(seed)
     times = np.asarray(times_s, dtype=np.float64)
     if action.kind == "walk":
-        path = straight(_START_S, action.walk_m, action.walk_mps)
+        path = _straight(_START_S, action.walk_m, action.walk_mps)
         return Performance(gait(skeleton, times, path, arm_scale), ())
     if action.kind == "turn":
-        return Performance(gait(skeleton, times, turning(_turns(action)), arm_scale), ())
+        return Performance(gait(skeleton, times, _turning(_turns(action)), arm_scale), ())
     if action.kind == "still":
         return Performance(_still(skeleton, action, len(times), arm_scale), ())
     moves = _moves(action, rng)
     spans = tuple(GestureSpan(move.start_s, move.end_s, move.label) for move in moves if move.label)
     return Performance(_swiping(skeleton, action, moves, times, rng, arm_scale), spans)
+
+
+def _straight(start_s: float, distance_m: float, speed_mps: float, ramp_s: float = 0.7) -> Path:
+    """Stand, walk a distance towards the camera, stand."""
+    cruise_s = distance_m / speed_mps - ramp_s
+    if cruise_s <= 0:
+        raise ValueError("too short a way to reach this speed")
+    fine = np.arange(0.0, cruise_s + 2 * ramp_s + 1.0 / _GRID_HZ, 1.0 / _GRID_HZ)
+    share = minimum_jerk(fine / ramp_s) - minimum_jerk((fine - ramp_s - cruise_s) / ramp_s)
+    way = np.concatenate([[0.0], np.cumsum(0.5 * (share[1:] + share[:-1]))])
+    way *= distance_m / way[-1]
+    return Path(lambda t: np.interp(t, start_s + fine, way), np.zeros_like)
+
+
+def _turning(turns: tuple[tuple[float, float, float], ...]) -> Path:
+    """Turn on the spot: ``(start_s, end_s, to_deg)`` one after another."""
+
+    def yaw_deg(times: Floats) -> Floats:
+        yaw, before = np.zeros(len(times)), 0.0
+        for start_s, end_s, to_deg in turns:
+            yaw += (to_deg - before) * minimum_jerk((times - start_s) / (end_s - start_s))
+            before = to_deg
+        return yaw
+
+    return Path(np.zeros_like, yaw_deg)
 
 
 def _moves(action: Action, rng: np.random.Generator) -> list[Move]:

@@ -10,7 +10,7 @@ import numpy as np
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.rotations import Floats, applied, product
 from sd2core.body.track import LANDMARKS
-from sd2core.simulate.people.posing import turn_about
+from sd2core.simulate.limbs import turn_about
 
 _SIZES = ((640, 480), (640, 480), (640, 360), (480, 640))
 _UPPER_BODY = tuple(

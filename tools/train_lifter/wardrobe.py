@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from sd2core.body.limbs import LIMBS, vertex_limbs
 from sd2core.body.model import Body
-from sd2core.simulate.clothing import EYES, LIPS, WHITES, Clothes, linear
+from tools.build_sample.clothing import EYES, LIPS, WHITES, Clothes, linear
 
 Singles = NDArray[np.float32]
 

@@ -1,7 +1,7 @@
 """Motion of one take of a campaign: gestures in random order, other movements, rest.
 
 Gestures are strokes of an arm between two sides of the body, or between above and below,
-as in :mod:`~sd2core.simulate.gestures`, but none like another: poses, speed, path, evenness
+as in :mod:`~sd2core.simulate.limbs`, but none like another: poses, speed, path, evenness
 of speed, hand and pauses are drawn for each. Between them hands rest, sink, or do
 something else. Other takes hold no gesture at all: people stand and move their arms
 and trunk at random, or step to and fro.
@@ -19,7 +19,7 @@ from sd2core.body.model import Skeleton
 from sd2core.body.rotations import Floats, about, applied, product
 from sd2core.simulate.campaign.people import Subject
 from sd2core.simulate.gait import Path, gait
-from sd2core.simulate.gestures import (
+from sd2core.simulate.limbs import (
     HANGING,
     ArmPose,
     Motion,
@@ -86,7 +86,7 @@ class Move:
 
     start_s: float
     end_s: float
-    to: Floats  # Fields of :class:`~sd2core.simulate.gestures.ArmPose`, (9,).
+    to: Floats  # Fields of :class:`~sd2core.simulate.limbs.ArmPose`, (9,).
     bow: Floats  # Distance of the way from the straight one in its middle, (9,).
     skew: float  # 1: fastest in the middle of the time; below 1 earlier.
     label: int = 0

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sd2core.body.rotations import Floats
-from sd2core.simulate.gestures import elbow_position
+from sd2core.simulate.limbs import elbow_position
 from sd2core.simulate.people.signals import Moves, envelope, follow, wander
 
 PARAMETERS = 11

@@ -9,7 +9,7 @@ import numpy as np
 
 from sd2core.body.model import Skeleton
 from sd2core.body.rotations import Floats, applied, product, transposed
-from sd2core.simulate.gestures import Motion
+from sd2core.simulate.limbs import Motion, place_limb, turn_about, turn_hand
 from sd2core.simulate.people.arms import (
     GESTURE_STYLES,
     HELD_OUT_STYLES,
@@ -17,7 +17,6 @@ from sd2core.simulate.people.arms import (
     moving_arm,
     still_arm,
 )
-from sd2core.simulate.people.posing import place_limb, turn_about, turn_hand
 from sd2core.simulate.people.signals import wander
 from sd2core.simulate.people.walking import Footwork, footwork
 

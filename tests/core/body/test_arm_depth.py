@@ -11,7 +11,7 @@ from sd2core.body.keypoints import KeypointSpace
 from sd2core.body.rig import Rig
 from sd2core.body.shape import ShapeSpace
 from sd2core.body.track import LANDMARKS, TORSO_CORNERS
-from sd2core.simulate.gestures import swipes
+from tools.build_sample.swipes import swipes
 
 SPACE = ShapeSpace()
 ARM = [LANDMARKS.index(name) for name in ("elbow.R", "wrist.R")]

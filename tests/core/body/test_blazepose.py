@@ -13,7 +13,7 @@ from sd2core.body.blazepose import PoseDetector, PoseLandmarker, Roi, _refined, 
 from sd2core.body.landmark_models import LandmarkModels
 from sd2core.body.model import Body
 from sd2core.body.track import LANDMARKS, MIRRORED
-from sd2core.simulate.render import Camera, Renderer
+from tools.build_sample.render import Camera, Renderer
 
 CAMERA = Camera()
 PLACE = np.array([0.2, CAMERA.above_floor_m, 2.6])

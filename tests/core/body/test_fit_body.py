@@ -18,8 +18,8 @@ from sd2core.body.skinning import pose_vertices
 from sd2core.body.track import LANDMARKS, TORSO_CORNERS, Landmarks, LandmarkTrack
 from sd2core.errors import Sd2Error
 from sd2core.progress import Cancelled
-from sd2core.simulate.gestures import swipes
 from sd2core.timebase import Timebase
+from tools.build_sample.swipes import swipes
 
 SPACE = ShapeSpace()
 CAMERA = PinholeCamera()

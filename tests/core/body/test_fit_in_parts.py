@@ -25,8 +25,8 @@ from sd2core.body.refining import Stretch
 from sd2core.body.shape import ShapeSpace
 from sd2core.body.track import LANDMARKS, PER_FRAME, LandmarkTrack
 from sd2core.errors import Sd2Error
-from sd2core.simulate.gestures import swipes
 from sd2core.timebase import Timebase
+from tools.build_sample.swipes import swipes
 
 CAMERA = PinholeCamera()
 HIPS = [LANDMARKS.index(f"hip.{side}") for side in "LR"]

@@ -19,8 +19,8 @@ from sd2core.io.mesh import load_mesh, save_mesh
 from sd2core.mesh.decimation import decimate
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Cancelled
-from sd2core.simulate.sample import write_compact_mesh
 from sd2core.timebase import Timebase
+from tools.build_sample.sample import write_compact_mesh
 
 SUFFIXES = [".npz", ".zarr", ".zarr.zip"]
 

@@ -14,7 +14,7 @@ from sd2core.errors import Sd2Error
 from sd2core.io.radar.mars import JOINTS
 from sd2core.mocap.driving import DrivenClip, puppet_of, resample_pose
 from sd2core.mocap.skeleton import KINECT_MARKERS, SkeletonClip
-from sd2core.simulate.gestures import swipes
+from tools.build_sample.swipes import swipes
 
 FRAMES = 40
 SHAPE = SPACE.random(np.random.default_rng(3))

@@ -14,8 +14,8 @@ from sd2core.body.track import LANDMARKS
 from sd2core.errors import Sd2Error
 from sd2core.io.video import open_video
 from sd2core.progress import Cancelled
-from sd2core.simulate.clothing import Clothes, Outfit
-from sd2core.simulate.render import Renderer, Studio
+from tools.build_sample.clothing import Clothes, Outfit
+from tools.build_sample.render import Renderer, Studio
 from tools.fitting import clips as clip_module
 from tools.fitting.clips import clip_named, make_fit_truth, scene
 from tools.fitting.truth import read_truth, truth_folders

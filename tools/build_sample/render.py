@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.model import Body, vertex_normals
 from sd2core.numerics.raster import interpolate, lit_share, rasterise
-from sd2core.simulate.clothing import Clothes, linear, srgb
+from tools.build_sample.clothing import Clothes, linear, srgb
 
 Singles = NDArray[np.float32]
 

@@ -13,19 +13,20 @@ from sd2core.fmcw.processing import doppler_map
 from sd2core.io.mesh import load_mesh
 from sd2core.io.radar import load_capture
 from sd2core.io.video import open_video
-from sd2core.progress import Cancelled
+from sd2core.progress import Cancelled, Progress
 from sd2core.radar_config import PAPER_RADAR
 from sd2core.recording.recording import Recording, open_recording
 from sd2core.scattering.facets import facet_visibility
 from sd2core.sensor import VirtualSensor
-from sd2core.simulate.gestures import DURATION_S, SPANS
-from sd2core.simulate.render import Camera
-from sd2core.simulate.sample import (
+from tools.build_sample.__main__ import main
+from tools.build_sample.render import Camera
+from tools.build_sample.sample import (
     FRAMES_PER_S,
     RECORDED,
     body_sequence,
     make_sample,
 )
+from tools.build_sample.swipes import DURATION_S, SPANS
 
 SHORT_S = 0.2
 
@@ -95,6 +96,29 @@ def test_an_existing_folder_is_not_touched(tmp_path: Path) -> None:
 def test_a_missing_parent_is_named(tmp_path: Path) -> None:
     with pytest.raises(Sd2Error, match="does not exist"):
         make_sample(tmp_path / "nowhere" / "x.sd2")
+
+
+def test_the_command_hands_the_folder_over(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    asked: list[Path] = []
+
+    def make(out: Path, progress: Progress) -> Path:
+        progress(0, 2)
+        asked.append(out)
+        return out
+
+    monkeypatch.setattr("tools.build_sample.__main__.make_sample", make)
+    assert main(["make", str(tmp_path / "mine.sd2")]) == 0
+    assert asked == [tmp_path / "mine.sd2"]
+    assert str(tmp_path / "mine.sd2") in capsys.readouterr().out
+
+
+def test_the_command_does_not_replace_a_sample(tmp_path: Path) -> None:
+    (tmp_path / "a.sd2").mkdir()
+    (tmp_path / "a.sd2" / "precious").touch()
+    assert main(["make", str(tmp_path / "a.sd2")]) == 1
+    assert [path.name for path in (tmp_path / "a.sd2").iterdir()] == ["precious"]
 
 
 def test_gestures_that_do_not_fit_are_left_out(short: Path) -> None:

@@ -1,19 +1,12 @@
-"""The paper's four swipes as the motion of a standing body's right arm.
+"""Limbs of a standing body brought to places, by inverse kinematics in closed form.
 
-Directions are as the sensor (and the camera) sees them: a left-to-right swipe goes
-from the left of the image to its right, which is from the body's right to its left.
-
-The hand follows minimum-jerk moves (T. Flash and N. Hogan, "The coordination of arm
-movements", J. Neurosci. 5, 1985) between poses that are given around the shoulder, so
-that a swipe is an arc, as a real one is, and has a radial velocity even where it
-crosses the view. The arm follows by closed-form inverse kinematics; torso and head go
-along a little, and the chest breathes.
+An arm is posed by the place of its wrist around the shoulder; torso and head go along a
+little, and the chest breathes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -22,15 +15,7 @@ from numpy.typing import ArrayLike
 from sd2core.body.model import Skeleton
 from sd2core.body.rotations import Floats, about, applied, frame, product, transposed
 
-DURATION_S = 15.0
-
-
-class GestureSpan(NamedTuple):
-    """Time span of one gesture: half-open ``[start_s, end_s)``."""
-
-    start_s: float
-    end_s: float
-    label: str
+_KNEES_REACH = 0.995
 
 
 class Motion(NamedTuple):
@@ -59,82 +44,13 @@ class ArmPose:
     torso_deg: float  # Turn of the upper body, positive across (the arm's side comes forward).
 
 
-class Move(NamedTuple):
-    """One arm's way to a pose; a labelled one is a gesture's stroke."""
-
-    start_s: float
-    end_s: float
-    to: ArmPose
-    label: str | None = None
-
-
 HANGING = ArmPose(-10.0, -80.0, 0.525, 0.5, 0.0, 1.0, -28.0, 5.0, 0.0)
-_LEFT = ArmPose(-64.0, -13.0, 0.46, 0.35, 1.0, 0.25, 20.0, -8.0, -6.0)
-_RIGHT = ArmPose(36.0, -15.0, 0.42, 0.9, 1.0, 0.0, 10.0, 12.0, 9.0)
-_UP = ArmPose(-14.0, 22.0, 0.32, 0.75, 1.0, 0.0, 45.0, -10.0, -3.0)
-_DOWN = ArmPose(-4.0, -44.0, 0.50, 0.8, 0.5, 0.6, 60.0, 18.0, 5.0)
-_LEFT_AGAIN = ArmPose(-58.0, -18.0, 0.47, 0.35, 1.0, 0.25, 24.0, -8.0, -5.0)
-_RIGHT_AGAIN = ArmPose(38.0, -18.0, 0.43, 0.9, 1.0, 0.0, 10.0, 12.0, 8.0)
-_UP_AGAIN = ArmPose(-10.0, 17.0, 0.33, 0.75, 1.0, 0.0, 42.0, -8.0, -3.0)
-_DOWN_AGAIN = ArmPose(-8.0, -47.0, 0.50, 0.8, 0.5, 0.6, 62.0, 20.0, 4.0)
-
-_MOVES = (
-    Move(0.3, 1.35, _LEFT),
-    Move(1.6, 2.8, _RIGHT, "left-to-right"),
-    Move(3.05, 4.25, _LEFT, "right-to-left"),
-    Move(4.45, 5.2, _UP),
-    Move(5.45, 6.45, _DOWN, "up-to-down"),
-    Move(6.7, 7.7, _UP, "down-to-up"),
-    Move(7.95, 8.9, _DOWN_AGAIN, "up-to-down"),
-    Move(9.15, 10.15, _UP_AGAIN, "down-to-up"),
-    Move(10.35, 11.1, _LEFT_AGAIN),
-    Move(11.35, 12.5, _RIGHT_AGAIN, "left-to-right"),
-    Move(12.75, 13.9, _LEFT_AGAIN, "right-to-left"),
-    Move(14.0, 14.95, HANGING),
-)
-
-SPANS = tuple(
-    GestureSpan(move.start_s, move.end_s, move.label) for move in _MOVES if move.label is not None
-)
-"""The strokes themselves; raising, holding and lowering the hand belong to no gesture."""
 
 
 def minimum_jerk(phase: ArrayLike) -> Floats:
     """Share of the way at a share of the time, held at 0 and 1 outside."""
     x = np.clip(np.asarray(phase, dtype=np.float64), 0.0, 1.0)
     return x * x * x * (10.0 + x * (6.0 * x - 15.0))
-
-
-def swipes(skeleton: Skeleton, times_s: ArrayLike) -> Motion:
-    """Motion of the whole body at any times, smooth in time.
-
-    Before 0.3 s and after 14.95 s the arm hangs.
-    """
-    times = np.asarray(times_s, dtype=np.float64)
-    arm = arm_poses(_MOVES, times)  # (T, parameters)
-    rotations = np.tile(np.eye(3), (len(times), len(skeleton), 1, 1))
-    turn_torso(skeleton, rotations, times, arm[:, 8])
-    relax_fingers(skeleton, rotations)
-    reach(skeleton, rotations, "R", arm)
-    hanging = np.tile(np.array(astuple(HANGING)), (len(times), 1))
-    hanging[:, 0] += 1.2 * np.sin(0.9 * times)
-    reach(skeleton, rotations, "L", hanging)
-    return Motion(rotations, np.zeros((len(times), 3)))
-
-
-def arm_poses(moves: Sequence[Move], times: Floats) -> Floats:
-    """Parameters of the arm through time: hanging, plus every move so far.
-
-    The moves follow one another. Columns of the result are the fields of :class:`ArmPose`.
-    """
-    before = np.array(astuple(HANGING))
-    poses = np.tile(before, (len(times), 1))
-    for move in moves:
-        after = np.array(astuple(move.to))
-        share = minimum_jerk((times - move.start_s) / (move.end_s - move.start_s))
-        poses += share[:, None] * (after - before)
-        before = after
-    return poses
 
 
 def turn_torso(skeleton: Skeleton, rotations: Floats, times: Floats, across_deg: Floats) -> None:
@@ -177,8 +93,8 @@ def reach(
     """Bring one wrist to its place: shoulder, elbow and wrist rotations in closed form.
 
     ``rotations``, (T, B, 3, 3), are those of the whole body, which faces the camera; those of the
-    arm are replaced. ``arm`` comes from :func:`arm_poses`; ``scale`` is the length of this arm to
-    that for which the poses were written.
+    arm are replaced. ``arm``, (T, 9), has the fields of :class:`ArmPose`; ``scale`` is the length
+    of this arm to that for which the poses were written.
     """
     index, heads = skeleton.index, skeleton.heads_m
     upper, lower = index[f"upperarm01.{side}"], index[f"lowerarm01.{side}"]
@@ -257,3 +173,71 @@ def elbow_position(
     aside = aside / np.linalg.norm(aside, axis=1, keepdims=True)
     elbow: Floats = shoulder + along * line + np.sqrt(upper_m**2 - along**2) * aside
     return elbow
+
+
+def turn_about(axis: int, angle_deg: Floats) -> Floats:
+    """Rotations about x (0), y (1) or z (2), (T, 3, 3)."""
+    return about(np.eye(3)[axis], angle_deg)
+
+
+def place_limb(
+    skeleton: Skeleton,
+    rotations: Floats,
+    bones: tuple[str, str, str],
+    root: Floats,
+    target_m: Floats,
+    pole: Floats,
+) -> Floats:
+    """Bring the end of a limb of two bones to a place.
+
+    ``bones`` are thigh, shank, foot; or upper arm, forearm, wrist. The first two are written in
+    ``rotations``, (T, B, 3, 3). ``root``, (T, 3, 4), is the transform of the parent of the limb;
+    ``target_m``, (T, 3), is brought nearer where it is out of reach; ``pole``, (T, 3), is where the
+    joint bends to. Returns the turn of the second bone against rest, (T, 3, 3), in the axes of
+    ``target_m``.
+    """
+    first, second, end = (skeleton.index[bone] for bone in bones)
+    heads = skeleton.heads_m
+    upper_rest, lower_rest = heads[second] - heads[first], heads[end] - heads[second]
+    upper, lower = float(np.linalg.norm(upper_rest)), float(np.linalg.norm(lower_rest))
+    start = applied(root[..., :3], heads[first]) + root[..., 3]
+    line = target_m - start
+    far = np.linalg.norm(line, axis=1, keepdims=True)
+    reach = np.clip(far, 1.05 * abs(upper - lower) + 0.02, _KNEES_REACH * (upper + lower))
+    target = start + line * (reach / far)
+    upper_turn, lower_turn = bend(start, target, upper_rest, lower_rest, pole)
+    rotations[:, first] = product(transposed(root[..., :3]), upper_turn)
+    # The thigh's two bones turn as one: what lies between them is the identity.
+    rotations[:, second] = product(transposed(upper_turn), lower_turn)
+    return lower_turn
+
+
+def turn_hand(
+    skeleton: Skeleton, rotations: Floats, side: str, angles_deg: Floats, curl: Floats
+) -> None:
+    """Turn, bend and close one hand.
+
+    The rotations of forearm, wrist and fingers are written. ``angles_deg``, (T, 3): pronation,
+    flexion, deviation. ``curl``, (T, 2): of fingers and thumb, 0 open to 1 closed.
+    """
+    index, heads = skeleton.index, skeleton.heads_m
+    across = 1.0 if side == "R" else -1.0
+    forearm, wrist = index[f"lowerarm02.{side}"], index[f"wrist.{side}"]
+    along = _unit(heads[wrist] - heads[forearm])
+    knuckles = across * _unit(heads[index[f"finger5-1.{side}"]] - heads[index[f"finger2-1.{side}"]])
+    half = about(along, -across * 0.5 * angles_deg[:, 0])
+    rotations[:, forearm] = half
+    palm = _unit(np.cross(along, knuckles))
+    bend = product(about(knuckles, angles_deg[:, 1]), about(palm, angles_deg[:, 2]))
+    rotations[:, wrist] = product(half, bend)
+    curl = np.clip(curl, 0.0, 1.0)
+    for finger in range(1, 6):
+        amount = curl[:, 0] if finger > 1 else 0.5 * curl[:, 1]
+        for joint, most_deg in ((1, 70.0), (2, 85.0), (3, 55.0)):
+            bone = index.get(f"finger{finger}-{joint}.{side}")
+            if bone is not None:
+                rotations[:, bone] = about(knuckles, 4.0 + most_deg * amount)
+
+
+def _unit(vector: Floats) -> Floats:
+    return np.asarray(vector / np.linalg.norm(vector))

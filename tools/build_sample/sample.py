@@ -28,9 +28,9 @@ from sd2core.radar_config import PAPER_RADAR
 from sd2core.recording.recording import SUFFIX, Recording, Span
 from sd2core.scattering.facets import facet_visibility
 from sd2core.sensor import VirtualSensor
-from sd2core.simulate.gestures import DURATION_S, SPANS, swipes
-from sd2core.simulate.render import Camera, Renderer
 from sd2core.timebase import Timebase
+from tools.build_sample.render import Camera, Renderer
+from tools.build_sample.swipes import DURATION_S, SPANS, swipes
 
 FRAMES_PER_S = 30
 DISTANCE_M = 2.2

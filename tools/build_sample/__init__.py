@@ -1,0 +1,1 @@
+"""The bundled sample: a drawn body that swipes, and its radar signal."""
