@@ -10,8 +10,8 @@ import av
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.body.keypoints import KeypointSpace
 from sd2core.body.model import Body
+from sd2core.body.rig import KeypointSpace
 from sd2core.body.shape import BodyShape, ShapeSpace
 from tools.build_sample.render import Camera, Renderer
 from tools.build_sample.swipes import swipes

@@ -32,7 +32,7 @@ def denoise(maps: Sequence[Path], model: str, digest: str, outs: Sequence[Path])
 
 def _denoise_long(trained: TrainedDenoiser, maps: Sequence[Path], outs: Sequence[Path]) -> None:
     """Denoise one stretch after the other, keeping the model's state."""
-    from sd2core.denoise.long_maps import denoise_long
+    from sd2core.denoise.live import denoise_long
     from sd2core.denoise.resample_to_model import check_map, clips, is_regular
 
     files, rate_hz = _Files(maps), trained.card.frame_rate_hz
@@ -124,7 +124,7 @@ class _Writer:
 def _model(path: str, digest: str) -> TrainedDenoiser:
     """Load a model, which the process keeps from one task to the next."""
     from sd2core.denoise.files import load_model
-    from sd2core.denoise.threads import use_one_thread
+    from sd2core.denoise.model import use_one_thread
 
     # There are as many processes as cores.
     use_one_thread()

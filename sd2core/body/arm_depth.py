@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from sd2core.body.evidence import DEPTH_CAUTION, Evidence
 from sd2core.body.rig import Rig
 from sd2core.body.rotations import Floats
-from sd2core.body.track import LANDMARKS
+from sd2core.body.track import LANDMARK
 
-_AT = {name: row for row, name in enumerate(LANDMARKS)}
 _CASES = np.array([[u, f] for u in (-1.0, 1.0) for f in (-1.0, 1.0)])  # upper arm, forearm
 
 _SPEED_MPS = 1.5
@@ -36,7 +35,7 @@ def resolve_arm_depths(evidence: Evidence, rig: Rig) -> Evidence:
     for side in "LR":
         _lean(points_m, evidence, rig, back, side)
     arms = [
-        _AT[f"{part}.{side}"]
+        LANDMARK[f"{part}.{side}"]
         for part in ("elbow", "wrist", "pinky", "index", "thumb")
         for side in "LR"
     ]
@@ -48,15 +47,15 @@ def resolve_arm_depths(evidence: Evidence, rig: Rig) -> Evidence:
 
 def _back(points_m: Floats) -> Floats:
     """Unit vectors out of the back, (T, 3)."""
-    left, right = points_m[:, _AT["shoulder.L"]], points_m[:, _AT["shoulder.R"]]
-    hips = 0.5 * (points_m[:, _AT["hip.L"]] + points_m[:, _AT["hip.R"]])
+    left, right = points_m[:, LANDMARK["shoulder.L"]], points_m[:, LANDMARK["shoulder.R"]]
+    hips = 0.5 * (points_m[:, LANDMARK["hip.L"]] + points_m[:, LANDMARK["hip.R"]])
     # x to the person's left, y down: their cross product points backwards.
     back = np.cross(left - right, hips - 0.5 * (left + right))
     return np.asarray(back / np.linalg.norm(back, axis=1, keepdims=True))
 
 
 def _lean(points_m: Floats, evidence: Evidence, rig: Rig, back: Floats, side: str) -> None:
-    rows = [_AT[f"{part}.{side}"] for part in ("shoulder", "elbow", "wrist")]
+    rows = [LANDMARK[f"{part}.{side}"] for part in ("shoulder", "elbow", "wrist")]
     rest = rig.keypoints.rest_m[rows]
     lengths_m = np.linalg.norm(np.diff(rest, axis=0), axis=1)
     shoulder = points_m[:, rows[0]]
@@ -70,7 +69,7 @@ def _lean(points_m: Floats, evidence: Evidence, rig: Rig, back: Floats, side: st
     points_m[:, rows[1]] = elbow[frames, chosen]
     shift = wrist[frames, chosen] - points_m[:, rows[2]]
     for part in ("wrist", "pinky", "index", "thumb"):
-        points_m[:, _AT[f"{part}.{side}"]] += shift
+        points_m[:, LANDMARK[f"{part}.{side}"]] += shift
 
 
 def _on_ray(start: Floats, ray: Floats, length_m: float, sign: Floats) -> Floats:
@@ -98,7 +97,7 @@ def _likeliest(
     lean[..., 0] -= points_m[:, rows[:1], 2]
     lifted = np.diff(points_m[:, rows, 2], axis=1)[:, None]
     away = (lean - lifted) / (evidence.depth_sd_m[:, None, rows[1:]] / DEPTH_CAUTION)
-    shoulders = points_m[:, [_AT["shoulder.L"], _AT["shoulder.R"]]].mean(axis=1)
+    shoulders = points_m[:, [LANDMARK["shoulder.L"], LANDMARK["shoulder.R"]]].mean(axis=1)
     beyond = ((both - shoulders[:, None, None]) * back[:, None, None]).sum(axis=-1)
     behind = np.maximum(beyond - _COMMON_M, 0.0) / _BEHIND_SD_M
     price = _saturated(away).sum(axis=-1) + _saturated(behind).sum(axis=-1)  # (T, 4)

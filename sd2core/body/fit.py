@@ -16,10 +16,9 @@ from sd2core.body.evidence import EvidenceInParts
 from sd2core.body.fit_windows import Windows
 from sd2core.body.fitted import PER_FRAME, BodyFit, FittedMotion, mean_over_limbs
 from sd2core.body.initial import initial_pose
-from sd2core.body.keypoints import KeypointSpace
 from sd2core.body.lifter import Lifted, LiftedInParts, Lifter
 from sd2core.body.limbs import LIMBS
-from sd2core.body.rig import Rig
+from sd2core.body.rig import KeypointSpace, Rig
 from sd2core.body.rotations import Floats
 from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.body.shaping import shape_of_lengths, shape_of_outlines

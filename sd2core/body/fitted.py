@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.initial import Pose
-from sd2core.body.keypoints import KeypointSpace
 from sd2core.body.limbs import LIMB_LANDMARKS, LIMBS, vertex_limbs
 from sd2core.body.model import Body, Resolution
-from sd2core.body.rig import Rig
+from sd2core.body.rig import KeypointSpace, Rig
 from sd2core.body.rotations import Floats
 from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.body.skinning import pose_vertices

@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 
 from sd2core.body.rig import JOINT, JOINTS, Rig
 from sd2core.body.rotations import Floats, aligning, applied, from_vector, to_vector, transposed
-from sd2core.body.track import LANDMARKS
+from sd2core.body.track import LANDMARK
 
-_AT = {name: row for row, name in enumerate(LANDMARKS)}
 _FACE = ("nose", "ear.L", "ear.R", "eye_outer.L", "eye_outer.R", "mouth.L", "mouth.R")
 
 
@@ -57,15 +56,15 @@ def initial_pose(rig: Rig, seen_m: Floats, trust: Floats) -> Pose:
 
 
 def _pairs(first: str, second: str) -> list[tuple[int, int]]:
-    return [(_AT[first], _AT[second])]
+    return [(LANDMARK[first], LANDMARK[second])]
 
 
 def _spokes(hub: str, others: tuple[str, ...]) -> list[tuple[int, int]]:
-    return [(_AT[hub], _AT[other]) for other in others]
+    return [(LANDMARK[hub], LANDMARK[other]) for other in others]
 
 
 def _across(low: str, high: str) -> list[tuple[int, int]]:
-    return [(_AT[f"{low}.{a}"], _AT[f"{high}.{b}"]) for a in "LR" for b in "LR"]
+    return [(LANDMARK[f"{low}.{a}"], LANDMARK[f"{high}.{b}"]) for a in "LR" for b in "LR"]
 
 
 class _Fitting:
@@ -83,7 +82,7 @@ class _Fitting:
 
     def hinge(self, name: str, chain: list[str]) -> None:
         """Bend until the angle between the two bones is the one seen."""
-        first, middle, last = (_AT[point] for point in chain)
+        first, middle, last = (LANDMARK[point] for point in chain)
         rest = self.rig.keypoints.rest_m
         at_rest = _angle(rest[middle] - rest[first], rest[last] - rest[middle])
         seen = _angle(
@@ -96,7 +95,7 @@ class _Fitting:
     def hand(self, side: str) -> None:
         """Wrist and twist of the forearm: half of the twist at each of its places."""
         knuckles = [f"{part}.{side}" for part in ("index", "pinky", "thumb")]
-        pairs = [(_AT[f"wrist.{side}"], _AT[point]) for point in knuckles]
+        pairs = [(LANDMARK[f"wrist.{side}"], LANDMARK[point]) for point in knuckles]
         pairs += _pairs(f"pinky.{side}", f"index.{side}")
         turn = self._turn(f"wrist.{side}", pairs)
         axis = self.rig.axes[JOINT[f"pronation.{side}"]][:, 0]

@@ -1,25 +1,34 @@
-"""Landmark files: a whole track for exchange, and the state of a stopped search."""
+"""Landmarks on disk: a whole track in a file, and a search in a folder, read part by part."""
 
 from __future__ import annotations
 
+import hashlib
 import json
+import os
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.body.landmark_repair import RawTrack, repair_landmarks
+from sd2core.body.person_selection import Rectangle
+from sd2core.body.refining import Stretch
 from sd2core.body.track import PER_FRAME, Landmarks, LandmarkTrack, parts
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
+from sd2core.io.video import VideoReader
 from sd2core.timebase import Timebase
 
 FORMAT = "sd2-landmarks"
 VERSION = 1
+_SEARCH_VERSION = 1
 
 _ARRAYS = (*PER_FRAME, "silhouette_frames", "silhouettes")
+_PLACES = ("image_px", "depth_px", "world_m", "visibility")
 
 
 def save_track(track: Landmarks, path: Path | str) -> None:
@@ -119,3 +128,184 @@ def _unreadable(path: Path, why: object) -> Sd2Error:
     return Sd2Error(
         f"{path} cannot be read as landmarks ({why})", "a file written by SD² Studio (.npz)"
     )
+
+
+class SearchStore:
+    """Arrays by name: files of a folder, or without one in memory.
+
+    Files of another search (video, person, silhouettes) are ignored.
+    """
+
+    def __init__(
+        self,
+        folder: Path | None,
+        video: VideoReader,
+        person: Rectangle | None,
+        silhouettes: int | None,
+    ) -> None:
+        self._folder = folder
+        self._in_memory: dict[str, dict[str, Any]] = {}
+        if folder is None:
+            return
+        folder.mkdir(parents=True, exist_ok=True)
+        about = os.stat(video.path)
+        identity = {
+            "version": _SEARCH_VERSION,
+            "video": [str(video.path.resolve()), about.st_size, about.st_mtime_ns],
+            "frames": [len(video), video.width, video.height],
+            "person": None if person is None else list(vars(person).values()),
+            "silhouettes": silhouettes,
+        }
+        self._key = hashlib.sha256(json.dumps(identity).encode()).hexdigest()
+
+    def read(self, name: str) -> dict[str, Any] | None:
+        """Arrays of a name, or None if this search has not written them."""
+        if self._folder is None:
+            return self._in_memory.get(name)
+        if not (self._folder / name).is_file():
+            return None
+        try:
+            arrays, meta = read_arrays(self._folder / name)
+        except Sd2Error:
+            return None
+        return arrays if meta.get("key") == self._key else None
+
+    def write(self, name: str, arrays: Mapping[str, Any]) -> None:
+        """Keep arrays under a name."""
+        if self._folder is None:
+            self._in_memory[name] = dict(arrays)
+        else:
+            write_arrays(self._folder / name, arrays, {"key": self._key})
+
+
+class TrackInParts:
+    """Landmarks in a store, repaired; see :class:`~sd2core.body.track.Landmarks`."""
+
+    def __init__(
+        self,
+        store: SearchStore,
+        timebase: Timebase,
+        width: int,
+        height: int,
+        refined: RefinedStretches,
+        max_gap_s: float,
+    ) -> None:
+        self.timebase, self.width, self.height = timebase, width, height
+        self.silhouette_frames, self.silhouettes = refined.silhouettes()
+        self._store = store
+        self._starts = [start for start, _ in parts(len(timebase))]
+        self._kept = lru_cache(maxsize=2)(self._read)
+        self.present, self.bridged = np.zeros((2, len(timebase)), bool)
+        written = 0
+
+        def write(found: RawTrack) -> None:
+            nonlocal written
+            frames = slice(written, written + len(found.present))
+            known = vars(found) | {"confidence": refined.confidence[frames]}
+            store.write(_name(written), {name: known[name] for name in PER_FRAME})
+            self.present[frames], self.bridged[frames] = found.present, found.bridged
+            written = frames.stop
+
+        self.notes = repair_landmarks(
+            refined.found, timebase.times_s, refined.confidence > 0.0, max_gap_s, write
+        )
+
+    def __len__(self) -> int:
+        return len(self.timebase)
+
+    def part(self, start: int, stop: int) -> LandmarkTrack:
+        """Frames ``start`` to ``stop`` as a track of their own."""
+        first = int(np.searchsorted(self._starts, start, side="right")) - 1
+        last = max(int(np.searchsorted(self._starts, stop)), first + 1)
+        pieces = [self._kept(begin) for begin in self._starts[first:last]]
+        cut = slice(start - self._starts[first], stop - self._starts[first])
+        kept = (self.silhouette_frames >= start) & (self.silhouette_frames < stop)
+        return LandmarkTrack(
+            timebase=Timebase(self.timebase.times_s[start:stop]),
+            width=self.width,
+            height=self.height,
+            silhouette_frames=self.silhouette_frames[kept] - start,
+            silhouettes=self.silhouettes[kept],
+            notes=self.notes,
+            **{name: _joined(pieces, name)[cut] for name in PER_FRAME},
+        )
+
+    def _read(self, start: int) -> Mapping[str, NDArray[Any]]:
+        arrays = self._store.read(_name(start))
+        if arrays is None:
+            raise Sd2Error(
+                f"The landmarks of frames {start} and on have gone from the folder of the work",
+                "a folder that no other program changes",
+                "Start the same command again; it goes on from what is there",
+            )
+        return arrays
+
+
+class RefinedStretches:
+    """Results of the second pass, stretch by stretch in a store."""
+
+    def __init__(self, store: SearchStore, video: VideoReader, stretch_frames: int) -> None:
+        self._store, self._frames_each = store, stretch_frames
+        self._times_s = video.timebase.times_s
+        self.confidence = np.zeros(len(video), np.float32)
+        self._masks: list[tuple[NDArray[np.intp], NDArray[np.uint8]]] = []
+
+    def add(self, start: int, stretch: Stretch) -> None:
+        """Keep a stretch that has been looked at."""
+        self._store.write(self._name(start), vars(stretch))
+        self._count(start, stretch)
+
+    def resumed(self, start: int) -> bool:
+        """True if the stretch that begins with a frame is in the store already."""
+        stretch = self._read(start)
+        if stretch is not None:
+            self._count(start, stretch)
+        return stretch is not None
+
+    def silhouettes(self) -> tuple[NDArray[np.intp], NDArray[np.uint8]]:
+        """All frames with a mask, and the masks."""
+        frames, masks = zip(*self._masks, strict=True)
+        return np.concatenate(frames), np.concatenate(masks)
+
+    def found(self, start: int, stop: int) -> RawTrack:
+        """Frames ``start`` to ``stop``, not repaired."""
+        step = self._frames_each
+        begin = start // step * step
+        stretches = []
+        for first in range(begin, stop, step):
+            stretch = self._read(first)
+            if stretch is None:
+                raise Sd2Error(
+                    f"What was found in frame {first} and on has gone from the folder of the work",
+                    "a folder that no other program changes",
+                    "Start the same command again; it goes on from what is there",
+                )
+            stretches.append(vars(stretch))
+        cut = slice(start - begin, stop - begin)
+        return RawTrack(
+            times_s=self._times_s[start:stop],
+            present=self.confidence[start:stop] > 0.0,
+            bridged=np.zeros(stop - start, bool),
+            **{name: _joined(stretches, name)[cut] for name in _PLACES},
+        )
+
+    def _count(self, start: int, stretch: Stretch) -> None:
+        """Note what has to be known of the whole clip."""
+        self.confidence[start : start + len(stretch.confidence)] = stretch.confidence
+        self._masks.append((stretch.silhouette_frames, stretch.silhouettes))
+
+    def _read(self, start: int) -> Stretch | None:
+        arrays = self._store.read(self._name(start))
+        return None if arrays is None else Stretch(**arrays)
+
+    @staticmethod
+    def _name(start: int) -> str:
+        return f"refined-{start:07d}.npz"
+
+
+def _name(start: int) -> str:
+    return f"mended-{start:07d}.npz"
+
+
+def _joined(pieces: Sequence[Mapping[str, NDArray[Any]]], name: str) -> NDArray[Any]:
+    return np.concatenate([piece[name] for piece in pieces])

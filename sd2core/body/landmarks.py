@@ -9,9 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.blazepose import Pose, PoseDetector, PoseLandmarker
-from sd2core.body.landmark_files import load_track, save_track
+from sd2core.body.landmark_files import (
+    RefinedStretches,
+    SearchStore,
+    TrackInParts,
+)
 from sd2core.body.landmark_models import LandmarkModels
-from sd2core.body.landmark_store import RefinedStretches, SearchStore, TrackInParts
 from sd2core.body.person_selection import Rectangle, Start, find_person_in, find_prominent_person
 from sd2core.body.refining import Refiner
 from sd2core.body.roi import Roi, Sightings, roi_numbers, roi_of, roi_path
@@ -20,8 +23,6 @@ from sd2core.errors import Sd2Error
 from sd2core.io.video import VideoReader
 from sd2core.numerics.compiled import worker_count
 from sd2core.progress import Progress, silent
-
-__all__ = ["Rectangle", "find_landmarks", "load_track", "save_track"]
 
 OnFrame = Callable[[int, NDArray[np.float32], NDArray[np.float32]], None]
 """``on_frame(frame, image_px (33, 2), visibility (33,))``."""

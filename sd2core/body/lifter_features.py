@@ -169,9 +169,6 @@ def _foreshortening(around: Floats, world_m: Floats) -> tuple[Floats, Floats, Fl
 
 def rate(values: Floats, axis: int) -> Floats:
     """Derivative per second: central differences along one axis, one-sided at its ends."""
-    values = np.moveaxis(np.asarray(values), axis, 0)
-    if len(values) < 2:
-        return np.moveaxis(np.zeros_like(values), 0, axis)
-    inner = (values[2:] - values[:-2]) / 2.0
-    ends = values[1] - values[0], values[-1] - values[-2]
-    return np.moveaxis(RATE_HZ * np.concatenate([ends[0][None], inner, ends[1][None]]), 0, axis)
+    if values.shape[axis] < 2:
+        return np.zeros_like(values)
+    return np.asarray(RATE_HZ * np.gradient(values, axis=axis))

@@ -19,7 +19,7 @@ VERSION = 2
 INFLUENCES = 8
 """Bones per vertex, at most."""
 
-_SKELETON = ("bone_names", "bone_parents", "bone_heads", "bone_tails", "bone_rotations")
+_SKELETON = ("bone_names", "bone_parents", "bone_heads", "bone_tails")
 
 Resolution = Literal["low", "medium", "high"]
 
@@ -32,7 +32,6 @@ class Skeleton:
     parents: tuple[int, ...]  # -1 for the root
     heads_m: Floats  # (B, 3) points about which the bones turn
     tails_m: Floats  # (B, 3)
-    rotations: Floats  # (B, 3, 3) axes as Anny defines them, in columns; for exchange only
 
     @cached_property
     def index(self) -> Mapping[str, int]:
@@ -58,7 +57,6 @@ class Skeleton:
             tuple(place[self.parents[bone]] for bone in numbers),
             self.heads_m[rows],
             self.tails_m[rows],
-            self.rotations[rows],
         )
         return pruned, rows
 
@@ -149,13 +147,12 @@ class Body:
 
 def load_skeleton(path: Path | None = None) -> Skeleton:
     """Read the bones of the bundled body (or of another export)."""
-    names, parents, heads, tails, rotations = read_body_arrays(_SKELETON, path)
+    names, parents, heads, tails = read_body_arrays(_SKELETON, path)
     return Skeleton(
         names=tuple(str(name) for name in names),
         parents=tuple(int(parent) for parent in parents),
         heads_m=heads.astype(np.float64),
         tails_m=tails.astype(np.float64),
-        rotations=rotations.astype(np.float64),
     )
 
 

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.camera import PinholeCamera
-from sd2core.body.keypoints import KeypointSpace
 from sd2core.body.model import Body
+from sd2core.body.rig import KeypointSpace
 from sd2core.body.rotations import Floats
 from sd2core.body.shape import BodyShape, ShapeSpace
-from sd2core.body.silhouette import overlap, silhouette
 from sd2core.body.skinning import pose_vertices
-from sd2core.body.track import LANDMARKS
+from sd2core.body.track import LANDMARK
+from sd2core.numerics.raster import rasterise
 
 Transforms = Callable[[BodyShape], Floats]
 
-_AT = {name: row for row, name in enumerate(LANDMARKS)}
 _SEGMENTS = (
     ("shoulder.L", "shoulder.R", 0.03),
     ("hip.L", "hip.R", 0.03),
@@ -37,6 +37,9 @@ _OUTLINE_WEIGHT = 60.0
 """Worth of a whole overlap against half a squared standard deviation of shape."""
 _TRIALS = 90
 
+NEAREST_M = 0.05
+"""Smallest depth that is drawn."""
+
 
 def shape_of_lengths(
     space: ShapeSpace, keypoints: KeypointSpace, seen_m: Floats, trust: Floats, stature_m: float
@@ -47,7 +50,7 @@ def shape_of_lengths(
     """
     rows, lengths, sds = [], [], []
     for first, second, sd_m in _SEGMENTS:
-        pair = _AT[first], _AT[second]
+        pair = LANDMARK[first], LANDMARK[second]
         seen = trust[:, pair].min(axis=1) > _SEEN
         if seen.sum() < min(_ENOUGH_FRAMES, len(seen)):
             continue
@@ -118,3 +121,39 @@ def shape_of_outlines(
         bounds=[(-2.5, 2.5)] * len(space),
     )
     return shaped(found.x)
+
+
+def silhouette(
+    vertices_m: NDArray[Any],
+    faces: NDArray[np.int32],
+    camera: PinholeCamera,
+    size: tuple[int, int] | None = None,
+) -> NDArray[np.bool_]:
+    """Mask (height, width) of the pixels that a mesh in the camera frame covers.
+
+    ``size`` (width, height) is that of the mask, which shows the whole picture; by default the
+    picture's own.
+    """
+    width, height = size or (camera.width, camera.height)
+    vertices = np.asarray(vertices_m, np.float64)
+    ahead = vertices[:, 2] > NEAREST_M
+    kept = faces[ahead[faces].all(axis=1)]
+    depth = np.where(ahead, vertices[:, 2], 1.0)
+    points = camera.project(np.concatenate([vertices[:, :2], depth[:, None]], axis=1))
+    points *= np.array([width / camera.width, height / camera.height])
+    buffer = np.zeros((height, width), np.float32)
+    owner = np.full((height, width), -1, np.int32)
+    rasterise(
+        points.astype(np.float32),
+        (1.0 / depth).astype(np.float32),
+        np.ascontiguousarray(kept, np.int32),
+        buffer,
+        owner,
+    )
+    return owner >= 0
+
+
+def overlap(one: NDArray[np.bool_], other: NDArray[np.bool_]) -> float:
+    """Intersection over union of two masks of one size; NaN when both are empty."""
+    union = int(np.count_nonzero(one | other))
+    return int(np.count_nonzero(one & other)) / union if union else float("nan")

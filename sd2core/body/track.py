@@ -49,6 +49,9 @@ LANDMARKS = (
 )
 """The 33 landmarks of BlazePose in its order; L and R are the person's own sides."""
 
+LANDMARK = {name: number for number, name in enumerate(LANDMARKS)}
+"""Number of a landmark by its name."""
+
 MIRRORED = tuple(
     LANDMARKS.index(
         name[:-1] + {"L": "R", "R": "L"}[name[-1]] if name[-2:] in (".L", ".R") else name

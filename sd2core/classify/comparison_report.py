@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from sd2core.classify.comparison import Run, Table, gains
 from sd2core.classify.experiment import Condition
 from sd2core.classify.metrics import mean_recall, recalls, shares
+from sd2core.files.tables import markdown_table, numbers_table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -123,12 +124,12 @@ def confusion_rows(table: Table, condition: Condition) -> Rows:
 
 def as_text(table: Table) -> str:
     """Return all tables for a terminal."""
-    return "\n".join(_lines(table, _plain))
+    return "\n".join(_lines(table, numbers_table))
 
 
 def as_markdown(table: Table) -> str:
     """Return all tables in Markdown."""
-    return "\n".join(_lines(table, _markdown)) + "\n"
+    return "\n".join(_lines(table, markdown_table)) + "\n"
 
 
 def mean_confusion(table: Table, condition: Condition) -> NDArray[np.float64]:
@@ -237,22 +238,6 @@ def _number(values: NDArray[np.float64], scale: float = 100.0, digits: int = 1) 
         return "–"
     text = f"{known.mean():.{digits}f}"
     return text if len(known) < 2 else f"{text} ± {known.std(ddof=1):.{digits}f}"
-
-
-def _plain(rows: Sequence[Sequence[str]]) -> list[str]:
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return [
-        "  ".join(
-            text.rjust(width) if place else text.ljust(width)
-            for place, (text, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in rows
-    ]
-
-
-def _markdown(rows: Sequence[Sequence[str]]) -> list[str]:
-    rule = ["---", *["---:"] * (len(rows[0]) - 1)]
-    return [f"| {' | '.join(row)} |" for row in (rows[0], rule, *rows[1:])]
 
 
 # -- Figures -------------------------------------------------------------------------------------

@@ -71,22 +71,10 @@ class TrainedClassifier:
             When the map is not on the axis that the model knows.
         """
         matching.check_bins(doppler, self.card)
-        energies = np.ascontiguousarray(doppler.values.T)  # (frames, bins)
-        found = np.tile(self.card.no_person(), (len(energies), 1))
-        done, total = 0, len(energies)
-
-        def work(values: NDArray[np.float32]) -> Probabilities:
-            return self.probabilities_of(values, lambda frames, _: progress(done + frames, total))
-
-        rate_hz = self.card.frame_rate_hz
-        for start, stop in matching.stretches(doppler, rate_hz):
-            values, times_s = energies[start:stop], doppler.times_s[start:stop]
-            done = start
-            if matching.is_regular(times_s, rate_hz):
-                found[start:stop] = work(values)
-            else:
-                found[start:stop] = matching.at_rate(work, values, times_s, rate_hz)
-        progress(total, total)
+        found = np.tile(self.card.no_person(), (len(doppler.timebase), 1))
+        matching.apply_to_stretches(
+            self.probabilities_of, doppler, self.card.frame_rate_hz, found, progress
+        )
         return found
 
     def probabilities_of(

@@ -9,7 +9,8 @@ import torch
 from torch import Tensor, nn
 
 from sd2core.classify.defaults import MODELS, WIDTH
-from sd2core.denoise.s4_layer import S4Layer
+from sd2core.denoise.registry import check_option
+from sd2core.denoise.s4_layer import S4Layer, S4Stack
 from sd2core.errors import Sd2Error
 
 State = Any
@@ -82,7 +83,7 @@ class LstmClassifier(Classifier):
         return self.head(hidden), state
 
 
-class S4Classifier(Classifier):
+class S4Classifier(S4Stack, Classifier):
     """S4 layers of the denoiser between a linear layer and the head.
 
     ``size`` is the number of features per frame, ``width`` the channels, ``state_size`` the
@@ -109,30 +110,6 @@ class S4Classifier(Classifier):
             for _ in range(depth)
         )
 
-    def initial_state(self, batch: int = 1) -> State:
-        """Return one state per layer."""
-        return [layer.initial_state(batch) for layer in self.layers]
-
-    def forward(self, features: Tensor) -> Tensor:
-        """Process whole clips by convolution."""
-        hidden = self.lift(features)
-        for layer in self.layers:
-            hidden = layer(hidden)
-        return self.head(hidden)
-
-    def chunk(self, features: Tensor, state: State) -> tuple[Tensor, State]:
-        """Process the next frames by recurrence."""
-        hidden, after = self.lift(features), []
-        for layer, one in zip(self.layers, state, strict=True):
-            hidden, one = layer.chunk(hidden, one)
-            after.append(one)
-        return self.head(hidden), after
-
-    def ssm_parameters(self) -> Iterator[nn.Parameter]:
-        """Yield the parameters of all state spaces."""
-        for layer in self.layers:
-            yield from layer.ssm_parameters()
-
 
 _MODELS: Mapping[str, type[Classifier]] = {"lstm": LstmClassifier, "s4": S4Classifier}
 _OPTIONS: Mapping[str, Mapping[str, Any]] = {
@@ -158,17 +135,7 @@ def build(name: str, size: int, classes: int, **given: Any) -> Classifier:
     """
     known = options(name)
     for option, value in given.items():
-        if option not in known:
-            raise Sd2Error(
-                f"The classifier {name} has no option {option!r}", f"one of {', '.join(known)}"
-            )
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise Sd2Error(f"{name}: {option} is {value!r}", "a number")
-        if isinstance(known[option], int):
-            if not isinstance(value, int) or not 1 <= value <= _LARGEST:
-                raise Sd2Error(f"{name}: {option} is {value!r}", f"a whole number, 1 to {_LARGEST}")
-        elif not 0 <= value < 1:
-            raise Sd2Error(f"{name}: {option} is {value!r}", "a share from 0 to below 1")
+        check_option(f"classifier {name}", option, value, known, _LARGEST)
     return _MODELS[name](size, classes, **{**known, **given})
 
 

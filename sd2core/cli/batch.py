@@ -10,8 +10,17 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sd2core.cli.options import add_command, add_json, positive_int
-from sd2core.cli.output import counted, duration, print_facts, print_json, print_rows
+from sd2core.cli.options import add_command, add_json_and_progress, positive_int
+from sd2core.cli.output import (
+    counted,
+    duration,
+    print_event,
+    print_facts,
+    print_json,
+    print_rows,
+    progress_bar,
+)
+from sd2core.cli.running import INTERRUPTED
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
@@ -20,7 +29,6 @@ if TYPE_CHECKING:
     from sd2core.batch.plan import BatchPlan
     from sd2core.batch.run import BatchEnd, Watch
 
-_INTERRUPTED = 130
 _LISTED_FAILURES = 10
 _LISTED_UNUSABLE = 5
 
@@ -71,13 +79,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         metavar="FOLDER",
         help="stop the batch in this folder; the same command resumes it",
     )
-    shown = parser.add_mutually_exclusive_group()
-    add_json(shown)
-    shown.add_argument(
-        "--progress-json",
-        action="store_true",
-        help="print progress as JSON lines, for other programs (docs/formats.md)",
-    )
+    add_json_and_progress(parser)
 
 
 def _batch(options: argparse.Namespace) -> int:
@@ -118,7 +120,7 @@ def _run(plan: BatchPlan, options: argparse.Namespace) -> int:
     elif not options.progress_json:
         _print_end(plan, end)
     if end.interrupted:
-        return _INTERRUPTED
+        return INTERRUPTED
     return 1 if end.failed else 0
 
 
@@ -126,7 +128,7 @@ def _run(plan: BatchPlan, options: argparse.Namespace) -> int:
 def _watching(options: argparse.Namespace) -> Iterator[Watch]:
     """Show progress as lines on standard output, or as a bar on a terminal."""
     if options.progress_json:
-        yield lambda event: print(json.dumps(event, ensure_ascii=False), flush=True)
+        yield lambda event: print_event(**event)
         return
     from tqdm import tqdm
 
@@ -212,7 +214,6 @@ def _times(status: BatchStatus) -> dict[str, str]:
 
 def _dry_run(plan: BatchPlan, options: argparse.Namespace) -> int:
     from sd2core.batch.estimate import estimate
-    from sd2core.cli.output import progress_bar
     from sd2core.numerics.compiled import worker_count
 
     workers = options.workers or worker_count()

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.options import add_command, add_json, add_mesh_reading, position
-from sd2core.cli.output import print_json, progress_bar
+from sd2core.cli.output import print_json, print_rows, progress_bar
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
@@ -99,12 +99,11 @@ def _compare(options: argparse.Namespace) -> None:
     if options.json:
         print_json(comparison.as_dict())
         return
-    for line in table(comparison):
-        print(line)
+    _print(comparison)
 
 
-def table(comparison: Comparison) -> list[str]:
-    """Lines of text: one per mesh, then the notes."""
+def _print(comparison: Comparison) -> None:
+    """Print a line per mesh, then the notes."""
     from sd2core.compare.joints import JOINTS
 
     where = "where they are" if comparison.alignment == "none" else "from the pelvis"
@@ -123,19 +122,13 @@ def table(comparison: Comparison) -> list[str]:
         cells.append(f"{one.jitter_mps3.mean():.0f}")
         cells.append("" if is_reference else f"{one.map_l1:.3f}")
         rows.append(cells)
-    widths = [max(len(row[column]) for row in rows) for column in range(len(head))]
-    lines = [
+    print(
         f"{len(times)} common frames, {times[0]:.2f} to {times[-1]:.2f} s; sensor at ({place}) m;"
         f" {len(JOINTS)} joints compared {where}"
-    ]
-    for row in rows:
-        cells = [
-            cell.ljust(width) if column == 0 else cell.rjust(width)
-            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ]
-        lines.append("  ".join(cells).rstrip())
-    lines += [f"note: {note}" for note in comparison.notes]
-    return lines
+    )
+    print_rows(rows, right=range(1, len(head)))
+    for note in comparison.notes:
+        print(f"note: {note}")
 
 
 def _labels(options: argparse.Namespace) -> list[str]:

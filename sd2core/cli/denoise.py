@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from sd2core.cli.options import add_command, add_json
+from sd2core.cli.options import add_command, add_json, add_map_output
 from sd2core.cli.output import progress_bar
 from sd2core.errors import Sd2Error
 
@@ -29,9 +29,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         ),
     )
     parser.add_argument("map", type=Path, metavar="MAP", help="a map from `sd2 synth`")
-    parser.add_argument(
-        "--out", type=Path, required=True, metavar="FILE.npz", help="the map to write"
-    )
+    add_map_output(parser)
     parser.add_argument(
         "--model",
         metavar="FILE|NAME",

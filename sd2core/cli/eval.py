@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.options import add_command
 from sd2core.cli.output import finite, progress_bar
@@ -48,67 +49,89 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--data", type=Path, nargs="+", required=True, metavar="PAIRS", help="stores of pairs"
     )
+    add_judging(parser, "those that the first model's run kept for the test, or all", "the errors")
+    parser.add_argument("--markdown", type=Path, metavar="FILE", help="write the tables")
+
+
+def add_judging(parser: argparse.ArgumentParser, usual_subjects: str, drawn: str) -> None:
+    """Add whom an evaluation judges on which maps, and the files of its result."""
     parser.add_argument(
         "--subjects",
         metavar="NAMES",
-        help="who is judged, separated by commas, or `all` (default: those that the first model's"
-        " run kept for the test, or all)",
+        help=f"people to evaluate on, separated by commas, or `all` (default: {usual_subjects})",
     )
     parser.add_argument(
         "--all-placements",
         action="store_true",
-        help="judge also what other places of the sensor saw, not each take's own only",
+        help="use also the maps from other places of the sensor, not only each movement's own",
     )
     parser.add_argument(
         "--json", type=Path, metavar="FILE", help="write all numbers, or - to print them"
     )
     parser.add_argument(
-        "--plot", type=Path, metavar="FILE", help="draw the errors, as .png, .svg or .pdf"
+        "--plot", type=Path, metavar="FILE", help=f"draw {drawn}, as .png, .svg or .pdf"
     )
-    parser.add_argument("--markdown", type=Path, metavar="FILE", help="write the tables")
 
 
-def _eval(options: argparse.Namespace) -> None:
+def check_result_files(options: argparse.Namespace) -> None:
+    """Refuse files of ``--json`` and ``--plot`` that cannot be written."""
     from sd2core.cli.reading import check_output
-    from sd2core.files.atomic import atomic_write_text
-    from sd2core.files.figure_files import SUFFIXES, save_figure
+    from sd2core.files.figure_files import SUFFIXES
 
     if options.plot is not None:
         check_output(options.plot, *SUFFIXES)
     if options.json not in (None, _STANDARD_OUTPUT):
         check_output(options.json, ".json")
+
+
+def named_subjects(text: str, everybody: tuple[str, ...]) -> tuple[str, ...]:
+    """Parse ``--subjects``."""
+    return everybody if text == "all" else tuple(name for name in text.split(",") if name)
+
+
+def print_or_write(options: argparse.Namespace, content: Mapping[str, Any]) -> bool:
+    """Print all numbers or write them, as ``--json`` says; True where they were printed."""
+    from sd2core.files.atomic import atomic_write_text
+
+    text = json.dumps(finite(content), indent=2, ensure_ascii=False)
+    if options.json == _STANDARD_OUTPUT:
+        print(text)
+        return True
+    if options.json is not None:
+        atomic_write_text(options.json, text + "\n")
+    return False
+
+
+def _eval(options: argparse.Namespace) -> None:
+    from sd2core.cli.reading import check_output
+    from sd2core.files.atomic import atomic_write_text
+    from sd2core.files.figure_files import save_figure
+
+    check_result_files(options)
     if options.markdown is not None:
         check_output(options.markdown, ".md")
     from sd2core.train.data import read_mixed
-    from sd2core.train.evaluate import evaluate
+    from sd2core.train.evaluation import evaluate
     from sd2core.train.evaluation_text import as_markdown, as_text, draw
 
     pairs = read_mixed(options.data)
+    subjects = None
+    if options.subjects is not None:
+        subjects = named_subjects(options.subjects, pairs.subjects)
     with progress_bar("Denoising", unit="take") as progress:
         evaluation = evaluate(
             [_loaded(model) for model in options.models],
             pairs,
-            _subjects(options.subjects, pairs.subjects),
+            subjects,
             first_only=not options.all_placements,
             progress=progress,
         )
-    content = json.dumps(finite(evaluation.to_json()), indent=2, ensure_ascii=False)
-    if options.json == _STANDARD_OUTPUT:
-        print(content)
-    else:
+    if not print_or_write(options, evaluation.to_json()):
         print(as_text(evaluation))
-    if options.json not in (None, _STANDARD_OUTPUT):
-        atomic_write_text(options.json, content + "\n")
     if options.plot is not None:
         save_figure(draw(evaluation), options.plot)
     if options.markdown is not None:
         atomic_write_text(options.markdown, as_markdown(evaluation))
-
-
-def _subjects(text: str | None, everybody: tuple[str, ...]) -> tuple[str, ...] | None:
-    if text is None:
-        return None
-    return everybody if text == "all" else tuple(name for name in text.split(",") if name)
 
 
 def _loaded(model: str) -> TrainedDenoiser:

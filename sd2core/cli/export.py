@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import shlex
 import sys
 import time
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from sd2core.cli.options import (
     add_axis,
     add_command,
-    add_json,
+    add_json_and_progress,
     add_people_kept_out,
     bin_list,
     name_list,
@@ -21,9 +20,16 @@ from sd2core.cli.options import (
     positive_int,
     share,
 )
-from sd2core.cli.output import counted, duration, print_facts, print_json, progress_bar
+from sd2core.cli.output import (
+    counted,
+    duration,
+    print_event,
+    print_facts,
+    print_json,
+    progress_bar,
+    progress_events,
+)
 from sd2core.errors import Sd2Error
-from sd2core.runs.pace import Pace
 
 if TYPE_CHECKING:
     from sd2core.datasets.forecast import Forecast
@@ -68,11 +74,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--dry-run", action="store_true", help="print counts, size and time, and write nothing"
     )
-    told = parser.add_mutually_exclusive_group()
-    add_json(told)
-    told.add_argument(
-        "--progress-json", action="store_true", help="print a JSON line per step, for programs"
-    )
+    add_json_and_progress(parser)
 
 
 def _add_content(parser: argparse.ArgumentParser) -> None:
@@ -172,17 +174,16 @@ def _add_making(parser: argparse.ArgumentParser) -> None:
 
 
 def _export(options: argparse.Namespace) -> int:
-    lines = _Lines() if options.progress_json else None
     try:
-        return _exported(options, lines)
+        return _exported(options)
     except Sd2Error as error:
-        if lines is None:
+        if not options.progress_json:
             raise
-        lines.say("error", text=str(error))
+        print_event("error", text=str(error))
         return 1
 
 
-def _exported(options: argparse.Namespace, lines: _Lines | None) -> int:
+def _exported(options: argparse.Namespace) -> int:
     from sd2core.datasets.layout import format_of
     from sd2core.datasets.sources import gather
 
@@ -197,18 +198,19 @@ def _exported(options: argparse.Namespace, lines: _Lines | None) -> int:
     from sd2core.runs.pace import keep_pace
 
     begun_s = time.monotonic()
-    if lines is not None:
-        lines.say("start", format="sd2-export-progress", version=1, sources=len(sources))
-        written = write_dataset(options.out, sources, wanted, lines.progress)
-        lines.say("progress", done=0, total=0, stage="sheet", left_s=None)
+    if options.progress_json:
+        print_event("start", format="sd2-export-progress", version=1, sources=len(sources))
+        steps = progress_events(_LINE_EVERY_S, time_left=True, stage="segments")
+        written = write_dataset(options.out, sources, wanted, steps)
+        print_event("progress", done=0, total=0, stage="sheet", left_s=None)
     else:
         with progress_bar("Exporting", "step") as progress:
             written = write_dataset(options.out, sources, wanted, progress)
     if written.added == written.sources:
         keep_pace(making.pace_kind, time.monotonic() - begun_s, written.segments)
     sheet = write_preview(options.out)
-    if lines is not None:
-        lines.say("done", **_said(written, sheet))
+    if options.progress_json:
+        print_event("done", **_said(written, sheet))
     elif options.json:
         print_json(_said(written, sheet))
     else:
@@ -342,24 +344,3 @@ def _complain(failed: tuple[str, ...] | list[str]) -> None:
 
 def _listed(counts: dict[Any, int]) -> str:
     return ", ".join(f"{name} {count:,}" for name, count in counts.items())
-
-
-class _Lines:
-    """Writer of one JSON object per line."""
-
-    def __init__(self) -> None:
-        self._last_s = -1.0
-        self._total, self._pace = 0, Pace()
-
-    def say(self, event: str, **content: Any) -> None:
-        print(json.dumps({"event": event, **content}, ensure_ascii=False), flush=True)
-
-    def progress(self, done: int, total: int) -> None:
-        now_s = time.monotonic()
-        if total != self._total:  # packing into one file has steps of its own
-            self._total, self._pace = total, Pace()
-        self._pace.take(done, now_s)
-        if now_s - self._last_s >= _LINE_EVERY_S or done == total:
-            self._last_s = now_s
-            left_s = self._pace.left_s(total - done)
-            self.say("progress", done=done, total=total, stage="segments", left_s=left_s)

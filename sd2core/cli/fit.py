@@ -9,19 +9,29 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sd2core.cli.fit_lines import FitLines
 from sd2core.cli.options import (
     add_command,
-    add_json,
+    add_json_and_progress,
     not_negative_float,
     positive_float,
 )
-from sd2core.cli.output import print_facts, print_json, progress_bar
+from sd2core.cli.output import print_event, print_facts, print_json, progress_bar, progress_events
+from sd2core.cli.running import error_text
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
-    from sd2core.body.fit_video import FitChoices, FitReport, FittedVideo
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from sd2core.body.fit_video import FitChoices, FitReport, FittedVideo, Stage
+    from sd2core.io.video import VideoReader
     from sd2core.progress import Progress
+
+_FORMAT = "sd2-fit-progress"
+_VERSION = 1
+_PROGRESS_EVERY_S = 0.05
+_LANDMARKS_EVERY_S = 0.1
+_UNITS = {"models": "byte", "fit": "step"}
 
 _BARS = {
     "models": ("Fetching the landmark models", "B"),
@@ -111,13 +121,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         action="store_true",
         help="start from the beginning, not where a stopped run ended",
     )
-    kind = parser.add_mutually_exclusive_group()
-    add_json(kind)
-    kind.add_argument(
-        "--progress-json",
-        action="store_true",
-        help="print what is done as JSON lines, for other programs (docs/formats.md)",
-    )
+    add_json_and_progress(parser)
 
 
 def _rectangle(text: str) -> tuple[float, float, float, float]:
@@ -139,33 +143,29 @@ def _frame(text: str) -> int:
 
 
 def _fit(options: argparse.Namespace) -> None:
-    lines = FitLines(options.video, options.out) if options.progress_json else None
-    if lines is None:
-        _make(options, None)
-        return
     try:
-        _make(options, lines)
+        _make(options)
     except Exception as error:
-        lines.error(error)
+        if options.progress_json:
+            print_event("error", text=error_text(error))
         raise
 
 
-def _make(options: argparse.Namespace, lines: FitLines | None) -> None:
+def _make(options: argparse.Namespace) -> None:
     if options.person_frame is not None and options.person is None:
         raise Sd2Error("--person-frame is given without --person", "the rectangle in that frame")
     if options.landmarks is not None:
         from sd2core.cli.reading import check_output
 
         check_output(options.landmarks, ".npz")
-    from sd2core.body.fit_folder import PARTIAL, check_fit_output
-    from sd2core.body.fit_video import fit_video
+    from sd2core.body.fit_video import PARTIAL, check_fit_output, fit_video
     from sd2core.runs.pace import keep_pace
 
     check_fit_output(options.out)
     goes_on = options.out.with_name(options.out.name + PARTIAL).exists() and not options.restart
     begun_s, begun_core_s = time.perf_counter(), time.process_time()
     with ExitStack() as stack:
-        report = _bars(stack) if lines is None else lines.report()
+        report = _lines(options) if options.progress_json else _bars(stack)
         made = fit_video(
             options.video,
             options.out,
@@ -179,8 +179,11 @@ def _make(options: argparse.Namespace, lines: FitLines | None) -> None:
     if not goes_on:
         core_s = time.process_time() - begun_core_s
         keep_pace(("fit", options.resolution), core_s, made.frames)
-    if lines is not None:
-        lines.done(made, seconds)
+    if options.progress_json:
+        for note in made.notes:
+            print_event("note", text=note)
+        out, seconds = str(options.out), round(seconds, 2)
+        print_event("done", out=out, frames=made.frames, present=made.present, seconds=seconds)
     elif options.json:
         print_json(_summary(options, made, seconds))
     else:
@@ -208,7 +211,7 @@ def _choices(options: argparse.Namespace) -> FitChoices:
 
 def _bars(stack: ExitStack) -> FitReport:
     """One bar after the other on standard error."""
-    from sd2core.body.fit_video import FitReport, Stage
+    from sd2core.body.fit_video import FitReport
 
     current = stack.enter_context(ExitStack())
 
@@ -221,6 +224,49 @@ def _bars(stack: ExitStack) -> FitReport:
             print("Going on where a stopped run ended", file=sys.stderr)
 
     return FitReport(progress_of, started, lambda *_: None)
+
+
+def _lines(options: argparse.Namespace) -> FitReport:
+    """Lines of JSON for another program."""
+    from sd2core.body.fit_video import STAGES, FitReport
+
+    last_landmarks_s = -1.0
+
+    def started(video: VideoReader, resumed: bool) -> None:
+        print_event(
+            "start",
+            format=_FORMAT,
+            version=_VERSION,
+            video=str(options.video),
+            out=str(options.out),
+            frames=len(video),
+            width=video.width,
+            height=video.height,
+            frames_per_s=round(video.timebase.frames_per_s, 4),
+            stages=STAGES,
+            resumed=resumed,
+        )
+
+    def progress_of(stage: Stage) -> Progress:
+        return progress_events(_PROGRESS_EVERY_S, stage=stage, unit=_UNITS.get(stage, "frame"))
+
+    def landmarks(
+        stage: Stage, frame: int, image_px: NDArray[np.float32], visibility: NDArray[np.float32]
+    ) -> None:
+        nonlocal last_landmarks_s
+        now_s = time.monotonic()
+        if now_s - last_landmarks_s < _LANDMARKS_EVERY_S:
+            return
+        last_landmarks_s = now_s
+        print_event(
+            "landmarks",
+            stage=stage,
+            frame=frame,
+            image_px=[[round(float(x), 1), round(float(y), 1)] for x, y in image_px],
+            visibility=[round(float(value), 2) for value in visibility],
+        )
+
+    return FitReport(progress_of, started, landmarks)
 
 
 def _summary(options: argparse.Namespace, made: FittedVideo, seconds: float) -> dict[str, Any]:

@@ -37,6 +37,17 @@ def add_json(parser: argparse._ActionsContainer) -> None:
     parser.add_argument("--json", action="store_true", help="print JSON, for other programs")
 
 
+def add_json_and_progress(parser: argparse.ArgumentParser) -> None:
+    """Add ``--json`` and ``--progress-json``, of which one may be given."""
+    group = parser.add_mutually_exclusive_group()
+    add_json(group)
+    group.add_argument(
+        "--progress-json",
+        action="store_true",
+        help="print progress as JSON lines, for other programs (docs/formats.md)",
+    )
+
+
 def add_axis(parser: argparse._ActionsContainer) -> None:
     """Add the velocity axis."""
     parser.add_argument(
@@ -56,6 +67,18 @@ def add_axis(parser: argparse._ActionsContainer) -> None:
 def add_mesh_and_sensor(parser: argparse.ArgumentParser) -> None:
     """Add what is looked at, and from where."""
     parser.add_argument("mesh", type=Path, metavar="MESH", help="a mesh, or a recording")
+    add_sensor(parser)
+
+
+def add_map_output(parser: argparse.ArgumentParser) -> None:
+    """Add ``--out`` for a Doppler map."""
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="FILE.npz", help="the map to write"
+    )
+
+
+def add_sensor(parser: argparse.ArgumentParser) -> None:
+    """Add ``--sensor``."""
     parser.add_argument(
         "--sensor",
         type=position,

@@ -1,14 +1,17 @@
-"""Output of commands: facts for people, JSON for programs, bars for long work."""
+"""Output of commands: facts for people, JSON for programs, progress for both."""
 
 from __future__ import annotations
 
 import json
 import sys
+import time
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
+from sd2core.files.tables import text_table
 from sd2core.progress import Progress
+from sd2core.runs.pace import Pace
 
 
 @contextmanager
@@ -28,6 +31,33 @@ def progress_bar(what: str, unit: str = "frame") -> Iterator[Progress]:
 def print_json(content: Mapping[str, Any]) -> None:
     """Print one JSON object; NaN and infinities become null."""
     print(json.dumps(finite(content), indent=2, ensure_ascii=False))
+
+
+def print_event(event: str, **content: Any) -> None:
+    """Print one line of JSON at once, for a program that follows (docs/formats.md)."""
+    line = finite({"event": event, **content})
+    print(json.dumps(line, ensure_ascii=False), flush=True)
+
+
+def progress_events(every_s: float, *, time_left: bool = False, **content: Any) -> Progress:
+    """Progress that prints events of this content, no oftener than every so many seconds.
+
+    With ``time_left`` they say how many seconds are left (``left_s``) by the pace so far.
+    """
+    last_s, pace, pace_of = -1.0, Pace(), 0
+
+    def report(done: int, total: int) -> None:
+        nonlocal last_s, pace, pace_of
+        now_s = time.monotonic()
+        if total != pace_of:  # another kind of steps
+            pace, pace_of = Pace(), total
+        pace.take(done, now_s)
+        if now_s - last_s >= every_s or done == total:
+            last_s = now_s
+            left = {"left_s": pace.left_s(total - done)} if time_left else {}
+            print_event("progress", done=done, total=total, **content, **left)
+
+    return report
 
 
 def print_facts(title: str, facts: Mapping[str, str]) -> None:
@@ -54,13 +84,7 @@ def duration(seconds: float) -> str:
 
 def print_rows(rows: Sequence[Sequence[str]], *, right: Collection[int] = ()) -> None:
     """Print a table whose first row is its heading; ``right`` are columns of numbers."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for row in rows:
-        cells = (
-            text.rjust(width) if column in right else text.ljust(width)
-            for column, (text, width) in enumerate(zip(row, widths, strict=True))
-        )
-        print("  ".join(cells).rstrip())
+    print(*text_table(rows, right), sep="\n")
 
 
 def finite(value: Any) -> Any:

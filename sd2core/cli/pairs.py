@@ -40,21 +40,26 @@ def _add_recordings(kinds: argparse._SubParsersAction) -> None:
         ),
     )
     parser.add_argument("recordings", type=Path, nargs="+", metavar="RECORDING", help="NAME.sd2")
-    parser.add_argument(
-        "--out", type=Path, required=True, metavar="PAIRS", help="the store to write (.zarr)"
-    )
+    _add_pairs(parser, "14,15,16 of 32, else none")
     parser.add_argument(
         "--subjects",
         type=lambda text: tuple(text.split(",")),
         metavar="NAMES",
         help="subject of each recording, separated by commas (default: each shows another person)",
     )
+
+
+def _add_pairs(parser: argparse.ArgumentParser, usual_null_bins: str) -> None:
+    """Add the store of pairs, and the axis and nulled bins of its maps."""
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="PAIRS", help="the store to write (.zarr)"
+    )
     add_axis(parser)
     parser.add_argument(
         "--null-bins",
         type=bin_list,
         metavar="LIST",
-        help="bins to set to zero in input and target (default: 14,15,16 of 32, else none)",
+        help=f"bins to set to zero in input and target, e.g. 14,15,16 (default: {usual_null_bins})",
     )
     add_json(parser)
 
@@ -83,16 +88,7 @@ def _add_mars(kinds: argparse._SubParsersAction) -> None:
         metavar="FOLDER",
         help="a person's kinect_data_PART.csv and radar_data_PART.csv",
     )
-    parser.add_argument(
-        "--out", type=Path, required=True, metavar="PAIRS", help="the store to write (.zarr)"
-    )
-    add_axis(parser)
-    parser.add_argument(
-        "--null-bins",
-        type=bin_list,
-        metavar="LIST",
-        help="bins to set to zero in input and target, e.g. 14,15,16 (default: none)",
-    )
+    _add_pairs(parser, "none")
     parser.add_argument(
         "--visibility",
         choices=("none", "facing", "depth", "exact"),
@@ -108,18 +104,15 @@ def _add_mars(kinds: argparse._SubParsersAction) -> None:
         choices=("share", "intensity"),
         help="target of each frame: shares that add up to 1, or intensities (default: share)",
     )
-    add_json(parser)
 
 
 def _choices(options: argparse.Namespace) -> MarsChoices:
+    from sd2core.cli.reading import chosen_axis
     from sd2core.mocap.mars_pairs import MarsChoices
-    from sd2core.sensor import VelocityAxis
 
     choices = MarsChoices()
     synthesis = choices.synthesis
-    axis = VelocityAxis(
-        options.bins or synthesis.axis.bins, options.v_max or synthesis.axis.v_max_mps
-    )
+    axis = chosen_axis(options, synthesis.axis)
     changes = {
         name: getattr(options, name)
         for name in ("null_bins", "visibility", "weight")
@@ -130,22 +123,17 @@ def _choices(options: argparse.Namespace) -> MarsChoices:
 
 
 def _recordings(options: argparse.Namespace) -> None:
-    from dataclasses import replace
-
+    from sd2core.cli.reading import chosen_axis
     from sd2core.doppler import PRESETS
     from sd2core.mocap.recording_pairs import make_recording_pairs
-    from sd2core.sensor import VelocityAxis
 
     synthesis = PRESETS["paper"]
-    if options.bins or options.v_max:
-        axis = VelocityAxis(
-            options.bins or synthesis.axis.bins, options.v_max or synthesis.axis.v_max_mps
-        )
+    axis = chosen_axis(options, synthesis.axis)
+    if axis != synthesis.axis:
         # What is nulled by default are bins of the paper's axis.
-        nulled = synthesis.null_bins if axis == synthesis.axis else ()
-        synthesis = replace(synthesis, axis=axis, null_bins=nulled)
+        synthesis = replace(synthesis, axis=axis, null_bins=())
     if options.null_bins is not None:
-        synthesis = replace(synthesis, null_bins=tuple(options.null_bins))
+        synthesis = replace(synthesis, null_bins=options.null_bins)
     with progress_bar("Making pairs") as progress:
         made = make_recording_pairs(
             options.recordings, options.out, synthesis, subjects=options.subjects, progress=progress

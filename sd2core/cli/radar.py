@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sd2core.cli.options import add_axis, add_command, add_json, span_m
+from sd2core.cli.options import add_axis, add_command, add_json, add_map_output, span_m
 from sd2core.cli.output import progress_bar
 from sd2core.errors import Sd2Error
 
@@ -38,9 +38,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         metavar="CAPTURE",
         help="the capture's folder, the .h5 of a K60168A, or a recording",
     )
-    parser.add_argument(
-        "--out", type=Path, required=True, metavar="FILE.npz", help="the map to write"
-    )
+    add_map_output(parser)
     add_axis(parser)
     parser.add_argument(
         "--clutter",
@@ -60,11 +58,10 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 def _radar(options: argparse.Namespace) -> None:
     from sd2core.cli.info.description import describe_map, limit_facts, show
-    from sd2core.cli.reading import check_map_output
+    from sd2core.cli.reading import check_map_output, chosen_axis
     from sd2core.fmcw import doppler_map, limits
     from sd2core.io.radar import holds_map, load_capture, load_recorded_map
     from sd2core.recording.recording import is_recording, open_recording
-    from sd2core.sensor import VelocityAxis
 
     check_map_output(options.out)
     offset_s = 0.0
@@ -79,11 +76,10 @@ def _radar(options: argparse.Namespace) -> None:
         return
     else:
         capture = load_capture(options.capture)
-    default = VelocityAxis()
     with progress_bar("Processing") as progress:
         doppler = doppler_map(
             capture,
-            axis=VelocityAxis(options.bins or default.bins, options.v_max or default.v_max_mps),
+            axis=chosen_axis(options),
             clutter=options.clutter,
             range_m=options.range,
             progress=progress,

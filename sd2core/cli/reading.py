@@ -14,7 +14,7 @@ from sd2core.files.atomic import check_writable
 if TYPE_CHECKING:
     from sd2core.mesh.sequence import MeshSequence
     from sd2core.recording.recording import MeshReading, Recording
-    from sd2core.sensor import VirtualSensor
+    from sd2core.sensor import VelocityAxis, VirtualSensor
 
 
 _OF_THE_MESH = ("faces", "fps", "scale", "person", "distance_m", "image_size", "focal_px")
@@ -102,6 +102,14 @@ def _given(options: argparse.Namespace, names: tuple[str, ...], but: tuple[str, 
         for name in names
         if name not in but and getattr(options, name) is not None
     ]
+
+
+def chosen_axis(options: argparse.Namespace, usual: VelocityAxis | None = None) -> VelocityAxis:
+    """Velocity axis of ``--bins`` and ``--v-max``; what is not given is as usual."""
+    from sd2core.sensor import VelocityAxis
+
+    usual = usual or VelocityAxis()
+    return VelocityAxis(options.bins or usual.bins, options.v_max or usual.v_max_mps)
 
 
 def check_output(path: Path, *suffixes: str) -> None:

@@ -10,7 +10,9 @@ from collections.abc import Sequence
 
 from sd2core.errors import Sd2Error
 
-_INTERRUPTED = 130
+INTERRUPTED = 130
+"""Exit code of a command that the user stopped."""
+
 _STARTS_WITH_NEGATIVE_NUMBER = re.compile(r"-\.?\d")
 
 
@@ -29,7 +31,7 @@ def run(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> int:
         return _explain(str(error))
     except KeyboardInterrupt:
         print("sd2: interrupted", file=sys.stderr)
-        return _INTERRUPTED
+        return INTERRUPTED
     except BrokenPipeError:
         # Whoever read the output (`| head`) has seen enough.
         _discard_output()

@@ -5,10 +5,10 @@ from __future__ import annotations
 import argparse
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from sd2core.cli.options import add_command, add_json
-from sd2core.cli.output import duration, print_facts, print_json
+from sd2core.cli.output import duration, print_facts, print_json, print_rows
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ def _runs(options: argparse.Namespace) -> None:
         _print_table(runs)
 
 
-def _steer(run: TrainingFolder, word: str) -> None:
+def _steer(run: TrainingFolder, word: Literal["pause", "resume", "stop", "cancel"]) -> None:
     state = run.state()
     if word == "cancel" and state in ("stopped", "died", "failed"):
         lock = run.lock()
@@ -77,16 +77,8 @@ def _steer(run: TrainingFolder, word: str) -> None:
         run.discard()
         print(f"{run.path} is deleted")
         return
-    if word == "pause":
-        run.tell("pause")
-    elif word == "resume":
-        run.tell("run")
-    elif word == "stop":
-        run.tell("stop")
-    else:
-        run.tell("cancel")
-    said = {"pause": "to pause", "resume": "to go on", "stop": "to stop", "cancel": "to cancel"}
-    print(f"{run.path} is told {said[word]}")
+    run.tell("run" if word == "resume" else word)
+    print(f"{run.path} is told to {'go on' if word == 'resume' else word}")
 
 
 def _print_one(run: TrainingFolder) -> None:
@@ -125,10 +117,7 @@ def _print_table(runs: list[TrainingFolder]) -> None:
                 _validation(status),
             )
         )
-    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-    for row in rows:
-        line = "  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True))
-        print(line.rstrip())
+    print_rows(rows)
 
 
 def _done(status: RunStatus) -> str:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from sd2core.cli.options import (
     add_command,
     add_mesh_reading,
-    position,
+    add_sensor,
     positive_float,
     positive_int,
 )
@@ -93,12 +93,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         metavar="N",
         help="pictures side by side; more go below (default: 10)",
     )
-    parser.add_argument(
-        "--sensor",
-        type=position,
-        metavar="X,Y,Z",
-        help="where the radar is, in metres (default: the recording's sensor, or the camera)",
-    )
+    add_sensor(parser)
     add_mesh_reading(parser)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sd2core.cli.ladder import add_wish, chosen
@@ -12,6 +11,7 @@ from sd2core.cli.options import (
     add_axis,
     add_command,
     add_json,
+    add_map_output,
     add_mesh_and_sensor,
     add_mesh_reading,
     bin_list,
@@ -82,9 +82,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         ),
     )
     add_mesh_and_sensor(parser)
-    parser.add_argument(
-        "--out", type=Path, required=True, metavar="FILE.npz", help="the map to write"
-    )
+    add_map_output(parser)
     parser.add_argument(
         "--preset",
         choices=("paper", "vid2doppler"),
@@ -288,16 +286,14 @@ def _check_fmcw(options: argparse.Namespace) -> None:
 
 
 def _by_fmcw(options: argparse.Namespace, mesh: MeshSequence, sensor: VirtualSensor) -> DopplerMap:
+    from sd2core.cli.reading import chosen_axis
     from sd2core.fmcw import doppler_map
     from sd2core.io.radar import named_radar
-    from sd2core.sensor import VelocityAxis
 
     config = named_radar(options.radar)
     capture = simulate_with_bar(mesh, sensor, config, options.visibility or "exact")
-    default = VelocityAxis()
-    axis = VelocityAxis(options.bins or default.bins, options.v_max or default.v_max_mps)
     with progress_bar("Processing") as progress:
-        doppler = doppler_map(capture, axis=axis, progress=progress)
+        doppler = doppler_map(capture, axis=chosen_axis(options), progress=progress)
     provenance = doppler.meta | {"simulation": capture.meta["simulation"]}
     # The capture's clock starts with its first frame, the map's is the mesh's.
     return replace(doppler, meta=provenance).shifted(mesh.timebase.start_s)

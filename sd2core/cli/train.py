@@ -18,13 +18,13 @@ from sd2core.cli.options import (
     positive_int,
 )
 from sd2core.cli.output import print_facts, print_json
+from sd2core.cli.running import INTERRUPTED
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
     from sd2core.train.config import TrainConfig
     from sd2core.train.start import Ending, Watch
 
-_INTERRUPTED = 130
 _BACKGROUND_NICE = 10
 
 # Options that are settings: section, name.
@@ -360,7 +360,7 @@ def _say_ending(options: argparse.Namespace, run: Path, ending: Ending) -> int:
         if ending.outcome == "stopped":
             facts["go on"] = f"sd2 train --resume {run}"
         print_facts(f"{run} has {_WORDS[ending.outcome]}", facts)
-    return _INTERRUPTED if ending.interrupted else 0
+    return INTERRUPTED if ending.interrupted else 0
 
 
 _WORDS = {"finished": "finished", "stopped": "been stopped", "cancelled": "been discarded"}

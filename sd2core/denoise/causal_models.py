@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any, Literal
 
 from torch import Tensor, nn
 
 from sd2core.denoise.model import Denoiser, State
-from sd2core.denoise.s4_layer import DT_MAX, DT_MIN, S4Layer
+from sd2core.denoise.s4_layer import DT_MAX, DT_MIN, S4Layer, S4Stack
 
 
-class S4Denoiser(Denoiser):
+class S4Denoiser(S4Stack, Denoiser):
     """The paper's denoiser: a linear layer per frame, S4 layers along time, a linear layer.
 
     Parameters
@@ -59,38 +58,6 @@ class S4Denoiser(Denoiser):
             for _ in range(depth)
         )
         self.head = nn.Linear(channels, bins)
-
-    def initial_state(self, batch: int = 1) -> State:
-        """Zero states, one per layer."""
-        return [layer.initial_state(batch) for layer in self.layers]
-
-    def forward(self, values: Tensor) -> Tensor:
-        """Denoise whole sequences by convolution, (batch, frames, bins)."""
-        hidden = self.lift(values)
-        for layer in self.layers:
-            hidden = layer(hidden)
-        return self.head(hidden)
-
-    def chunk(self, values: Tensor, state: State) -> tuple[Tensor, State]:
-        """Advance by some frames."""
-        hidden, after = self.lift(values), []
-        for layer, one in zip(self.layers, state, strict=True):
-            hidden, one = layer.chunk(hidden, one)
-            after.append(one)
-        return self.head(hidden), after
-
-    def step(self, frame: Tensor, state: State) -> tuple[Tensor, State]:
-        """Advance by one frame."""
-        hidden, after = self.lift(frame), []
-        for layer, one in zip(self.layers, state, strict=True):
-            hidden, one = layer.step(hidden, one)
-            after.append(one)
-        return self.head(hidden), after
-
-    def ssm_parameters(self) -> Iterator[nn.Parameter]:
-        """State-space parameters of all layers."""
-        for layer in self.layers:
-            yield from layer.ssm_parameters()
 
 
 class SerialS4Denoiser(S4Denoiser):

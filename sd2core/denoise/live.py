@@ -1,9 +1,9 @@
-"""Use of a trained denoiser on whole maps, and live on single frames."""
+"""Use of a trained denoiser: on whole maps, live on single frames, on maps larger than memory."""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -26,6 +26,13 @@ CHUNK = 512
 
 _ROUND = 64
 _BATCH = 16
+_BLOCK = 16 * CHUNK
+
+Read = Callable[[int, int], NDArray[np.float32]]
+"""Returns the energies of frames from one to another (exclusive), (n, bins)."""
+
+Write = Callable[[int, NDArray[np.float32]], None]
+"""Takes the first frame, and its denoised energies and those of the next ones, (n, bins)."""
 
 
 class TrainedDenoiser:
@@ -64,25 +71,10 @@ class TrainedDenoiser:
             When the map is not of the kind that the model was trained on.
         """
         matching.check_map(doppler, self.card)
-        energies = np.ascontiguousarray(doppler.values.T)  # (frames, bins)
-        denoised = np.zeros_like(energies)
-        done, total = 0, len(energies)
-        resampled = False
-
-        def work(values: NDArray[np.float32]) -> NDArray[np.float32]:
-            return self.denoise_values(values, lambda frames, _: progress(done + frames, total))
-
-        for start, stop in matching.stretches(doppler, self.card.frame_rate_hz):
-            values, times_s = energies[start:stop], doppler.times_s[start:stop]
-            done = start
-            if matching.is_regular(times_s, self.card.frame_rate_hz):
-                denoised[start:stop] = work(values)
-            else:
-                resampled = True
-                denoised[start:stop] = matching.at_rate(
-                    work, values, times_s, self.card.frame_rate_hz
-                )
-        progress(total, total)
+        denoised = np.zeros(doppler.values.shape[::-1], np.float32)  # (frames, bins)
+        resampled = matching.apply_to_stretches(
+            self.denoise_values, doppler, self.card.frame_rate_hz, denoised, progress
+        )
         return self.as_denoised(doppler, denoised, resampled)
 
     def as_denoised(
@@ -112,19 +104,26 @@ class TrainedDenoiser:
         They come in the unit of the synthetic maps of the training, and the result is in that of
         its radar maps.
         """
-        values = np.array(energies, dtype=np.float32)
-        if values.ndim != 2 or values.shape[1] != self.card.axis.bins:
+        if energies.ndim != 2 or energies.shape[1] != self.card.axis.bins:
             raise Sd2Error(
-                f"The values are of shape {values.shape}", f"(frames, {self.card.axis.bins})"
+                f"The values are of shape {energies.shape}", f"(frames, {self.card.axis.bins})"
             )
-        values[:, list(self.card.null_bins)] = 0.0
-        if not len(values):
-            return values
-        compressed = self.card.scaling.input.compress(values)
+        if not len(energies):
+            return np.zeros(energies.shape, np.float32)
         run = self._in_chunks if self.network.window is None else self._in_windows
-        expanded = self.card.scaling.target.expand(run(compressed, progress))
-        expanded[:, list(self.card.null_bins)] = 0.0
-        return expanded
+        return self.expanded(run(self.compressed(energies), progress))
+
+    def compressed(self, energies: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Input of the network from energies (…, bins)."""
+        values = np.array(energies, dtype=np.float32)
+        values[..., list(self.card.null_bins)] = 0.0
+        return self.card.scaling.input.compress(values)
+
+    def expanded(self, answer: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Energies (…, bins) from output of the network."""
+        energies = self.card.scaling.target.expand(answer)
+        energies[..., list(self.card.null_bins)] = 0.0
+        return energies
 
     def live(self) -> LiveDenoiser:
         """Denoiser of single frames, at the model's frame rate."""
@@ -212,9 +211,7 @@ class LiveDenoiser:
 
     def __init__(self, trained: TrainedDenoiser) -> None:
         self._trained = trained
-        self._card = trained.card
         self.equals_batch = trained.network.window is None
-        self._nulled = list(trained.card.null_bins)
         self.reset()
 
     def reset(self) -> None:
@@ -229,17 +226,13 @@ class LiveDenoiser:
 
         Without a person (``present`` False) the result is empty, and a new clip begins.
         """
-        values = np.array(energies, dtype=np.float32)
-        if values.shape != (self._card.axis.bins,):
-            raise Sd2Error(f"The frame is of shape {values.shape}", f"({self._card.axis.bins},)")
+        bins = self._trained.card.axis.bins
+        if energies.shape != (bins,):
+            raise Sd2Error(f"The frame is of shape {energies.shape}", f"({bins},)")
         if not present:
             self.reset()
-            return np.zeros_like(values)
-        values[self._nulled] = 0.0
-        compressed = self._card.scaling.input.compress(values)
-        expanded = self._card.scaling.target.expand(self._answer(compressed))
-        expanded[self._nulled] = 0.0
-        return expanded
+            return np.zeros(bins, np.float32)
+        return self._trained.expanded(self._answer(self._trained.compressed(energies)))
 
     def advance(
         self, energies: NDArray[np.float32], present: NDArray[np.bool_] | None = None
@@ -266,19 +259,15 @@ class LiveDenoiser:
 
     def _run(self, energies: NDArray[np.float32]) -> NDArray[np.float32]:
         """Denoise frames without a gap."""
-        trained, card = self._trained, self._card
-        values = np.array(energies, dtype=np.float32)
-        values[:, self._nulled] = 0.0
-        compressed = card.scaling.input.compress(values)
-        done = np.empty_like(values)
+        trained = self._trained
+        compressed = trained.compressed(energies)
+        done = np.empty_like(compressed)
         with torch.no_grad():
-            for start in range(0, len(values), CHUNK):
+            for start in range(0, len(compressed), CHUNK):
                 chunk = torch.from_numpy(compressed[start : start + CHUNK])[None]
                 answer, self._state = trained.network.chunk(chunk.to(trained.device), self._state)
                 done[start : start + CHUNK] = answer[0].cpu().numpy()
-        expanded = card.scaling.target.expand(done)
-        expanded[:, self._nulled] = 0.0
-        return expanded
+        return trained.expanded(done)
 
     def _answer(self, compressed: NDArray[np.float32]) -> NDArray[np.float32]:
         network, device = self._trained.network, self._trained.device
@@ -296,3 +285,79 @@ class LiveDenoiser:
             known = np.pad(known, ((missing, 0), (0, 0)), "symmetric")
             answer = network(torch.from_numpy(known)[None].to(device))[0, -1].cpu().numpy()
         return answer
+
+
+def denoise_long(
+    trained: TrainedDenoiser,
+    runs: list[tuple[int, int]],
+    times_s: NDArray[np.float64],
+    read: Read,
+    write: Write,
+) -> None:
+    """Denoise a long map block by block, with the result of :meth:`TrainedDenoiser.denoise`.
+
+    A causal model continues from its last state; one of fixed windows gets the windows that it
+    would get in the whole map. So results are equal to the rounding of single precision.
+
+    ``runs`` are half-open ranges of frames that are clips of their own, from
+    :func:`~sd2core.denoise.resample_to_model.clips`; ``times_s`` are the times of all frames, and
+    ``write`` is called for the frames of all runs, in their order.
+    """
+    rate_hz = trained.card.frame_rate_hz
+    for start, stop in runs:
+        own_s = times_s[start:stop]
+        if matching.is_regular(own_s, rate_hz):
+            for first, answers in _blocks(trained, stop - start, _from(start, read)):
+                write(start + first, answers)
+        else:
+            _at_rate(trained, start, own_s, read, write)
+
+
+def _from(start: int, read: Read) -> Read:
+    """Reader with frames counted from ``start``."""
+    return lambda low, high: read(start + low, start + high)
+
+
+def _at_rate(
+    trained: TrainedDenoiser, start: int, times_s: NDArray[np.float64], read: Read, write: Write
+) -> None:
+    """Denoise one run of another or uneven frame rate, as :func:`matching.at_rate` does."""
+    even_s = matching.even_times(times_s, trained.card.frame_rate_hz)
+
+    def between(low: int, high: int) -> NDArray[np.float32]:
+        first = max(int(np.searchsorted(times_s, even_s[low])) - 1, 0)
+        last = min(int(np.searchsorted(times_s, even_s[high - 1])) + 1, len(times_s))
+        values = read(start + first, start + last)
+        return matching.interpolated(values, times_s[first:last], even_s[low:high])
+
+    written = 0
+    before = np.zeros((0, trained.card.axis.bins), np.float32)
+    for low, answers in _blocks(trained, len(even_s), between):
+        high = low + len(answers)
+        known_s = even_s[low - len(before) : high]
+        known = np.concatenate([before, answers])
+        # A frame lies between two even times; the last one of a block has its second later.
+        ready = len(times_s) if high == len(even_s) else int(np.searchsorted(times_s, known_s[-1]))
+        if ready > written:
+            write(start + written, matching.interpolated(known, known_s, times_s[written:ready]))
+            written = ready
+        before = answers[-1:]
+
+
+def _blocks(
+    trained: TrainedDenoiser, count: int, read: Read
+) -> Iterator[tuple[int, NDArray[np.float32]]]:
+    """Denoise frames at the model's rate block by block; yields first frames and results."""
+    window = trained.network.window
+    if window is None:
+        live = trained.live()
+        for low in range(0, count, _BLOCK):
+            yield low, live.advance(read(low, min(low + _BLOCK, count)))
+        return
+    # Windows begin every so many frames from the start of the run.
+    step = window - OVERLAP
+    for low in range(0, count, _BLOCK):
+        high = min(low + _BLOCK, count)
+        first = max((low - window) // step * step, 0)
+        last = min(high + window, count)
+        yield low, trained.denoise_values(read(first, last))[low - first : high - first]

@@ -16,7 +16,7 @@ deviation of |e| is given as well, for comparison with tables that mean that one
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,10 +41,6 @@ class VelocityError:
     empty_target: int  # Frames left out because the target is empty.
     empty_estimate: int  # Judged frames in which the estimate is empty and counts as 0 m/s.
 
-    def to_json(self) -> dict[str, float | int]:
-        """Errors by name."""
-        return asdict(self)
-
 
 @dataclass(frozen=True)
 class MapError:
@@ -57,10 +53,6 @@ class MapError:
     rmse_compressed: float
     # Pearson's, of compressed values over all these cells; NaN where one of the maps does not vary.
     correlation: float
-
-    def to_json(self) -> dict[str, float]:
-        """Errors by name."""
-        return asdict(self)
 
 
 def velocity_error(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+import torch
 from torch import Tensor, nn
 
 State = Any
@@ -51,3 +52,8 @@ class Denoiser(nn.Module):
 def parameter_count(model: nn.Module) -> int:
     """Number of learned parameters."""
     return sum(parameter.numel() for parameter in model.parameters())
+
+
+def use_one_thread() -> None:
+    """Leave the other cores to other processes, which work beside this one."""
+    torch.set_num_threads(1)

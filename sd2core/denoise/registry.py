@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from sd2core.errors import Sd2Error
 
@@ -15,9 +15,6 @@ if TYPE_CHECKING:
 
     from sd2core.denoise.model import Denoiser
 
-Match = Literal["parameters", "time"]
-"""parameters: about as many numbers to learn as the S4; time: about as long a step of training."""
-
 
 @dataclass(frozen=True)
 class _Entry:
@@ -25,7 +22,6 @@ class _Entry:
     summary: str
     options: Mapping[str, Any] = field(default_factory=dict)
     fixed: Mapping[str, Any] = field(default_factory=dict)
-    same_time: Mapping[str, Any] = field(default_factory=dict)
 
 
 _S4 = {
@@ -56,7 +52,6 @@ _ENTRIES: dict[str, _Entry] = {
         # A sample is a bin, not a frame.
         {**_S4, "dt_min": 1e-3, "dt_max": 1e-1},
         {"kernel": "legs"},
-        {"channels": 4},
     ),
     "gru": _Entry(
         "causal_models.GruDenoiser",
@@ -67,13 +62,11 @@ _ENTRIES: dict[str, _Entry] = {
         "window_models.UNetDenoiser",
         "2D U-Net over windows of 72 frames",
         {"channels": 12, "depth": 3, "dropout": 0.0},
-        same_time={"channels": 5},
     ),
     "swin": _Entry(
         "window_models.SwinDenoiser",
         "Swin transformer over windows of 72 frames",
         {"channels": 48, "depth": 2, "dropout": 0.0},
-        same_time={"channels": 16},
     ),
     "none": _Entry("filters.NoDenoiser", "no denoising"),
     "median": _Entry(
@@ -96,14 +89,12 @@ _LARGEST = 4096
 """No option is a larger number: a damaged file must not ask for all the memory."""
 
 
-def options(name: str, match: Match = "parameters") -> dict[str, Any]:
-    """Default options of a model.
+def options(name: str) -> dict[str, Any]:
+    """Default options of a model, with about as many numbers to learn as the S4's.
 
-    ``match`` makes it comparable to the S4 in the number of parameters, or in the time of a
-    training step. Raises Sd2Error when there is no such model.
+    Raises Sd2Error when there is no such model.
     """
-    entry = _entry(name)
-    return {**entry.options, **(entry.same_time if match == "time" else {})}
+    return dict(_entry(name).options)
 
 
 def summary(name: str) -> str:
@@ -119,7 +110,7 @@ def build(name: str, bins: int = 32, **given: Any) -> Denoiser:
     """
     entry = _entry(name)
     for option, value in given.items():
-        _check(name, option, value, entry.options)
+        check_option(f"model {name}", option, value, entry.options, _LARGEST)
     module, _, class_name = entry.place.partition(".")
     found = getattr(import_module(f"sd2core.denoise.{module}"), class_name)
     model: Denoiser = found(bins, **entry.fixed, **{**entry.options, **given})
@@ -153,22 +144,27 @@ def _entry(name: str) -> _Entry:
     return _ENTRIES[name]
 
 
-def _check(name: str, option: str, value: Any, known: Mapping[str, Any]) -> None:
+def check_option(what: str, option: str, value: Any, known: Mapping[str, Any], most: int) -> None:
+    """Raise Sd2Error for an option of a network that is unknown or not of its default's kind.
+
+    ``what`` names the network in messages; whole numbers are 1 to ``most``.
+    """
     if option not in known:
         raise Sd2Error(
-            f"The model {name} has no option {option!r}",
+            f"The {what} has no option {option!r}",
             f"one of {', '.join(known)}" if known else "no options",
         )
+    found = f"{what}: {option} is {value!r}"
     if isinstance(known[option], bool):
         if not isinstance(value, bool):
-            raise Sd2Error(f"{name}: {option} is {value!r}", "true or false")
+            raise Sd2Error(found, "true or false")
     elif isinstance(known[option], int):
-        if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= _LARGEST:
-            raise Sd2Error(f"{name}: {option} is {value!r}", f"a whole number, 1 to {_LARGEST}")
+        if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
+            raise Sd2Error(found, f"a whole number, 1 to {most}")
     elif isinstance(value, bool) or not isinstance(value, int | float):
-        raise Sd2Error(f"{name}: {option} is {value!r}", "a number")
+        raise Sd2Error(found, "a number")
     elif option in ("dt_min", "dt_max"):
         if not 1e-6 <= value <= 10:
-            raise Sd2Error(f"{name}: {option} is {value!r}", "a step from 1e-6 to 10")
+            raise Sd2Error(found, "a step from 1e-6 to 10")
     elif not 0 <= value < 1:
-        raise Sd2Error(f"{name}: {option} is {value!r}", "a share from 0 to below 1")
+        raise Sd2Error(found, "a share from 0 to below 1")

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import Presence, runs
+from sd2core.progress import Progress
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 
@@ -128,6 +129,35 @@ def is_regular(times_s: NDArray[np.float64], frame_rate_hz: float) -> bool:
     steps = np.diff(times_s) * frame_rate_hz
     even = bool((np.abs(steps - 1.0) <= _UNEVEN).all())
     return even and abs(float(steps.mean()) - 1.0) <= SAME_RATE
+
+
+def apply_to_stretches(
+    work: Callable[[Stretch, Progress], Stretch],
+    doppler: DopplerMap,
+    frame_rate_hz: float,
+    result: Stretch,
+    progress: Progress,
+) -> bool:
+    """Apply ``work`` to every stretch of a map, at the model's rate, and write it into ``result``.
+
+    The rows of the result are the map's frames; those between stretches stay as they are.
+    Progress counts frames. True if frames were interpolated to the model's rate and back.
+    """
+    energies = np.ascontiguousarray(doppler.values.T)  # (frames, bins)
+    total, resampled = len(energies), False
+    for start, stop in stretches(doppler, frame_rate_hz):
+
+        def own(values: Stretch, start: int = start) -> Stretch:
+            return work(values, lambda frames, _: progress(start + frames, total))
+
+        values, times_s = energies[start:stop], doppler.times_s[start:stop]
+        if is_regular(times_s, frame_rate_hz):
+            result[start:stop] = own(values)
+        else:
+            resampled = True
+            result[start:stop] = at_rate(own, values, times_s, frame_rate_hz)
+    progress(total, total)
+    return resampled
 
 
 def at_rate(

@@ -200,9 +200,6 @@ def _per_channel(values: Tensor, channels: int) -> nn.Parameter:
     return nn.Parameter(values.float().expand(channels, *values.shape).clone())
 
 
-__all__ = ["Kernel", "S4Layer", "State"]
-
-
 class S4Layer(nn.Module):
     """Residual S4 layer x + mix(gelu(k ∗ norm(x) + D norm(x))), one state space per channel.
 
@@ -302,3 +299,46 @@ class S4Layer(nn.Module):
                 remedy="Take a causal model.",
             )
         return self.past
+
+
+class S4Stack(nn.Module):
+    """Base of networks of S4 layers: ``lift`` per frame, ``layers`` along time, ``head`` per frame.
+
+    The state is a list of one state per layer.
+    """
+
+    lift: nn.Module
+    layers: nn.ModuleList
+    head: nn.Module
+
+    def initial_state(self, batch: int = 1) -> list[State]:
+        """Zero states before the first frame."""
+        return [layer.initial_state(batch) for layer in self.layers]
+
+    def forward(self, values: Tensor) -> Tensor:
+        """Process whole sequences (B, L, …) by convolution."""
+        hidden = self.lift(values)
+        for layer in self.layers:
+            hidden = layer(hidden)
+        return self.head(hidden)
+
+    def chunk(self, values: Tensor, state: list[State]) -> tuple[Tensor, list[State]]:
+        """Advance by some frames (B, l, …), by recurrence."""
+        hidden, after = self.lift(values), []
+        for layer, one in zip(self.layers, state, strict=True):
+            hidden, one = layer.chunk(hidden, one)
+            after.append(one)
+        return self.head(hidden), after
+
+    def step(self, frame: Tensor, state: list[State]) -> tuple[Tensor, list[State]]:
+        """Advance by one frame (B, …)."""
+        hidden, after = self.lift(frame), []
+        for layer, one in zip(self.layers, state, strict=True):
+            hidden, one = layer.step(hidden, one)
+            after.append(one)
+        return self.head(hidden), after
+
+    def ssm_parameters(self) -> Iterator[nn.Parameter]:
+        """State-space parameters of all layers."""
+        for layer in self.layers:
+            yield from layer.ssm_parameters()

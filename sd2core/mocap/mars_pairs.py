@@ -26,8 +26,7 @@ from sd2core.io.radar.mars import (
     mars_parts,
     read_mars,
 )
-from sd2core.mocap.driving import DrivenClip, puppet_of
-from sd2core.mocap.skeleton import KINECT_MARKERS, SkeletonClip
+from sd2core.mocap.driving import KINECT_MARKERS, DrivenClip, SkeletonClip, puppet_of
 from sd2core.pairs.store import PairWriter, Take, TakeKey
 from sd2core.progress import Progress, silent
 from sd2core.sensor import VelocityAxis, VirtualSensor

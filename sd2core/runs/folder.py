@@ -50,35 +50,16 @@ class RunFolder:
 
     def __init__(self, path: Path) -> None:
         self.path = Path(path)
-
-    @property
-    def description(self) -> Path:
-        """File with the state of the run and its process."""
-        return self.path / self.file_name
-
-    @property
-    def progress(self) -> Path:
-        """File of JSON lines."""
-        return self.path / "progress.jsonl"
-
-    @property
-    def control(self) -> Path:
-        """File with the word that the process obeys."""
-        return self.path / "control"
-
-    @property
-    def log(self) -> Path:
-        """File for people."""
-        return self.path / "log.txt"
+        self.description = self.path / self.file_name  # state of the run and its process
+        self.progress = self.path / "progress.jsonl"  # JSON lines
+        self.control = self.path / "control"  # the word that the process obeys
+        self.log = self.path / "log.txt"  # for people
+        self._lock = self.path / "lock"
 
     @property
     def output(self) -> Path:
         """File with what the process prints; beside the folder, which may not be made yet."""
         return self.path.with_name(f".{self.path.name}.out")
-
-    @property
-    def _lock(self) -> Path:
-        return self.path / "lock"
 
     @property
     def exists(self) -> bool:

@@ -10,26 +10,40 @@ from typing import Any, Literal, Protocol
 import torch
 
 from sd2core.denoise.model import Denoiser
-from sd2core.denoise.scaling import Scaling
 from sd2core.errors import Sd2Error
 from sd2core.runs.control import Control, Word
 from sd2core.runs.folder import State
 from sd2core.runs.pace import Pace
 from sd2core.runs.progress import ProgressWriter, StepLines
-from sd2core.sensor import VelocityAxis
 from sd2core.train.checkpoint import Checkpoint, Position, write_checkpoint
-from sd2core.train.clock import Clock
 from sd2core.train.config import TrainConfig
 from sd2core.train.data import Order
 from sd2core.train.folder import TrainingFolder
-from sd2core.train.optimiser import rate_factor
 from sd2core.train.validate import Exam, Validation, validate
+
+
+class Clock:
+    """Seconds of training; ``elapsed_s`` are those of earlier processes."""
+
+    def __init__(self, elapsed_s: float = 0.0) -> None:
+        self._before_s = elapsed_s
+        self._begun_s = time.monotonic()
+
+    @property
+    def elapsed_s(self) -> float:
+        """Seconds since the run began, without pauses."""
+        return self._before_s + time.monotonic() - self._begun_s
+
+    def leave_out(self, seconds: float) -> None:
+        """Do not count a pause."""
+        self._begun_s += seconds
+
 
 Outcome = Literal["finished", "stopped", "cancelled", "failed"]
 
 
-class Learner(Protocol):
-    """The part of :class:`sd2core.train.learner.Learner` that callbacks use."""
+class Module(Protocol):
+    """The part of :class:`~sd2core.train.denoiser_module.DenoiserModule` that callbacks use."""
 
     network: Denoiser
     device: torch.device
@@ -42,9 +56,8 @@ class Learner(Protocol):
 class TrainingCallbacks:
     """Callbacks of a run between its steps.
 
-    ``counted`` are the bins that are not nulled, ``position`` is the start, ``about`` goes
-    into checkpoints, and ``save_best(validation, epoch)`` writes the model that is to be
-    used.
+    ``position`` is the start, ``about`` goes into checkpoints, and ``save_best(validation,
+    epoch)`` writes the model that is to be used.
     """
 
     def __init__(
@@ -55,19 +68,14 @@ class TrainingCallbacks:
         control: Control,
         order: Order,
         exam: Exam,
-        scaling: Scaling,
-        axis: VelocityAxis,
-        counted: tuple[int, ...],
         position: Position,
         about: dict[str, Any],
         save_best: Callable[[Validation, int], None],
     ) -> None:
-        self.config, self.scaling, self.counted = config, scaling, counted
-        self.position = position
+        self.config, self.order, self.exam, self.position = config, order, exam, position
         self.outcome: Outcome = "stopped"
         self.rate = 0.0
         self._folder, self._writer, self._control = folder, writer, control
-        self.order, self._exam, self._axis = order, exam, axis
         self._about, self._save_best = about, save_best
         self._lines = StepLines(writer)
         self._counted: torch.Tensor | None = None
@@ -95,13 +103,13 @@ class TrainingCallbacks:
             return position.elapsed_s >= 60.0 * training.minutes
         return position.epoch >= training.epochs
 
-    def begin(self, learner: Learner) -> None:
+    def begin(self, module: Module) -> None:
         """Move data to the device, install signal handlers and start the clock."""
         self._control.take_signals()
-        self._learner = learner
-        self._exam = self._exam.on(learner.device)
+        self._module = module
+        self.exam = self.exam.on(module.device)
         self._squares = torch.tensor(
-            self.position.squares, dtype=torch.float64, device=learner.device
+            self.position.squares, dtype=torch.float64, device=module.device
         )
         self._clock = Clock(self.position.elapsed_s)
         self._kept_s = self._clock.elapsed_s
@@ -110,7 +118,7 @@ class TrainingCallbacks:
     def counted_on(self, device: torch.device) -> torch.Tensor:
         """Bins that are not nulled, as an index on a device."""
         if self._counted is None or self._counted.device != device:
-            self._counted = torch.tensor(self.counted, device=device)
+            self._counted = torch.tensor(self.exam.counted, device=device)
         return self._counted
 
     def agreed_rate_factor(self) -> float:
@@ -189,14 +197,7 @@ class TrainingCallbacks:
         """Validate and keep the best model; True when the run is over."""
         position = self.position
         position.squares = self._finite_squares()
-        found = validate(
-            self._learner.network,
-            self._exam,
-            self.scaling,
-            self._axis,
-            self.counted,
-            lambda: self._control.word() != "cancel",
-        )
+        found = validate(self._module.network, self.exam, lambda: self._control.word() != "cancel")
         if found is None:
             return False
         training = self.config.training
@@ -250,7 +251,7 @@ class TrainingCallbacks:
         position.elapsed_s = self._clock.elapsed_s
         self._kept_s = position.elapsed_s
         if self._leads:
-            weights, moments = self._learner.checkpoint_tensors()
+            weights, moments = self._module.checkpoint_tensors()
             checkpoint = Checkpoint(weights, moments, position, self._about)
             write_checkpoint(self._folder.last, self._folder.last_record, checkpoint)
             self._pace.keep(self.config.pace_kind)
@@ -261,7 +262,7 @@ class TrainingCallbacks:
         It is no epoch's, so the position does not know of it: a resumed run ends as it
         would have ended without the stop.
         """
-        found = validate(self._learner.network, self._exam, self.scaling, self._axis, self.counted)
+        found = validate(self._module.network, self.exam)
         if found is not None and math.isfinite(found.rmse):
             self._write_best(found, self.position.epoch)
 
@@ -292,11 +293,11 @@ class TrainingCallbacks:
     @property
     def _leads(self) -> bool:
         """True in the one of several processes that writes files."""
-        return bool(self._learner.trainer.is_global_zero)
+        return bool(self._module.trainer.is_global_zero)
 
     def _agreed(self, word: Word, number: float) -> tuple[Word, float]:
         """Answer of the first process in all processes; else they would wait for each other."""
-        trainer = self._learner.trainer
+        trainer = self._module.trainer
         if trainer.world_size == 1:
             return word, number
         agreed: tuple[Word, float] = trainer.strategy.broadcast((word, number))
@@ -309,3 +310,15 @@ def _diverged(step: int) -> Sd2Error:
         "a training that converges",
         "Choose a lower learning rate, or clip gradients to a smaller norm",
     )
+
+
+def rate_factor(done: float, warm_up: float, final: float) -> float:
+    """Share of the highest learning rate when the share ``done`` (0 to 1) of the run is done.
+
+    It rises linearly from zero during the share ``warm_up`` and falls to ``final`` at the
+    end, with half a cosine.
+    """
+    if done < warm_up:
+        return done / warm_up
+    angle = math.pi * min(1.0, (done - warm_up) / max(1.0 - warm_up, 1e-9))
+    return final + (1.0 - final) * 0.5 * (1.0 + math.cos(angle))

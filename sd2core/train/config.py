@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
@@ -13,69 +13,100 @@ from sd2core.files.paths import located_path
 from sd2core.files.toml import toml_lines
 from sd2core.pairs.segments import LENGTH, OVERLAP
 from sd2core.runs.pace import Kind
-from sd2core.train.rules import Allowed, choice, flag, number, paths, refused, table, text, texts
+
+Rule = Callable[[str, Any], Any]
+"""``rule(key, value)`` gives the value as it is kept, or raises :class:`Sd2Error`."""
 
 
-@dataclass(frozen=True)
-class ConfigKey:
-    """One setting: its section, its name and the values that it may have."""
-
-    section: str
-    name: str
-    default: Any
-    allowed: str  # in words
-    about: str
+def refused(key: str, value: Any, allowed: str) -> Sd2Error:
+    """Error for a value that is not allowed."""
+    return Sd2Error(f"{key} is {value!r}", allowed)
 
 
-def _setting(
-    about: str,
-    checked: Allowed,
-    default: Any = MISSING,
-    *,
-    optional: bool = False,
-    factory: Any = None,
-) -> Any:
-    allowed, rule = checked
-    metadata = {"about": about, "allowed": allowed, "rule": rule, "optional": optional}
-    if factory is not None:
-        return field(default_factory=factory, metadata=metadata)
-    return field(default=default, metadata=metadata)
+def number(low: float, high: float, *, whole: bool = False) -> Rule:
+    """Rule for a number between two others, both included."""
+    allowed = f"a {'whole ' if whole else ''}number from {low:g} to {high:g}"
+
+    def rule(key: str, value: Any) -> Any:
+        fits = isinstance(value, int | float) and not isinstance(value, bool)
+        if not fits or (whole and int(value) != value) or not low <= value <= high:
+            raise refused(key, value, allowed)
+        return int(value) if whole else float(value)
+
+    return rule
+
+
+def choice(*values: str) -> Rule:
+    """Rule for one of a few words."""
+
+    def rule(key: str, value: Any) -> str:
+        if value not in values:
+            raise refused(key, value, f"one of {', '.join(values)}")
+        return str(value)
+
+    return rule
+
+
+def flag(key: str, value: Any) -> bool:
+    """Rule for true or false."""
+    if not isinstance(value, bool):
+        raise refused(key, value, "true or false")
+    return value
+
+
+def text(key: str, value: Any) -> str:
+    """Rule for any text that is not empty."""
+    if not isinstance(value, str) or not value:
+        raise refused(key, value, "a text")
+    return value
+
+
+def texts(key: str, value: Any) -> tuple[str, ...]:
+    """Rule for a list of texts."""
+    if not isinstance(value, list | tuple) or not all(isinstance(one, str) for one in value):
+        raise refused(key, value, "a list of texts")
+    return tuple(value)
+
+
+def paths(key: str, value: Any) -> tuple[Path, ...]:
+    """Rule for at least one path."""
+    fits = isinstance(value, list | tuple) and value
+    if not fits or not all(isinstance(one, str | Path) and str(one) for one in value):
+        raise refused(key, value, "a list of at least one path")
+    return tuple(Path(one) for one in value)
+
+
+def table(key: str, value: Any) -> dict[str, Any]:
+    """Rule for a flat table of plain values."""
+    plain = isinstance(value, Mapping) and all(
+        isinstance(one, bool | int | float | str) for one in value.values()
+    )
+    if not plain:
+        raise refused(key, value, "a table of numbers, texts, true or false")
+    return dict(value)
+
+
+def _setting(rule: Rule, default: Any = MISSING, *, factory: Any = MISSING) -> Any:
+    return field(default=default, default_factory=factory, metadata={"rule": rule})
 
 
 @dataclass(frozen=True)
 class DataConfig:
-    """Data to learn from; :func:`settings` has the meaning of every field."""
+    """Data to learn from."""
 
-    pairs: tuple[Path, ...] = _setting("stores of pairs; several are mixed", paths())
-    validation_subjects: tuple[str, ...] | None = _setting(
-        "kept out to choose the best epoch (default: chosen by itself)",
-        texts(),
-        None,
-        optional=True,
-    )
-    test_subjects: tuple[str, ...] | None = _setting(
-        "kept out for `sd2 eval` (default: chosen by itself)", texts(), None, optional=True
-    )
-    segment_frames: int = _setting("frames of a segment", number(2, 10_000, whole=True), LENGTH)
-    overlap_frames: int = _setting(
-        "frames that neighbouring segments share", number(0, 9_999, whole=True), OVERLAP
-    )
-    placements: str = _setting(
-        "range synthesis: learn from every place that the sensor was put at, or the first only",
-        choice("all", "first"),
-        "all",
-    )
-    segments: str = _setting(
-        "cut at other places in every epoch (shifted by up to half a step), or always at the same",
-        choice("shifted", "fixed"),
-        "shifted",
-    )
-    range_factor: float = _setting(
-        "range synthesis: scale input and target together as if the person were up to this"
-        " many times nearer or farther; 1 is off",
-        number(1.0, 4.0),
-        1.0,
-    )
+    pairs: tuple[Path, ...] = _setting(paths)  # Stores of pairs; several are mixed.
+    # Kept out to choose the best epoch, and for `sd2 eval`; chosen by themselves by default.
+    validation_subjects: tuple[str, ...] | None = _setting(texts, None)
+    test_subjects: tuple[str, ...] | None = _setting(texts, None)
+    segment_frames: int = _setting(number(2, 10_000, whole=True), LENGTH)
+    overlap_frames: int = _setting(number(0, 9_999, whole=True), OVERLAP)  # Of neighbours.
+    # Range synthesis: learn from every place that the sensor was put at, or the first only.
+    placements: str = _setting(choice("all", "first"), "all")
+    # Cut at other places in every epoch (shifted by up to half a step), or always at the same.
+    segments: str = _setting(choice("shifted", "fixed"), "shifted")
+    # Range synthesis: scale input and target together as if the person were up to this many
+    # times nearer or farther; 1 is off.
+    range_factor: float = _setting(number(1.0, 4.0), 1.0)
 
     def __post_init__(self) -> None:
         _check(self, "data")
@@ -91,8 +122,8 @@ class DataConfig:
 class ModelConfig:
     """Model to train."""
 
-    name: str = _setting("architecture, see `sd2 train --help`", text(), "s4")
-    options: Mapping[str, Any] = _setting("options of the architecture", table(), factory=dict)
+    name: str = _setting(text, "s4")  # Architecture, see `sd2 train --help`.
+    options: Mapping[str, Any] = _setting(table, factory=dict)  # Of the architecture.
 
     def __post_init__(self) -> None:
         _check(self, "model")
@@ -102,39 +133,23 @@ class ModelConfig:
 class TrainingConfig:
     """Optimisation settings."""
 
-    batch_size: int = _setting("segments per step", number(1, 100_000, whole=True), 64)
-    epochs: int = _setting("passes over all segments", number(1, 1_000_000, whole=True), 500)
-    minutes: float | None = _setting(
-        "train for this long instead of a number of epochs; the learning rate follows the clock",
-        number(0.001, 1e5),
-        None,
-        optional=True,
-    )
-    learning_rate: float = _setting("at its highest", number(1e-8, 1.0), 3e-3)
-    ssm_learning_rate: float = _setting(
-        "the same for the parameters of the state space, which never decay",
-        number(1e-8, 1.0),
-        1e-3,
-    )
-    weight_decay: float = _setting("of AdamW, on matrices only", number(0.0, 1.0), 0.01)
-    warm_up: float = _setting("share of the run in which the rate rises", number(0.0, 0.5), 0.03)
-    final_rate: float = _setting("share of the rate at the end", number(0.0, 1.0), 0.01)
-    clip_norm: float = _setting("gradients are clipped to it; 0 is off", number(0.0, 1e6), 1.0)
-    early_stopping_epochs: int | None = _setting(
-        "end after so many epochs without a better one (default: never)",
-        number(1, 1_000_000, whole=True),
-        None,
-        optional=True,
-    )
-    select_by: str = _setting(
-        "the best epoch is that of the lowest validation error of this kind",
-        choice("rmse", "mae"),
-        "rmse",
-    )
-    seed: int = _setting("of weights, order and dropout", number(0, 2**31 - 1, whole=True), 0)
-    checkpoint_s: float = _setting(
-        "seconds between checkpoints, at most", number(0.0, 86_400.0), 30.0
-    )
+    batch_size: int = _setting(number(1, 100_000, whole=True), 64)  # Segments per step.
+    epochs: int = _setting(number(1, 1_000_000, whole=True), 500)  # Passes over all segments.
+    # Instead of a number of epochs; the learning rate follows the clock.
+    minutes: float | None = _setting(number(0.001, 1e5), None)
+    learning_rate: float = _setting(number(1e-8, 1.0), 3e-3)  # At its highest.
+    # The same for the parameters of the state space, which never decay.
+    ssm_learning_rate: float = _setting(number(1e-8, 1.0), 1e-3)
+    weight_decay: float = _setting(number(0.0, 1.0), 0.01)  # Of AdamW, on matrices only.
+    warm_up: float = _setting(number(0.0, 0.5), 0.03)  # Share of the run in which the rate rises.
+    final_rate: float = _setting(number(0.0, 1.0), 0.01)  # Share of the rate at the end.
+    clip_norm: float = _setting(number(0.0, 1e6), 1.0)  # Gradients are clipped to it; 0 is off.
+    # End after so many epochs without a better one.
+    early_stopping_epochs: int | None = _setting(number(1, 1_000_000, whole=True), None)
+    # The best epoch is that of the lowest validation error of this kind.
+    select_by: str = _setting(choice("rmse", "mae"), "rmse")
+    seed: int = _setting(number(0, 2**31 - 1, whole=True), 0)  # Of weights, order and dropout.
+    checkpoint_s: float = _setting(number(0.0, 86_400.0), 30.0)  # Between checkpoints, at most.
 
     def __post_init__(self) -> None:
         _check(self, "training")
@@ -144,21 +159,12 @@ class TrainingConfig:
 class MachineConfig:
     """Settings of the machine: device, precision, threads, priority."""
 
-    device: str = _setting(
-        "auto takes a GPU where there is one", choice("auto", "cpu", "cuda"), "auto"
-    )
-    devices: int = _setting("processors of that kind", number(1, 64, whole=True), 1)
-    precision: str = _setting(
-        "auto is bf16 on GPUs that have it, else 32", choice("auto", "32", "bf16"), "auto"
-    )
-    threads: int | None = _setting(
-        "of the CPU (default: as many as torch takes)",
-        number(1, 1024, whole=True),
-        None,
-        optional=True,
-    )
-    nice: int = _setting("lower priority, 0 to 19", number(0, 19, whole=True), 0)
-    deterministic: bool = _setting("refuse what is not reproducible", flag(), False)
+    device: str = _setting(choice("auto", "cpu", "cuda"), "auto")  # A GPU where there is one.
+    devices: int = _setting(number(1, 64, whole=True), 1)  # Processors of that kind.
+    precision: str = _setting(choice("auto", "32", "bf16"), "auto")  # bf16 on GPUs that have it.
+    threads: int | None = _setting(number(1, 1024, whole=True), None)  # As many as torch takes.
+    nice: int = _setting(number(0, 19, whole=True), 0)  # Lower priority.
+    deterministic: bool = _setting(flag, False)  # Refuse what is not reproducible.
 
     def __post_init__(self) -> None:
         _check(self, "machine")
@@ -202,21 +208,6 @@ _SECTIONS: dict[str, type] = {
 }
 
 
-def settings() -> list[ConfigKey]:
-    """Every setting with its default, its allowed values and its meaning."""
-    return [
-        ConfigKey(
-            section,
-            one.name,
-            {} if one.default_factory is not MISSING else one.default,
-            one.metadata["allowed"],
-            one.metadata["about"],
-        )
-        for section, kind in _SECTIONS.items()
-        for one in fields(kind)
-    ]
-
-
 def config_from(
     content: Mapping[str, Any], folder: Path, source: str = "The settings"
 ) -> TrainConfig:
@@ -228,19 +219,19 @@ def config_from(
     _refuse_unknown(content, tuple(_SECTIONS), source, "section")
     sections: dict[str, Any] = {}
     for section, kind in _SECTIONS.items():
-        table = content.get(section, {})
-        if not isinstance(table, Mapping):
-            raise refused(section, table, f"a section [{section}] with settings")
+        given = content.get(section, {})
+        if not isinstance(given, Mapping):
+            raise refused(section, given, f"a section [{section}] with settings")
         names = tuple(one.name for one in fields(kind))
-        _refuse_unknown(table, names, source, f"setting in [{section}]")
-        sections[section] = dict(table)
+        _refuse_unknown(given, names, source, f"setting in [{section}]")
+        sections[section] = dict(given)
     if "pairs" not in sections["data"]:
         raise Sd2Error(
             f"{source} name no pairs to learn from", 'pairs = ["campaign.zarr"] in [data]'
         )
-    stored = paths()[1]("data.pairs", sections["data"]["pairs"])
+    stored = paths("data.pairs", sections["data"]["pairs"])
     sections["data"]["pairs"] = tuple(located_path(str(path), folder) for path in stored)
-    return TrainConfig(**{name: _SECTIONS[name](**table) for name, table in sections.items()})
+    return TrainConfig(**{name: _SECTIONS[name](**given) for name, given in sections.items()})
 
 
 def read_config(path: Path) -> TrainConfig:
@@ -276,7 +267,7 @@ def config_text(config: TrainConfig, folder: Path) -> str:
 def _check(record: Any, section: str) -> None:
     for one in fields(record):
         value = getattr(record, one.name)
-        if value is None and one.metadata["optional"]:
+        if value is None and one.default is None:
             continue
         object.__setattr__(record, one.name, one.metadata["rule"](f"{section}.{one.name}", value))
 

@@ -1,16 +1,35 @@
-"""Results of an evaluation: numbers by model, gesture and person, and over seeds."""
+"""Evaluation of models on people that they have not learnt from.
+
+Every take is denoised whole, from its first frame on. Velocities are compared frame by
+frame; :mod:`sd2core.denoise.metrics` defines how. Two sets of frames are judged:
+
+- those in which something moves: the strongest bin of the radar's map lies 10 dB above the
+  noise of its take (:func:`sd2core.denoise.metrics.stands_out`). This is the measure that
+  models are ranked by;
+- all frames. Where nothing moves, the strongest bin of a radar's map is that of its noise,
+  which no model can foretell, so this measure has a floor well above zero.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.denoise.card import ModelCard
-from sd2core.denoise.metrics import MapError, VelocityError
+from sd2core.denoise.live import TrainedDenoiser
+from sd2core.denoise.metrics import MapError, VelocityError, map_error, stands_out, velocity_error
+from sd2core.denoise.registry import FILTERS, fit_filter, options
+from sd2core.denoise.scaling import Compression, Scaling
+from sd2core.errors import Sd2Error
+from sd2core.maps import mean_velocity_mps, peak_velocity_mps
+from sd2core.pairs.store import PairSet
+from sd2core.progress import Progress, silent
+
+Energies = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -22,14 +41,6 @@ class Score:
     peak_all: VelocityError  # the same of all frames
     mean: VelocityError  # of the energy-weighted mean velocity, where something moves
     map: MapError  # of all cells of all frames
-
-    def to_json(self) -> dict[str, Any]:
-        """Errors by name."""
-        parts = {name: getattr(self, name).to_json() for name in _PARTS}
-        return {"frames": self.frames, **parts}
-
-
-_PARTS = ("peak", "peak_all", "mean", "map")
 
 
 @dataclass(frozen=True)
@@ -121,7 +132,221 @@ def _report_json(report: Report) -> dict[str, Any]:
     return {
         "name": report.name,
         "seed": report.seed,
-        "all": report.all.to_json(),
-        "by_label": {name: score.to_json() for name, score in report.by_label.items()},
-        "by_subject": {name: score.to_json() for name, score in report.by_subject.items()},
+        "all": asdict(report.all),
+        "by_label": {name: asdict(score) for name, score in report.by_label.items()},
+        "by_subject": {name: asdict(score) for name, score in report.by_subject.items()},
     }
+
+
+def evaluate(
+    models: Sequence[TrainedDenoiser],
+    pairs: PairSet,
+    subjects: Iterable[str] | None = None,
+    *,
+    first_only: bool = True,
+    progress: Progress = silent,
+) -> Evaluation:
+    """Measure models, and for comparison filters that need no training.
+
+    The filters are fitted on the subjects that the first model learnt from, as far as they
+    are there; else on all that are not judged. By default the test subjects of the first
+    model are judged, or all, with ``first_only`` on what every take's own sensor saw.
+    Progress counts takes.
+
+    Raises Sd2Error if a model does not fit the pairs, or a subject has no take.
+    """
+    for model in models:
+        _check_fits(model.card, pairs)
+    judged_subjects = _judged_subjects(models, pairs, subjects)
+    judged = pairs.of(judged_subjects).placements(first_only=first_only)
+    if not judged.takes:
+        raise Sd2Error("No take is left to judge", "takes of a sensor of their own")
+    truth = _Truth.of(judged)
+    filters = _filters(models, pairs, judged_subjects)
+    total = len(judged.takes) * (len(filters) + len(models))
+
+    reports = []
+    for number, (name, model) in enumerate(
+        [*filters, *((_title(model.card), model) for model in models)]
+    ):
+        estimate = _estimated(model, judged, progress, number * len(judged.takes), total)
+        reports.append(_report(name, model.card, estimate, truth))
+    progress(total, total)
+    groups = [Group(report.name, (report,), False) for report in reports[: len(filters)]]
+    return Evaluation(
+        kind=pairs.kind,
+        subjects=judged.subjects,
+        labels=tuple(truth.labels),
+        frames=len(truth.energies),
+        moving=int(truth.moving.sum()),
+        groups=(*groups, *_grouped(reports[len(filters) :])),
+        notes=_notes(models, judged_subjects, pairs),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Truth:
+    """All judged takes one after another."""
+
+    pairs: PairSet
+    energies: Energies  # (frames, bins)
+    moving: NDArray[np.bool_]  # (frames,)
+    labels: dict[str, NDArray[np.bool_]]
+    subjects: dict[str, NDArray[np.bool_]]
+    compression: Compression
+
+    @classmethod
+    def of(cls, pairs: PairSet) -> _Truth:
+        takes, nulled = pairs.takes, list(pairs.null_bins)
+        energies = np.concatenate([take.radar for take in takes])
+        energies[:, nulled] = 0.0
+        label = np.concatenate([take.label for take in takes])
+        subject = np.concatenate(
+            [np.full(len(take.label), pairs.subjects.index(take.subject)) for take in takes]
+        )
+        return cls(
+            pairs,
+            energies,
+            np.concatenate([stands_out(take.radar, pairs.null_bins) for take in takes]),
+            {name: label == n for n, name in enumerate(pairs.labels) if (label == n).any()},
+            {name: subject == n for n, name in enumerate(pairs.subjects)},
+            Compression.fitted([energies], pairs.null_bins),
+        )
+
+
+def _estimated(
+    model: TrainedDenoiser, pairs: PairSet, progress: Progress, done: int, total: int
+) -> Energies:
+    found = []
+    for number, take in enumerate(pairs.takes):
+        progress(done + number, total)
+        found.append(model.denoise_values(take.synthetic))
+    return np.concatenate(found)
+
+
+def _report(name: str, card: ModelCard, estimate: Energies, truth: _Truth) -> Report:
+    everywhere = np.ones(len(estimate), bool)
+    axis, seed = truth.pairs.axis, card.about.get("seed")
+    peaks_mps = peak_velocity_mps(estimate, axis), peak_velocity_mps(truth.energies, axis)
+    means_mps = mean_velocity_mps(estimate, axis), mean_velocity_mps(truth.energies, axis)
+
+    def score(frames: NDArray[np.bool_]) -> Score:
+        return Score(
+            frames=int(frames.sum()),
+            peak=velocity_error(*peaks_mps, frames & truth.moving),
+            peak_all=velocity_error(*peaks_mps, frames),
+            mean=velocity_error(*means_mps, frames & truth.moving),
+            map=map_error(
+                estimate[frames], truth.energies[frames], truth.compression, truth.pairs.null_bins
+            ),
+        )
+
+    return Report(
+        name=name,
+        card=card,
+        seed=seed if isinstance(seed, int) else None,
+        all=score(everywhere),
+        by_label={label: score(frames) for label, frames in truth.labels.items()},
+        by_subject={subject: score(frames) for subject, frames in truth.subjects.items()},
+    )
+
+
+def _filters(
+    models: Sequence[TrainedDenoiser], pairs: PairSet, judged: Sequence[str]
+) -> list[tuple[str, TrainedDenoiser]]:
+    learnt = _learnt(models[0].card, "training") if models else []
+    fitted_on = [name for name in pairs.subjects if name in learnt and name not in judged]
+    fitted_on = fitted_on or [name for name in pairs.subjects if name not in judged]
+    takes = pairs.of(fitted_on or judged).placements(first_only=True).takes
+    takes = takes or pairs.of(fitted_on or judged).takes
+    scaling = Scaling.fitted(
+        [take.synthetic for take in takes], [take.radar for take in takes], pairs.null_bins
+    )
+    inputs = [scaling.input.compress(take.synthetic) for take in takes]
+    targets = [scaling.target.compress(take.radar) for take in takes]
+    made = []
+    for name in FILTERS:
+        network, chosen = fit_filter(name, inputs, targets, pairs.null_bins)
+        card = ModelCard(
+            model=name,
+            options=chosen,
+            scaling=scaling,
+            axis=pairs.axis,
+            null_bins=pairs.null_bins,
+            frame_rate_hz=pairs.frame_rate_hz,
+            trained_on=pairs.kind,
+        )
+        made.append((name, TrainedDenoiser(network, card)))
+    return made
+
+
+def _grouped(reports: Sequence[Report]) -> list[Group]:
+    """Models by architecture, in the order of the first of each."""
+    groups: dict[str, list[Report]] = {}
+    for report in reports:
+        groups.setdefault(_architecture(report.card), []).append(report)
+    return [Group(name, tuple(members), True) for name, members in groups.items()]
+
+
+def _architecture(card: ModelCard) -> str:
+    """The model's name, with the options that are not its defaults."""
+    usual = options(card.model)
+    other = [f"{name}={value}" for name, value in card.options.items() if usual.get(name) != value]
+    return card.model + (f" ({', '.join(other)})" if other else "")
+
+
+def _title(card: ModelCard) -> str:
+    if card.path is None:
+        return card.title or card.model
+    # All best models have one name; their runs tell them apart.
+    return card.path.parent.name if card.path.stem == "best" else card.path.stem
+
+
+def _judged_subjects(
+    models: Sequence[TrainedDenoiser], pairs: PairSet, subjects: Iterable[str] | None
+) -> tuple[str, ...]:
+    if subjects is not None:
+        return pairs.of(subjects).subjects
+    unseen = _learnt(models[0].card, "test") if models else []
+    return tuple(name for name in pairs.subjects if name in unseen) or pairs.subjects
+
+
+def _learnt(card: ModelCard, part: str) -> list[str]:
+    subjects = card.about.get("subjects")
+    return list(subjects.get(part, ())) if isinstance(subjects, Mapping) else []
+
+
+def _notes(
+    models: Sequence[TrainedDenoiser], judged: Sequence[str], pairs: PairSet
+) -> tuple[str, ...]:
+    notes = []
+    for model in models:
+        seen = {*_learnt(model.card, "training"), *_learnt(model.card, "validation")}
+        known = [name for name in judged if name in seen]
+        if known:
+            notes.append(
+                f"{_title(model.card)} has learnt from, or was chosen by, subjects called"
+                f" {', '.join(known)}: its errors there say nothing about other people"
+            )
+        if model.card.trained_on != pairs.kind:
+            notes.append(
+                f"{_title(model.card)} has learnt from {model.card.trained_on} radar, and is"
+                f" judged by {pairs.kind} radar"
+            )
+    if not set(pairs.subjects) - set(judged):
+        notes.append("the filters were fitted on the very takes that they are judged by")
+    return tuple(dict.fromkeys(notes))
+
+
+def _check_fits(card: ModelCard, pairs: PairSet) -> None:
+    for what, mine, theirs in (
+        ("velocity axis", card.axis, pairs.axis),
+        ("null bins", card.null_bins, tuple(pairs.null_bins)),
+        ("frame rate", card.frame_rate_hz, pairs.frame_rate_hz),
+    ):
+        if mine != theirs:
+            raise Sd2Error(
+                f"The {what} of the model {_title(card)} is {mine}, that of the pairs {theirs}",
+                "the same",
+                "Judge it by pairs like those that it learnt from",
+            )

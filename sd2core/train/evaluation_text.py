@@ -8,26 +8,25 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.files.tables import markdown_table, numbers_table
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from sd2core.train.evaluation import Evaluation, Group
 
-_Table = Callable[[Sequence[str], Sequence[Sequence[str]]], list[str]]
-"""``table(head, rows)`` gives lines."""
-
 _COLOURS = ("#888888", "#bbbbbb", "#444444", "#1b7837", "#2166ac", "#b35806", "#7b3294", "#c51b7d")
 
 
 def as_text(evaluation: Evaluation) -> str:
     """All tables for a terminal."""
-    return "\n".join(_lines(evaluation, _plain_table))
+    return "\n".join(_lines(evaluation, numbers_table))
 
 
 def as_markdown(evaluation: Evaluation) -> str:
     """The same in Markdown."""
-    return "\n".join(_lines(evaluation, _markdown_table)) + "\n"
+    return "\n".join(_lines(evaluation, markdown_table)) + "\n"
 
 
 def draw(evaluation: Evaluation) -> Figure:
@@ -85,7 +84,9 @@ def _bar(
         axes.plot(np.full(len(values), place), values, ".", color="black", markersize=3)
 
 
-def _lines(evaluation: Evaluation, table: _Table) -> list[str]:
+def _lines(
+    evaluation: Evaluation, table: Callable[[Sequence[Sequence[str]]], list[str]]
+) -> list[str]:
     groups = evaluation.groups
     reference = groups[0].values("peak", "mae_mps").mean()
     lines = [
@@ -111,7 +112,7 @@ def _lines(evaluation: Evaluation, table: _Table) -> list[str]:
         ]
         for group in groups
     ]
-    lines += table(head, rows)
+    lines += table([head, *rows])
     for what, names in zip(("gesture", "person"), _places(evaluation), strict=True):
         key = "label" if what == "gesture" else "subject"
         head = [f"peak MAE m/s per {what}", *names]
@@ -122,7 +123,8 @@ def _lines(evaluation: Evaluation, table: _Table) -> list[str]:
             ]
             for group in groups
         ]
-        lines += ["", *table(head, [*rows, ["moving frames", *_counts(groups[0], key, names)]])]
+        moving = ["moving frames", *_counts(groups[0], key, names)]
+        lines += ["", *table([head, *rows, moving])]
     empty = groups[0].reports[0].all.peak_all.empty_target
     lines += [
         "",
@@ -142,22 +144,6 @@ def _lines(evaluation: Evaluation, table: _Table) -> list[str]:
         )
     lines += [f"Note: {note}." for note in evaluation.notes]
     return lines
-
-
-def _plain_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    widths = [max(len(row[column]) for row in (head, *rows)) for column in range(len(head))]
-
-    def line(row: Sequence[str]) -> str:
-        first = row[0].ljust(widths[0])
-        rest = (text.rjust(width) for text, width in zip(row[1:], widths[1:], strict=True))
-        return "  ".join([first, *rest])
-
-    return [line(row) for row in (head, *rows)]
-
-
-def _markdown_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    rule = ["---", *["---:"] * (len(head) - 1)]
-    return [f"| {' | '.join(row)} |" for row in (head, rule, *rows)]
 
 
 def _counts(group: Group, key: str, names: Sequence[str]) -> list[str]:

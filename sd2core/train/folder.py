@@ -14,16 +14,6 @@ from sd2core.errors import Sd2Error
 from sd2core.runs.folder import LIVE, RunFolder, State
 from sd2core.runs.progress import Event, last_of, read_events, standing
 
-CONFIG_NAME = "config.toml"
-BEST_NAME = "best.safetensors"
-LAST_NAME = "last.safetensors"
-LAST_RECORD_NAME = "last.json"
-
-_OURS = (
-    CONFIG_NAME, BEST_NAME, LAST_NAME, LAST_RECORD_NAME, "progress.jsonl", "control", "log.txt",
-    "run.json", "lock",
-)  # fmt: skip
-
 
 @dataclass(frozen=True)
 class RunStatus:
@@ -55,25 +45,12 @@ class TrainingFolder(RunFolder):
     working = "training"
     look = "sd2 runs"
 
-    @property
-    def config(self) -> Path:
-        """Settings."""
-        return self.path / CONFIG_NAME
-
-    @property
-    def best(self) -> Path:
-        """Model of the best epoch."""
-        return self.path / BEST_NAME
-
-    @property
-    def last(self) -> Path:
-        """Checkpoint to resume from."""
-        return self.path / LAST_NAME
-
-    @property
-    def last_record(self) -> Path:
-        """Description of the checkpoint."""
-        return self.path / LAST_RECORD_NAME
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        self.config = self.path / "config.toml"  # settings
+        self.best = self.path / "best.safetensors"  # model of the best epoch
+        self.last = self.path / "last.safetensors"  # checkpoint to resume from
+        self.last_record = self.path / "last.json"  # description of the checkpoint
 
     def make(self) -> None:
         """Make the folder. Raises Sd2Error if it exists with content, or cannot be made."""
@@ -107,8 +84,9 @@ class TrainingFolder(RunFolder):
 
     def discard(self) -> None:
         """Delete what the run made, and the folder when nothing else is in it."""
-        for name in _OURS:
-            (self.path / name).unlink(missing_ok=True)
+        made = (self.config, self.best, self.last, self.last_record, self.progress, self.control)
+        for path in (*made, self.log, self.description, self._lock):
+            path.unlink(missing_ok=True)
         # What a write left that was killed.
         for rest in self.path.glob(".sd2-*.tmp"):
             rest.unlink(missing_ok=True)

@@ -27,8 +27,8 @@ from sd2core.train.callbacks import Outcome, TrainingCallbacks
 from sd2core.train.checkpoint import Checkpoint, Position, read_checkpoint
 from sd2core.train.config import TrainConfig
 from sd2core.train.data import Order, TrainingData, prepare, read_mixed
+from sd2core.train.denoiser_module import DenoiserModule, Steps
 from sd2core.train.folder import TrainingFolder
-from sd2core.train.learner import Learner, Steps
 from sd2core.train.machine import device_of, machine_words, precision_of, settled
 from sd2core.train.validate import Exam, Validation
 
@@ -72,30 +72,22 @@ def carry_out(
             data.pairs.null_bins,
         )
         about = _About(config, data, scaling, command, machine_words(device, precision, threads))
-        course = TrainingCallbacks(
+        callbacks = TrainingCallbacks(
             config,
             folder,
             writer,
             control,
             order_of(config, data),
             Exam.of(data.validation, scaling, data.pairs.axis, data.pairs.null_bins),
-            scaling,
-            data.pairs.axis,
-            _counted(data),
             checkpoint.position if checkpoint is not None else Position(),
             {"data_digest": digest, "threads": threads},
             lambda found, epoch: about.save(folder.best, network, found, epoch),
         )
-        learner = Learner(
-            network,
-            data.training,
-            course,
-            checkpoint,
-        )
-        _say_start(writer, course, data, network, device, resumed=checkpoint is not None)
-        if course.over:
+        module = DenoiserModule(network, data.training, callbacks, checkpoint)
+        _say_start(writer, callbacks, data, network, device, resumed=checkpoint is not None)
+        if callbacks.over:
             # Killed between its last checkpoint and its last line.
-            return "finished", course.position
+            return "finished", callbacks.position
         ranks = config.machine.devices
         trainer = Trainer(
             accelerator="gpu" if device == "cuda" else "cpu",
@@ -103,7 +95,7 @@ def carry_out(
             strategy=DDPStrategy(forward_sync_buffers=False) if ranks > 1 else "auto",
             precision=precision,
             max_epochs=1,
-            # The course does all of this, between steps.
+            # The callbacks do all of this, between steps.
             logger=False,
             enable_checkpointing=False,
             enable_progress_bar=False,
@@ -112,12 +104,12 @@ def carry_out(
             limit_val_batches=0,
             use_distributed_sampler=False,
         )
-        position = course.position
+        position = callbacks.position
         steps = Steps(
-            course.order, data.training, position.epoch, position.step, local_rank(), ranks
+            callbacks.order, data.training, position.epoch, position.step, local_rank(), ranks
         )
-        trainer.fit(learner, steps)
-    return course.outcome, course.position
+        trainer.fit(module, steps)
+    return callbacks.outcome, callbacks.position
 
 
 def order_of(config: TrainConfig, data: TrainingData) -> Order:
@@ -153,21 +145,16 @@ def _network(config: TrainConfig, data: TrainingData, checkpoint: Checkpoint | N
     return network
 
 
-def _counted(data: TrainingData) -> tuple[int, ...]:
-    nulled = set(data.pairs.null_bins)
-    return tuple(number for number in range(data.pairs.axis.bins) if number not in nulled)
-
-
 def _say_start(
     writer: ProgressWriter,
-    course: TrainingCallbacks,
+    callbacks: TrainingCallbacks,
     data: TrainingData,
     network: Denoiser,
     device: str,
     *,
     resumed: bool,
 ) -> None:
-    config, position, split = course.config, course.position, data.split
+    config, position, split = callbacks.config, callbacks.position, data.split
     timed = config.training.minutes is not None
     writer.say(
         "start",
@@ -176,7 +163,7 @@ def _say_start(
         device=device,
         epochs=None if timed else config.training.epochs,
         minutes=config.training.minutes,
-        steps_per_epoch=course.order.steps,
+        steps_per_epoch=callbacks.order.steps,
         train_segments=len(data.training),
         validation_segments=len(data.validation),
         training_subjects=list(split.training),

@@ -13,7 +13,7 @@ from __future__ import annotations
 import os
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -27,7 +27,7 @@ from sd2core.train.config import TrainConfig, config_text, read_config
 from sd2core.train.folder import TrainingFolder
 
 if TYPE_CHECKING:
-    from sd2core.train.checkpoint import Position
+    from sd2core.train.callbacks import Outcome
 
 Watch = Callable[[Event], None]
 """Told every line of progress as it is written."""
@@ -147,8 +147,7 @@ def _trained(
         except BaseException as error:
             _note_failure(folder, writer, error)
             raise
-        writer.say("end", **_end_line(folder, outcome, position))
-        folder.set_state(outcome)
+        _say_end(folder, writer, outcome, position.best or {})
     if outcome == "cancelled":
         # Windows deletes no file that is open.
         lock.release()
@@ -177,16 +176,23 @@ def _beside(folder: TrainingFolder, config: TrainConfig, command: str, resume: b
     return Ending(outcome, None, None, None, None, first=False)
 
 
-def _end_line(folder: TrainingFolder, outcome: str, position: Position) -> dict[str, Any]:
-    best = position.best or {}
-    return {
-        "outcome": outcome,
-        "best_epoch": best.get("epoch"),
-        "validation_rmse": best.get("validation_rmse"),
-        "validation_mae_mps": best.get("validation_mae_mps"),
-        "model": folder.best.name if folder.best.exists() else None,
-        "error": None,
-    }
+def _say_end(
+    folder: TrainingFolder,
+    writer: ProgressWriter,
+    outcome: Outcome,
+    best: Mapping[str, Any],
+    error: Mapping[str, str] | None = None,
+) -> None:
+    writer.say(
+        "end",
+        outcome=outcome,
+        best_epoch=best.get("epoch"),
+        validation_rmse=best.get("validation_rmse"),
+        validation_mae_mps=best.get("validation_mae_mps"),
+        model=folder.best.name if folder.best.exists() else None,
+        error=error,
+    )
+    folder.set_state(outcome)
 
 
 def _note_failure(folder: TrainingFolder, writer: ProgressWriter, error: BaseException) -> None:
@@ -206,16 +212,7 @@ def _note_failure(folder: TrainingFolder, writer: ProgressWriter, error: BaseExc
         found = f"This should not happen ({type(error).__name__}: {error})"
         remedy = f"Please report it, with {folder.log.name}"
         said = {"found": found, "expected": "", "remedy": remedy}
-    writer.say(
-        "end",
-        outcome="failed",
-        best_epoch=None,
-        validation_rmse=None,
-        validation_mae_mps=None,
-        model=folder.best.name if folder.best.exists() else None,
-        error=said,
-    )
-    folder.set_state("failed")
+    _say_end(folder, writer, "failed", {}, said)
 
 
 def _clear_failed(folder: TrainingFolder) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -38,10 +38,13 @@ class Exam:
     targets: torch.Tensor  # likewise
     peaks_mps: NDArray[np.float64]
     """Of the targets, (segments · length,); NaN in frames in which nothing moves."""
+    scaling: Scaling
+    axis: VelocityAxis
+    counted: tuple[int, ...]  # bins that are not nulled
 
     def on(self, device: torch.device) -> Exam:
         """Copy on a device."""
-        return Exam(self.inputs.to(device), self.targets.to(device), self.peaks_mps)
+        return replace(self, inputs=self.inputs.to(device), targets=self.targets.to(device))
 
     @classmethod
     def of(
@@ -54,26 +57,22 @@ class Exam:
             torch.from_numpy(scaling.input.compress(segments.inputs)),
             torch.from_numpy(scaling.target.compress(segments.targets)),
             np.where(segments.moving.ravel(), peak_velocity_mps(energies, axis), np.nan),
+            scaling,
+            axis,
+            tuple(number for number in range(axis.bins) if number not in null_bins),
         )
 
 
 def validate(
-    model: Denoiser,
-    exam: Exam,
-    scaling: Scaling,
-    axis: VelocityAxis,
-    counted: tuple[int, ...],
-    keep_on: Callable[[], bool] = lambda: True,
+    model: Denoiser, exam: Exam, keep_on: Callable[[], bool] = lambda: True
 ) -> Validation | None:
-    """Measure a model over the bins that are ``counted`` (not nulled).
-
-    ``keep_on`` is asked between batches; if it says False there is no result (None).
-    """
+    """Measure a model; no result (None) if ``keep_on``, asked between batches, says False."""
     training = model.training
     model.eval()
     squares, cells = 0.0, 0
     found_mps = []
-    nulled = [number for number in range(axis.bins) if number not in set(counted)]
+    bins = exam.axis.bins
+    nulled = [number for number in range(bins) if number not in exam.counted]
     try:
         with torch.no_grad():
             for start in range(0, len(exam.inputs), _BATCH):
@@ -81,12 +80,12 @@ def validate(
                     return None
                 batch = slice(start, start + _BATCH)
                 answer = model(exam.inputs[batch]).float()
-                difference = (answer - exam.targets[batch])[..., list(counted)]
+                difference = (answer - exam.targets[batch])[..., list(exam.counted)]
                 squares += float(difference.double().square().sum())
                 cells += difference.numel()
-                energies = scaling.target.expand(answer.cpu().numpy())
+                energies = exam.scaling.target.expand(answer.cpu().numpy())
                 energies[..., nulled] = 0.0
-                found_mps.append(peak_velocity_mps(energies.reshape(-1, axis.bins), axis))
+                found_mps.append(peak_velocity_mps(energies.reshape(-1, bins), exam.axis))
     finally:
         model.train(training)
     error = velocity_error(np.concatenate(found_mps), exam.peaks_mps)

@@ -33,10 +33,9 @@ from sd2core.body import fit_windows, lifter
 from sd2core.body import track as tracks
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.fit import fit_body
-from sd2core.body.fit_folder import LANDMARKS, MARKER, PARTIAL
-from sd2core.body.fit_video import FitChoices, FitReport, fit_video
+from sd2core.body.fit_video import LANDMARKS, MARKER, PARTIAL, FitChoices, FitReport, fit_video
+from sd2core.body.landmark_files import RefinedStretches, SearchStore
 from sd2core.body.landmark_models import landmark_models
-from sd2core.body.landmark_store import RefinedStretches, SearchStore
 from sd2core.body.landmarks import DEFAULT_SILHOUETTES, SIGHTINGS, find_landmarks
 from sd2core.body.refining import Stretch
 from sd2core.body.track import LandmarkTrack

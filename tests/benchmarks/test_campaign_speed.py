@@ -18,9 +18,8 @@ from sd2core.numerics.compiled import warm_up
 from sd2core.pairs.store import Take
 from sd2core.simulate.campaign.fit_errors import FitErrors
 from sd2core.simulate.campaign.motion import perform
-from sd2core.simulate.campaign.people import random_subject
 from sd2core.simulate.campaign.radar import TargetOptions, radar_target
-from sd2core.simulate.campaign.scene import random_setting
+from sd2core.simulate.campaign.scene import random_setting, random_subject
 from sd2core.simulate.campaign.takes import OPTIONS, Campaign, TakeMaker
 
 PEOPLE = 3

@@ -16,10 +16,10 @@ from scipy.ndimage import gaussian_filter1d
 from timing import best_s
 
 from sd2core.body.blazepose import PoseDetector, PoseLandmarker
-from sd2core.body.keypoints import KeypointSpace
 from sd2core.body.landmark_models import LandmarkModels
 from sd2core.body.landmarks import find_landmarks
 from sd2core.body.model import Body
+from sd2core.body.rig import KeypointSpace
 from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.body.track import LANDMARKS
 from sd2core.files.resources import resource_path

@@ -21,7 +21,7 @@ from sd2core.train.config import (
     TrainConfig,
     TrainingConfig,
 )
-from sd2core.train.optimiser import optimiser_of
+from sd2core.train.denoiser_module import optimiser_of
 from sd2core.train.start import begin
 
 BATCH, LENGTH, BINS = 64, 72, 8
@@ -51,7 +51,7 @@ def test_the_loop_costs_little(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Between two steps: gathering a batch, chance, rate, control file, Lightning's hooks."""
-    from sd2core.train.learner import Learner
+    from sd2core.train.denoiser_module import DenoiserModule
 
     pairs = write_pairs(tmp_path / "p.zarr", takes=40, frames=450, axis=VelocityAxis(BINS, 2.0))
     config = TrainConfig(
@@ -61,13 +61,13 @@ def test_the_loop_costs_little(
         MachineConfig(device="cpu", threads=1),
     )
     starts_s: list[float] = []
-    before = Learner.on_train_batch_start
+    before = DenoiserModule.on_train_batch_start
 
-    def noted(self: Learner, *arguments: Any) -> None:
+    def noted(self: DenoiserModule, *arguments: Any) -> None:
         starts_s.append(time.thread_time())
         before(self, *arguments)
 
-    monkeypatch.setattr(Learner, "on_train_batch_start", noted)
+    monkeypatch.setattr(DenoiserModule, "on_train_batch_start", noted)
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:

@@ -41,8 +41,9 @@ MARS = (SHARED / "paired" / "mars_subject1", SHARED / "paired" / "mars_subject4"
 COMPARED = ("s4", "s4d", "gru", "unet", "swin")
 ALL = {
     **{name: (name,) for name in COMPARED},
-    "unet-step": ("unet", *settings(options_of("unet", "time"))),
-    "swin-step": ("swin", *settings(options_of("swin", "time"))),
+    # As long a step of training as the S4 has.
+    "unet-step": ("unet", *settings({**options_of("unet"), "channels": 5})),
+    "swin-step": ("swin", *settings({**options_of("swin"), "channels": 16})),
     "s4-both": ("s4", *settings({"bidirectional": "true"})),
     "s4-range": ("s4", "--range-factor", "2"),
 }

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from sd2core.doppler import Synthesizer
 from sd2core.io.radar.mars import MarsPart, mars_parts, read_mars
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.mocap.driving import DrivenClip
+from sd2core.mocap.driving import DrivenClip, SkeletonClip
 from sd2core.mocap.mars_pairs import (
     MarsChoices,
     body_doppler,
@@ -31,7 +31,6 @@ from sd2core.mocap.mars_pairs import (
     radar_doppler,
     skeleton_clip,
 )
-from sd2core.mocap.skeleton import SkeletonClip
 from sd2core.pairs.store import PairSet, read_pairs
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase

@@ -10,9 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from sd2core.body.fit import fit_body
-from sd2core.body.keypoints import KeypointSpace
 from sd2core.body.landmark_files import load_track
-from sd2core.body.rig import Rig
+from sd2core.body.rig import KeypointSpace, Rig
 from sd2core.body.rotations import Floats
 from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.errors import Sd2Error

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.camera import PinholeCamera
-from sd2core.body.silhouette import overlap, silhouette
+from sd2core.body.shaping import overlap, silhouette
 from sd2core.body.track import LANDMARKS, LandmarkTrack
 from sd2core.compare.joints import JOINTS, own_patches, own_resolution
 from sd2core.errors import Sd2Error

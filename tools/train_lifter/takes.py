@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from sd2core.body.blazepose import CLOSE_UP, PoseLandmarker, Roi
 from sd2core.body.camera import PinholeCamera
-from sd2core.body.keypoints import KeypointSpace
+from sd2core.body.rig import KeypointSpace
 from sd2core.body.rotations import Floats
 from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.body.skinning import pose_vertices

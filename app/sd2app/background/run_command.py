@@ -86,15 +86,14 @@ class CommandFolder(RunFolder):
     maker = "SD² Studio"
     look = "the window"
 
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        self.progress = self.output  # which also has plain lines
+
     @property
     def output(self) -> Path:
         """File with what the process prints."""
         return self.path / "output.txt"
-
-    @property
-    def progress(self) -> Path:
-        """File with lines of JSON: the same as the output, which also has plain lines."""
-        return self.output
 
     @property
     def facts(self) -> dict[str, Any]:

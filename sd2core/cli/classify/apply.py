@@ -6,10 +6,17 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sd2core.cli.labels.reading import add_replace, check_label_output, write
-from sd2core.cli.labels.suggest import map_and_clock
+from sd2core.cli.labels.reading import check_label_output, print_lost
+from sd2core.cli.labels.suggest import (
+    add_searched_map,
+    map_and_clock,
+    span_cells,
+    spans_data,
+    write_found,
+)
 from sd2core.cli.options import add_command, add_json, not_negative_float
 from sd2core.cli.output import counted, print_json, print_rows, progress_bar
+from sd2core.cli.recording_maps import MAP_NAMES
 
 if TYPE_CHECKING:
     import numpy as np
@@ -35,9 +42,7 @@ def add_apply(kinds: argparse._SubParsersAction) -> None:
             "  sd2 classify apply map.npz --model g.safetensors --probabilities p.npz"
         ),
     )
-    parser.add_argument(
-        "map", type=Path, metavar="MAP", help="a map, a recording, or the .h5 of a K60168A"
-    )
+    add_searched_map(parser, MAP_NAMES)
     parser.add_argument(
         "--model",
         type=Path,
@@ -45,13 +50,6 @@ def add_apply(kinds: argparse._SubParsersAction) -> None:
         metavar="FILE",
         help="classifier from `sd2 classify train`",
     )
-    parser.add_argument(
-        "--of",
-        choices=("synthetic", "denoised", "radar"),
-        help="which map of a recording (default: synthetic where there is a mesh)",
-    )
-    parser.add_argument("--out", type=Path, metavar="FILE", help="the file of labels to write")
-    add_replace(parser)
     parser.add_argument(
         "--probabilities",
         type=Path,
@@ -80,8 +78,6 @@ def _apply(options: argparse.Namespace) -> None:
     from sd2core.classify.spans import SpanOptions, predicted_spans
     from sd2core.cli.reading import check_output
     from sd2core.denoise.resample_to_model import check_bins
-    from sd2core.labels.spans import Labels, LabelTrack
-    from sd2core.labels.suggest import TRACK
 
     if options.out is not None:
         check_label_output(options.out, replace=options.replace)
@@ -97,9 +93,7 @@ def _apply(options: argparse.Namespace) -> None:
     spans = predicted_spans(
         probabilities, doppler.timebase, card.classes, chosen, present=doppler.present
     )
-    lost: list[str] = []
-    if options.out is not None:
-        lost = write(options.out, Labels((LabelTrack(TRACK),), spans), clock)
+    lost = write_found(options, spans, clock)
     if options.probabilities is not None:
         _write_probabilities(options.probabilities, probabilities, doppler.times_s, card.classes)
     if options.json:
@@ -111,16 +105,7 @@ def _apply(options: argparse.Namespace) -> None:
                 "mean_probabilities": dict(
                     zip(card.classes, probabilities.mean(axis=0).tolist(), strict=True)
                 ),
-                "spans": [
-                    {
-                        "id": span.id,
-                        "start_s": span.start_s,
-                        "end_s": span.end_s,
-                        "label": span.label,
-                        "confidence": span.confidence,
-                    }
-                    for span in spans
-                ],
+                "spans": spans_data(spans, "label", "confidence"),
                 "path": None if options.out is None else str(options.out),
                 "not_kept": lost,
             }
@@ -129,22 +114,12 @@ def _apply(options: argparse.Namespace) -> None:
     print(f"{counted(len(spans), 'gesture')} in the {doppler.kind} map, by {options.model}")
     if spans:
         rows = [("id", "start s", "end s", "gesture", "confidence")]
-        rows += [
-            (
-                str(span.id),
-                f"{span.start_s:.3f}",
-                f"{span.end_s:.3f}",
-                span.label,
-                f"{span.confidence:.2f}",
-            )
-            for span in spans
-        ]
+        rows += [(*span_cells(span), span.label, f"{span.confidence:.2f}") for span in spans]
         print_rows(rows, right=(0, 1, 2, 4))
     for path in (options.out, options.probabilities):
         if path is not None:
             print(f"Wrote {path}")
-    for sentence in lost:
-        print(f"  not kept: {sentence}")
+    print_lost(lost)
 
 
 def _write_probabilities(

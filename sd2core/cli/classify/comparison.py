@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.classify.data import DATA_HELP, add_sources, clips_of
-from sd2core.cli.classify.network import add_network, network_of
-from sd2core.cli.options import add_command, add_json, positive_int, share
-from sd2core.cli.output import finite, print_json, progress_bar
+from sd2core.cli.classify.train import add_network, network_of
+from sd2core.cli.options import add_command, add_json_and_progress, positive_int, share
+from sd2core.cli.output import finite, print_event, print_json, progress_bar
 
 if TYPE_CHECKING:
     from sd2core.classify.comparison import Table, TableOptions
@@ -68,12 +68,7 @@ def add_table(kinds: argparse._SubParsersAction) -> None:
     )
     add_network(parser)
     parser.add_argument("--steps", type=positive_int, metavar="N", help="batches per training")
-    parser.add_argument(
-        "--progress-json",
-        action="store_true",
-        help="print progress as JSON lines, for other programs (docs/formats.md)",
-    )
-    add_json(parser)
+    add_json_and_progress(parser)
 
 
 def _shares(text: str) -> tuple[float, ...]:
@@ -95,7 +90,7 @@ def _table(options: argparse.Namespace) -> None:
     content = finite(as_json(table))
     _write(folder, table, content)
     if options.progress_json:
-        print(json.dumps({"event": "written", "folder": str(folder)}), flush=True)
+        print_event("written", folder=str(folder))
     elif options.json:
         print_json(content)
     else:
@@ -109,8 +104,7 @@ def _lines() -> Iterator[Progress]:
     begun_s = time.monotonic()
 
     def report(done: int, total: int) -> None:
-        told = {"done": done, "total": total, "elapsed_s": time.monotonic() - begun_s}
-        print(json.dumps({"event": "run", **told}), flush=True)
+        print_event("run", done=done, total=total, elapsed_s=time.monotonic() - begun_s)
 
     yield report
 

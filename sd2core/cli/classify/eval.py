@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sd2core.cli.classify.data import DATA_HELP, add_data, asked_maps, clips_of, denoiser_for
+from sd2core.cli.eval import add_judging, check_result_files, named_subjects, print_or_write
 from sd2core.cli.options import add_command
-from sd2core.cli.output import finite, print_rows
+from sd2core.cli.output import print_rows
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
     from sd2core.classify.card import ClassifierCard
     from sd2core.classify.data import Clip, ClipSet
     from sd2core.classify.metrics import Score
-
-_STANDARD_OUTPUT = Path("-")
 
 
 def add_eval(kinds: argparse._SubParsersAction) -> None:
@@ -46,36 +44,15 @@ def add_eval(kinds: argparse._SubParsersAction) -> None:
         metavar="FILE",
         help="classifier from `sd2 classify train`",
     )
-    parser.add_argument(
-        "--subjects",
-        metavar="NAMES",
-        help="people to evaluate on, separated by commas, or `all` (default: those the training"
-        " kept for the test)",
-    )
-    parser.add_argument(
-        "--all-placements",
-        action="store_true",
-        help="use also the maps from other places of the sensor, not only each movement's own",
-    )
-    parser.add_argument(
-        "--json", type=Path, metavar="FILE", help="write all numbers, or - to print them"
-    )
-    parser.add_argument(
-        "--plot", type=Path, metavar="FILE", help="draw both matrices, as .png, .svg or .pdf"
-    )
+    add_judging(parser, "those the training kept for the test", "both matrices")
 
 
 def _eval(options: argparse.Namespace) -> None:
     from sd2core.classify.files import load_classifier
     from sd2core.classify.live import judge
-    from sd2core.cli.reading import check_output
-    from sd2core.files.atomic import atomic_write_text
-    from sd2core.files.figure_files import SUFFIXES, save_figure
+    from sd2core.files.figure_files import save_figure
 
-    if options.plot is not None:
-        check_output(options.plot, *SUFFIXES)
-    if options.json not in (None, _STANDARD_OUTPUT):
-        check_output(options.json, ".json")
+    check_result_files(options)
     classifier = load_classifier(options.model)
     maps = asked_maps(options)
     known = clips_of(options.data, maps, denoiser_for(maps, options.denoiser))
@@ -91,13 +68,8 @@ def _eval(options: argparse.Namespace) -> None:
         **found.to_json(),
         **found.summary(),
     }
-    content = json.dumps(finite(told), indent=2, ensure_ascii=False)
-    if options.json == _STANDARD_OUTPUT:
-        print(content)
-    else:
+    if not print_or_write(options, told):
         _say(found, known, subjects, sorted(learnt))
-    if options.json not in (None, _STANDARD_OUTPUT):
-        atomic_write_text(options.json, content + "\n")
     if options.plot is not None:
         from sd2core.classify.comparison_report import confusion_figure
         from sd2core.classify.metrics import shares
@@ -113,10 +85,8 @@ def _eval(options: argparse.Namespace) -> None:
 
 def _judged(known: ClipSet, card: ClassifierCard, options: argparse.Namespace) -> tuple[Clip, ...]:
     kept = card.about.get("split", {}).get("test") or ()
-    if options.subjects == "all":
-        names = known.subjects
-    elif options.subjects is not None:
-        names = tuple(name for name in options.subjects.split(",") if name)
+    if options.subjects is not None:
+        names = named_subjects(options.subjects, known.subjects)
     else:
         # Data of other people than the training's are judged whole.
         names = tuple(name for name in kept if name in known.subjects) or known.subjects

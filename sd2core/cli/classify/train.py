@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from sd2core.classify.defaults import DELAY_S, MODELS, WIDTH
 from sd2core.cli.classify.data import (
     DATA_HELP,
     add_data,
@@ -19,20 +20,20 @@ from sd2core.cli.classify.data import (
     denoiser_for,
     split_of,
 )
-from sd2core.cli.classify.network import add_network, network_of
 from sd2core.cli.options import (
     add_command,
-    add_json,
+    add_json_and_progress,
     add_people_kept_out,
+    not_negative_float,
     positive_float,
     positive_int,
 )
-from sd2core.cli.output import finite, print_facts, print_json
+from sd2core.cli.output import finite, print_event, print_facts, print_json
+from sd2core.cli.running import INTERRUPTED
 
 if TYPE_CHECKING:
+    from sd2core.classify.experiment import Network
     from sd2core.classify.training import TrainOptions, Watch
-
-_INTERRUPTED = 130
 
 
 def add_train(kinds: argparse._SubParsersAction) -> None:
@@ -82,12 +83,46 @@ def add_train(kinds: argparse._SubParsersAction) -> None:
         "--learning-rate", type=positive_float, metavar="R", help="peak learning rate"
     )
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="default: 0")
-    parser.add_argument(
-        "--progress-json",
-        action="store_true",
-        help="print progress as JSON lines, for other programs (docs/formats.md)",
+    add_json_and_progress(parser)
+
+
+def add_network(parser: argparse.ArgumentParser) -> None:
+    """Add model, features, width and delay."""
+    group = parser.add_argument_group("network")
+    group.add_argument(
+        "--model",
+        choices=MODELS,
+        default=MODELS[0],
+        help=f"two LSTM layers (the paper's), or two S4 layers (default: {MODELS[0]})",
     )
-    add_json(parser)
+    group.add_argument(
+        "--features",
+        choices=("columns", "peak"),
+        default="columns",
+        help="input per frame: whole columns (the default), or the strongest bin (the paper's)",
+    )
+    group.add_argument(
+        "--width",
+        type=positive_int,
+        default=WIDTH,
+        metavar="N",
+        help=f"units or channels of a layer (default: {WIDTH}; the paper's: 16)",
+    )
+    group.add_argument(
+        "--delay-s",
+        type=not_negative_float,
+        default=DELAY_S,
+        metavar="S",
+        help="classify a frame so much later, with the frames after it known (default:"
+        f" {DELAY_S:g}; the paper's: 0, at once)",
+    )
+
+
+def network_of(options: argparse.Namespace) -> Network:
+    """Return the network chosen by the options."""
+    from sd2core.classify.experiment import Network
+
+    return Network(options.model, options.features, options.width, options.delay_s)
 
 
 def _train(options: argparse.Namespace) -> int:
@@ -127,7 +162,7 @@ def _train(options: argparse.Namespace) -> int:
     run = {"model": str(options.out), "card": card.to_json(), "events": made.events}
     atomic_write_text(options.out.with_suffix(".json"), json.dumps(finite(run), indent=1) + "\n")
     if options.progress_json:
-        print(json.dumps({"event": "written", "model": str(options.out)}), flush=True)
+        print_event("written", model=str(options.out))
     elif options.json:
         print_json({"interrupted": made.interrupted, **run})
     else:
@@ -135,7 +170,7 @@ def _train(options: argparse.Namespace) -> int:
 
         description = describe_classifier_card(options.out, card)
         print_facts(f"Wrote {options.out}", description.facts)
-    return _INTERRUPTED if made.interrupted else 0
+    return INTERRUPTED if made.interrupted else 0
 
 
 def _options(options: argparse.Namespace) -> TrainOptions:
@@ -163,7 +198,7 @@ def _watching(options: argparse.Namespace, steps: int) -> Iterator[Watch]:
     from tqdm import tqdm
 
     if options.progress_json:
-        yield lambda event: print(json.dumps(finite(event)), flush=True)
+        yield lambda event: print_event(**event)
         return
     with tqdm(
         total=steps, desc="Training", unit="step", file=sys.stderr, disable=None, leave=False

@@ -232,8 +232,7 @@ def describe_map(path: Path, doppler: DopplerMap) -> Description:
     }
     facts = {
         "kind": doppler.kind,
-        "velocity": f"{doppler.axis.bins} bins of {doppler.axis.bin_width_mps:g} m/s over"
-        f" ±{doppler.axis.v_max_mps:g} m/s, approaching is positive",
+        "velocity": axis_in_words(doppler.axis),
         "time": _clock(doppler.timebase),
         "no person": _gaps(doppler.present, doppler.timebase),
         "unit": doppler.unit,
@@ -247,6 +246,14 @@ def describe_map(path: Path, doppler: DopplerMap) -> Description:
     }
     notes = tuple(doppler.meta.get("notes", ()))
     return Description(f"Doppler map {path}", data, facts, notes)
+
+
+def axis_in_words(axis: VelocityAxis) -> str:
+    """Bins of a velocity axis, its end and its sign."""
+    return (
+        f"{axis.bins} bins of {axis.bin_width_mps:g} m/s over ±{axis.v_max_mps:g} m/s,"
+        " approaching is positive"
+    )
 
 
 def bins_in_words(axis: VelocityAxis, bins: tuple[int, ...]) -> str:

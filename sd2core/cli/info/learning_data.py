@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sd2core.cli.info.description import Description, bins_in_words
+from sd2core.cli.info.description import Description, axis_in_words, bins_in_words
 from sd2core.cli.output import counted
 from sd2core.datasets.card import describe_dataset, duration_text, limits
 from sd2core.datasets.reading import open_dataset
@@ -33,8 +33,7 @@ def describe_dataset_at(path: Path) -> Description:
         f" {counted(len(card['subjects']), 'subject')}, {duration_text(card)}, up to"
         f" {counted(card['placements'], 'placement')} each",
         "range": "" if ranges_m is None else f"{ranges_m[0]:g} to {ranges_m[1]:g} m",
-        "velocity": f"{axis.bins} bins of {axis.bin_width_mps:g} m/s over ±{axis.v_max_mps:g} m/s,"
-        " approaching is positive",
+        "velocity": axis_in_words(axis),
         "nulled bins": bins_in_words(axis, null_bins),
     }
     data = {"kind": "dataset", "path": str(path)} | card
@@ -82,8 +81,7 @@ def describe_pairs(path: Path, pairs: PairSet) -> Description:
             f"{name} {count / pairs.frames:.0%}" for name, count in labelled.items()
         ),
         "sensors": f"{placements} for each take, up to {max(ranges_m):.2f} m from the camera",
-        "velocity": f"{pairs.axis.bins} bins of {pairs.axis.bin_width_mps:g} m/s over"
-        f" ±{pairs.axis.v_max_mps:g} m/s, approaching is positive",
+        "velocity": axis_in_words(pairs.axis),
         "nulled bins": bins_in_words(pairs.axis, pairs.null_bins),
     }
     return Description(f"Pairs {path}", data, facts)

@@ -9,7 +9,7 @@ from typing import Any
 from sd2core.classify.card import FORMAT as CLASSIFIER
 from sd2core.classify.card import ClassifierCard
 from sd2core.classify.files import describe_classifier
-from sd2core.cli.info.description import Description, bins_in_words
+from sd2core.cli.info.description import Description, axis_in_words, bins_in_words
 from sd2core.denoise.card import ModelCard
 from sd2core.denoise.files import describe_model
 from sd2core.denoise.registry import MODELS, summary
@@ -62,8 +62,7 @@ def model_words(card: ModelCard) -> str:
 
 def _axis_facts(card: ModelCard | ClassifierCard) -> dict[str, str]:
     return {
-        "velocity": f"{card.axis.bins} bins of {card.axis.bin_width_mps:g} m/s over"
-        f" ±{card.axis.v_max_mps:g} m/s",
+        "velocity": axis_in_words(card.axis),
         "nulled bins": bins_in_words(card.axis, card.null_bins),
         "frame rate": f"{card.frame_rate_hz:.4g} frames/s",
     }

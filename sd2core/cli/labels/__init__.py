@@ -12,14 +12,11 @@ from sd2core.cli.labels.cut import add_cut
 from sd2core.cli.labels.figure import add_figure
 from sd2core.cli.labels.label_set import add_set
 from sd2core.cli.labels.reading import (
-    add_clock,
-    add_reading,
+    add_labels,
     add_replace,
     check_label_output,
-    clock_of,
-    labels_at,
     print_lost,
-    with_rate,
+    read_named,
     write,
 )
 from sd2core.cli.labels.recover import add_recover
@@ -62,9 +59,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         ),
         examples="  sd2 labels show walk.sd2\n  sd2 labels show walk.eaf --video walk.mp4 --json",
     )
-    show.add_argument("file", type=Path, metavar="FILE", help="the file with labels")
-    add_reading(show, "FILE")
-    add_clock(show)
+    add_labels(show)
     add_json(show)
 
     convert = add_command(
@@ -82,12 +77,10 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             "  sd2 labels convert walk.eaf labels.json"
         ),
     )
-    convert.add_argument("file", type=Path, metavar="IN", help="the file with labels")
+    add_labels(convert, "IN")
     convert.add_argument("out", type=Path, metavar="OUT", help="the file to write")
-    add_reading(convert, "IN")
     convert.add_argument("--to", metavar="NAME", help="the format of OUT, likewise")
     add_replace(convert)
-    add_clock(convert)
     add_json(convert)
 
     _add_statistics(kinds)
@@ -100,9 +93,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 
 def _show(options: argparse.Namespace) -> None:
-    clock = clock_of(options, options.file)
-    labels = labels_at(options.file, clock, options.format, options.observation)
-    clock = with_rate(options, clock, labels)
+    labels, clock = read_named(options)
     if options.json:
         print_json(_described(labels, clock))
         return
@@ -130,9 +121,8 @@ def _show(options: argparse.Namespace) -> None:
 
 def _convert(options: argparse.Namespace) -> None:
     check_label_output(options.out, replace=options.replace)
-    clock = clock_of(options, options.file)
-    labels = labels_at(options.file, clock, options.format, options.observation)
-    lost = write(options.out, labels, with_rate(options, clock, labels), options.to)
+    labels, clock = read_named(options)
+    lost = write(options.out, labels, clock, options.to)
     if options.json:
         print_json({"path": str(options.out), "spans": len(labels.spans), "not_kept": lost})
         return
@@ -171,9 +161,7 @@ def _add_statistics(kinds: argparse._SubParsersAction) -> None:
             "  sd2 labels statistics walk.eaf --video walk.mp4 --csv"
         ),
     )
-    parser.add_argument("file", type=Path, metavar="FILE", help="the file with labels")
-    add_reading(parser, "FILE")
-    add_clock(parser)
+    add_labels(parser)
     form = parser.add_mutually_exclusive_group()
     form.add_argument("--csv", action="store_true", help="print comma-separated values")
     add_json(form)
@@ -182,9 +170,7 @@ def _add_statistics(kinds: argparse._SubParsersAction) -> None:
 def _statistics(options: argparse.Namespace) -> None:
     from sd2core.labels.statistics import statistics_rows, statistics_text
 
-    clock = clock_of(options, options.file)
-    labels = labels_at(options.file, clock, options.format, options.observation)
-    clock = with_rate(options, clock, labels)
+    labels, clock = read_named(options)
     if options.json:
         print_json({"labels": _statistics_of(labels, clock)})
     elif options.csv:

@@ -8,12 +8,12 @@ from statistics import median
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.labels.reading import add_clock, clock_of, labels_at, needed, with_rate
+from sd2core.cli.labels.suggest import spans_data
 from sd2core.cli.options import add_command, add_json, share
 from sd2core.cli.output import counted, print_json, print_rows
 
 if TYPE_CHECKING:
     from sd2core.labels.agreement import Agreement, Answer, Kappa
-    from sd2core.labels.spans import Span
 
 
 def add_agree(kinds: argparse._SubParsersAction) -> None:
@@ -132,8 +132,8 @@ def _data(found: Agreement) -> dict[str, Any]:
             }
             for match in spans.matches
         ],
-        "only_a": [_span_data(span) for span in spans.only_a],
-        "only_b": [_span_data(span) for span in spans.only_b],
+        "only_a": spans_data(spans.only_a, "label"),
+        "only_b": spans_data(spans.only_b, "label"),
     }
 
 
@@ -144,10 +144,6 @@ def _kappa(kappa: Kappa) -> tuple[str, str, str]:
 
 def _kappa_data(kappa: Kappa) -> dict[str, Any]:
     return {"kappa": kappa.value, "observed": kappa.observed, "expected": kappa.expected}
-
-
-def _span_data(span: Span) -> dict[str, Any]:
-    return {"id": span.id, "start_s": span.start_s, "end_s": span.end_s, "label": span.label}
 
 
 def _answer(answer: Answer) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from sd2core.cli.labels.reading import labels_at, recording_clock
 from sd2core.cli.options import add_command, add_json
 from sd2core.cli.output import counted, print_json, progress_bar
-from sd2core.cli.recording_maps import MAP_NAMES, maps_of, parsed_maps, usual_maps
+from sd2core.cli.recording_maps import add_labelled_recording, chosen_maps, maps_of
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def add_cut(kinds: argparse._SubParsersAction) -> None:
             " --parts video,maps"
         ),
     )
-    parser.add_argument("recording", type=Path, metavar="RECORDING", help="a recording (.sd2)")
+    add_labelled_recording(parser)
     parser.add_argument(
         "--out", type=Path, required=True, metavar="FOLDER", help="folder, made if missing"
     )
@@ -50,14 +50,6 @@ def add_cut(kinds: argparse._SubParsersAction) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--parts", default=_PARTS, metavar="LIST", help=f"some of {_PARTS} (default: all)"
-    )
-    parser.add_argument(
-        "--maps",
-        metavar="LIST",
-        help=f"some of {', '.join(MAP_NAMES)} (default: those of its mesh and its radar)",
-    )
-    parser.add_argument(
-        "--labels", type=Path, metavar="FILE", help="other labels than the recording's own"
     )
     parser.add_argument(
         "--replace", action="store_true", help="replace folders that hold something else"
@@ -121,7 +113,7 @@ def _source(options: argparse.Namespace, recording: Recording, clock: Timebase) 
     if not {*parts} <= {*PARTS}:
         raise Sd2Error(f"The parts are {options.parts!r}", f"some of {_PARTS}")
     mesh = None
-    names = parsed_maps(options.maps) if options.maps else usual_maps(recording)
+    names = chosen_maps(options, recording)
     if recording.mesh is not None and ("mesh" in parts or "maps" in parts):
         with progress_bar("Reading the mesh") as progress:
             mesh = recording.load_mesh(progress)

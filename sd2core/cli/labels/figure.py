@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from sd2core.cli.labels.reading import labels_at, recording_clock
 from sd2core.cli.options import add_command, not_negative_float
-from sd2core.cli.recording_maps import MAP_NAMES, maps_of, parsed_maps, usual_maps
+from sd2core.cli.recording_maps import add_labelled_recording, chosen_maps, maps_of
 
 if TYPE_CHECKING:
     from sd2core.maps import DopplerMap
@@ -32,17 +32,9 @@ def add_figure(kinds: argparse._SubParsersAction) -> None:
             " --to-s 6"
         ),
     )
-    parser.add_argument("recording", type=Path, metavar="RECORDING", help="a recording (.sd2)")
+    add_labelled_recording(parser)
     parser.add_argument(
         "--out", type=Path, required=True, metavar="FILE", help="FILE.png, FILE.svg or FILE.pdf"
-    )
-    parser.add_argument(
-        "--maps",
-        metavar="LIST",
-        help=f"some of {', '.join(MAP_NAMES)} (default: those of its mesh and its radar)",
-    )
-    parser.add_argument(
-        "--labels", type=Path, metavar="FILE", help="other labels than the recording's own"
     )
     parser.add_argument(
         "--from-s", type=not_negative_float, metavar="S", help="start of the figure, in seconds"
@@ -62,7 +54,7 @@ def _figure(options: argparse.Namespace) -> None:
     recording = open_recording(options.recording)
     clock = recording_clock(recording)
     labels = labels_at(options.labels or options.recording, clock)
-    names = parsed_maps(options.maps) if options.maps else usual_maps(recording)
+    names = chosen_maps(options, recording)
     rows = [
         MapRow(doppler, _title(name, doppler), _strongest(doppler))
         for name, doppler in maps_of(recording, names, axis=VelocityAxis()).items()

@@ -8,14 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.labels.reading import (
-    add_clock,
-    add_reading,
+    add_labels,
     add_replace,
     check_label_output,
-    clock_of,
-    labels_at,
     print_lost,
-    with_rate,
+    read_named,
     write,
 )
 from sd2core.cli.options import add_command, add_json
@@ -47,7 +44,7 @@ def add_set(kinds: argparse._SubParsersAction) -> None:
             "  sd2 labels set walk.sd2 --use gestures.json --out labels.json"
         ),
     )
-    parser.add_argument("file", type=Path, metavar="FILE", help="the file with labels")
+    add_labels(parser)
     parser.add_argument("--export", type=Path, metavar="SET.json", help="write the set by itself")
     parser.add_argument(
         "--use", metavar="SET.json", help=f"another set; {_USUAL!r} is the program's own"
@@ -56,8 +53,6 @@ def add_set(kinds: argparse._SubParsersAction) -> None:
         "--out", type=Path, metavar="OUT", help="where to write the labels with that other set"
     )
     add_replace(parser)
-    add_reading(parser, "FILE")
-    add_clock(parser)
     add_json(parser)
 
 
@@ -70,12 +65,11 @@ def _set(options: argparse.Namespace) -> None:
     for path in (options.export, options.out):
         if path is not None:
             check_label_output(path, replace=options.replace)
-    clock = clock_of(options, options.file)
-    labels = labels_at(options.file, clock, options.format, options.observation)
+    labels, clock = read_named(options)
     written, lost = [], []
     if options.use is not None:
         labels = set_label_set(labels, _other(options.use)).labels
-        lost = write(options.out, labels, with_rate(options, clock, labels))
+        lost = write(options.out, labels, clock)
         written.append(options.out)
     if options.export is not None:
         files.write_label_set(options.export, labels.label_set)

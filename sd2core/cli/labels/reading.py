@@ -31,12 +31,21 @@ def add_clock(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_reading(parser: argparse.ArgumentParser, name: str) -> None:
-    """Add the options on how to read a file."""
+def add_labels(parser: argparse.ArgumentParser, name: str = "FILE") -> None:
+    """Add a file with labels, how to read it, and the times of frames; see :func:`read_named`."""
+    parser.add_argument("file", type=Path, metavar=name, help="the file with labels")
     parser.add_argument("--format", metavar="NAME", help=f"the format of {name}: {_FORMATS}")
     parser.add_argument(
         "--observation", metavar="NAME", help="which one of a BORIS project with several"
     )
+    add_clock(parser)
+
+
+def read_named(options: argparse.Namespace) -> tuple[Labels, Timebase | None]:
+    """Read the labels that are named, and the frame times as far as they are known."""
+    clock = clock_of(options, options.file)
+    labels = labels_at(options.file, clock, options.format, options.observation)
+    return labels, with_rate(options, clock, labels)
 
 
 def add_replace(parser: argparse.ArgumentParser) -> None:

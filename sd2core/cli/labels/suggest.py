@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from dataclasses import fields
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.labels.reading import (
     add_replace,
@@ -20,6 +20,7 @@ from sd2core.cli.recording_maps import MapName, maps_of
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
+    from sd2core.labels.spans import Span
     from sd2core.maps import DopplerMap
     from sd2core.recording.recording import Recording
     from sd2core.sensor import VelocityAxis
@@ -54,16 +55,7 @@ def add_suggest(kinds: argparse._SubParsersAction) -> None:
             "  sd2 labels suggest swing.h5 --margin-s 0.1 --out suggested.csv"
         ),
     )
-    parser.add_argument(
-        "map", type=Path, metavar="MAP", help="a map, a recording, or the .h5 of a K60168A"
-    )
-    parser.add_argument("--out", type=Path, metavar="FILE", help="the file of labels to write")
-    add_replace(parser)
-    parser.add_argument(
-        "--of",
-        choices=("synthetic", "radar"),
-        help="which map of a recording (default: synthetic where there is a mesh)",
-    )
+    add_searched_map(parser, ("synthetic", "radar"))
     for name, (metavar, text) in _HELP.items():
         parser.add_argument(
             f"--{name.replace('_', '-')}", type=not_negative_float, metavar=metavar, help=text
@@ -72,9 +64,22 @@ def add_suggest(kinds: argparse._SubParsersAction) -> None:
     add_json(parser)
 
 
+def add_searched_map(parser: argparse.ArgumentParser, kinds: tuple[MapName, ...]) -> None:
+    """Add the map in which spans are looked for, and the file for them."""
+    parser.add_argument(
+        "map", type=Path, metavar="MAP", help="a map, a recording, or the .h5 of a K60168A"
+    )
+    parser.add_argument(
+        "--of",
+        choices=kinds,
+        help="which map of a recording (default: synthetic where there is a mesh)",
+    )
+    parser.add_argument("--out", type=Path, metavar="FILE", help="the file of labels to write")
+    add_replace(parser)
+
+
 def _suggest(options: argparse.Namespace) -> None:
-    from sd2core.labels.spans import Labels, LabelTrack
-    from sd2core.labels.suggest import TRACK, SuggestOptions, motion_energy_db, suggest_spans
+    from sd2core.labels.suggest import SuggestOptions, motion_energy_db, suggest_spans
 
     if options.out is not None:
         check_label_output(options.out, replace=options.replace)
@@ -89,25 +94,14 @@ def _suggest(options: argparse.Namespace) -> None:
     spans = suggest_spans(doppler, chosen, label=options.label)
     energy_db = motion_energy_db(doppler)
     loudest_db = float(max((value for value in energy_db.tolist() if value == value), default=0.0))
-    lost: list[str] = []
-    if options.out is not None:
-        lost = write(options.out, Labels((LabelTrack(TRACK),), spans), clock)
+    lost = write_found(options, spans, clock)
     if options.json:
         print_json(
             {
                 "map_kind": doppler.kind,
                 "loudest_db": loudest_db,
                 "options": {field.name: getattr(chosen, field.name) for field in fields(chosen)},
-                "spans": [
-                    {
-                        "id": span.id,
-                        "start_s": span.start_s,
-                        "end_s": span.end_s,
-                        "confidence": span.confidence,
-                        "note": span.note,
-                    }
-                    for span in spans
-                ],
+                "spans": spans_data(spans, "confidence", "note"),
                 "path": None if options.out is None else str(options.out),
                 "not_kept": lost,
             }
@@ -120,22 +114,34 @@ def _suggest(options: argparse.Namespace) -> None:
     )
     if spans:
         rows = [("id", "start s", "end s", "confidence", "why")]
-        rows += [
-            (
-                str(span.id),
-                f"{span.start_s:.3f}",
-                f"{span.end_s:.3f}",
-                f"{span.confidence:.2f}",
-                span.note,
-            )
-            for span in spans
-        ]
+        rows += [(*span_cells(span), f"{span.confidence:.2f}", span.note) for span in spans]
         print_rows(rows, right=(0, 1, 2, 3))
     else:
         print(f"The loudest frame is {loudest_db:.1f} dB over the quiet level.")
     if options.out is not None:
         print(f"Wrote {options.out}")
     print_lost(lost)
+
+
+def write_found(options: argparse.Namespace, spans: tuple[Span, ...], clock: Timebase) -> list[str]:
+    """Write spans to the file of ``--out``, where one is named; return what it cannot hold."""
+    from sd2core.labels.spans import Labels, LabelTrack
+    from sd2core.labels.suggest import TRACK
+
+    if options.out is None:
+        return []
+    return write(options.out, Labels((LabelTrack(TRACK),), spans), clock)
+
+
+def spans_data(spans: tuple[Span, ...], *facts: str) -> list[dict[str, Any]]:
+    """Number, times and further facts of spans, for JSON."""
+    names = ("id", "start_s", "end_s", *facts)
+    return [{name: getattr(span, name) for name in names} for span in spans]
+
+
+def span_cells(span: Span) -> tuple[str, str, str]:
+    """Number, start and end in seconds, for a table."""
+    return str(span.id), f"{span.start_s:.3f}", f"{span.end_s:.3f}"
 
 
 def map_and_clock(

@@ -21,7 +21,7 @@ from sd2core.processes import ONE_THREAD, end_with_parent
 from sd2core.progress import Progress, silent
 from sd2core.simulate.campaign.fit_errors import FitErrors
 from sd2core.simulate.campaign.motion import LABELS
-from sd2core.simulate.campaign.people import subject_name
+from sd2core.simulate.campaign.scene import subject_name
 from sd2core.simulate.campaign.takes import OPTIONS, Campaign, TakeMaker, take_name
 from sd2core.version import __version__
 

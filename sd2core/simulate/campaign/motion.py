@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from sd2core.body.model import Skeleton
 from sd2core.body.rotations import Floats, about, applied, product
-from sd2core.simulate.campaign.people import Subject
+from sd2core.simulate.campaign.scene import Subject
 from sd2core.simulate.gait import Path, gait
 from sd2core.simulate.limbs import (
     HANGING,

@@ -19,9 +19,8 @@ from sd2core.pairs.store import Take
 from sd2core.radar_config import PAPER_RADAR, RadarConfig
 from sd2core.simulate.campaign.fit_errors import FitErrors
 from sd2core.simulate.campaign.motion import perform
-from sd2core.simulate.campaign.people import random_subject
 from sd2core.simulate.campaign.radar import TargetOptions, radar_target
-from sd2core.simulate.campaign.scene import random_setting
+from sd2core.simulate.campaign.scene import random_setting, random_subject
 from sd2core.timebase import Timebase
 
 FITTED: Resolution = "medium"

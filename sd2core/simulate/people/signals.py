@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sd2core.body.rotations import Floats
+from sd2core.simulate.limbs import minimum_jerk
 
 _WAVES = 9
 
@@ -21,8 +22,7 @@ class Moves(NamedTuple):
 
 def smooth_share(phase: Floats, skew: Floats) -> Floats:
     """Share of the way at a share of the time: a quintic of warped time, 0 and 1 outside."""
-    x = np.clip(phase, 0.0, 1.0) ** skew
-    return np.asarray(x * x * x * (10.0 + x * (6.0 * x - 15.0)))
+    return minimum_jerk(np.clip(phase, 0.0, 1.0) ** skew)
 
 
 def follow(times_s: Floats, moves: Moves, poses: Floats) -> Floats:

@@ -7,8 +7,7 @@ import pytest
 
 from sd2core.body.arm_depth import resolve_arm_depths
 from sd2core.body.evidence import Evidence
-from sd2core.body.keypoints import KeypointSpace
-from sd2core.body.rig import Rig
+from sd2core.body.rig import KeypointSpace, Rig
 from sd2core.body.shape import ShapeSpace
 from sd2core.body.track import LANDMARKS, TORSO_CORNERS
 from tools.build_sample.swipes import swipes

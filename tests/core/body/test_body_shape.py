@@ -6,8 +6,8 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sd2core.body.keypoints import KeypointSpace
 from sd2core.body.model import Body
+from sd2core.body.rig import KeypointSpace
 from sd2core.body.rotations import about
 from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.body.track import LANDMARKS, MIRRORED

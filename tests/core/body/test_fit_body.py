@@ -10,10 +10,10 @@ from sd2core.body import fit_windows
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.fit import fit_body
 from sd2core.body.fitted import BodyFit
-from sd2core.body.keypoints import KeypointSpace
 from sd2core.body.lifter import LiftedTrack
+from sd2core.body.rig import KeypointSpace
 from sd2core.body.shape import BodyShape, ShapeSpace
-from sd2core.body.silhouette import overlap, silhouette
+from sd2core.body.shaping import overlap, silhouette
 from sd2core.body.skinning import pose_vertices
 from sd2core.body.track import LANDMARKS, TORSO_CORNERS, Landmarks, LandmarkTrack
 from sd2core.errors import Sd2Error

@@ -16,12 +16,17 @@ from sd2core.body import evidence, fit_windows, landmark_repair, lifter, track
 from sd2core.body import fit as fitting
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.fit import fit_body, fit_motion
-from sd2core.body.keypoints import KeypointSpace
-from sd2core.body.landmark_files import load_track, save_track
+from sd2core.body.landmark_files import (
+    RefinedStretches,
+    SearchStore,
+    TrackInParts,
+    load_track,
+    save_track,
+)
 from sd2core.body.landmark_repair import RawTrack, swap_sides
-from sd2core.body.landmark_store import RefinedStretches, SearchStore, TrackInParts
 from sd2core.body.lifter import LiftedInParts, Lifter
 from sd2core.body.refining import Stretch
+from sd2core.body.rig import KeypointSpace
 from sd2core.body.shape import ShapeSpace
 from sd2core.body.track import LANDMARKS, PER_FRAME, LandmarkTrack
 from sd2core.errors import Sd2Error

@@ -17,8 +17,10 @@ from filmed_people import (
     swiping,
 )
 
+from sd2core.body.landmark_files import load_track, save_track
 from sd2core.body.landmark_models import LandmarkModels
-from sd2core.body.landmarks import Rectangle, find_landmarks, load_track, save_track
+from sd2core.body.landmarks import find_landmarks
+from sd2core.body.person_selection import Rectangle
 from sd2core.body.track import LANDMARKS, LandmarkTrack
 from sd2core.errors import Sd2Error
 from sd2core.io.video import open_video

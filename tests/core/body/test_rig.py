@@ -6,8 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sd2core.body.initial import Pose, initial_pose
-from sd2core.body.keypoints import KeypointSpace
-from sd2core.body.rig import JOINT, JOINTS, Rig
+from sd2core.body.rig import JOINT, JOINTS, KeypointSpace, Rig
 from sd2core.body.rotations import aligning, from_vector, to_vector
 from sd2core.body.shape import ShapeSpace
 from sd2core.body.track import LANDMARKS

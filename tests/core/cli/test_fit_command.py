@@ -17,8 +17,8 @@ import zarr
 from cli_outcome import Sd2
 from filmed_people import empty_room, film, swiping
 
+from sd2core.body.landmark_files import load_track
 from sd2core.body.landmark_models import LandmarkModels
-from sd2core.body.landmarks import load_track
 from sd2core.io.mesh import load_mesh
 
 REPOSITORY = Path(__file__).resolve().parents[3]

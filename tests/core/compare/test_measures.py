@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sd2core.body.camera import PinholeCamera
-from sd2core.body.silhouette import overlap, silhouette
+from sd2core.body.shaping import overlap, silhouette
 from sd2core.compare.measures import (
     correlation,
     jitter,

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sd2core.denoise.model import Denoiser, parameter_count
-from sd2core.denoise.registry import FILTERS, MODELS, build, options, summary
+from sd2core.denoise.registry import FILTERS, MODELS, build, summary
 from sd2core.denoise.window_models import WINDOW, WindowBlock
 from sd2core.errors import Sd2Error
 
@@ -175,7 +175,6 @@ def test_sizes_are_comparable() -> None:
 @pytest.mark.parametrize("name", [*MODELS, *FILTERS])
 def test_every_model_says_what_it_is(name: str) -> None:
     assert summary(name)
-    assert options(name, "time").keys() == options(name).keys()
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sd2core.body.keypoints import KeypointSpace
+from sd2core.body.rig import KeypointSpace
 from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.body.track import LANDMARKS
 from sd2core.io.radar.mars import JOINTS

@@ -7,13 +7,12 @@ import pytest
 from mars_files import SPACE, approaching, joints_of
 
 from sd2core.body.initial import Pose
-from sd2core.body.keypoints import KeypointSpace
 from sd2core.body.rig import JOINTS as TURNS
+from sd2core.body.rig import KeypointSpace
 from sd2core.body.rotations import about
 from sd2core.errors import Sd2Error
 from sd2core.io.radar.mars import JOINTS
-from sd2core.mocap.driving import DrivenClip, puppet_of, resample_pose
-from sd2core.mocap.skeleton import KINECT_MARKERS, SkeletonClip
+from sd2core.mocap.driving import KINECT_MARKERS, DrivenClip, SkeletonClip, puppet_of, resample_pose
 from tools.build_sample.swipes import swipes
 
 FRAMES = 40

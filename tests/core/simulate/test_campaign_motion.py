@@ -11,7 +11,7 @@ from sd2core.body.model import Skeleton
 from sd2core.body.rotations import Floats, applied
 from sd2core.body.shape import ShapeSpace
 from sd2core.simulate.campaign.motion import LABELS, Performance, perform
-from sd2core.simulate.campaign.people import Subject, random_subject
+from sd2core.simulate.campaign.scene import Subject, random_subject
 
 TIMES_S = np.arange(450) / 30.0
 

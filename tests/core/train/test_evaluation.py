@@ -17,7 +17,7 @@ from sd2core.denoise.registry import build
 from sd2core.denoise.scaling import Compression, Scaling
 from sd2core.errors import Sd2Error
 from sd2core.pairs.store import PairSet, Take, read_pairs
-from sd2core.train.evaluate import evaluate
+from sd2core.train.evaluation import evaluate
 from sd2core.train.evaluation_text import as_markdown, as_text, draw
 
 FRAMES = 60

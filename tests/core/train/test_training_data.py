@@ -16,6 +16,7 @@ from sd2core.denoise.registry import MODELS, build
 from sd2core.errors import Sd2Error
 from sd2core.pairs.store import read_pairs
 from sd2core.sensor import VelocityAxis
+from sd2core.train.callbacks import rate_factor
 from sd2core.train.config import DataConfig, TrainingConfig
 from sd2core.train.data import (
     Order,
@@ -26,8 +27,7 @@ from sd2core.train.data import (
     split_subjects,
     windows_of,
 )
-from sd2core.train.learner import Steps
-from sd2core.train.optimiser import optimiser_of, rate_factor, set_rate
+from sd2core.train.denoiser_module import Steps, optimiser_of, set_rate
 
 
 class TestSplit:

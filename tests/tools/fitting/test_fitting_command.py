@@ -123,7 +123,7 @@ def test_real_videos_are_looked_at_too(
 ) -> None:
     """The landmark model's part is played by the mesh itself."""
     from sd2core.body.camera import PinholeCamera
-    from sd2core.body.silhouette import silhouette
+    from sd2core.body.shaping import silhouette
     from sd2core.body.track import LandmarkTrack
     from sd2core.io.video_writing import write_video
 

@@ -5,7 +5,7 @@ from dataclasses import astuple
 import numpy as np
 import pytest
 
-from sd2core.body.keypoints import KeypointSpace
+from sd2core.body.rig import KeypointSpace
 from sd2core.body.shape import ShapeSpace
 from sd2core.body.track import LANDMARKS
 from tools.fitting.cast import PEOPLE

@@ -8,7 +8,7 @@ import pytest
 from known_clip import TIMES, waving, write_clip
 
 from sd2core.body.camera import PinholeCamera
-from sd2core.body.silhouette import silhouette
+from sd2core.body.shaping import silhouette
 from sd2core.body.track import LANDMARKS, LandmarkTrack
 from sd2core.compare.joints import JOINTS, own_patches
 from sd2core.errors import Sd2Error

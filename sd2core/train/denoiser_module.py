@@ -17,8 +17,8 @@ from lightning.pytorch import LightningModule
 from sd2core.denoise.model import Denoiser
 from sd2core.train.callbacks import TrainingCallbacks
 from sd2core.train.checkpoint import Checkpoint, moments_of, set_moments
+from sd2core.train.config import TrainingConfig
 from sd2core.train.data import Order, Windows
-from sd2core.train.optimiser import optimiser_of, set_rate
 
 
 class Step(NamedTuple):
@@ -68,10 +68,10 @@ class Steps:
             epoch, first = epoch + 1, 0
 
 
-class Learner(LightningModule):
+class DenoiserModule(LightningModule):
     """Denoiser with all that it learns from.
 
-    ``windows`` hold energies; the course's scaling compresses them. Training goes on from
+    ``windows`` hold energies; the scaling of the validation compresses them. Training goes on from
     ``checkpoint`` if there is one.
     """
 
@@ -79,21 +79,21 @@ class Learner(LightningModule):
         self,
         network: Denoiser,
         windows: Windows,
-        course: TrainingCallbacks,
+        callbacks: TrainingCallbacks,
         checkpoint: Checkpoint | None = None,
     ) -> None:
         super().__init__()
         self.network = network
         # Not buffers: they belong to no checkpoint, and need not be broadcast.
-        self._inputs = torch.from_numpy(course.scaling.input.compress(windows.inputs))
-        self._targets = torch.from_numpy(course.scaling.target.compress(windows.targets))
+        self._inputs = torch.from_numpy(callbacks.exam.scaling.input.compress(windows.inputs))
+        self._targets = torch.from_numpy(callbacks.exam.scaling.target.compress(windows.targets))
         self._frames = torch.arange(windows.length)
-        self._course = course
+        self._callbacks = callbacks
         self._moments = checkpoint.moments if checkpoint is not None else None
 
     def configure_optimizers(self) -> torch.optim.Optimizer:
         """AdamW, with its moments where a run goes on."""
-        optimiser = optimiser_of(self.network, self._course.config.training)
+        optimiser = optimiser_of(self.network, self._callbacks.config.training)
         if self._moments is not None:
             set_moments(optimiser, self._moments)
             self._moments = None
@@ -106,32 +106,32 @@ class Learner(LightningModule):
 
     def on_train_start(self) -> None:
         """Begin the run here, because Lightning has put its own signal handlers in place before."""
-        self._course.begin(self)
+        self._callbacks.begin(self)
 
     def on_train_batch_start(self, batch: Step, batch_idx: int) -> None:
         """Set the learning rate, and seed the random numbers by the position in the run."""
-        course = self._course
-        course.rate = set_rate(self._optimiser, course.agreed_rate_factor())
+        callbacks = self._callbacks
+        callbacks.rate = set_rate(self._optimiser, callbacks.agreed_rate_factor())
         seed = np.random.SeedSequence(
-            [course.config.training.seed, batch.epoch, batch.number, self.global_rank]
+            [callbacks.config.training.seed, batch.epoch, batch.number, self.global_rank]
         )
         torch.manual_seed(int(seed.generate_state(1, np.uint64)[0]))
 
     def training_step(self, batch: Step, batch_idx: int) -> torch.Tensor:
         """Root mean square error of one batch."""
-        course = self._course
+        callbacks = self._callbacks
         rows = batch.start[:, None] + self._frames  # (segments, length)
         inputs, targets = self._inputs[rows], self._targets[rows]
-        if course.config.data.range_factor > 1.0:
+        if callbacks.config.data.range_factor > 1.0:
             # (g·x / r)^p = g^p · (x / r)^p: gains are as well applied to compressed values.
-            scaling = course.scaling
+            scaling = callbacks.exam.scaling
             inputs = inputs * (batch.gain**scaling.input.exponent)[:, None, None]
             targets = targets * (batch.gain**scaling.target.exponent)[:, None, None]
         difference = (self.network(inputs) - targets).float()
-        if len(course.counted) < difference.shape[-1]:
-            difference = difference.index_select(-1, course.counted_on(difference.device))
+        if len(callbacks.exam.counted) < difference.shape[-1]:
+            difference = difference.index_select(-1, callbacks.counted_on(difference.device))
         square = difference.square().mean()
-        course.note(square.detach(), len(batch.index))
+        callbacks.note(square.detach(), len(batch.index))
         # At zero the root has no slope.
         return (square + 1e-12).sqrt()
 
@@ -146,13 +146,13 @@ class Learner(LightningModule):
         Lightning refuses to clip for a fused optimiser in mixed precision, because that
         could unscale gradients by itself; without fp16 nothing is scaled.
         """
-        norm = self._course.config.training.clip_norm
+        norm = self._callbacks.config.training.clip_norm
         if norm > 0:
             torch.nn.utils.clip_grad_norm_(self.network.parameters(), norm)
 
     def on_train_batch_end(self, outputs: Any, batch: Step, batch_idx: int) -> None:
         """Count the step; stop training when the run is over."""
-        if not self._course.after_step():
+        if not self._callbacks.after_step():
             self.trainer.should_stop = True
 
     def checkpoint_tensors(self) -> tuple[dict[str, torch.Tensor], dict[int, Any]]:
@@ -163,3 +163,37 @@ class Learner(LightningModule):
     def _optimiser(self) -> torch.optim.Optimizer:
         optimiser: torch.optim.Optimizer = self.trainer.optimizers[0]
         return optimiser
+
+
+def optimiser_of(model: Denoiser, config: TrainingConfig) -> torch.optim.AdamW:
+    """AdamW (I. Loshchilov and F. Hutter, ICLR 2019) in three groups.
+
+    Matrices decay; vectors (biases, norms, gains) do not; parameters of state spaces do
+    not either, and have a rate of their own: decay would pull time constants to one
+    value, and a large step moves poles far (A. Gu et al., ICLR 2022, appendix D).
+    Every group keeps its highest rate as ``peak_lr``.
+    """
+    ssm = {id(parameter) for parameter in model.ssm_parameters()}
+    matrices, vectors, spaces = [], [], []
+    for parameter in model.parameters():
+        if id(parameter) in ssm:
+            spaces.append(parameter)
+        elif parameter.ndim > 1:
+            matrices.append(parameter)
+        else:
+            vectors.append(parameter)
+    groups: list[dict[str, Any]] = [
+        {"params": matrices, "lr": config.learning_rate, "weight_decay": config.weight_decay},
+        {"params": vectors, "lr": config.learning_rate, "weight_decay": 0.0},
+        {"params": spaces, "lr": config.ssm_learning_rate, "weight_decay": 0.0},
+    ]
+    groups = [{**group, "peak_lr": group["lr"]} for group in groups if group["params"]]
+    fused = all(parameter.is_floating_point() for parameter in model.parameters())
+    return torch.optim.AdamW(groups, fused=fused)
+
+
+def set_rate(optimiser: torch.optim.Optimizer, factor: float) -> float:
+    """Set every group to a share of its highest rate; return the rate of the first."""
+    for group in optimiser.param_groups:
+        group["lr"] = factor * group["peak_lr"]
+    return float(optimiser.param_groups[0]["lr"])

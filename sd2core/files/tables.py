@@ -1,0 +1,28 @@
+"""Tables as text, for a terminal and for Markdown; the first row is the heading."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+
+def text_table(rows: Sequence[Sequence[str]], right: Collection[int]) -> list[str]:
+    """Lines of a table with aligned columns; those numbered in ``right`` are of numbers."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [
+        "  ".join(
+            text.rjust(width) if column in right else text.ljust(width)
+            for column, (text, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in rows
+    ]
+
+
+def numbers_table(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Lines of a table with names in the first column and numbers in the others."""
+    return text_table(rows, range(1, len(rows[0])))
+
+
+def markdown_table(rows: Sequence[Sequence[str]]) -> list[str]:
+    """The same in Markdown."""
+    rule = ["---", *["---:"] * (len(rows[0]) - 1)]
+    return [f"| {' | '.join(row)} |" for row in (rows[0], rule, *rows[1:])]
