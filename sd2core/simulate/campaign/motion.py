@@ -29,8 +29,10 @@ from sd2core.simulate.limbs import (
     relax_fingers,
     turn_torso,
 )
+from sd2core.simulate.people.arms import STYLES
 from sd2core.simulate.people.motion import Deed, random_motion
 from sd2core.simulate.people.signals import wander
+from sd2core.simulate.people.walking import Mode
 
 LABELS = ("background", "left-to-right", "right-to-left", "up-to-down", "down-to-up")
 """Directions as the camera sees them; its left is the body's right."""
@@ -67,7 +69,7 @@ _STROKES_S = (0.42, 1.35)
 _MOVES_S = (0.5, 1.2)
 _SWIPE, _ELSE, _SINK = 0.72, 0.15, 0.07
 """Probability that a gesture, another movement or a sinking hand comes next; otherwise rest."""
-_SMALL = Deed("stand", ("rest", "rest"), False, natural=True)
+_SMALL = Deed("stand", (STYLES["rest"], STYLES["rest"]), False, natural=True)
 _ARMS = ("talk", "slow", "strokes", "rest", "up and aside")
 _STEPS_M, _STEPS_MPS = (0.15, 0.6), (0.35, 0.9)
 
@@ -244,11 +246,11 @@ def about_the_floor(skeleton: Skeleton, turns: Floats) -> Floats:
 def _moving(
     rng: np.random.Generator, subject: Subject, skeleton: Skeleton, times_s: Floats
 ) -> Motion:
-    legs = "shift" if rng.random() < 0.4 else "stand"
+    legs: Mode = "shift" if rng.random() < 0.4 else "stand"
     if rng.random() < 0.25:
         deed = _SMALL
     else:
-        one, other = (str(name) for name in rng.choice(_ARMS, 2))
+        one, other = (STYLES[name] for name in rng.choice(_ARMS, 2))
         deed = Deed(legs, (one, other), False, natural=True)
     return random_motion(rng, skeleton, subject.shape.stature_m, times_s, deed)
 

@@ -67,7 +67,7 @@ ZONES = {
     "hang": ((-30.0, 60.0), (-89.0, -78.0), (0.93, 0.985)),
 }
 
-TRAINING_STYLES = {
+STYLES = {
     "strokes": ArmStyle(),
     "quick": ArmStyle(0.28, 0.7, 0.6, 0.5, (("front", 0.75), ("any", 0.25)), 0.0),
     "slow": ArmStyle(0.8, 2.5, 0.5, 1.0, (("any", 0.5), ("front", 0.5)), 0.1),
@@ -79,20 +79,7 @@ TRAINING_STYLES = {
     "across": ArmStyle(0.3, 1.0, 0.4, 0.5, (("across", 0.4), ("aside", 0.4), ("front", 0.2))),
     "rest": ArmStyle(0.6, 1.5, 0.9, 3.0, (("hang", 0.8), ("any", 0.2)), 0.02),
 }
-"""Styles that the lifter is trained on, by name."""
-
-GESTURE_STYLES = {
-    "gestures": ArmStyle(0.3, 1.3, 0.75, 0.5, (("reach", 0.88), ("hang", 0.12)), 0.05),
-    "out and back": ArmStyle(0.3, 1.3, 0.75, 0.5, (("reach", 0.95), ("hang", 0.05)), 0.0, True),
-}
-"""Styles of a person who gestures before a sensor; trained on too."""
-
-HELD_OUT_STYLES = {
-    "boxing": ArmStyle(0.25, 0.5, 0.4, 0.5, (("forward", 0.6), ("guard", 0.4)), 0.0, True),
-    "directing": ArmStyle(0.45, 1.1, 0.6, 0.8, (("low", 0.4), ("up", 0.3), ("aside", 0.3)), 0.0),
-    "signing": ArmStyle(0.25, 0.6, 0.3, 0.4, (("chest", 0.4), ("face", 0.4), ("across", 0.2)), 0.5),
-}
-"""Styles that the lifter is tested on: these never occur in training."""
+"""Styles of arms in motion, by name."""
 
 
 def still_arm(rng: np.random.Generator, times_s: Floats) -> Floats:

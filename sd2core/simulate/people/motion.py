@@ -10,29 +10,21 @@ import numpy as np
 from sd2core.body.model import Skeleton
 from sd2core.body.rotations import Floats, applied, product, transposed
 from sd2core.simulate.limbs import Motion, place_limb, turn_about, turn_hand
-from sd2core.simulate.people.arms import (
-    GESTURE_STYLES,
-    HELD_OUT_STYLES,
-    TRAINING_STYLES,
-    moving_arm,
-    still_arm,
-)
+from sd2core.simulate.people.arms import ArmStyle, moving_arm, still_arm
 from sd2core.simulate.people.signals import wander
-from sd2core.simulate.people.walking import Footwork, footwork
+from sd2core.simulate.people.walking import Footwork, Mode, footwork
 
 _SPINE = ("spine05", "spine04", "spine03", "spine02", "spine01")
 _NECK = ("neck01", "neck02", "neck03", "head")
 _FASTEST_MPS = {"lowerarm01": 4.5, "wrist": 6.5, "foot": 6.0}
-
-_ARMS = TRAINING_STYLES | GESTURE_STYLES | HELD_OUT_STYLES
 
 
 @dataclass(frozen=True)
 class Deed:
     """Action of a person in one take."""
 
-    legs: str  # One of :data:`~sd2core.simulate.people.walking.MODES`.
-    arms: tuple[str, str]  # Styles of left and right arm.
+    legs: Mode
+    arms: tuple[ArmStyle, ArmStyle]  # Left and right.
     still: bool  # True for nothing but breath and sway.
     # True for elbows and trunk as people have them, not in any possible position.
     natural: bool = False
@@ -75,10 +67,8 @@ def _drawn(
     arms = [
         still_arm(rng, times_s)
         if deed.still
-        else moving_arm(
-            rng, times_s, _ARMS[name], natural=deed.natural, elbows_rest=deed.elbows_rest
-        )
-        for name in deed.arms
+        else moving_arm(rng, times_s, style, natural=deed.natural, elbows_rest=deed.elbows_rest)
+        for style in deed.arms
     ]
     if deed.arms[0] == deed.arms[1] and rng.random() < 0.5:
         arms[1] = arms[0].copy()  # both hands the same, mirrored

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from sd2core.body.rotations import Floats
 from sd2core.simulate.people.signals import Moves, follow, smooth_share, wander
 
-MODES = {"stand": 0.56, "shift": 0.18, "walk": 0.14, "turn": 0.05, "sit": 0.07}
-"""Actions of the legs, each with its probability."""
+Mode = Literal["stand", "shift", "walk", "turn", "sit"]
+"""Action of the legs."""
 
 _STEP = 0.36
 """Statures."""
@@ -29,9 +30,9 @@ class Footwork:
 
 
 def footwork(
-    rng: np.random.Generator, times_s: Floats, mode: str, *, still: bool = False
+    rng: np.random.Generator, times_s: Floats, mode: Mode, *, still: bool = False
 ) -> Footwork:
-    """Random footwork of one of :data:`MODES`; ``still`` leaves a breath of sway only."""
+    """Random footwork; ``still`` leaves a breath of sway only."""
     count = len(times_s)
     place = np.zeros((count, 2))
     heading = np.zeros(count)

@@ -16,6 +16,7 @@ from sd2core.body.rig import KeypointSpace
 from sd2core.body.shape import ShapeSpace
 from sd2core.body.track import LANDMARKS, MIRRORED, TORSO_CORNERS, LandmarkTrack
 from sd2core.errors import Sd2Error
+from sd2core.simulate.people.arms import STYLES
 from sd2core.simulate.people.motion import Deed, random_motion
 from sd2core.timebase import Timebase
 
@@ -55,7 +56,7 @@ def _moving(
     space = ShapeSpace()
     shape, times = space.random(rng), np.arange(0.0, seconds, 1.0 / 30.0)
     skeleton = space.skeleton(shape)
-    deed = Deed("stand", ("rest", style), still, natural)
+    deed = Deed("stand", (STYLES["rest"], STYLES[style]), still, natural)
     motion = random_motion(rng, skeleton, shape.stature_m, times, deed)
     places = KeypointSpace(space).of(shape).positions(skeleton.transforms(*motion))
     return places + np.array([0.0, 1.1, DISTANCE_M]), shape.stature_m

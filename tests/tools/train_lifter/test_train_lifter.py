@@ -11,9 +11,9 @@ from sd2core.body.blazepose import CROP_PX, Pose, Roi
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.lifter import POINTS, Lifter
 from sd2core.body.lifter_features import rate
-from sd2core.simulate.people.arms import GESTURE_STYLES
+from sd2core.simulate.people.arms import STYLES
 from tools.train_lifter.crops import CropPainter, Look
-from tools.train_lifter.deeds import random_deed
+from tools.train_lifter.deeds import GESTURE_STYLES, HELD_OUT_STYLES, random_deed
 from tools.train_lifter.emulate import Emulator, Walk, random_walks
 from tools.train_lifter.examples import batch, emulated, example, varied
 from tools.train_lifter.takes import Stage, Take, TakeMaker
@@ -49,10 +49,16 @@ def takes() -> list[Take]:
     return [maker.make((7, 0, number), frames=24) for number in range(4)]
 
 
+def test_tested_styles_are_never_trained_on() -> None:
+    trained = STYLES | GESTURE_STYLES
+    assert not set(trained) & set(HELD_OUT_STYLES)
+    assert not set(trained.values()) & set(HELD_OUT_STYLES.values())
+
+
 def test_who_gestures_does_not_walk_and_moves_the_hands_before_the_body(stage: Stage) -> None:
     deeds = [random_deed(np.random.default_rng(n), manner="gestures") for n in range(60)]
     assert {deed.legs for deed in deeds} == {"stand", "shift", "sit"}
-    assert all(set(deed.arms) & set(GESTURE_STYLES) for deed in deeds)
+    assert all(set(deed.arms) & set(GESTURE_STYLES.values()) for deed in deeds)
     ahead = []
     for n in range(12):
         scene = stage.scene(np.random.default_rng(n), manner="gestures", frames=60)
