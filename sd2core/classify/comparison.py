@@ -6,7 +6,7 @@ import hashlib
 import json
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -87,7 +87,7 @@ class Run:
         return {
             "format": FORMAT,
             "version": VERSION,
-            "condition": self.condition.to_json(),
+            "condition": asdict(self.condition),
             "seed": self.seed,
             "subjects": list(self.subjects),
             "real": self.real,
@@ -264,7 +264,7 @@ def _key(
             sums.update(np.ascontiguousarray(tensor.cpu().numpy()).data)
         model = sums.hexdigest()
     training = condition.network.of(options.training, seed)
-    told = [VERSION, data, model, condition.to_json(), seed, training.to_json()]
+    told = [VERSION, data, model, asdict(condition), seed, training.to_json()]
     return hashlib.blake2b(json.dumps(told).encode(), digest_size=12).hexdigest()
 
 

@@ -51,7 +51,7 @@ def as_json(table: Table) -> dict[str, Any]:
         "network": asdict(table.options.network),
         "conditions": [
             {
-                **condition.to_json(),
+                **asdict(condition),
                 "title": title_of(condition),
                 "mean_recall_frames": _spread(_values(table, condition, frame_recall)),
                 "mean_recall_gestures": _spread(_values(table, condition, gesture_recall)),

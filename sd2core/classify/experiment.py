@@ -12,7 +12,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
@@ -85,13 +85,9 @@ class Condition:
         if self.added not in ADDED:
             raise Sd2Error(f"{self.added!r} is to be added", f"one of {', '.join(ADDED)}")
 
-    def to_json(self) -> dict[str, Any]:
-        """Return the fields by name."""
-        return asdict(self)
-
     @classmethod
     def from_json(cls, content: Mapping[str, Any]) -> Condition:
-        """Parse :meth:`to_json`; raises TypeError."""
+        """Parse the fields by name; raises TypeError."""
         return cls(**{**content, "network": Network(**content["network"])})
 
 

@@ -11,7 +11,6 @@ from sd2core.cli import (
     denoise,
     eval,
     export,
-    fetch_models,
     fit,
     importing,
     info,
@@ -19,13 +18,13 @@ from sd2core.cli import (
     ladder,
     pairs,
     placements,
+    preparing,
     radar,
     runs,
     simulate,
     strip,
     synth,
     train,
-    warm_up,
 )
 from sd2core.version import __version__
 
@@ -85,8 +84,7 @@ def build_parser() -> tuple[argparse.ArgumentParser, argparse._SubParsersAction]
         runs,
         eval,
         batch,
-        warm_up,
-        fetch_models,
+        preparing,
     )
     for group in groups:
         group.add_commands(commands)

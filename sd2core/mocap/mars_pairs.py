@@ -100,21 +100,6 @@ def body_doppler(
     return np.ascontiguousarray(found.values[:, :: choices.moments].T)
 
 
-def drive(part: MarsPart, progress: Progress = silent) -> list[DrivenClip]:
-    """One part's body in the poses of all its stretches; ``progress`` counts frames."""
-    clips = [skeleton_clip(stretch) for stretch in part.stretches]
-    total = sum(len(clip.times_s) for clip in clips)
-    done = 0
-    progress(done, total)
-    puppet = puppet_of(clips, KINECT_MARKERS)
-    driven = []
-    for clip in clips:
-        driven.append(puppet.pose(clip, partial(progress, done, total)))
-        done += len(clip.times_s)
-    progress(total, total)
-    return driven
-
-
 def make_mars_pairs(
     folders: Sequence[Path],
     out: Path,

@@ -23,11 +23,10 @@ from numpy.typing import NDArray
 from sd2core.doppler import Synthesizer
 from sd2core.io.radar.mars import MarsPart, mars_parts, read_mars
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.mocap.driving import DrivenClip, SkeletonClip
+from sd2core.mocap.driving import KINECT_MARKERS, DrivenClip, SkeletonClip, puppet_of
 from sd2core.mocap.mars_pairs import (
     MarsChoices,
     body_doppler,
-    drive,
     radar_doppler,
     skeleton_clip,
 )
@@ -103,6 +102,13 @@ def residuals(driven: list[DrivenClip]) -> str:
         f"a body of {stature:.2f} m, joints {values.mean():.1f} cm from the skeleton's in the"
         f" mean, 95 % within {np.percentile(values, 95):.1f} cm"
     )
+
+
+def drive(part: MarsPart) -> list[DrivenClip]:
+    """One part's body in the poses of all its stretches."""
+    clips = [skeleton_clip(stretch) for stretch in part.stretches]
+    puppet = puppet_of(clips, KINECT_MARKERS)
+    return [puppet.pose(clip) for clip in clips]
 
 
 def inputs(folders: list[Path]) -> None:

@@ -1,4 +1,4 @@
-"""``sd2 fetch-models``: the landmark models that ``sd2 fit`` needs, once."""
+"""``sd2 warm-up`` and ``sd2 fetch-models``: what is prepared once, after installing."""
 
 from __future__ import annotations
 
@@ -7,10 +7,22 @@ from pathlib import Path
 
 from sd2core.cli.options import add_command
 from sd2core.cli.output import progress_bar
+from sd2core.errors import Sd2Error
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
-    """Add ``fetch-models``."""
+    """Add ``warm-up`` and ``fetch-models``."""
+    add_command(
+        commands,
+        "warm-up",
+        "compile the numerical kernels once, after installing",
+        handler=_warm_up,
+        description=(
+            "Takes about half a minute the first time and keeps the result on disk. Without\n"
+            "it everything works as well: the kernels are compiled in the background while\n"
+            "a slower form serves."
+        ),
+    )
     parser = add_command(
         commands,
         "fetch-models",
@@ -39,7 +51,6 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 def _fetch(options: argparse.Namespace) -> None:
     from sd2core.body.landmark_models import fetch_models, landmark_models
-    from sd2core.errors import Sd2Error
 
     if options.if_missing:
         try:
@@ -52,3 +63,10 @@ def _fetch(options: argparse.Namespace) -> None:
     with progress_bar("Fetching the landmark models", unit="B") as progress:
         models = fetch_models(progress, source=options.source)
     print(f"Fetched the landmark models into {models.detector.parent}")
+
+
+def _warm_up(options: argparse.Namespace) -> None:
+    from sd2core.numerics.compiled import warm_up
+
+    with progress_bar("Compiling", unit="module") as progress:
+        warm_up(progress)
