@@ -5,8 +5,9 @@ from __future__ import annotations
 import argparse
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import Any
 
 
 def add_command(
@@ -129,6 +130,17 @@ def add_mesh_reading(parser: argparse.ArgumentParser) -> None:
         metavar="F",
         help="focal length of the video in pixels, likewise (default: the diagonal)",
     )
+
+
+def given(options: argparse.Namespace, names: Iterable[str]) -> dict[str, Any]:
+    """Those of the named options that the user gave."""
+    values = {name: getattr(options, name) for name in names}
+    return {name: value for name, value in values.items() if value is not None}
+
+
+def flag(name: str) -> str:
+    """Option of a name as it is typed: ``--v-max`` of ``v_max``."""
+    return f"--{name.replace('_', '-')}"
 
 
 def position(text: str) -> tuple[float, float, float]:

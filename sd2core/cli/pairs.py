@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sd2core.cli.options import add_axis, add_command, add_json, bin_list
+from sd2core.cli.options import add_axis, add_command, add_json, bin_list, given
 from sd2core.cli.output import print_facts, print_json, progress_bar
 
 if TYPE_CHECKING:
@@ -113,11 +113,7 @@ def _choices(options: argparse.Namespace) -> MarsChoices:
     choices = MarsChoices()
     synthesis = choices.synthesis
     axis = chosen_axis(options, synthesis.axis)
-    changes = {
-        name: getattr(options, name)
-        for name in ("null_bins", "visibility", "weight")
-        if getattr(options, name) is not None
-    }
+    changes = given(options, ("null_bins", "visibility", "weight"))
     choices = replace(choices, synthesis=replace(synthesis, axis=axis, **changes))
     return replace(choices, target=options.target) if options.target else choices
 

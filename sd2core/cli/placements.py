@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.ladder import add_wish
-from sd2core.cli.options import add_command, add_json, add_mesh_reading, positive_int
+from sd2core.cli.options import add_command, add_json, add_mesh_reading, flag, given, positive_int
 from sd2core.cli.output import counted, duration, print_facts, print_json, print_rows, progress_bar
 from sd2core.errors import Sd2Error
 
@@ -137,11 +137,8 @@ def _spec(options: argparse.Namespace, recording: Recording | None) -> Placement
     from sd2core.files.number_lists import parse_interval, parse_numbers
     from sd2core.placements.placements import PlacementCloud, PlacementGrid, read_placements
 
-    typed = {
-        f"--{name}": getattr(options, name)
-        for name in ("ranges", "azimuths", "elevations", "cloud", "seed")
-        if getattr(options, name) is not None
-    }
+    names = ("ranges", "azimuths", "elevations", "cloud", "seed")
+    typed = [flag(name) for name in given(options, names)]
     if options.placements is not None:
         if typed:
             raise Sd2Error(f"--placements is given with {', '.join(typed)}", "one of the two")

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from sd2core.cli.options import flag, given
 from sd2core.cli.output import progress_bar
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import check_writable
@@ -86,22 +87,14 @@ def refuse_unused_mesh_options(
 ) -> None:
     """Refuse options on how to read a mesh that would change nothing, except ``but``."""
     if mesh is None:
-        for name in _given(options, _OF_THE_MESH, but):
+        for name in map(flag, given(options, (n for n in _OF_THE_MESH if n not in but))):
             raise Sd2Error(f"{name} is given, and {path} holds no mesh", f"{name} for a mesh only")
     elif mesh.suffix.lower() not in _BODY_MODEL_SUFFIXES:
-        for name in _given(options, _OF_BODY_MODELS, but):
+        for name in map(flag, given(options, (n for n in _OF_BODY_MODELS if n not in but))):
             raise Sd2Error(
                 f"{name} is given, and {mesh} is not the output of a body model",
                 f"{name} for {', '.join(sorted(_BODY_MODEL_SUFFIXES))} files only",
             )
-
-
-def _given(options: argparse.Namespace, names: tuple[str, ...], but: tuple[str, ...]) -> list[str]:
-    return [
-        f"--{name.replace('_', '-')}"
-        for name in names
-        if name not in but and getattr(options, name) is not None
-    ]
 
 
 def chosen_axis(options: argparse.Namespace, usual: VelocityAxis | None = None) -> VelocityAxis:

@@ -15,6 +15,8 @@ from sd2core.cli.options import (
     add_mesh_and_sensor,
     add_mesh_reading,
     bin_list,
+    flag,
+    given,
     not_negative_float,
     positive_float,
     positive_int,
@@ -233,12 +235,11 @@ def _check_wish(options: argparse.Namespace) -> None:
     wish = "--tolerance" if options.tolerance is not None else "--budget-ms"
     if options.model == "fmcw":
         raise Sd2Error(f"{wish} is given with --model fmcw", f"{wish} with the histogram only")
-    for name in _RUNGS:
-        if getattr(options, name) is not None:
-            raise Sd2Error(
-                f"{wish} is given with --{name.replace('_', '-')}",
-                f"one of them: with {wish} the plan chooses how",
-            )
+    for name in given(options, _RUNGS):
+        raise Sd2Error(
+            f"{wish} is given with {flag(name)}",
+            f"one of them: with {wish} the plan chooses how",
+        )
 
 
 def _as_chosen(
@@ -269,14 +270,11 @@ def _counted(
 
 
 def _check_fmcw(options: argparse.Namespace) -> None:
-    given = [name for name in _COUNTING_ONLY if getattr(options, name) is not None]
-    if options.preset != "paper":
-        given.append("preset")
-    if options.uncertainty:
-        given.append("uncertainty")
-    if given:
+    unfit = list(given(options, _COUNTING_ONLY))
+    unfit += ["preset"] * (options.preset != "paper") + ["uncertainty"] * options.uncertainty
+    if unfit:
         raise Sd2Error(
-            f"--{given[0].replace('_', '-')} is given with --model fmcw",
+            f"{flag(unfit[0])} is given with --model fmcw",
             "options of the histogram with the histogram only",
         )
     if options.visibility not in (None, "facing", "exact"):
@@ -303,6 +301,5 @@ def synthesis_options(options: argparse.Namespace) -> SynthesisOptions:
     """The preset, with options of the command line in its place."""
     from sd2core.doppler.options import chosen_options
 
-    names = ("visibility", *_COUNTING_ONLY)
-    given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
-    return chosen_options(options.preset, options.bins, options.v_max, given)
+    chosen = given(options, ("visibility", *_COUNTING_ONLY))
+    return chosen_options(options.preset, options.bins, options.v_max, chosen)

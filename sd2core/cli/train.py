@@ -14,6 +14,8 @@ from sd2core.cli.options import (
     add_command,
     add_json,
     add_people_kept_out,
+    flag,
+    given,
     positive_float,
     positive_int,
 )
@@ -249,14 +251,14 @@ def _train(options: argparse.Namespace) -> int:
 
 
 def _refuse_with_resume(options: argparse.Namespace) -> None:
-    given = [name for name in _SETTINGS if getattr(options, name) is not None]
-    given += ["set"] * bool(options.set) + ["background"] * options.background
-    given += ["out"] * (options.out is not None) + ["show_settings"] * options.show_settings
+    refused = list(given(options, (*_SETTINGS, "out")))
+    refused += ["set"] * bool(options.set) + ["background"] * options.background
+    refused += ["show_settings"] * options.show_settings
     if options.inputs:
         raise Sd2Error(f"--resume is given with {options.inputs[0]}", "the run alone")
-    if given:
+    if refused:
         raise Sd2Error(
-            f"--resume is given with --{given[0].replace('_', '-')}",
+            f"--resume is given with {flag(refused[0])}",
             "the run alone, which goes on with its own settings",
         )
 
@@ -283,10 +285,9 @@ def _config(options: argparse.Namespace) -> TrainConfig:
     values: dict[str, dict[str, Any]] = {}
     if options.background:
         values["machine"] = {"threads": 1, "nice": _BACKGROUND_NICE}
-    for option, (section, name) in _SETTINGS.items():
-        given = getattr(options, option)
-        if given is not None:
-            values.setdefault(section, {})[name] = given
+    for option, value in given(options, _SETTINGS).items():
+        section, name = _SETTINGS[option]
+        values.setdefault(section, {})[name] = value
     if options.epochs is not None and options.minutes is None:
         # Asked for now, it holds before a time limit of the file.
         values["training"]["minutes"] = None

@@ -24,6 +24,7 @@ from sd2core.cli.options import (
     add_command,
     add_json_and_progress,
     add_people_kept_out,
+    given,
     not_negative_float,
     positive_float,
     positive_int,
@@ -176,12 +177,8 @@ def _train(options: argparse.Namespace) -> int:
 def _options(options: argparse.Namespace) -> TrainOptions:
     from sd2core.classify.training import TrainOptions
 
-    given: dict[str, Any] = {
-        name: getattr(options, name)
-        for name in ("steps", "patience", "learning_rate")
-        if getattr(options, name) is not None
-    }
-    return network_of(options).of(TrainOptions(**given), options.seed)
+    chosen = TrainOptions(**given(options, ("steps", "patience", "learning_rate")))
+    return network_of(options).of(chosen, options.seed)
 
 
 def _kept_out(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import fields
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +14,7 @@ from sd2core.cli.labels.reading import (
     recording_clock,
     write,
 )
-from sd2core.cli.options import add_command, add_json, not_negative_float
+from sd2core.cli.options import add_command, add_json, flag, given, not_negative_float
 from sd2core.cli.output import counted, print_json, print_rows
 from sd2core.cli.recording_maps import MapName, maps_of
 from sd2core.errors import Sd2Error
@@ -57,9 +57,7 @@ def add_suggest(kinds: argparse._SubParsersAction) -> None:
     )
     add_searched_map(parser, ("synthetic", "radar"))
     for name, (metavar, text) in _HELP.items():
-        parser.add_argument(
-            f"--{name.replace('_', '-')}", type=not_negative_float, metavar=metavar, help=text
-        )
+        parser.add_argument(flag(name), type=not_negative_float, metavar=metavar, help=text)
     parser.add_argument("--label", default="gesture", help="label of the spans (default: gesture)")
     add_json(parser)
 
@@ -83,13 +81,7 @@ def _suggest(options: argparse.Namespace) -> None:
 
     if options.out is not None:
         check_label_output(options.out, replace=options.replace)
-    chosen = SuggestOptions(
-        **{
-            field.name: getattr(options, field.name)
-            for field in fields(SuggestOptions)
-            if getattr(options, field.name) is not None
-        }
-    )
+    chosen = SuggestOptions(**given(options, _HELP))
     doppler, clock = map_and_clock(options)
     spans = suggest_spans(doppler, chosen, label=options.label)
     energy_db = motion_energy_db(doppler)
@@ -100,7 +92,7 @@ def _suggest(options: argparse.Namespace) -> None:
             {
                 "map_kind": doppler.kind,
                 "loudest_db": loudest_db,
-                "options": {field.name: getattr(chosen, field.name) for field in fields(chosen)},
+                "options": asdict(chosen),
                 "spans": spans_data(spans, "confidence", "note"),
                 "path": None if options.out is None else str(options.out),
                 "not_kept": lost,
