@@ -1,4 +1,4 @@
-"""Common properties of the sources of a data set, collected and checked."""
+"""Header and index of a data set, made of its sources after a check that they fit together."""
 
 from __future__ import annotations
 
