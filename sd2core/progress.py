@@ -12,5 +12,16 @@ class Cancelled(Exception):
     """Raised by a progress callback: the caller no longer wants the result."""
 
 
+_STEPS = 1000
+"""Steps of a whole whose parts report with totals of their own."""
+
+
+def part_of(progress: Progress, start: float, stop: float, of: int = 1) -> Progress:
+    """Progress of a part of the work, from ``start`` to ``stop`` of ``of``."""
+    return lambda done, total: progress(
+        round(_STEPS * (start + (stop - start) * done / max(total, 1))), _STEPS * of
+    )
+
+
 def silent(done: int, total: int) -> None:
     """Report nothing."""

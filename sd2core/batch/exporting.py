@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import shutil
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
@@ -19,6 +18,7 @@ from sd2core.batch.synthesis import LONGEST_FRAMES
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.digests import file_digest
+from sd2core.files.paths import remove
 from sd2core.maps import DopplerMap, MapKind, joined
 from sd2core.progress import Progress
 from sd2core.sensor import VirtualSensor
@@ -47,13 +47,9 @@ def dataset_key(folder: BatchFolder, export: Export) -> str:
 
 def is_exported(folder: BatchFolder, export: Export) -> bool:
     """Tell if the data set exists and was made of the current results."""
-    try:
-        note = json.loads((folder.path / _NOTE).read_text(encoding="utf-8"))
-        return bool(
-            note["key"] == dataset_key(folder, export) and dataset_path(folder, export).exists()
-        )
-    except (OSError, ValueError, KeyError, TypeError):
+    if not dataset_path(folder, export).exists() or not folder.results.exists():
         return False
+    return _noted(folder).get("key") == dataset_key(folder, export)
 
 
 def export_dataset(folder: BatchFolder, export: Export, progress: Progress) -> None:
@@ -62,7 +58,6 @@ def export_dataset(folder: BatchFolder, export: Export, progress: Progress) -> N
     Sources that have been there stay. Where one of them has changed, or the settings have,
     the whole data set is written again.
     """
-    from sd2core.datasets.card import write_card
     from sd2core.datasets.options import DatasetOptions
     from sd2core.datasets.writing import write_dataset
 
@@ -78,12 +73,11 @@ def export_dataset(folder: BatchFolder, export: Export, progress: Progress) -> N
         title=export.title,
     )
     settings = key_of("export", {"settings": export.model_dump(mode="json")})
-    if _settings_of(note) != settings or _is_stale(out, folder, export):
+    if _noted(folder).get("settings") != settings or _is_stale(out, folder, export):
         for path in (*folder.path.glob("dataset.*"),):
-            shutil.rmtree(path) if path.is_dir() else path.unlink()
+            remove(path)
     atomic_write_text(note, json.dumps({"settings": settings}) + "\n")
     written = write_dataset(out, _Counted(folder, export), options, progress)
-    write_card(out)
     if written.failed:
         first = written.failed[0]
         raise Sd2Error(
@@ -94,11 +88,13 @@ def export_dataset(folder: BatchFolder, export: Export, progress: Progress) -> N
     atomic_write_text(note, json.dumps(content) + "\n")
 
 
-def _settings_of(note: Path) -> str | None:
+def _noted(folder: BatchFolder) -> dict[str, Any]:
+    """Content of the note about the data set; empty where there is none."""
     try:
-        return str(json.loads(note.read_text(encoding="utf-8"))["settings"])
-    except (OSError, ValueError, KeyError, TypeError):
-        return None
+        content = json.loads((folder.path / _NOTE).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return content if isinstance(content, dict) else {}
 
 
 def _is_stale(out: Path, folder: BatchFolder, export: Export) -> bool:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import json
-import os
 import shutil
 import time
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -23,7 +22,8 @@ from sd2core.batch.pool import Pool, local_pool, scheduler_pool
 from sd2core.batch.task_graph import TaskGraph
 from sd2core.batch.tasks import BEGUN
 from sd2core.errors import Sd2Error
-from sd2core.files.atomic import atomic_write
+from sd2core.files.atomic import atomic_write, atomic_write_text
+from sd2core.files.paths import remove
 from sd2core.runs.control import Control, signals_kept, write_control
 from sd2core.runs.pace import keep_pace
 from sd2core.runs.progress import Event, ProgressWriter
@@ -77,7 +77,7 @@ def run_batch(
             control = Control(folder.control)
             control.take_signals()
             folder.set_state("running", started_unix_s=time.time())
-            _write_plan(folder, plan)
+            atomic_write_text(folder.plan, plan_text(plan, folder.path))
             _clear(folder)
             if pool is None:
                 pool = (
@@ -303,11 +303,6 @@ def _if_there(out: str, root: Path) -> str | None:
     return path.relative_to(root).as_posix() if path.exists() else None
 
 
-def _write_plan(folder: BatchFolder, plan: BatchPlan) -> None:
-    with atomic_write(folder.plan) as stream:
-        stream.write(plan_text(plan, folder.path).encode())
-
-
 def _clear(folder: BatchFolder) -> None:
     """Remove leftovers of killed processes."""
     begun = folder.path / BEGUN
@@ -320,27 +315,7 @@ def remove_old_leftovers(folder: Path, old_s: float = _OLD_S) -> None:
     """Delete temporary files and folders of a batch that are no longer written to."""
     before_s = time.time() - old_s
     for kind in _KINDS:
-        for shelf in _entries(folder / kind):
-            for entry in _entries(Path(shelf.path)):
-                if entry.name.startswith(".") and entry.name.endswith(".tmp"):
-                    _remove(entry, before_s)
-
-
-def _remove(entry: os.DirEntry[str], before_s: float) -> None:
-    try:
-        if entry.stat(follow_symlinks=False).st_mtime > before_s:
-            return
-        if entry.is_dir(follow_symlinks=False):
-            shutil.rmtree(entry.path, ignore_errors=True)
-        else:
-            os.unlink(entry.path)
-    except OSError:  # of another user, or gone meanwhile
-        return
-
-
-def _entries(folder: Path) -> list[os.DirEntry[str]]:
-    try:
-        with os.scandir(folder) as entries:
-            return list(entries)
-    except OSError:
-        return []
+        for path in (folder / kind).glob("*/.*.tmp"):
+            with suppress(OSError):  # of another user, or gone meanwhile
+                if path.lstat().st_mtime <= before_s:
+                    remove(path)

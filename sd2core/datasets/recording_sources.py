@@ -39,7 +39,7 @@ from sd2core.mesh.sequence import MeshSequence
 from sd2core.mocap.recording_pairs import on_clock
 from sd2core.placements.body_extent import BodyExtent
 from sd2core.placements.placements import Place, Placements
-from sd2core.progress import Progress
+from sd2core.progress import Progress, part_of
 from sd2core.recording.recording import Recording, open_recording
 from sd2core.runs.pace import Kind
 from sd2core.sensor import Vector, VelocityAxis, VirtualSensor
@@ -48,7 +48,6 @@ from sd2core.timebase import Timebase
 if TYPE_CHECKING:
     from sd2core.denoise.live import TrainedDenoiser
 
-_STEPS = 1000
 _COUNTED_SHARE = 0.05
 """Share of the time that a source takes whose radar is simulated."""
 
@@ -207,7 +206,7 @@ class _Opened:
         sensor = self._sensor(key.placement)
         counted_share = _COUNTED_SHARE if self._simulates else 1.0
         if self._mesh is not None and {"synthetic", "denoised"} & {*wanted}:
-            synthetic = self._counted(sensor, _stage(progress, 0.0, counted_share))
+            synthetic = self._counted(sensor, part_of(progress, 0.0, counted_share))
             maps["synthetic"] = synthetic
             model = _model_of(self.recording, self._making)
             if "denoised" in wanted and model is not None:
@@ -219,7 +218,7 @@ class _Opened:
             there = self._mesh.timebase if self._mesh is not None else radar.timebase
             maps[radar.kind] = on_clock(radar, there)
         if self._simulates:
-            maps["simulated"] = self._simulated(sensor, _stage(progress, counted_share, 1.0))
+            maps["simulated"] = self._simulated(sensor, part_of(progress, counted_share, 1.0))
         maps = {kind: one for kind, one in maps.items() if kind in wanted}
         if not maps:
             raise Sd2Error(
@@ -302,13 +301,6 @@ class _Opened:
 
     def _label(self, times_s: NDArray[np.float64]) -> NDArray[np.int16]:
         return label_per_frame(self._spans, self._names, times_s)
-
-
-def _stage(progress: Progress, start: float, stop: float) -> Progress:
-    """Map the progress of a part of the work to a range of the whole."""
-    return lambda done, of: progress(
-        round(_STEPS * (start + (stop - start) * done / max(of, 1))), _STEPS
-    )
 
 
 def places_of(recording: Recording, making: Making) -> tuple[Place, ...]:

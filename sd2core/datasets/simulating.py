@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import asdict, dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,7 +18,7 @@ from sd2core.fmcw.simulation import simulate_radar
 from sd2core.maps import DopplerMap, joined
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mocap.recording_pairs import on_clock
-from sd2core.progress import Progress, silent
+from sd2core.progress import Progress, part_of, silent
 from sd2core.radar_config import PAPER_RADAR, RadarConfig
 from sd2core.sensor import VelocityAxis, VirtualSensor
 from sd2core.timebase import Timebase
@@ -94,17 +93,12 @@ def simulated_map(
             wave=WaveOptions(coherent=False),
             options=options,
             memory_bytes=_BLOCK_BYTES,
-            progress=partial(_part, progress, low - first, stop - first),
+            progress=part_of(progress, low - first, high - first, stop - first),
         )
         block = doppler_map(capture, axis=axis, clutter=CLUTTER)
         meta = _of_all_frames(block.meta, capture.meta["simulation"])
         maps.append(replace(block, timebase=Timebase(there_s[low:high]), meta=meta))
     return on_clock(joined(maps), clock)
-
-
-def _part(progress: Progress, before: int, of: int, done: int, _: int) -> None:
-    """Report the progress over all blocks."""
-    progress(before + done, of)
 
 
 def _of_all_frames(meta: dict[str, Any], simulation: dict[str, Any]) -> dict[str, Any]:

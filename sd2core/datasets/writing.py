@@ -30,11 +30,8 @@ from sd2core.datasets.store import LOCK_NAME, SegmentStore, open_arrays
 from sd2core.errors import Sd2Error
 from sd2core.files.lock import FileLock
 from sd2core.io.kinds import is_dataset
-from sd2core.progress import Progress, silent
+from sd2core.progress import Progress, part_of, silent
 from sd2core.train.data import Split
-
-_STEPS = 1000
-"""Steps of progress per source."""
 
 
 @dataclass(frozen=True)
@@ -165,7 +162,7 @@ class _Writer:
                     f"Two sources are {one.key.title}", "subject, recording and placement once"
                 )
             seen.add(digest)
-            report = _part(progress, number, total)
+            report = part_of(progress, number, number + 1, total)
             report(0, 1)
             if self._is_there(one, digest):
                 continue
@@ -202,7 +199,7 @@ class _Writer:
         if isinstance(one, Source):
             source = one
         else:
-            source = one.load(lambda done, of: progress(int(900 * done / max(of, 1)), _STEPS))
+            source = one.load(part_of(progress, 0.0, 0.9))
             if source.key != one.key:
                 raise Sd2Error(f"{one.key.title} turned out to be {source.key.title}")
         store = self._open_store(source)
@@ -240,7 +237,7 @@ class _Writer:
 
         store.append(counted(), entry)
         self._know(entry, digest)
-        progress(_STEPS, _STEPS)
+        progress(1, 1)
 
     def _open_store(self, source: Source) -> SegmentStore:
         if self._store is None:
@@ -316,10 +313,3 @@ def _refuse_other(out: Path, form: FileFormat) -> None:
 
 def _digest(key: SourceKey) -> bytes:
     return hashlib.blake2b("\0".join(map(str, key)).encode(), digest_size=16).digest()
-
-
-def _part(progress: Progress, number: int, of: int) -> Progress:
-    """Map the progress of one source to that of all."""
-    return lambda done, total: progress(
-        number * _STEPS + int(_STEPS * done / max(total, 1)), of * _STEPS
-    )

@@ -17,7 +17,7 @@ from sd2core.fmcw.processing import doppler_map
 from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import Presence, runs
 from sd2core.pairs.store import PairWriter, Take, TakeKey
-from sd2core.progress import Progress, silent
+from sd2core.progress import Progress, part_of, silent
 from sd2core.recording.recording import Recording, open_recording
 from sd2core.timebase import Timebase
 from sd2core.version import __version__
@@ -27,7 +27,6 @@ TAKE_S = 15.0
 
 _BACKGROUND = "background"
 _SAME_RATE = 0.01
-_STEPS = 1000
 """Steps of progress per recording."""
 
 
@@ -68,7 +67,9 @@ def make_recording_pairs(
     found: dict[str, tuple[int, int]] = {}
     left_out_s = 0.0
     for number, (recording, subject) in enumerate(zip(opened, names, strict=True)):
-        synthetic, radar = _maps(recording, synthesis, _part(progress, number, len(opened)))
+        synthetic, radar = _maps(
+            recording, synthesis, part_of(progress, number, number + 1, len(opened))
+        )
         rate_hz = synthetic.timebase.frames_per_s
         this = (recording.folder, rate_hz, radar.kind == "simulated")
         first = first or this
@@ -130,12 +131,9 @@ def _maps(
     recording: Recording, synthesis: SynthesisOptions, progress: Progress
 ) -> tuple[DopplerMap, DopplerMap]:
     mesh = recording.load_mesh()
-    made = Synthesizer(mesh, synthesis).map(
-        recording.sensor,
-        progress=lambda done, total: progress(round(0.9 * _STEPS * done / max(total, 1)), _STEPS),
-    )
+    made = Synthesizer(mesh, synthesis).map(recording.sensor, progress=part_of(progress, 0.0, 0.9))
     radar = doppler_map(recording.load_capture(), axis=synthesis.axis)
-    progress(_STEPS, _STEPS)
+    progress(1, 1)
     return made, radar
 
 
@@ -218,8 +216,3 @@ def _nearest(
     nearest = np.where(times_s - there_s[left] <= np.abs(there_s[right] - times_s), left, right)
     spacing_s = float(np.median(np.diff(there_s))) if len(there_s) > 1 else 0.0
     return nearest, np.abs(there_s[nearest] - times_s) <= 0.75 * spacing_s
-
-
-def _part(progress: Progress, number: int, of: int) -> Progress:
-    """Progress of one recording, converted to that of all."""
-    return lambda done, total: progress(number * _STEPS + round(_STEPS * done / total), of * _STEPS)
