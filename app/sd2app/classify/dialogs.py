@@ -1,10 +1,10 @@
-"""Dialogs of classifiers: files, training data, deletion, model card and results."""
+"""Dialogs of classifiers: files, training data, model card and results."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from PySide6.QtWidgets import QApplication, QFileDialog
+from PySide6.QtWidgets import QFileDialog
 
 from sd2app.classify.model import ClassifyModel
 from sd2app.classify.text import classifier_page
@@ -12,7 +12,6 @@ from sd2app.classify.training import ClassTraining
 from sd2app.feature import Shell
 from sd2app.session.content import UNTITLED
 from sd2app.session.session import Session
-from sd2app.widgets.dialogs import may_delete
 from sd2app.widgets.model_card_dialog import ModelCardDialog
 from sd2core.errors import Sd2Error
 
@@ -22,12 +21,12 @@ _RESULTS = "Results (*.json)"
 
 
 class ClassifyDialogs:
-    """Dialogs, followed by calls of the models; ``report`` shows the sentence of a failure."""
+    """Dialogs, followed by calls of the models."""
 
     def __init__(
         self, shell: Shell, classify: ClassifyModel, training: ClassTraining, session: Session
     ) -> None:
-        self._shell, self._session = shell, session
+        self.shell, self._session = shell, session
         self._parent = shell.dialog_parent
         self._classify, self._training = classify, training
 
@@ -40,7 +39,7 @@ class ClassifyDialogs:
 
     def use(self, path: Path | None) -> None:
         """Classify with a file, or not at all."""
-        self._shell.attempt(lambda: self._classify.use(path))
+        self.shell.attempt(lambda: self._classify.use(path))
 
     def show_card(self) -> None:
         """Show the card of the classifier in use."""
@@ -87,26 +86,6 @@ class ClassifyDialogs:
         content = self._session.document.content
         return content is not None and content.recording.folder != UNTITLED
 
-    def train(self) -> None:
-        """Start the training."""
-        self._shell.attempt(self._training.train)
-
-    def compare(self) -> None:
-        """Start the comparison."""
-        self._shell.attempt(self._training.compare)
-
-    def again(self) -> None:
-        """Resume the comparison in view."""
-        self._shell.attempt(self._training.again)
-
-    def copy_command(self) -> None:
-        """Put the command on the clipboard."""
-        QApplication.clipboard().setText(self._training.command)
-
-    def use_model(self) -> None:
-        """Use the model of the run in view."""
-        self._shell.attempt(self._training.use_model)
-
     def show_result(self) -> None:
         """Show the result of the comparison in view."""
         run = self._training.run
@@ -119,24 +98,12 @@ class ClassifyDialogs:
         if name:
             self._show(Path(name))
 
-    def delete(self) -> None:
-        """Ask, then delete the run in view."""
-        run = self._training.run
-        if run is None:
-            return
-        what = (
-            f"{run.folder.path.name} is deleted with what it made. A classifier that was put to"
-            " use stays among your classifiers."
-        )
-        if may_delete(self._parent, "Delete this run?", what):
-            self._training.delete()
-
     def _show(self, path: Path) -> None:
         # Imported here because a result needs what loads torch.
         from sd2app.classify.result import read_result
         from sd2app.classify.result_dialog import ClassResultDialog
 
         display = self._session.display
-        self._shell.attempt(
+        self.shell.attempt(
             lambda: ClassResultDialog(read_result(path), display, self._parent).show()
         )

@@ -48,22 +48,21 @@ class ClassRunView(RunView[ClassRun]):
         dialogs: ClassifyDialogs,
         parent: QWidget | None = None,
     ) -> None:
-        tell = partial(partial, training.tell)
+        shell = dialogs.shell
         buttons = (
             Button(
                 "use", "Use this model", "Say with it which gesture each frame shows",
-                dialogs.use_model, primary=True,
+                partial(shell.attempt, training.use_model), primary=True,
             ),
             Button(
                 "show", "Show result", "Both confusion matrices, and the learning curve",
                 dialogs.show_result, primary=True,
             ),
-            Button("stop", "Stop", "End it now and keep what there is", tell("stop")),
-            Button("cancel", "Cancel", "End it now and delete what it made", tell("cancel")),
-            Button("again", "Resume", "Train what is missing", dialogs.again),
-            Button("delete", "Delete…", "Delete it with what it made", dialogs.delete),
+            Button(
+                "again", "Resume", "Train what is missing", partial(shell.attempt, training.again)
+            ),
         )  # fmt: skip
-        super().__init__(training, buttons, parent)
+        super().__init__(training, shell, buttons, parent)
         self._training = training
         self._curve = ChartView(display, "Recall over the steps", class_chart(ClassHistory()), self)
         self._facts = FactRows(1, at_the_edge=False, parent=self)

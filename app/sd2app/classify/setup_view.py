@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from PySide6.QtCore import QSignalBlocker, Qt
 from PySide6.QtWidgets import QCheckBox, QGridLayout, QHBoxLayout, QLabel, QWidget
 
@@ -44,11 +46,11 @@ class ClassSetupView(TrainingForm):
     def __init__(
         self, training: ClassTraining, dialogs: ClassifyDialogs, parent: QWidget | None = None
     ) -> None:
-        super().__init__(training.setup, parent)
+        super().__init__(training.setup, dialogs.shell, parent)
         self._training, self._labelled, self._dialogs = training, training.setup, dialogs
         self._add_labelled_data()
         self._add_network()
-        self.add_start(dialogs.train, dialogs.copy_command)
+        self.add_start(training.train, lambda: training.command)
         self.column.addWidget(rule())
         self._add_comparison()
         training.changed.connect(self._refresh)
@@ -109,7 +111,9 @@ class ClassSetupView(TrainingForm):
             lambda on: self._labelled.set_value("quick", "yes" if on else "no")
         )
         tip = "Train and compare in the background"
-        self._compare = outlined("Compare", tip, self._dialogs.compare, self)
+        self._compare = outlined(
+            "Compare", tip, partial(self._shell.attempt, self._training.compare), self
+        )
         tip = "Show a table of sd2 classify table, or a matrix of sd2 classify eval"
         show = outlined("Open a result…", tip, self._dialogs.open_result, self)
         for widget in (title("Does synthetic data help?"), sentence(_COMPARISON), self._quick):
@@ -132,10 +136,9 @@ class ClassSetupView(TrainingForm):
                 box.setChecked(name in setup.maps)
         with QSignalBlocker(self._quick):
             self._quick.setChecked(setup.value("quick") == "yes")
-        self.estimate.setVisible(not setup.problem)
-        steps = setup.value("steps")
+        steps = 0 if setup.problem else setup.value("steps")
         count = f"The data is read first; then {counted(steps, 'step')}"
-        self.estimate.show_estimate(count, steps, setup.step_s)
+        self.show_estimate(count, steps, setup.step_s)
         self.show_start(training.why_not_train, can_copy=not setup.train_problem)
         self._compare.setEnabled(not training.why_not_compare)
         self._compare.setToolTip(training.why_not_compare or "Train and compare in the background")

@@ -1,21 +1,20 @@
-"""Dialogs of the Train panel: pairs, deletion, and the run when the window closes."""
+"""Dialogs of the Train panel: pairs, runs, and what becomes of one when the window closes."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from PySide6.QtWidgets import QApplication, QCheckBox, QFileDialog, QMessageBox
+from PySide6.QtWidgets import QCheckBox, QFileDialog, QMessageBox
 
 from sd2app.feature import Shell
 from sd2app.training.model import TrainingModel
-from sd2app.widgets.dialogs import may_delete
 
 
 class TrainingDialogs:
-    """Dialogs and what may be refused, followed by calls of the model."""
+    """Dialogs, followed by calls of the model."""
 
     def __init__(self, shell: Shell, training: TrainingModel) -> None:
-        self._shell, self._training = shell, training
+        self.shell, self._training = shell, training
         self._parent = shell.dialog_parent
 
     def ask_store(self) -> None:
@@ -28,37 +27,13 @@ class TrainingDialogs:
         """Let the user choose recordings to make pairs of."""
         name = QFileDialog.getExistingDirectory(self._parent, "A recording, or a folder of some")
         if name:
-            self._shell.attempt(lambda: self._training.pair_maker.make(Path(name)))
-
-    def start(self) -> None:
-        """Start what is set up."""
-        self._shell.attempt(self._training.start)
-
-    def resume(self) -> None:
-        """Resume the run in view."""
-        self._shell.attempt(self._training.resume)
+            self.shell.attempt(lambda: self._training.pair_maker.make(Path(name)))
 
     def open_run(self) -> None:
         """Let the user choose a run in another folder, such as one started in a terminal."""
         name = QFileDialog.getExistingDirectory(self._parent, "Folder of a run")
         if name:
-            self._shell.attempt(lambda: self._training.open_run(Path(name)))
-
-    def copy_command(self) -> None:
-        """Put the command on the clipboard."""
-        self._shell.attempt(lambda: QApplication.clipboard().setText(self._training.command))
-
-    def delete(self) -> None:
-        """Ask, then delete the run in view."""
-        run = self._training.run
-        if run is None:
-            return
-        what = (
-            f"{run.folder.path.name} is deleted with its best model and its curves. A model that"
-            " was put to use stays among your models."
-        )
-        if may_delete(self._parent, "Delete this run?", what):
-            self._training.delete()
+            self.shell.attempt(lambda: self._training.open_run(Path(name)))
 
     def may_leave(self) -> bool:
         """True if the window may close; decides on a run under way."""

@@ -10,6 +10,7 @@ from PySide6.QtCore import QSignalBlocker
 from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from sd2app.background.run_monitor import UNDER_WAY
+from sd2app.feature import Shell
 from sd2app.session.display import DisplayModel
 from sd2app.training.dialogs import TrainingDialogs
 from sd2app.training.model import CLOSING, TrainingModel
@@ -49,7 +50,7 @@ class TrainingPanel(RunPanel):
         super().__init__(
             training,
             TrainingSetupView(training, dialogs),
-            TrainingRunView(training, adoption, display, dialogs),
+            TrainingRunView(training, adoption, display, dialogs.shell),
             "Runs: those under way, and those that have ended",
             dialogs.open_run,
             parent,
@@ -64,10 +65,10 @@ class TrainingRunView(RunView[TrainingMonitor]):
         training: TrainingModel,
         adoption: ModelAdoption,
         display: DisplayModel,
-        dialogs: TrainingDialogs,
+        shell: Shell,
         parent: QWidget | None = None,
     ) -> None:
-        tell = partial(partial, training.tell)
+        tell, attempt = partial(partial, training.tell), shell.attempt
         buttons = (
             Button(
                 "use", "Use this model", "Denoise with it, and compare with what was there before",
@@ -75,12 +76,9 @@ class TrainingRunView(RunView[TrainingMonitor]):
             ),
             Button("pause", "Pause", "Rest, and give the processor back", tell("pause")),
             Button("go_on", "Continue", "Go on training", tell("run")),
-            Button("stop", "Stop", "End it now and keep the best model", tell("stop")),
-            Button("cancel", "Cancel", "End it now and delete what it made", tell("cancel")),
-            Button("resume", "Resume", "Go on where it ended", dialogs.resume),
-            Button("delete", "Delete…", "Delete this run with its model", dialogs.delete),
+            Button("resume", "Resume", "Go on where it ended", partial(attempt, training.resume)),
         )  # fmt: skip
-        super().__init__(training, buttons, parent)
+        super().__init__(training, shell, buttons, parent)
         self._training, self._adoption = training, adoption
         self._gain = TrainingGainView(adoption, self)
         self._curves = ChartView(

@@ -40,7 +40,7 @@ class TrainingSetupView(TrainingForm):
     def __init__(
         self, training: TrainingModel, dialogs: TrainingDialogs, parent: QWidget | None = None
     ) -> None:
-        super().__init__(training.setup, parent)
+        super().__init__(training.setup, dialogs.shell, parent)
         self._training, self._pairs, self._dialogs = training, training.setup, dialogs
         self._menu = self.add_data(
             "Pairs",
@@ -54,7 +54,7 @@ class TrainingSetupView(TrainingForm):
         self.column.addWidget(self._making_part())
         self._add_model()
         self._add_settings()
-        self.add_start(dialogs.start, dialogs.copy_command)
+        self.add_start(training.start, lambda: training.command)
         training.changed.connect(self._refresh)
         self._refresh()
 
@@ -139,9 +139,8 @@ class TrainingSetupView(TrainingForm):
         self._about.setText(MODEL_WORDS[setup.value("model")][1])
         self._reset.setVisible(setup.differs)
         estimate = setup.estimate
-        self.estimate.setVisible(bool(estimate.segments))
         count = f"{estimate.segments:,} segments, {counted(estimate.steps, 'step')}"
-        self.estimate.show_estimate(count, estimate.steps, estimate.step_s)
+        self.show_estimate(count, estimate.steps, estimate.step_s)
         self.show_start(training.why_not_start, can_copy=not setup.problem)
 
     def _fill_menu(self) -> None:

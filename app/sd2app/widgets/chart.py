@@ -10,11 +10,12 @@ from PySide6.QtCore import QEvent, QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPen, QPolygonF
 from PySide6.QtWidgets import QWidget
 
-from sd2app.widgets.plot import LogAxis, PointPlot, Themed
+from sd2app.widgets.plot import PointPlot, Themed, log_ticks
 from sd2app.widgets.time_axis import ticks
 
 _STEPS = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}
-_ROUND = ((1,), (1, 3), (1, 2, 5), (1, 2, 3, 5, 7), (1, 1.5, 2, 3, 4, 5, 6, 8))
+ROUND = ((1,), (1, 3), (1, 2, 5), (1, 2, 3, 5, 7), (1, 1.5, 2, 3, 4, 5, 6, 8))
+"""Values within a decade, the fewest first; the last ones for axes shorter than a decade."""
 _NEAR_PX = 14.0
 _CAP_PX = 3.0
 
@@ -41,7 +42,7 @@ class Scale:
         if self.values:
             return self.values
         if self.log:
-            return log_ticks(self.low, self.high, most)
+            return log_ticks(self.low, self.high, most, ROUND)
         found = ticks(self.low, self.high, most)
         return [value for value in found if value == round(value)] if self.whole else found
 
@@ -253,19 +254,3 @@ class ChartView(PointPlot):
                 at = min(max(at + _STEPS[Qt.Key(key)], 0), len(points) - 1)
             self.point_at(points[at])
             self.explain()
-
-
-def log_ticks(low: float, high: float, most: int) -> list[float]:
-    """Round tick values on a logarithmic axis, also over less than a decade."""
-    first, last = (math.floor(math.log10(end)) for end in (low, high))
-    found: list[float] = []
-    for steps in _ROUND:
-        values = [
-            step * 10.0**power
-            for power in range(first, last + 1)
-            for step in steps
-            if low <= step * 10.0**power <= high
-        ]
-        if len(found) < len(values) <= most:
-            found = values
-    return found or LogAxis(low, high, 0.0, 1.0).ticks(most)

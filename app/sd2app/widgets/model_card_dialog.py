@@ -6,7 +6,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QDialog,
     QDialogButtonBox,
-    QGridLayout,
+    QFormLayout,
     QHBoxLayout,
     QLabel,
     QScrollArea,
@@ -15,6 +15,7 @@ from PySide6.QtWidgets import (
 
 from sd2app.widgets.layouts import column_of
 from sd2app.widgets.model_page import ModelPage
+from sd2app.widgets.panel import sentence, title
 
 
 class ModelCardDialog(QDialog):
@@ -24,16 +25,23 @@ class ModelCardDialog(QDialog):
         super().__init__(parent)
         self.setWindowTitle(f"Model: {page.title}")
         inside = QWidget(self)
-        self._grid = QGridLayout(inside)
-        self._grid.setContentsMargins(16, 8, 16, 16)
-        self._grid.setHorizontalSpacing(24)
-        self._grid.setVerticalSpacing(4)
-        self._grid.setColumnStretch(1, 1)
-        self._grid.addLayout(self._head(page), 0, 0, 1, 2)
-        self._add(page.rows)
-        for heading, rows in page.sections:
-            self._add(rows, heading)
-        self._grid.setRowStretch(self._grid.rowCount(), 1)
+        form = QFormLayout(inside)
+        form.setContentsMargins(16, 8, 16, 16)
+        form.setHorizontalSpacing(24)
+        form.setVerticalSpacing(4)
+        form.addRow(self._head(page))
+        for heading, rows in (("", page.rows), *page.sections):
+            if heading:
+                above = title(heading)
+                above.setMinimumHeight(32)
+                above.setAlignment(Qt.AlignmentFlag.AlignBottom)
+                form.addRow(above)
+            for name, text in rows:
+                value = sentence(text, "")
+                if name:
+                    form.addRow(sentence(name), value)
+                else:
+                    form.addRow(value)
         scroll = QScrollArea(self)
         scroll.setWidget(inside)
         scroll.setWidgetResizable(True)
@@ -45,9 +53,7 @@ class ModelCardDialog(QDialog):
     def _head(self, page: ModelPage) -> QHBoxLayout:
         row = QHBoxLayout()
         row.setSpacing(12)
-        title = QLabel(page.title, self)
-        title.setObjectName("title")
-        row.addWidget(title)
+        row.addWidget(title(page.title))
         if page.simulated:
             badge = QLabel("simulated data only", self)
             badge.setObjectName("badge")
@@ -55,24 +61,3 @@ class ModelCardDialog(QDialog):
             row.addWidget(badge)
         row.addStretch(1)
         return row
-
-    def _add(self, rows: list[tuple[str, str]], heading: str = "") -> None:
-        number = self._grid.rowCount()
-        if heading:
-            label = QLabel(heading, self)
-            label.setObjectName("title")
-            self._grid.addWidget(label, number, 0, 1, 2, Qt.AlignmentFlag.AlignBottom)
-            self._grid.setRowMinimumHeight(number, 32)
-            number += 1
-        for name, text in rows:
-            value = QLabel(text, self)
-            value.setWordWrap(True)
-            value.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-            if name:
-                label = QLabel(name, self)
-                label.setObjectName("muted")
-                self._grid.addWidget(label, number, 0, Qt.AlignmentFlag.AlignTop)
-                self._grid.addWidget(value, number, 1)
-            else:
-                self._grid.addWidget(value, number, 0, 1, 2)
-            number += 1

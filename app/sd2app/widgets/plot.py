@@ -62,17 +62,24 @@ class LogAxis:
 
     def ticks(self, most: int) -> list[float]:
         """Values to write: decades, and 2 and 5 times them where there is room."""
-        first, last = (math.floor(math.log10(end)) for end in (self.low, self.high))
-        for steps in ((1, 2, 5), (1, 3), (1,)):
-            values = [
-                step * 10.0**power
-                for power in range(first, last + 1)
-                for step in steps
-                if self.low * 0.999 <= step * 10.0**power <= self.high * 1.001
-            ]
-            if len(values) <= most:
-                return values
-        return values[:: -(-len(values) // most)]
+        return log_ticks(0.999 * self.low, 1.001 * self.high, most, ((1,), (1, 3), (1, 2, 5)))
+
+
+def log_ticks(low: float, high: float, most: int, choice: Sequence[Sequence[float]]) -> list[float]:
+    """Values of a logarithmic axis: of each decade these ones, as many as there is room for."""
+    first, last = (math.floor(math.log10(end)) for end in (low, high))
+    found: list[float] = []
+    for steps in choice:
+        values = [
+            step * 10.0**power
+            for power in range(first, last + 1)
+            for step in steps
+            if low <= step * 10.0**power <= high
+        ]
+        if len(found) < len(values) <= most:
+            found = values
+    decades = [10.0**power for power in range(first, last + 1) if low <= 10.0**power <= high]
+    return found or decades[:: -(-len(decades) // most)]
 
 
 def tick_text(value: float) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, Generic, NamedTuple
 
@@ -12,6 +13,8 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QSizePolicy, QV
 
 from sd2app.background.run_monitor import UNDER_WAY
 from sd2app.background.runs import Run, Runs
+from sd2app.feature import Shell
+from sd2app.widgets.dialogs import may_delete
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.panel import outlined, sentence, side_by_side
 
@@ -114,10 +117,21 @@ class RunView(QWidget, Generic[Run]):
     """Progress and actions of the run in view, and why it ended; subclasses add what it made."""
 
     def __init__(
-        self, runs: Runs[Run], buttons: Sequence[Button], parent: QWidget | None = None
+        self,
+        runs: Runs[Run],
+        shell: Shell,
+        buttons: Sequence[Button],
+        parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
-        self._runs = runs
+        self._runs, self._shell = runs, shell
+        tell = partial(partial, runs.tell)
+        buttons = (
+            *buttons,
+            Button("stop", "Stop", "End it now and keep the best so far", tell("stop")),
+            Button("cancel", "Cancel", "End it now and delete what it made", tell("cancel")),
+            Button("delete", "Delete…", "Delete this run with what it made", self._delete),
+        )
         self._headline = QLabel(self)
         self._headline.setObjectName("title")
         self._headline.setWordWrap(True)
@@ -158,6 +172,16 @@ class RunView(QWidget, Generic[Run]):
         raise NotImplementedError
 
     # --- showing ----------------------------------------------------------------------------
+
+    def _delete(self) -> None:
+        run = self._runs.run
+        if run is not None and may_delete(
+            self._shell.dialog_parent,
+            "Delete this run?",
+            f"{run.path.name} is deleted with what it made. A model that was put to use stays"
+            " among your models.",
+        ):
+            self._runs.delete()
 
     def refresh(self) -> None:
         """Follow the run in view."""

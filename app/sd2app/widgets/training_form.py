@@ -8,6 +8,7 @@ from typing import Any, NamedTuple, Protocol
 
 from PySide6.QtCore import QSignalBlocker, Qt
 from PySide6.QtWidgets import (
+    QApplication,
     QGridLayout,
     QHBoxLayout,
     QLabel,
@@ -18,9 +19,10 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from sd2app.widgets.estimate import EstimateLines
+from sd2app.feature import Shell
 from sd2app.widgets.inputs import Choice, NumberBox
 from sd2app.widgets.panel import ElidedLabel, outlined, sentence, side_by_side, title
+from sd2app.widgets.text import about
 
 
 class Setup(Protocol):
@@ -56,9 +58,9 @@ class Field(NamedTuple):
 class TrainingForm(QWidget):
     """Page over a :class:`Setup`; subclasses put its parts together."""
 
-    def __init__(self, setup: Setup, parent: QWidget | None = None) -> None:
+    def __init__(self, setup: Setup, shell: Shell, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._setup = setup
+        self._setup, self._shell = setup, shell
         self._shown_data: Sequence[Any] | None = None
         self._numbers: dict[str, NumberBox] = {}
         self._choices: dict[str, Choice] = {}
@@ -113,16 +115,24 @@ class TrainingForm(QWidget):
         self._choices[name] = choice
         return choice
 
-    def add_start(self, start: Callable[[], None], copy_command: Callable[[], None]) -> None:
-        """Add the estimate, why it cannot start, and the buttons."""
-        self.estimate = EstimateLines(self)
+    def add_start(self, start: Callable[[], None], command: Callable[[], str]) -> None:
+        """Add the estimate, why it cannot start, and the buttons to start it or to copy it."""
+        self._time = title("")
+        self._time.setWordWrap(True)
+        self._time.setAccessibleName("How long it will take")
+        self._basis = sentence("")
         self._problem = sentence("", "warning")
-        self._start = outlined("Start training", "Train in a background process", start, self)
+        for label in (self._time, self._basis, self._problem):
+            self.column.addWidget(label)
+        attempt, tip = self._shell.attempt, "Train in a background process"
+        self._start = outlined("Start training", tip, lambda: attempt(start), self)
         self._start.setObjectName("primary")
-        tip = "The same as a command for a terminal"
-        self._copy = outlined("Copy command", tip, copy_command, self)
-        self.column.addWidget(self.estimate)
-        self.column.addWidget(self._problem)
+        self._copy = outlined(
+            "Copy command",
+            "The same as a command for a terminal",
+            lambda: attempt(lambda: QApplication.clipboard().setText(command())),
+            self,
+        )
         self.column.addLayout(side_by_side(self._start, self._copy, spacing_px=6))
 
     # --- showing --------------------------------------------------------------------------
@@ -143,6 +153,17 @@ class TrainingForm(QWidget):
                 choice.setCurrentIndex(choice.findData(self._setup.value(name)))
         for name, box in self._numbers.items():
             box.show_value(self._setup.value(name))
+
+    def show_estimate(self, count: str, steps: int, step_s: float | None) -> None:
+        """Show the time of so many steps, if there are any; ``count`` ends with their number."""
+        self._time.setVisible(steps > 0)
+        self._basis.setVisible(steps > 0)
+        if step_s is None:
+            self._time.setText("Time: not known yet")
+            self._basis.setText(f"{count}. The first ones tell how long it takes.")
+        else:
+            self._time.setText(f"Takes {about(steps * step_s)}")
+            self._basis.setText(f"{count} of about {step_text(step_s)}, as measured here before.")
 
     def show_start(self, why_not: str, can_copy: bool) -> None:
         """Show whether a training can be started."""
@@ -190,6 +211,13 @@ class TrainingForm(QWidget):
             grid.addWidget(below, 2, 0)
         grid.setColumnStretch(0, 1)
         return row
+
+
+def step_text(seconds: float) -> str:
+    """Time of a step."""
+    if seconds >= 0.95:
+        return f"{seconds:.1f} s"
+    return f"{float(f'{1000 * seconds:.2g}'):g} ms"
 
 
 def labelled(grid: QGridLayout, place: tuple[int, int], field: Field, box: NumberBox) -> None:
