@@ -58,41 +58,6 @@ def take_lines(target: T, readers: Readers[T], events: Iterable[dict[str, Any]])
     return taken
 
 
-class Poller(QObject):
-    """Calls a function in a thread at intervals and on demand, never twice at a time."""
-
-    found = Signal(object)
-    failed = Signal(object)  # the exception of a call; the next call follows all the same
-
-    def __init__(
-        self, name: str, look: Callable[[], Any], every_ms: int, parent: QObject | None = None
-    ) -> None:
-        super().__init__(parent)
-        self._look = look
-        self._runner = LatestRunner(name, self)
-        self._runner.finished.connect(self.found)
-        self._runner.failed.connect(self.failed)
-        self._timer = QTimer(self)
-        self._timer.setInterval(every_ms)
-        self._timer.timeout.connect(self.poll)
-        self._timer.start()
-        self.poll()
-
-    def set_interval(self, every_ms: int) -> None:
-        """Change the interval."""
-        self._timer.setInterval(every_ms)
-
-    def poll(self) -> None:
-        """Call now, unless a call is under way."""
-        if not self._runner.busy:
-            self._runner.submit(lambda emit: self._look())
-
-    def close(self) -> None:
-        """Stop calling."""
-        self._timer.stop()
-        self._runner.close()
-
-
 class _Found(NamedTuple):
     """One look at the folder of a run."""
 
@@ -142,9 +107,13 @@ class RunMonitor(QObject, Generic[F]):
         self._cancelled_s: float | None = None
         self._stopped_s: float | None = None
         self._poll_ms = poll_ms or POLL_MS
-        self._poller = Poller("run", self._look, self._poll_ms, self)
-        self._poller.found.connect(self._take)
-        self._poller.failed.connect(self._fail)
+        self._looker = LatestRunner("run", self)
+        self._looker.finished.connect(self._take)
+        self._looker.failed.connect(self._fail)
+        self._timer = QTimer(self)
+        self._timer.timeout.connect(self.poll)
+        self._timer.start(self._poll_ms)
+        self.poll()
 
     # --- what subclasses say ----------------------------------------------------------------
 
@@ -257,12 +226,14 @@ class RunMonitor(QObject, Generic[F]):
             self.folder.output.unlink(missing_ok=True)
 
     def poll(self) -> None:
-        """Look at the folder now, in the background."""
-        self._poller.poll()
+        """Look at the folder now, in the background, unless a look is under way."""
+        if not self._looker.busy:
+            self._looker.submit(lambda emit: self._look())
 
     def close(self) -> None:
         """Stop following the run; its process goes on."""
-        self._poller.close()
+        self._timer.stop()
+        self._looker.close()
 
     # --- looking ----------------------------------------------------------------------------
 
@@ -360,7 +331,7 @@ class RunMonitor(QObject, Generic[F]):
         """Take over another phase."""
         under_way = self._phase in UNDER_WAY
         rests = not under_way or self._phase == "paused"
-        self._poller.set_interval(SLOW_POLL_MS if rests else self._poll_ms)
+        self._timer.setInterval(SLOW_POLL_MS if rests else self._poll_ms)
         if under_way:
             return
         self._wish = None

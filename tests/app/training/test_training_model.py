@@ -248,7 +248,7 @@ def test_a_torn_line_waits_and_a_damaged_one_is_left_out(made, qtbot, tmp_path) 
     with model.run.folder.progress.open("a") as progress:
         progress.write('{"event": "epoch", "epoch": "many"}\n[1]\nnonsense\n' + line[:40])
         progress.flush()
-        with qtbot.waitSignal(model.run._poller.found):
+        with qtbot.waitSignal(model.run._looker.finished):
             model.run.poll()
         assert len(model.run.history.epoch_points) == 1
         progress.write(line[40:])
