@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import (
     QDialog,
     QDialogButtonBox,
-    QHBoxLayout,
     QLabel,
     QSizePolicy,
     QWidget,
@@ -134,35 +134,28 @@ class ClassResultDialog(QDialog):
         self._result = result
         self.setWindowTitle(f"Classifiers: {result.path.parent.name or result.path.name}")
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        first, *others = result.matrices
+        columns = [_MatrixColumn(display, QLabel(first.title))]
+        columns[0].show_matrix(first, result)
+        if others:
+            self._right = _MatrixColumn(display, self._what_else(others))
+            self._choose(_usual(others))
+            columns.append(self._right)
         layout = column_of(title(result.heading))
+        self.setLayout(layout)  # first, so that the keyboard goes from top to bottom
         if result.summary:
             layout.addWidget(sentence(result.summary))
-        first = result.matrices[0]
-        row = row_of(spacing_px=24)
-        self._left = _MatrixColumn(display, self)
-        self._left.heading.addWidget(QLabel(first.title, self))
-        self._left.heading.addStretch(1)
-        self._left.show_matrix(first, result)
-        row.addWidget(self._left, 1)
-        if len(result.matrices) > 1:
-            self._right = _MatrixColumn(display, self)
-            self._right.heading.addWidget(self._what_else(result.matrices[1:]))
-            self._right.heading.addStretch(1)
-            row.addWidget(self._right, 1)
-            self._choose(_usual(result.matrices[1:]))
-        layout.addLayout(row)
+        layout.addLayout(row_of(*((column, 1) for column in columns), spacing_px=24))
         if any(len(curve) > 1 for curve in result.curves):
             layout.addSpacing(8)
-            layout.addWidget(
-                _LearningCurves(display, "Learning curve", learning_chart(result), self), 1
-            )
+            curves = _LearningCurves(display, "Learning curve", learning_chart(result), self)
+            layout.addWidget(curves, 1)
         buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close, self)
         buttons.rejected.connect(self.reject)
         layout.addWidget(buttons)
-        self.setLayout(layout)
         self.resize(_WIDTH_PX, self.sizeHint().height())
 
-    def _what_else(self, matrices: tuple[Matrix, ...]) -> QWidget:
+    def _what_else(self, matrices: Sequence[Matrix]) -> QWidget:
         """Choice of the matrix on the right, or its title if there is only one."""
         if len(matrices) == 1:
             return QLabel(matrices[0].title, self)
@@ -179,15 +172,14 @@ class ClassResultDialog(QDialog):
 class _MatrixColumn(QWidget):
     """A heading, the matrix, and its mean recall."""
 
-    def __init__(self, display: DisplayModel, parent: QWidget) -> None:
-        super().__init__(parent)
-        self.heading = QHBoxLayout()
+    def __init__(self, display: DisplayModel, heading: QWidget) -> None:
+        super().__init__()
+        head = row_of(heading, STRETCH)
         # As high with a title as with a choice, so that the matrices line up.
-        self.heading.addStrut(28)
+        head.addStrut(28)
         self._view = ConfusionView(display, self)
         self._recall = sentence("", "plain")
-        parts = (self.heading, self._view, self._recall, STRETCH)
-        self.setLayout(column_of(*parts, margins_px=(0, 0, 0, 0)))
+        self.setLayout(column_of(head, self._view, self._recall, STRETCH, margins_px=(0, 0, 0, 0)))
 
     def show_matrix(self, matrix: Matrix, result: ClassResult) -> None:
         self._view.show_matrix(matrix, result.classes)
@@ -197,7 +189,7 @@ class _MatrixColumn(QWidget):
         self._recall.setText(text)
 
 
-def _usual(matrices: tuple[Matrix, ...]) -> int:
+def _usual(matrices: Sequence[Matrix]) -> int:
     """Default choice: denoised synthetic maps of the radar's own place, if present."""
     titles = [matrix.title for matrix in matrices]
     return titles.index("+ denoised synthetic") if "+ denoised synthetic" in titles else 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from PySide6.QtCore import QSignalBlocker, Qt
-from PySide6.QtWidgets import QCheckBox, QGridLayout, QHBoxLayout, QLabel, QWidget
+from PySide6.QtWidgets import QCheckBox, QGridLayout, QLabel, QWidget
 
 from sd2app.classify.dialogs import ClassifyDialogs
 from sd2app.classify.setup import MAPS, DataSource
@@ -13,6 +13,7 @@ from sd2app.classify.text import FEATURE_WORDS, MODEL_WORDS
 from sd2app.classify.training import ClassTraining
 from sd2app.training.text import division_text
 from sd2app.widgets.inputs import TypedLine
+from sd2app.widgets.layouts import row_of
 from sd2app.widgets.panel import outlined, rule, sentence, side_by_side, title
 from sd2app.widgets.text import counted
 from sd2app.widgets.training_form import Field, TrainingForm, labelled
@@ -157,9 +158,5 @@ class ClassSetupView(TrainingForm):
         line.setPlaceholderText("" if one.person else itself)
         line.ended.connect(lambda: self._labelled.name_person(one.path, line.text()))
         field = QWidget(self)
-        row = QHBoxLayout(field)
-        row.setContentsMargins(0, 2, 0, 2)
-        row.setSpacing(8)
-        row.addWidget(QLabel("Person", field))
-        row.addWidget(line, 1)
+        field.setLayout(row_of(QLabel("Person"), (line, 1), spacing_px=8, margins_px=(0, 2, 0, 2)))
         return field

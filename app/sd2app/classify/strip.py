@@ -16,7 +16,7 @@ from PySide6.QtGui import (
     QPaintEvent,
     QWheelEvent,
 )
-from PySide6.QtWidgets import QLabel, QSizePolicy, QWidget
+from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from sd2app.classify.model import ClassifyModel
 from sd2app.classify.text import ago_text, delay_text, reading_text
@@ -28,7 +28,7 @@ from sd2app.widgets.cached_paint import CachedPaint
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.layouts import column_of, row_of
 from sd2app.widgets.model_menu import ModelButton
-from sd2app.widgets.panel import ElidedLabel
+from sd2app.widgets.panel import ElidedLabel, title
 from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, TimeScale, paint_cursor, turn_wheel
 from sd2core.labels.label_set import LabelSet
 
@@ -60,17 +60,17 @@ class ClassStrip(QWidget):
     ) -> None:
         super().__init__(parent)
         self._classify = classify
-        title = QLabel("Classifier", self)
-        title.setObjectName("title")
         self._source = Choice("The map that the classifier looks at", self)
         self._source.activated.connect(lambda at: classify.set_source(classify.sources[at]))
         self._status = ElidedLabel(self)
         self._status.setObjectName("muted")
         self.readout = ClassReadout(session.display, classify, labels, self)
-        parts = (title, button, self._source, (self._status, 1), self.readout)
-        head = row_of(*parts, spacing_px=8, margins_px=(8, 2, MARGIN_PX, 2))
+        line = row_of(
+            title("Classifier"), button, self._source, (self._status, 1), self.readout,
+            spacing_px=8, margins_px=(8, 2, MARGIN_PX, 2),
+        )  # fmt: skip
         plot = ClassPlot(session, classify, labels, self)
-        self.setLayout(column_of(head, plot, spacing_px=0, margins_px=(0, 0, 0, 0)))
+        self.setLayout(column_of(line, plot, spacing_px=0, margins_px=(0, 0, 0, 0)))
         classify.changed.connect(self._refresh)
         classify.moved.connect(self._say)
         self._refresh()

@@ -7,7 +7,7 @@ from collections.abc import Collection
 from functools import partial
 
 from PySide6.QtCore import QSignalBlocker
-from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QCheckBox, QWidget
 
 from sd2app.background.run_monitor import UNDER_WAY
 from sd2app.feature import Shell
@@ -27,6 +27,7 @@ from sd2app.training.text import (
 )
 from sd2app.widgets.chart import Chart, ChartView, Curve, Mark, Scale
 from sd2app.widgets.inputs import Choice
+from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import FactRows, outlined, sentence, title
 from sd2app.widgets.plot import tick_text
 from sd2app.widgets.run_panel import Button, RunPanel, RunView
@@ -99,12 +100,9 @@ class TrainingRunView(RunView[TrainingMonitor]):
         self._choice.currentIndexChanged.connect(
             lambda index: self._training.set_closing(CLOSING[index])
         )
-        row = QHBoxLayout(self._closing)
-        row.setContentsMargins(0, 0, 0, 0)
-        label = QLabel("When closing:", self)
-        label.setObjectName("muted")
-        row.addWidget(label)
-        row.addWidget(self._choice, 1)
+        self._closing.setLayout(
+            row_of(sentence("When closing:"), (self._choice, 1), margins_px=(0, 0, 0, 0))
+        )
         return self._closing
 
     def texts(self, run: TrainingMonitor) -> tuple[str, str, str]:
@@ -144,23 +142,19 @@ class TrainingGainView(QWidget):
     def __init__(self, adoption: ModelAdoption, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._adoption = adoption
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(4)
-        layout.addWidget(title("In use"))
         self._summary = sentence("")
-        layout.addWidget(self._summary)
         self._table = FactRows(3, at_the_edge=True, parent=self)
-        layout.addWidget(self._table)
         self._both = QCheckBox("Show the map from before", self)
         self._both.setToolTip("Draw the map of the model before under that of this one")
         self._both.toggled.connect(adoption.set_comparing)
         back = outlined("Go back", "Denoise with what was in use before", adoption.go_back, self)
-        row = QHBoxLayout()
-        row.addWidget(self._both)
-        row.addStretch(1)
-        row.addWidget(back)
-        layout.addLayout(row)
+        buttons = row_of(self._both, STRETCH, back)
+        self.setLayout(
+            column_of(
+                title("In use"), self._summary, self._table, buttons,
+                spacing_px=4, margins_px=(0, 0, 0, 0),
+            )
+        )  # fmt: skip
         adoption.changed.connect(self._refresh)
         self._refresh()
 

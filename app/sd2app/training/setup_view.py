@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QProgressBar, QToolButton, QWidget
+from PySide6.QtWidgets import QGridLayout, QProgressBar, QToolButton, QWidget
 
 from sd2app.training.dialogs import TrainingDialogs
 from sd2app.training.model import TrainingModel
 from sd2app.training.text import MODEL_WORDS, division_text
+from sd2app.widgets.layouts import STRETCH, row_of
 from sd2app.widgets.panel import ElidedLabel, outlined, sentence, title
 from sd2app.widgets.text import counted
 from sd2app.widgets.training_form import Field, TrainingForm, labelled
@@ -69,21 +70,16 @@ class TrainingSetupView(TrainingForm):
         bar.setMaximumWidth(64)
         bar.setAccessibleName("Pairs are being made")
         self._making_cancel = outlined("Cancel", "Make no pairs", maker.cancel, self)
-        row = QHBoxLayout(self._making)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.addWidget(self._making_text, 1)
-        row.addWidget(bar)
-        row.addWidget(self._making_cancel)
+        self._making.setLayout(
+            row_of((self._making_text, 1), bar, self._making_cancel, margins_px=(0, 0, 0, 0))
+        )
         return self._making
 
     def _add_model(self) -> None:
         names = {name: words[0] for name, words in MODEL_WORDS.items()}
-        row = QHBoxLayout()
-        row.setSpacing(8)
-        row.addWidget(title("Model"))
-        row.addWidget(self.choice("model", "Kind of model", names), 1)
+        kind = self.choice("model", "Kind of model", names)
         self._about = sentence("")
-        self.column.addLayout(row)
+        self.column.addLayout(row_of(title("Model"), (kind, 1), spacing_px=8))
         self.column.addWidget(self._about)
 
     def _add_settings(self) -> None:
@@ -104,10 +100,6 @@ class TrainingSetupView(TrainingForm):
         self._more.toggled.connect(self._unfold)
         tip = "Put all settings back to the paper's"
         self._reset = outlined("Reset", tip, self._pairs.reset, self)
-        row = QHBoxLayout()
-        row.addWidget(self._more)
-        row.addStretch(1)
-        row.addWidget(self._reset)
         self._rest = QWidget(self)
         rest = QGridLayout(self._rest)
         rest.setContentsMargins(0, 0, 0, 0)
@@ -121,7 +113,7 @@ class TrainingSetupView(TrainingForm):
         boxes[2].setPrefix("× ")
         self._rest.hide()
         self.column.addLayout(grid)
-        self.column.addLayout(row)
+        self.column.addLayout(row_of(self._more, STRETCH, self._reset))
         self.column.addWidget(self._rest)
 
     def _refresh(self) -> None:

@@ -7,7 +7,6 @@ from PySide6.QtWidgets import (
     QDialog,
     QDialogButtonBox,
     QFormLayout,
-    QHBoxLayout,
     QLabel,
     QScrollArea,
     QWidget,
@@ -15,7 +14,7 @@ from PySide6.QtWidgets import (
 
 from sd2app.widgets.layouts import column_of
 from sd2app.widgets.model_page import ModelPage
-from sd2app.widgets.panel import sentence, title
+from sd2app.widgets.panel import sentence, side_by_side, title
 
 
 class ModelCardDialog(QDialog):
@@ -29,7 +28,13 @@ class ModelCardDialog(QDialog):
         form.setContentsMargins(16, 8, 16, 16)
         form.setHorizontalSpacing(24)
         form.setVerticalSpacing(4)
-        form.addRow(self._head(page))
+        head = [title(page.title)]
+        if page.simulated:
+            badge = QLabel("simulated data only", self)
+            badge.setObjectName("badge")
+            badge.setToolTip("No real radar was there when this model learned")
+            head.append(badge)
+        form.addRow(side_by_side(*head, spacing_px=12))
         for heading, rows in (("", page.rows), *page.sections):
             if heading:
                 above = title(heading)
@@ -49,15 +54,3 @@ class ModelCardDialog(QDialog):
         buttons.rejected.connect(self.reject)
         self.setLayout(column_of(scroll, buttons))
         self.resize(640, 560)
-
-    def _head(self, page: ModelPage) -> QHBoxLayout:
-        row = QHBoxLayout()
-        row.setSpacing(12)
-        row.addWidget(title(page.title))
-        if page.simulated:
-            badge = QLabel("simulated data only", self)
-            badge.setObjectName("badge")
-            badge.setToolTip("No real radar was there when this model learned")
-            row.addWidget(badge)
-        row.addStretch(1)
-        return row

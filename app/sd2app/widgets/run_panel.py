@@ -9,14 +9,15 @@ from typing import Any, Generic, NamedTuple
 
 from PySide6.QtCore import QSignalBlocker
 from PySide6.QtGui import QHideEvent, QShowEvent
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QProgressBar, QSizePolicy, QWidget
 
 from sd2app.background.run_monitor import UNDER_WAY
 from sd2app.background.runs import Run, Runs
 from sd2app.feature import Shell
 from sd2app.widgets.dialogs import may_delete
 from sd2app.widgets.inputs import Choice
-from sd2app.widgets.panel import outlined, sentence, side_by_side
+from sd2app.widgets.layouts import STRETCH, column_of, row_of
+from sd2app.widgets.panel import outlined, sentence, side_by_side, title
 
 _NEW = "New training"
 _PARTS = 1000
@@ -46,17 +47,8 @@ class RunPanel(QWidget):
         self._list.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self._list.activated.connect(self._choose)
         self._new = outlined("New", "Set up another training", lambda: runs.select(None), self)
-        row = QHBoxLayout()
-        row.setSpacing(6)
-        row.addWidget(self._list, 1)
-        row.addWidget(self._new)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(8, 4, 8, 6)
-        column.setSpacing(8)
-        column.addLayout(row)
-        column.addWidget(setup)
-        column.addWidget(run)
-        column.addStretch(1)
+        head = row_of((self._list, 1), self._new, spacing_px=6)
+        self.setLayout(column_of(head, setup, run, STRETCH, spacing_px=8, margins_px=(8, 4, 8, 6)))
         runs.changed.connect(self._refresh)
         self._refresh()
 
@@ -132,8 +124,7 @@ class RunView(QWidget, Generic[Run]):
             Button("cancel", "Cancel", "End it now and delete what it made", tell("cancel")),
             Button("delete", "Delete…", "Delete this run with what it made", self._delete),
         )
-        self._headline = QLabel(self)
-        self._headline.setObjectName("title")
+        self._headline = title("")
         self._headline.setWordWrap(True)
         self._headline.setAccessibleName("How the training stands")
         self._bar = QProgressBar(self)
@@ -146,15 +137,18 @@ class RunView(QWidget, Generic[Run]):
         for one in buttons:
             if one.primary:
                 self._buttons[one.name].setObjectName("primary")
-        self.column = QVBoxLayout(self)
-        self.column.setContentsMargins(0, 0, 0, 0)
-        self.column.setSpacing(6)
-        for widget in (self._headline, self._bar, self._time):
-            self.column.addWidget(widget)
-        # Above what subclasses add: they are to be at hand in a low window, too.
-        self.column.addLayout(side_by_side(*self._buttons.values(), spacing_px=6))
-        self.column.addWidget(self._reason)
-        self.column.addWidget(self._note)
+        self.column = column_of(
+            self._headline,
+            self._bar,
+            self._time,
+            # Above what subclasses add: they are to be at hand in a low window, too.
+            side_by_side(*self._buttons.values(), spacing_px=6),
+            self._reason,
+            self._note,
+            spacing_px=6,
+            margins_px=(0, 0, 0, 0),
+        )
+        self.setLayout(self.column)
         runs.changed.connect(self.refresh)
 
     # --- what subclasses say ----------------------------------------------------------------

@@ -10,17 +10,16 @@ from PySide6.QtCore import QSignalBlocker, Qt
 from PySide6.QtWidgets import (
     QApplication,
     QGridLayout,
-    QHBoxLayout,
     QLabel,
     QMenu,
     QSizePolicy,
     QToolButton,
-    QVBoxLayout,
     QWidget,
 )
 
 from sd2app.feature import Shell
 from sd2app.widgets.inputs import Choice, NumberBox
+from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import ElidedLabel, outlined, sentence, side_by_side, title
 from sd2app.widgets.text import about
 
@@ -64,9 +63,8 @@ class TrainingForm(QWidget):
         self._shown_data: Sequence[Any] | None = None
         self._numbers: dict[str, NumberBox] = {}
         self._choices: dict[str, Choice] = {}
-        self.column = QVBoxLayout(self)
-        self.column.setContentsMargins(0, 0, 0, 0)
-        self.column.setSpacing(6)
+        self.column = column_of(spacing_px=6, margins_px=(0, 0, 0, 0))
+        self.setLayout(self.column)
 
     # --- building -------------------------------------------------------------------------
 
@@ -77,16 +75,10 @@ class TrainingForm(QWidget):
         menu = QMenu(button)
         menu.setToolTipsVisible(True)
         button.setMenu(menu)
-        head = QHBoxLayout()
-        head.addWidget(title(heading))
-        head.addStretch(1)
-        head.addWidget(button)
-        self.nothing = sentence(nothing)
-        self._rows = QVBoxLayout()
-        self._rows.setSpacing(6)
-        self.column.addLayout(head)
+        self.nothing, self._division = sentence(nothing), sentence("")
+        self._rows = column_of(spacing_px=6)
+        self.column.addLayout(row_of(title(heading), STRETCH, button))
         self.column.addWidget(self.nothing)
-        self._division = sentence("")
         self.column.addLayout(self._rows)
         self.column.addWidget(self._division)
         return menu
