@@ -18,6 +18,7 @@ from sd2app.widgets.time_axis import (
     GUTTER_PX,
     TimeScale,
     paint_cursor,
+    paint_title,
     signed_text,
     ticks,
     turn_wheel,
@@ -148,16 +149,8 @@ class HeatmapView(MapWidget):
 
     def _paint_header(self, painter: QPainter) -> None:
         colours = self._display.palette
-        font = painter.font()
-        font.setBold(True)
-        painter.setFont(font)
-        painter.setPen(QColor(colours.text))
-        box = QRectF(8, 0, self.width() - 16, _HEADER_PX)
-        centred = Qt.AlignmentFlag.AlignVCenter
-        painter.drawText(box, centred | Qt.AlignmentFlag.AlignLeft, self.title())
-        left = 8 + painter.fontMetrics().horizontalAdvance(self.title()) + 12
-        font.setBold(False)
-        painter.setFont(font)
+        box, centred = QRectF(8, 0, self.width() - 16, _HEADER_PX), Qt.AlignmentFlag.AlignVCenter
+        left = 8 + paint_title(painter, box, self.title(), colours.text) + 12
         painter.setPen(QColor(colours.muted))
         left += self._place_button(left)
         room = self.width() - 16 - left - self._paint_corner(painter, box, left)

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QWidget
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
 from sd2app.widgets.plot import paint_axes
-from sd2app.widgets.time_axis import signed_text, ticks
+from sd2app.widgets.time_axis import paint_title, signed_text, ticks
 from sd2core.maps import DopplerMap
 
 _LEFT_PX, _TOP_PX, _RIGHT_PX, _BOTTOM_PX = 48, 30, 12, 40
@@ -80,15 +80,7 @@ class SpectrumView(QWidget):
         plot = QRectF(self.rect()).adjusted(
             _LEFT_PX, _TOP_PX + _LEGEND_PX * rows, -_RIGHT_PX, -_BOTTOM_PX
         )
-        font = painter.font()
-        font.setBold(True)
-        painter.setFont(font)
-        painter.setPen(QColor(colours.text))
-        painter.drawText(
-            QRectF(8, 0, self.width(), 24), Qt.AlignmentFlag.AlignVCenter, "This frame"
-        )
-        font.setBold(False)
-        painter.setFont(font)
+        paint_title(painter, QRectF(8, 0, self.width() - 8, 24), "This frame", colours.text)
         if not curves:
             return
         v_max = curves[0].map.axis.v_max_mps

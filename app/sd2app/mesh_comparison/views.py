@@ -21,7 +21,14 @@ from sd2app.session.session import Session
 from sd2app.video.overlay_settings import OverlayModel
 from sd2app.widgets.mesh_painting import draw_mesh, paint_picture
 from sd2app.widgets.plot import paint_axes
-from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, TimeScale, signed_text, ticks
+from sd2app.widgets.time_axis import (
+    GUTTER_PX,
+    MARGIN_PX,
+    TimeScale,
+    paint_title,
+    signed_text,
+    ticks,
+)
 from sd2core.mesh.presence import runs
 
 _TITLE_PX = 24
@@ -36,17 +43,6 @@ _LEAST_MPS = 0.2
 def colour_of(display: DisplayModel, number: int) -> QColor:
     """Colour of a mesh, in pictures and curves alike."""
     return QColor(display.palette.synthetic if number == 0 else display.palette.real)
-
-
-def _paint_title(painter: QPainter, box: QRectF, text: str, colour: str) -> None:
-    font = painter.font()
-    font.setBold(True)
-    painter.setFont(font)
-    painter.setPen(QColor(colour))
-    elided = painter.fontMetrics().elidedText(text, Qt.TextElideMode.ElideMiddle, int(box.width()))
-    painter.drawText(box, Qt.AlignmentFlag.AlignVCenter, elided)
-    font.setBold(False)
-    painter.setFont(font)
 
 
 class ComparedPicture(QWidget):
@@ -88,7 +84,7 @@ class ComparedPicture(QWidget):
         title = comparison.labels[self._number]
         if self._number == comparison.reference:
             title += " (reference)"
-        _paint_title(painter, QRectF(24, 0, self.width() - 32, _TITLE_PX), title, colours.text)
+        paint_title(painter, QRectF(24, 0, self.width() - 32, _TITLE_PX), title, colours.text)
         ground = QRect(0, _TITLE_PX, self.width(), self.height() - _TITLE_PX)
         painter.fillRect(ground, QColor(colours.well))
         camera, reader, picture = s.document.camera, s.video.reader, s.video.picture
@@ -146,7 +142,7 @@ class JointCurves(QWidget):
         colours, scale = self._display.palette, self.scale
         painter.fillRect(self.rect(), QColor(colours.panel))
         heading = QRectF(8, 0, self.width() - 16, _TITLE_PX)
-        _paint_title(painter, heading, joint_words(self._comparison.joint), colours.text)
+        paint_title(painter, heading, joint_words(self._comparison.joint), colours.text)
         painter.setPen(QColor(colours.muted))
         flags = Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignRight
         painter.drawText(heading, flags, "towards the sensor +  /  away −   m/s")

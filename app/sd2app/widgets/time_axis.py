@@ -83,6 +83,20 @@ def paint_cursor(painter: QPainter, plot: QRectF, x_px: float) -> None:
         painter.drawLine(top, bottom)
 
 
+def paint_title(painter: QPainter, box: QRectF, text: str, colour: str) -> int:
+    """Paint a bold title at the left of a box, elided where need be; returns its width."""
+    font = painter.font()
+    font.setBold(True)
+    painter.setFont(font)
+    painter.setPen(QColor(colour))
+    metrics = painter.fontMetrics()
+    shown = metrics.elidedText(text, Qt.TextElideMode.ElideMiddle, int(box.width()))
+    painter.drawText(box, Qt.AlignmentFlag.AlignVCenter, shown)
+    font.setBold(False)
+    painter.setFont(font)
+    return metrics.horizontalAdvance(shown)
+
+
 _ZOOM_PER_NOTCH = 0.8
 
 
