@@ -16,6 +16,7 @@ from sd2app.feature import Action, Feature, Shell
 from sd2app.maps.model import SynthesisModel
 from sd2app.maps.stack import MapStack
 from sd2app.session.session import Session
+from sd2app.widgets.dialogs import ask_map
 from sd2app.widgets.model_card_dialog import ModelCardDialog
 from sd2app.widgets.model_menu import ModelButton, ModelMenu, Words
 
@@ -128,11 +129,9 @@ class DenoiseFeature(Feature):
             ModelCardDialog(denoiser_page(self.model.card), self._shell.dialog_parent).exec()
 
     def _export(self) -> None:
-        name, _ = QFileDialog.getSaveFileName(
-            self._shell.dialog_parent, "Export denoised map", "denoised.npz", "Doppler map (*.npz)"
-        )
-        if name:
-            self._shell.attempt(lambda: self.model.export(Path(name)))
+        path = ask_map(self._shell.dialog_parent, "Export denoised map", "denoised.npz")
+        if path is not None:
+            self._shell.attempt(lambda: self.model.export(path))
 
     def changes(self) -> Sequence[SignalInstance]:
         """Model and live denoising."""

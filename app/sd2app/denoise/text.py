@@ -2,15 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from sd2app.widgets.model_page import (
-    ModelPage,
-    about_sections,
-    map_and_file_rows,
-    model_title,
-)
+from sd2app.widgets.model_page import ModelPage, about_sections, map_and_file_rows, model_title
 
 if TYPE_CHECKING:
     from sd2core.denoise.card import ModelCard
@@ -40,29 +34,20 @@ def origin_words(card: ModelCard) -> str:
     return "learned from real captures"
 
 
-def track_words(card: ModelCard) -> str:
-    """Text beside the title of the denoised map."""
+def track_words(card: ModelCard | None) -> str:
+    """Description of a map that a model makes; empty without a model."""
+    if card is None:
+        return ""
     simulated = " (simulated data only)" if card.trained_on == "simulated" else ""
     return f"{model_title(card)}{simulated}"
 
 
-def denoised_words(card: ModelCard | None) -> str:
-    """Description of a map made by this model; empty without a model."""
-    return "" if card is None else track_words(card)
-
-
 def denoiser_page(card: ModelCard) -> ModelPage:
     """Page of facts about a denoiser."""
-    return ModelPage(
-        model_title(card),
-        card.trained_on == "simulated",
-        list(card_rows(card)),
-        list(about_sections(card.about)),
-    )
-
-
-def card_rows(card: ModelCard) -> Iterator[tuple[str, str]]:
-    """Facts of a model card, a name and a text each."""
-    yield "Kind", f"{kind_words(card)}, {card.parameters:,} parameters"
-    yield "Learned from", "simulated data only" if card.trained_on == "simulated" else "real data"
-    yield from map_and_file_rows(card.axis, card.frame_rate_hz, card.path)
+    simulated = card.trained_on == "simulated"
+    rows = [
+        ("Kind", f"{kind_words(card)}, {card.parameters:,} parameters"),
+        ("Learned from", "simulated data only" if simulated else "real data"),
+        *map_and_file_rows(card.axis, card.frame_rate_hz, card.path),
+    ]
+    return ModelPage(model_title(card), simulated, rows, list(about_sections(card.about)))

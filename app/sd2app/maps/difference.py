@@ -117,10 +117,6 @@ class DifferenceModel(QObject):
             velocity_mps=one.velocity_mps,
             value=one.value,
             level_db=one.level_db - other.level_db,
-            note=note or f"{_level(one)} − ({_level(other)})",
+            note=note or f"{one.level} − ({other.level})",
             text=text,
         )
-
-
-def _level(reading: Reading) -> str:
-    return f"{reading.level_db:.1f} dB".replace("-", "−") if reading.value > 0 else "−∞ dB"

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 from PySide6.QtCore import QObject, SignalInstance
-from PySide6.QtWidgets import QFileDialog, QWidget
+from PySide6.QtWidgets import QWidget
 
 from sd2app.accuracy.model import AccuracyModel
 from sd2app.feature import Action, Feature, Shell
@@ -19,6 +18,7 @@ from sd2app.maps.stack import MapStack
 from sd2app.maps.uncertainty import UncertaintyModel
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
+from sd2app.widgets.dialogs import ask_map
 from sd2app.widgets.layouts import pane
 from sd2app.widgets.time_plot import Overlay
 
@@ -76,14 +76,9 @@ class MapsFeature(Feature):
         )  # fmt: skip
 
     def _export(self) -> None:
-        name, _ = QFileDialog.getSaveFileName(
-            self._shell.dialog_parent,
-            "Export synthetic map",
-            "synthetic.npz",
-            "Doppler map (*.npz)",
-        )
-        if name:
-            self._shell.attempt(lambda: self.synthesis.export(Path(name)))
+        path = ask_map(self._shell.dialog_parent, "Export synthetic map", "synthetic.npz")
+        if path is not None:
+            self._shell.attempt(lambda: self.synthesis.export(path))
 
     def stack(self, over_maps: Sequence[Overlay], over_all: Sequence[Overlay]) -> MapStack:
         """Maps one above the other, with what other features draw over them and the overview."""

@@ -37,7 +37,7 @@ class PlacementFields(QObject):
         self._placements = placements
         self._last = dict(_FIRST)
         self._plan: Placements | None = None
-        self._texts: dict[Name, str] = {}
+        self.texts: dict[Name, str] = {}  # of the fields that this kind of plan has
         self.problem = ""  # why the typed values are no plan; empty when they are
         placements.changed.connect(self._follow)
         self._follow()
@@ -47,15 +47,6 @@ class PlacementFields(QObject):
         """Kind of the plan."""
         return "none" if self._plan is None else _kind(self._plan)
 
-    @property
-    def names(self) -> tuple[Name, ...]:
-        """Fields that this kind has."""
-        return tuple(self._texts)
-
-    def text(self, name: Name) -> str:
-        """Text of a field."""
-        return self._texts.get(name, "")
-
     def set_kind(self, kind: Kind) -> None:
         """Plan something else; what was typed for a kind comes back with it."""
         if kind != self.kind:
@@ -63,11 +54,11 @@ class PlacementFields(QObject):
 
     def set_text(self, name: Name, text: str) -> None:
         """Type into a field; :meth:`end` makes it one step."""
-        if name not in self._texts or text == self._texts[name]:
+        if name not in self.texts or text == self.texts[name]:
             return
-        self._texts[name] = text
+        self.texts[name] = text
         try:
-            plan = _plan_of(self.kind, self._texts)
+            plan = _plan_of(self.kind, self.texts)
         except Sd2Error as error:
             self.problem = str(error)
             self.changed.emit()
@@ -88,7 +79,7 @@ class PlacementFields(QObject):
             return
         self._plan = plan
         self.problem = ""
-        self._texts = {} if plan is None else _texts_of(plan)
+        self.texts = {} if plan is None else _texts_of(plan)
         if plan is not None:
             self._last[_kind(plan)] = plan
         self.changed.emit()

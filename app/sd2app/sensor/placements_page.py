@@ -199,8 +199,8 @@ class PlacementsPage(QWidget):
             return
         for name, (label, line) in self._rows.items():
             for widget in (label, line):
-                widget.setVisible(name in fields.names)
-            line.show_text(fields.text(name))
+                widget.setVisible(name in fields.texts)
+            line.show_text(fields.texts.get(name, ""))
         _say(self._how, "" if fields.problem else _HOW[fields.kind])
         _say(self._problem, fields.problem)
         self._count.setText(count_text(model))

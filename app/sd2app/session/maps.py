@@ -41,6 +41,11 @@ class Reading:
     deviation: float | None = None
     text: str = ""
 
+    @property
+    def level(self) -> str:
+        """Level with its unit."""
+        return f"{self.level_db:.1f} dB".replace("-", "−") if self.value > 0 else "−∞ dB"
+
 
 class MapModel(QObject):
     """One Doppler map on the shared time axis.

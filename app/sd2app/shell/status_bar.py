@@ -101,7 +101,6 @@ def reading_text(reading: Reading) -> str:
     else:
         direction = "receding" if reading.velocity_mps < 0 else "still"
     velocity = f"{reading.velocity_mps:+.3f}".replace("-", "−")
-    level = f"{reading.level_db:.1f} dB".replace("-", "−") if reading.value > 0 else "−∞ dB"
     value = f"{reading.value:.3g}"
     if reading.deviation is not None:
         value += f" ± {reading.deviation:.2g}"
@@ -110,7 +109,7 @@ def reading_text(reading: Reading) -> str:
         clock_text(reading.time_s),
         f"frame {reading.frame}",
         f"{velocity} m/s ({direction})",
-        reading.text or f"{level} ({value})",
+        reading.text or f"{reading.level} ({value})",
     ]
     if reading.note:
         parts.append(reading.note)

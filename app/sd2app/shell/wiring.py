@@ -17,7 +17,7 @@ from sd2app.classify.library import core_classifiers
 from sd2app.dataset_export.feature import DatasetExportFeature
 from sd2app.denoise.feature import DenoiseFeature
 from sd2app.denoise.library import core_library
-from sd2app.denoise.text import denoised_words
+from sd2app.denoise.text import track_words
 from sd2app.denoise.validity import MapValidity
 from sd2app.feature import Feature, Shell
 from sd2app.figures.feature import FiguresFeature
@@ -151,7 +151,7 @@ def build_features(session: Session, shell: Shell, parts: Parts, parent: QObject
             shell,
             maps.difference,
             lambda: labels.model.labels,
-            lambda: denoised_words(denoise.model.card),
+            lambda: track_words(denoise.model.card),
         ),
         playback=PlaybackFeature(session),
         program=program,

@@ -46,3 +46,9 @@ def ask_figure(parent: QWidget, title: str, name: str) -> Path | None:
         return None
     path = Path(chosen)
     return path if path.suffix else path.with_suffix(f".{kind[:3].lower()}")
+
+
+def ask_map(parent: QWidget, title: str, name: str) -> Path | None:
+    """Let the user choose the file of a Doppler map."""
+    chosen, _ = QFileDialog.getSaveFileName(parent, title, name, "Doppler map (*.npz)")
+    return Path(chosen) if chosen else None

@@ -176,9 +176,9 @@ def test_fields_become_the_plan_and_say_what_is_wrong(stage):
     document.open(a_cube())
     fields = PlacementFields(stage)
     assert fields.kind == "none"
-    assert fields.names == ()
+    assert fields.texts == {}
     fields.set_kind("grid")
-    assert fields.text("range") == "1:4:1"
+    assert fields.texts["range"] == "1:4:1"
     fields.set_text("range", "1, 2.5,")
     assert "not a number" in fields.problem
     assert stage.plan.ranges_m == (1.0, 2.0, 3.0, 4.0)
@@ -200,7 +200,7 @@ def test_what_was_typed_stays_as_it_was_typed_and_comes_back_with_its_kind(stage
     fields.set_kind("cloud")
     fields.set_text("count", "007")
     fields.set_text("range", "1.0 : 2")
-    assert (fields.text("count"), fields.text("range")) == ("007", "1.0 : 2")
+    assert (fields.texts["count"], fields.texts["range"]) == ("007", "1.0 : 2")
     assert stage.plan == PlacementCloud(7, (1.0, 2.0), (-60.0, 60.0), (-10.0, 40.0))
     for name, text in (("count", "1.5"), ("seed", "-1"), ("azimuth", "5:1"), ("count", "²")):
         fields.set_text(name, text)
@@ -217,7 +217,7 @@ def test_an_undo_takes_the_place_of_what_was_typed(stage):
     fields = PlacementFields(stage)
     fields.set_text("range", "2")
     edits.type_placements(PlacementGrid((1.0,)))
-    assert fields.text("range") == "1"
+    assert fields.texts["range"] == "1"
 
 
 @pytest.mark.parametrize(

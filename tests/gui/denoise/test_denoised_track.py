@@ -158,6 +158,8 @@ def test_playing_live_shows_frames_as_the_clock_reaches_them(denoised, fake_mode
     c.playback.seek_frame(10)
     qtbot.keyClick(denoised, Qt.Key.Key_Space)
     qtbot.waitUntil(lambda: c.live.running and fake_models.steps > 8, timeout=10_000)
+    # What has been denoised is shown a little later.
+    qtbot.waitUntil(lambda: bool(c.denoised.covered[10:14].all()), timeout=10_000)
     covered, frame = c.denoised.covered.copy(), c.playback.frame
     assert covered[10:14].all()
     assert not covered[:10].any()
