@@ -75,11 +75,7 @@ def relax_fingers(skeleton: Skeleton, rotations: Floats) -> None:
     """Curl the fingers a little, each about the line of the knuckles."""
     index = skeleton.index
     for side in "LR":
-        knuckles = (
-            skeleton.heads_m[index[f"finger5-1.{side}"]]
-            - skeleton.heads_m[index[f"finger2-1.{side}"]]
-        )
-        axis = knuckles / np.linalg.norm(knuckles) * (1.0 if side == "R" else -1.0)
+        axis = _knuckles(skeleton, side)
         for finger in range(2, 6):
             for joint, angle_deg in ((1, 6.0), (2, 14.0), (3, 10.0)):
                 rotations[:, index[f"finger{finger}-{joint}.{side}"]] = about(
@@ -118,13 +114,9 @@ def reach(
     rotations[:, upper] = product(transposed(above[..., :3]), upper_turn)
     rotations[:, lower] = product(transposed(upper_turn), lower_turn)
     # The forearm's two bones share the turn of the hand, as radius and ulna do.
-    along = heads[wrist] - heads[forearm]
-    along = along / np.linalg.norm(along)
-    half = about(along, -across * 0.5 * arm[:, 6])
+    half = about(_unit(heads[wrist] - heads[forearm]), -across * 0.5 * arm[:, 6])
     rotations[:, forearm] = half
-    knuckles = heads[index[f"finger5-1.{side}"]] - heads[index[f"finger2-1.{side}"]]
-    flexion = about(across * knuckles / np.linalg.norm(knuckles), arm[:, 7])
-    rotations[:, wrist] = product(half, flexion)
+    rotations[:, wrist] = product(half, about(_knuckles(skeleton, side), arm[:, 7]))
 
 
 def arm_length_m(skeleton: Skeleton) -> float:
@@ -224,7 +216,7 @@ def turn_hand(
     across = 1.0 if side == "R" else -1.0
     forearm, wrist = index[f"lowerarm02.{side}"], index[f"wrist.{side}"]
     along = _unit(heads[wrist] - heads[forearm])
-    knuckles = across * _unit(heads[index[f"finger5-1.{side}"]] - heads[index[f"finger2-1.{side}"]])
+    knuckles = _knuckles(skeleton, side)
     half = about(along, -across * 0.5 * angles_deg[:, 0])
     rotations[:, forearm] = half
     palm = _unit(np.cross(along, knuckles))
@@ -237,6 +229,13 @@ def turn_hand(
             bone = index.get(f"finger{finger}-{joint}.{side}")
             if bone is not None:
                 rotations[:, bone] = about(knuckles, 4.0 + most_deg * amount)
+
+
+def _knuckles(skeleton: Skeleton, side: str) -> Floats:
+    """Axis about which fingers and hand bend, (3,): the line of the knuckles."""
+    index, heads = skeleton.index, skeleton.heads_m
+    line = _unit(heads[index[f"finger5-1.{side}"]] - heads[index[f"finger2-1.{side}"]])
+    return line if side == "R" else -line
 
 
 def _unit(vector: Floats) -> Floats:

@@ -17,9 +17,9 @@ import pytest
 
 from sd2core.body.evidence import Evidence
 from sd2core.body.initial import Pose, initial_pose
-from sd2core.body.objective import Objective, Residuals, cost
 from sd2core.body.rig import KeypointSpace, Rig
 from sd2core.body.shape import ShapeSpace
+from sd2core.body.solve import Objective, Residuals, cost
 from sd2core.body.track import TORSO_CORNERS
 from tools.build_sample.swipes import swipes
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import argparse
 
-from sd2core.cli.classify.apply import add_apply
 from sd2core.cli.classify.comparison import add_table
-from sd2core.cli.classify.eval import add_eval
 from sd2core.cli.classify.train import add_train
+from sd2core.cli.classify.trained import add_apply, add_eval
 from sd2core.cli.options import add_command
 
 

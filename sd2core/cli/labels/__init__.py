@@ -8,8 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.labels.agree import add_agree
-from sd2core.cli.labels.cut import add_cut
-from sd2core.cli.labels.figure import add_figure
 from sd2core.cli.labels.label_set import add_set
 from sd2core.cli.labels.reading import (
     add_labels,
@@ -19,6 +17,7 @@ from sd2core.cli.labels.reading import (
     read_named,
     write,
 )
+from sd2core.cli.labels.recording import add_cut, add_figure
 from sd2core.cli.labels.recover import add_recover
 from sd2core.cli.labels.suggest import add_suggest
 from sd2core.cli.options import add_command, add_json

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sd2core.body.objective import Normal
+from sd2core.body.solve import Normal
 
 
 @settings(max_examples=25, deadline=None)

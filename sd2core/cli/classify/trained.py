@@ -1,0 +1,244 @@
+"""``sd2 classify eval`` and ``sd2 classify apply``: a trained classifier scored, and used."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from sd2core.cli.classify.data import DATA_HELP, add_data, asked_maps, clips_of, denoiser_for
+from sd2core.cli.eval import add_judging, check_result_files, named_subjects, print_or_write
+from sd2core.cli.labels.reading import check_label_output, print_lost
+from sd2core.cli.labels.suggest import (
+    add_searched_map,
+    map_and_clock,
+    span_cells,
+    spans_data,
+    write_found,
+)
+from sd2core.cli.options import add_command, add_json, not_negative_float
+from sd2core.cli.output import counted, print_json, print_rows, progress_bar
+from sd2core.cli.recording_maps import MAP_NAMES
+from sd2core.errors import Sd2Error
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from sd2core.classify.card import ClassifierCard
+    from sd2core.classify.data import Clip, ClipSet
+    from sd2core.classify.metrics import Score
+
+
+def _add_model(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--model",
+        type=Path,
+        required=True,
+        metavar="FILE",
+        help="classifier from `sd2 classify train`",
+    )
+
+
+def add_eval(kinds: argparse._SubParsersAction) -> None:
+    """Add ``eval``."""
+    parser = add_command(
+        kinds,
+        "eval",
+        "evaluate a classifier on people it was not trained on",
+        handler=_eval,
+        description=(
+            f"{DATA_HELP}\n\n"
+            "Prints the confusion matrices of frames and of whole gestures, and the latency of a\n"
+            "recognised gesture. Uses the people that the training kept for the test, or those\n"
+            "that are named."
+        ),
+        examples=(
+            "  sd2 classify eval campaign.zarr --model gestures.safetensors\n"
+            "  sd2 classify eval own.sd2 --model g.safetensors --subjects all --plot matrix.png"
+        ),
+    )
+    add_data(parser)
+    _add_model(parser)
+    add_judging(parser, "those the training kept for the test", "both matrices")
+
+
+def _eval(options: argparse.Namespace) -> None:
+    from sd2core.classify.files import load_classifier
+    from sd2core.classify.live import judge
+    from sd2core.files.figure_files import save_figure
+
+    check_result_files(options)
+    classifier = load_classifier(options.model)
+    maps = asked_maps(options)
+    known = clips_of(options.data, maps, denoiser_for(maps, options.denoiser))
+    clips = _judged(known, classifier.card, options)
+    found = judge(classifier, clips, known)
+    subjects = list(dict.fromkeys(clip.subject for clip in clips))
+    learnt = set(classifier.card.about.get("split", {}).get("training", ())) & set(subjects)
+    told = {
+        "model": str(options.model),
+        "maps": list(known.kinds),
+        "subjects": subjects,
+        "learnt_from": sorted(learnt),
+        **found.to_json(),
+        **found.summary(),
+    }
+    if not print_or_write(options, told):
+        _say(found, known, subjects, sorted(learnt))
+    if options.plot is not None:
+        from sd2core.classify.comparison_report import confusion_figure
+        from sd2core.classify.metrics import shares
+
+        figure = confusion_figure(
+            [shares(found.frames), shares(found.gestures)],
+            found.classes,
+            ["frames", "gestures"],
+            f"{options.model.stem} on {' and '.join(known.kinds)} maps",
+        )
+        save_figure(figure, options.plot)
+
+
+def _judged(known: ClipSet, card: ClassifierCard, options: argparse.Namespace) -> tuple[Clip, ...]:
+    kept = card.about.get("split", {}).get("test") or ()
+    if options.subjects is not None:
+        names = named_subjects(options.subjects, known.subjects)
+    else:
+        # Data of other people than the training's are judged whole.
+        names = tuple(name for name in kept if name in known.subjects) or known.subjects
+    missing = [name for name in names if name not in known.subjects]
+    if missing:
+        raise Sd2Error(
+            f"There is nothing of {', '.join(missing)}", f"some of {', '.join(known.subjects)}"
+        )
+    clips = known.of(names)
+    return clips if options.all_placements else tuple(c for c in clips if c.placement == 0)
+
+
+def _say(found: Score, known: ClipSet, subjects: list[str], learnt: list[str]) -> None:
+    from sd2core.classify.metrics import shares
+
+    print(f"Evaluated on {' and '.join(known.kinds)} maps of {', '.join(subjects)}")
+    if learnt:
+        print(f"It was trained on {', '.join(learnt)}: this does not show how it does for others.")
+    for what, matrix in (("frames", found.frames), ("gestures", found.gestures)):
+        rows = [(what, *(f"taken for {name}" for name in found.classes), "in all")]
+        for name, row, counts in zip(found.classes, shares(matrix), matrix, strict=True):
+            cells = ["–" if value != value else f"{100 * value:.1f} %" for value in row]
+            rows.append((name, *cells, f"{counts.sum():,}"))
+        print()
+        print_rows(rows, right=range(1, len(found.classes) + 2))
+    print(f"\nMean recall of frames {100 * found.mean_recall:.1f} %")
+    if found.latency_s == found.latency_s:
+        print(
+            f"A gesture is recognised after {found.latency_s:.2f} s (median), {found.missed} never"
+        )
+
+
+def add_apply(kinds: argparse._SubParsersAction) -> None:
+    """Add ``apply``."""
+    parser = add_command(
+        kinds,
+        "apply",
+        "find gestures in a recording or a map",
+        handler=_apply,
+        description=(
+            "Computes the probability of each class in every frame, and spans of the frames in\n"
+            "which a gesture is the most probable class. The confidence of a span is the mean\n"
+            "probability of its class. The map must be on the velocity axis that the classifier\n"
+            "was trained on; another frame rate is resampled to the classifier's and back."
+        ),
+        examples=(
+            "  sd2 classify apply walk.sd2 --model gestures.safetensors\n"
+            "  sd2 classify apply walk.sd2 --of radar --model g.safetensors --out found.json\n"
+            "  sd2 classify apply map.npz --model g.safetensors --probabilities p.npz"
+        ),
+    )
+    add_searched_map(parser, MAP_NAMES)
+    _add_model(parser)
+    parser.add_argument(
+        "--probabilities",
+        type=Path,
+        metavar="FILE.npz",
+        help="write `probabilities` (frames, classes), `times_s` and `classes`",
+    )
+    parser.add_argument(
+        "--min-duration-s",
+        type=not_negative_float,
+        default=0.2,
+        metavar="S",
+        help="shorter spans are left out (default: 0.2)",
+    )
+    parser.add_argument(
+        "--merge-gap-s",
+        type=not_negative_float,
+        default=0.1,
+        metavar="S",
+        help="merge spans of a class with a shorter gap between them (default: 0.1)",
+    )
+    add_json(parser)
+
+
+def _apply(options: argparse.Namespace) -> None:
+    from sd2core.classify.files import describe_classifier, load_classifier
+    from sd2core.classify.spans import SpanOptions, predicted_spans
+    from sd2core.cli.reading import check_output
+    from sd2core.denoise.resample_to_model import check_bins
+
+    if options.out is not None:
+        check_label_output(options.out, replace=options.replace)
+    if options.probabilities is not None:
+        check_output(options.probabilities, ".npz")
+    chosen = SpanOptions(options.min_duration_s, options.merge_gap_s)
+    card = describe_classifier(options.model)
+    doppler, clock = map_and_clock(options, card.axis)
+    # Before torch is loaded, which takes seconds.
+    check_bins(doppler, card)
+    with progress_bar("Classifying") as progress:
+        probabilities = load_classifier(options.model).probabilities(doppler, progress)
+    spans = predicted_spans(
+        probabilities, doppler.timebase, card.classes, chosen, present=doppler.present
+    )
+    lost = write_found(options, spans, clock)
+    if options.probabilities is not None:
+        _write_probabilities(options.probabilities, probabilities, doppler.times_s, card.classes)
+    if options.json:
+        print_json(
+            {
+                "map_kind": doppler.kind,
+                "model": str(options.model),
+                "classes": list(card.classes),
+                "mean_probabilities": dict(
+                    zip(card.classes, probabilities.mean(axis=0).tolist(), strict=True)
+                ),
+                "spans": spans_data(spans, "label", "confidence"),
+                "path": None if options.out is None else str(options.out),
+                "not_kept": lost,
+            }
+        )
+        return
+    print(f"{counted(len(spans), 'gesture')} in the {doppler.kind} map, by {options.model}")
+    if spans:
+        rows = [("id", "start s", "end s", "gesture", "confidence")]
+        rows += [(*span_cells(span), span.label, f"{span.confidence:.2f}") for span in spans]
+        print_rows(rows, right=(0, 1, 2, 4))
+    for path in (options.out, options.probabilities):
+        if path is not None:
+            print(f"Wrote {path}")
+    print_lost(lost)
+
+
+def _write_probabilities(
+    path: Path,
+    probabilities: NDArray[np.float32],
+    times_s: NDArray[np.float64],
+    classes: tuple[str, ...],
+) -> None:
+    import numpy as np
+
+    from sd2core.files.atomic import atomic_write
+
+    with atomic_write(path) as stream:
+        np.savez_compressed(
+            stream, probabilities=probabilities, times_s=times_s, classes=np.array(classes)
+        )
