@@ -34,14 +34,8 @@ _NOT_MEASURED = {
 class AccuracyPanel(QWidget):
     """Tolerance, plan in use, plot of all plans, reasons."""
 
-    def __init__(
-        self,
-        accuracy: AccuracyModel,
-        display: DisplayModel,
-        measure: QAction,
-        parent: QWidget | None = None,
-    ) -> None:
-        super().__init__(parent)
+    def __init__(self, accuracy: AccuracyModel, display: DisplayModel, measure: QAction) -> None:
+        super().__init__()
         self.setObjectName("page")
         self._accuracy = accuracy
         self._nothing = sentence(_NO_MESH)

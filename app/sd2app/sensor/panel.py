@@ -44,14 +44,9 @@ class SensorPanel(QWidget):
     """Type a placement; read range, visible share and limits."""
 
     def __init__(
-        self,
-        session: Session,
-        synthesis: SynthesisModel,
-        to_camera: QAction,
-        aim: QAction,
-        parent: QWidget | None = None,
+        self, session: Session, synthesis: SynthesisModel, to_camera: QAction, aim: QAction
     ) -> None:
-        super().__init__(parent)
+        super().__init__()
         self.setObjectName("page")
         self._session, self._synthesis = session, synthesis
         self._capture = self._capture_part()
