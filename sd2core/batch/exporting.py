@@ -52,7 +52,7 @@ def is_exported(folder: BatchFolder, export: Export) -> bool:
     return _noted(folder).get("key") == dataset_key(folder, export)
 
 
-def export_dataset(folder: BatchFolder, export: Export, progress: Progress) -> None:
+def export_dataset(folder: BatchFolder, export: Export) -> None:
     """Write the data set with its card, or continue one that was begun.
 
     Sources that have been there stay. Where one of them has changed, or the settings have,
@@ -77,7 +77,7 @@ def export_dataset(folder: BatchFolder, export: Export, progress: Progress) -> N
         for path in (*folder.path.glob("dataset.*"),):
             remove(path)
     atomic_write_text(note, json.dumps({"settings": settings}) + "\n")
-    written = write_dataset(out, _Counted(folder, export), options, progress)
+    written = write_dataset(out, _Counted(folder, export), options)
     if written.failed:
         first = written.failed[0]
         raise Sd2Error(

@@ -298,7 +298,7 @@ class _Run:
             stream.write(b"\n  ]\n}\n")
 
 
-def _if_there(out: str, root: Path) -> str | None:
+def _if_there(out: str | Path, root: Path) -> str | None:
     path = Path(out)
     return path.relative_to(root).as_posix() if path.exists() else None
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -46,12 +46,6 @@ class Choosing:
     path: Path  # file that keeps the plan
     places: Sequence[VirtualSensor]  # some of all, see sd2core.accuracy.places.spread
     frames: int  # of all maps together
-
-
-def choosing_of(content: Mapping[str, Any]) -> Choosing:
-    """Rebuild from the JSON of a task."""
-    places = [VirtualSensor(**one) for one in content["places"]]
-    return Choosing(Path(content["path"]), places, content["frames"])
 
 
 @dataclass

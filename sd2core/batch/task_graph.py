@@ -15,7 +15,7 @@ from sd2core.batch.folder import BatchFolder
 from sd2core.batch.inputs import Inspection, MeshInput, Origin, VideoInput, known_inspection
 from sd2core.batch.keys import key_of
 from sd2core.batch.plan import STEPS, BatchPlan, Simulate, Step
-from sd2core.batch.synthesis import Stretch, stretches_of
+from sd2core.batch.synthesis import Choosing, Stretch, stretches_of
 from sd2core.batch.tasks import Task
 from sd2core.errors import Sd2Error
 from sd2core.files.digests import file_digest
@@ -48,9 +48,9 @@ class PlannedMap:
         return (*self.synthesis, *denoising, *self.simulation)
 
     @property
-    def denoised(self) -> list[str]:
+    def denoised(self) -> list[Path]:
         """Files of the denoised stretches, or none."""
-        return [] if self.denoising is None else list(self.denoising.details["outs"])
+        return [] if self.denoising is None else list(self.denoising.arguments["outs"])
 
 
 class TaskGraph:
@@ -63,7 +63,6 @@ class TaskGraph:
     def __init__(self, plan: BatchPlan, folder: BatchFolder, origins: Sequence[Origin]) -> None:
         self.plan, self.folder, self.origins = plan, folder, origins
         section = plan.synthesise
-        self._section = None if section is None else section.model_dump(mode="json")
         self._scene = (
             {}
             if section is None
@@ -106,10 +105,10 @@ class TaskGraph:
         if self.plan.export is not None:
             origin = Origin(str(self.folder.path), "data set", "")
             out = str(dataset_path(self.folder, self.plan.export))
-            details = {"export": self.plan.export.model_dump(mode="json")}
+            arguments = {"export": self.plan.export}
             key = dataset_key(self.folder, self.plan.export)
             sources = sum(1 for _ in rows_of(self.folder))
-            yield Task("export", key, origin, details, frames=sources, out=out)
+            yield Task("export", key, origin, arguments, frames=sources, out=out)
 
     def is_done(self, task: Task) -> bool:
         """Tell if the result of a task exists."""
@@ -171,13 +170,13 @@ class TaskGraph:
         choices = fit_choices(self.plan.fit, origin.subject, video.focal_px)
         key = key_of("fit", {"video": video.identity, "choices": choices})
         out = str(self.folder.result("meshes", key, ".zarr"))
-        details = {
+        arguments = {
             "video": video.path,
             "choices": choices,
             "models": self.plan.fit.models,
             "out": out,
         }
-        return Task("fit", key, origin, details, None, video.frames, origin.name, out)
+        return Task("fit", key, origin, arguments, None, video.frames, origin.name, out)
 
     def _synthesis(self, origin: Origin, mesh: MeshInput, own: VirtualSensor) -> Iterator[Task]:
         if self.plan.synthesise is None:
@@ -218,31 +217,28 @@ class TaskGraph:
             simulation = tuple(self._simulation_task(where, one) for one in simulated)
             yield PlannedMap(placement, sensor, stretches, synthesis, denoising, simulation)
 
-    def _choosing(self, mesh: MeshInput, sensors: Sequence[VirtualSensor]) -> dict[str, Any] | None:
+    def _choosing(self, mesh: MeshInput, sensors: Sequence[VirtualSensor]) -> Choosing | None:
         """Describe the choice of an accuracy plan for a mesh; None without a tolerance."""
         if self._scene["tolerance"] is None:
             return None
         from sd2core.accuracy.places import spread
 
-        places = [asdict(one) for one in spread(sensors)]
-        about = {"places": places, "frames": mesh.frames * len(sensors)}
+        places, frames = spread(sensors), mesh.frames * len(sensors)
+        about = {"places": [asdict(one) for one in places], "frames": frames}
         key = key_of("synthesise", {"mesh": mesh.identity, **self._scene, **about})
-        return about | {"path": str(self.folder.result("plans", key, ".json"))}
+        return Choosing(self.folder.result("plans", key, ".json"), places, frames)
 
-    def _synthesis_task(
-        self, where: _View, stretch: Stretch, choosing: dict[str, Any] | None
-    ) -> Task:
-        details = {"section": self._section, "choosing": choosing}
-        return self._map_task("synthesise", "synthetic", where, stretch, self._scene, details)
+    def _synthesis_task(self, where: _View, stretch: Stretch, choosing: Choosing | None) -> Task:
+        arguments = {"section": self.plan.synthesise, "choosing": choosing}
+        return self._map_task("synthesise", "synthetic", where, stretch, self._scene, arguments)
 
     def _simulation_task(self, where: _View, stretch: Stretch) -> Task:
         assert self._simulation is not None
         assert self.plan.synthesise is not None
-        axis = asdict(self.plan.synthesise.options().axis)
-        content = {"axis": axis, "simulation": self._simulation.as_json()}
-        radar = asdict(self._simulation.radar)
-        details = {"axis": axis, "radar": radar, "seed": self._simulation.seed}
-        return self._map_task("simulate", "simulated", where, stretch, content, details)
+        axis = self.plan.synthesise.options().axis
+        content = {"axis": asdict(axis), "simulation": self._simulation.as_json()}
+        arguments = {"axis": axis, "simulation": self._simulation}
+        return self._map_task("simulate", "simulated", where, stretch, content, arguments)
 
     def _map_task(
         self,
@@ -251,31 +247,28 @@ class TaskGraph:
         where: _View,
         stretch: Stretch,
         content: dict[str, Any],
-        details: dict[str, Any],
+        arguments: dict[str, Any],
     ) -> Task:
         """Return the task for a stretch of a map; its key hashes ``content``, mesh and sensor."""
         origin, mesh, placement, sensor = where
         view = {"sensor": asdict(sensor), "stretch": list(stretch)}
         key = key_of(step, {"mesh": mesh.identity, **view, **content})
-        out = str(self.folder.result(kind, key, ".npz"))
-        details = {"mesh": asdict(mesh), **view, **details, "out": out}
+        out = self.folder.result(kind, key, ".npz")
+        arguments |= {"mesh": mesh, "sensor": sensor, "stretch": stretch, "out": out}
         frames = stretch[1] - stretch[0]
-        return Task(step, key, origin, details, placement, frames, origin.name, out)
+        return Task(step, key, origin, arguments, placement, frames, origin.name, str(out))
 
     def _denoising_task(self, synthesis: Sequence[Task]) -> Task:
         model, digest = self.model
         key = key_of("denoise", {"model": digest, "maps": [one.key for one in synthesis]})
         ends = [".npz"] if len(synthesis) == 1 else [f"-{n}.npz" for n in range(len(synthesis))]
-        outs = [str(self.folder.result("denoised", key, end)) for end in ends]
-        details = {
-            "maps": [one.out for one in synthesis],
-            "model": model,
-            "digest": digest,
-            "outs": outs,
-        }
-        one = synthesis[0]
-        frames = sum(each.frames for each in synthesis)
-        return Task("denoise", key, one.origin, details, one.placement, frames, one.group, outs[-1])
+        outs = [self.folder.result("denoised", key, end) for end in ends]
+        maps = [Path(one.out) for one in synthesis]
+        arguments = {"maps": maps, "model": model, "digest": digest, "outs": outs}
+        one, frames = synthesis[0], sum(each.frames for each in synthesis)
+        return Task(
+            "denoise", key, one.origin, arguments, one.placement, frames, one.group, str(outs[-1])
+        )
 
     def all_maps(self) -> Iterator[tuple[Origin, str, MeshInput, PlannedMap]]:
         """Yield every map of every recording that is inspected and fitted, in order.

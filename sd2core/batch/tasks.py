@@ -5,21 +5,18 @@ from __future__ import annotations
 import os
 import platform
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from sd2core.batch.folder import BatchFolder
-from sd2core.batch.inputs import Origin, inspect, mesh_input
+from sd2core.batch.inputs import MeshInput, Origin, inspect
 from sd2core.batch.keys import all_code_digest
-from sd2core.batch.plan import Export, Step, Synthesise
+from sd2core.batch.plan import Step
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import DISK_FULL
-from sd2core.progress import silent
-from sd2core.radar_config import RadarConfig
-from sd2core.sensor import VelocityAxis, VirtualSensor
 
 BEGUN = "begun"
 """Folder of the tasks under way; it exists only while a batch runs."""
@@ -35,7 +32,7 @@ class Task:
     step: Step
     key: str  # name of the result: tasks of one key have the same result
     origin: Origin
-    details: Mapping[str, Any]  # arguments, as JSON can hold them
+    arguments: Mapping[str, Any]  # small values and paths, which a worker can be sent
     placement: int | None = None
     frames: int = 0  # to work on
     group: str = ""  # best done by one process
@@ -44,8 +41,8 @@ class Task:
     @property
     def work(self) -> int:
         """Amount that the time grows with: frames, times vertices where it is made of a mesh."""
-        mesh = self.details.get("mesh")
-        return max(self.frames, 1) * (mesh["vertices"] if mesh else 1)
+        mesh: MeshInput | None = self.arguments.get("mesh")
+        return max(self.frames, 1) * (1 if mesh is None else mesh.vertices)
 
     def record(self, folder: Path, most_deaths: int = 2) -> dict[str, Any]:
         """Return what is sent to a worker."""
@@ -55,8 +52,8 @@ class Task:
             "out": self.out,
             "folder": str(folder),
             "most_deaths": most_deaths,
-            "origin": asdict(self.origin),
-            "details": dict(self.details),
+            "origin": self.origin,
+            "arguments": dict(self.arguments),
         }
 
 
@@ -130,7 +127,7 @@ def _attempt(folder: BatchFolder, record: Mapping[str, Any]) -> Outcome:
         if record["out"] and os.path.exists(record["out"]) and record["step"] in _ONE_FILE:
             return Outcome()  # a worker that was lost had just written it
         _compile_once()
-        _WORK[record["step"]](folder, Origin(**record["origin"]), **record["details"])
+        _do(record["step"], folder, record["origin"], record["arguments"])
     except Sd2Error as error:
         return Outcome(error=error_fields(error))
     except MemoryError as error:
@@ -174,86 +171,27 @@ def _compile_once() -> None:
         warm_up()
 
 
-def _inspect(folder: BatchFolder, origin: Origin) -> None:
-    inspect(folder, origin)
+def _do(step: Step, folder: BatchFolder, origin: Origin, arguments: Mapping[str, Any]) -> None:
+    """Do the work of a step, whose modules only those load that do it."""
+    if step == "inspect":
+        inspect(folder, origin)
+    elif step == "fit":
+        from sd2core.batch.fitting import fit_to_video
 
+        fit_to_video(**arguments)
+    elif step == "synthesise":
+        from sd2core.batch.synthesis import synthesise
 
-def _fit(folder: BatchFolder, origin: Origin, **details: Any) -> None:
-    from sd2core.batch.fitting import fit_to_video
+        synthesise(**arguments)
+    elif step == "denoise":
+        from sd2core.batch.denoising import denoise
 
-    fit_to_video(**details)
+        denoise(**arguments)
+    elif step == "simulate":
+        from sd2core.batch.synthesis import simulate
 
+        simulate(**arguments)
+    else:
+        from sd2core.batch.exporting import export_dataset
 
-def _synthesise(
-    folder: BatchFolder,
-    origin: Origin,
-    mesh: Mapping[str, Any],
-    sensor: Mapping[str, Any],
-    section: Mapping[str, Any],
-    stretch: list[int],
-    choosing: Mapping[str, Any] | None,
-    out: str,
-) -> None:
-    from sd2core.batch.synthesis import choosing_of, synthesise
-
-    synthesise(
-        mesh_input(mesh),
-        VirtualSensor(**sensor),
-        Synthesise.model_validate(dict(section), strict=False),
-        (stretch[0], stretch[1]),
-        None if choosing is None else choosing_of(choosing),
-        Path(out),
-    )
-
-
-def _denoise(
-    folder: BatchFolder,
-    origin: Origin,
-    maps: list[str],
-    model: str,
-    digest: str,
-    outs: list[str],
-) -> None:
-    from sd2core.batch.denoising import denoise
-
-    denoise([Path(one) for one in maps], model, digest, [Path(one) for one in outs])
-
-
-def _simulate(
-    folder: BatchFolder,
-    origin: Origin,
-    mesh: Mapping[str, Any],
-    sensor: Mapping[str, Any],
-    axis: Mapping[str, Any],
-    radar: Mapping[str, Any],
-    seed: int,
-    stretch: list[int],
-    out: str,
-) -> None:
-    from sd2core.batch.synthesis import simulate
-    from sd2core.datasets.simulating import Simulation
-
-    simulate(
-        mesh_input(mesh),
-        VirtualSensor(**sensor),
-        Simulation(RadarConfig(**radar), seed),
-        VelocityAxis(**axis),
-        (stretch[0], stretch[1]),
-        Path(out),
-    )
-
-
-def _export(folder: BatchFolder, origin: Origin, export: Mapping[str, Any]) -> None:
-    from sd2core.batch.exporting import export_dataset
-
-    export_dataset(folder, Export.model_validate(dict(export), strict=False), silent)
-
-
-_WORK: dict[str, Callable[..., None]] = {
-    "inspect": _inspect,
-    "fit": _fit,
-    "synthesise": _synthesise,
-    "denoise": _denoise,
-    "simulate": _simulate,
-    "export": _export,
-}
+        export_dataset(folder, **arguments)
