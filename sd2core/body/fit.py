@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.body.arm_depth import resolve_arm_depths
 from sd2core.body.camera import PinholeCamera
-from sd2core.body.evidence import EvidenceInParts
+from sd2core.body.evidence import EvidenceInParts, resolve_arm_depths
 from sd2core.body.fit_windows import Windows
 from sd2core.body.fitted import PER_FRAME, BodyFit, FittedMotion, mean_over_limbs
 from sd2core.body.initial import initial_pose

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sd2core.body.arm_depth import resolve_arm_depths
-from sd2core.body.evidence import Evidence
+from sd2core.body.evidence import Evidence, resolve_arm_depths
 from sd2core.body.rig import KeypointSpace, Rig
 from sd2core.body.shape import ShapeSpace
 from sd2core.body.track import LANDMARKS, TORSO_CORNERS
