@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Collection
 from functools import partial
 
-from PySide6.QtWidgets import QWidget
-
 from sd2app.background.run_monitor import UNDER_WAY
 from sd2app.classify.dialogs import ClassifyDialogs
 from sd2app.classify.run import CheckPoint, ClassHistory, ClassRun
@@ -23,18 +21,13 @@ class ClassPanel(RunPanel):
     """Panel of trainings and comparisons of classifiers."""
 
     def __init__(
-        self,
-        training: ClassTraining,
-        display: DisplayModel,
-        dialogs: ClassifyDialogs,
-        parent: QWidget | None = None,
+        self, training: ClassTraining, display: DisplayModel, dialogs: ClassifyDialogs
     ) -> None:
         super().__init__(
             training,
             ClassSetupView(training, dialogs),
             ClassRunView(training, display, dialogs),
             "Trainings and comparisons: under way, or ended",
-            parent=parent,
         )
 
 
@@ -42,11 +35,7 @@ class ClassRunView(RunView[ClassRun]):
     """Recall of a training, and the result of a comparison."""
 
     def __init__(
-        self,
-        training: ClassTraining,
-        display: DisplayModel,
-        dialogs: ClassifyDialogs,
-        parent: QWidget | None = None,
+        self, training: ClassTraining, display: DisplayModel, dialogs: ClassifyDialogs
     ) -> None:
         shell = dialogs.shell
         buttons = (
@@ -62,9 +51,9 @@ class ClassRunView(RunView[ClassRun]):
                 "again", "Resume", "Train what is missing", partial(shell.attempt, training.again)
             ),
         )  # fmt: skip
-        super().__init__(training, shell, buttons, parent)
+        super().__init__(training, shell, buttons)
         self._training = training
-        self._curve = ChartView(display, "Recall over the steps", class_chart(ClassHistory()), self)
+        self._curve = ChartView(display, "Recall over the steps", class_chart(ClassHistory()))
         self._facts = FactRows(1, at_the_edge=False, parent=self)
         self._about = sentence("")
         for part in (self._curve, self._facts, self._about):

@@ -36,8 +36,8 @@ _PAD = 1.15
 class ConfusionView(QWidget):
     """Confusion matrix: true classes from top to bottom, answers from left to right."""
 
-    def __init__(self, display: DisplayModel, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, display: DisplayModel) -> None:
+        super().__init__()
         self._display = display
         display.theme_changed.connect(self.update)
         self._classes: tuple[str, ...] = ()
@@ -127,9 +127,7 @@ class ConfusionView(QWidget):
 class ClassResultDialog(QDialog):
     """Reference matrix on the left, a chosen matrix on the right, learning curves below."""
 
-    def __init__(
-        self, result: ClassResult, display: DisplayModel, parent: QWidget | None = None
-    ) -> None:
+    def __init__(self, result: ClassResult, display: DisplayModel, parent: QWidget) -> None:
         super().__init__(parent)
         self._result = result
         self.setWindowTitle(f"Classifiers: {result.path.parent.name or result.path.name}")
@@ -148,7 +146,7 @@ class ClassResultDialog(QDialog):
         layout.addLayout(row_of(*((column, 1) for column in columns), spacing_px=24))
         if any(len(curve) > 1 for curve in result.curves):
             layout.addSpacing(8)
-            curves = _LearningCurves(display, "Learning curve", learning_chart(result), self)
+            curves = _LearningCurves(display, "Learning curve", learning_chart(result))
             layout.addWidget(curves, 1)
         buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close, self)
         buttons.rejected.connect(self.reject)
@@ -177,7 +175,7 @@ class _MatrixColumn(QWidget):
         head = row_of(heading, STRETCH)
         # As high with a title as with a choice, so that the matrices line up.
         head.addStrut(28)
-        self._view = ConfusionView(display, self)
+        self._view = ConfusionView(display)
         self._recall = sentence("", "plain")
         self.setLayout(column_of(head, self._view, self._recall, STRETCH, margins_px=(0, 0, 0, 0)))
 

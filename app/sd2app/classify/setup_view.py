@@ -44,10 +44,8 @@ _COMPARISON = (
 class ClassSetupView(TrainingForm):
     """A form over :class:`ClassSetup`."""
 
-    def __init__(
-        self, training: ClassTraining, dialogs: ClassifyDialogs, parent: QWidget | None = None
-    ) -> None:
-        super().__init__(training.setup, dialogs.shell, parent)
+    def __init__(self, training: ClassTraining, dialogs: ClassifyDialogs) -> None:
+        super().__init__(training.setup, dialogs.shell)
         self._training, self._labelled, self._dialogs = training, training.setup, dialogs
         self._add_labelled_data()
         self._add_network()

@@ -51,25 +51,20 @@ class ClassStrip(QWidget):
     """A line with model, map and read-out over the probabilities, stacked."""
 
     def __init__(
-        self,
-        session: Session,
-        classify: ClassifyModel,
-        labels: LabelsModel,
-        button: ModelButton,
-        parent: QWidget | None = None,
+        self, session: Session, classify: ClassifyModel, labels: LabelsModel, button: ModelButton
     ) -> None:
-        super().__init__(parent)
+        super().__init__()
         self._classify = classify
         self._source = Choice("The map that the classifier looks at", self)
         self._source.activated.connect(lambda at: classify.set_source(classify.sources[at]))
         self._status = ElidedLabel(self)
         self._status.setObjectName("muted")
-        self.readout = ClassReadout(session.display, classify, labels, self)
+        self.readout = ClassReadout(session.display, classify, labels)
         line = row_of(
             title("Classifier"), button, self._source, (self._status, 1), self.readout,
             spacing_px=8, margins_px=(8, 2, MARGIN_PX, 2),
         )  # fmt: skip
-        plot = ClassPlot(session, classify, labels, self)
+        plot = ClassPlot(session, classify, labels)
         self.setLayout(column_of(line, plot, spacing_px=0, margins_px=(0, 0, 0, 0)))
         classify.changed.connect(self._refresh)
         classify.moved.connect(self._say)
@@ -110,14 +105,8 @@ class ClassReadout(QWidget):
     Where there is no room for the bars there are the words alone.
     """
 
-    def __init__(
-        self,
-        display: DisplayModel,
-        classify: ClassifyModel,
-        labels: LabelsModel,
-        parent: QWidget | None = None,
-    ) -> None:
-        super().__init__(parent)
+    def __init__(self, display: DisplayModel, classify: ClassifyModel, labels: LabelsModel) -> None:
+        super().__init__()
         self._classify, self._labels, self._display = classify, labels, display
         self._shown: ClassReading | None = None
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
@@ -200,14 +189,8 @@ class ClassReadout(QWidget):
 class ClassPlot(QWidget):
     """Probabilities over time, stacked: the background at the bottom. Click or drag seeks."""
 
-    def __init__(
-        self,
-        session: Session,
-        classify: ClassifyModel,
-        labels: LabelsModel,
-        parent: QWidget | None = None,
-    ) -> None:
-        super().__init__(parent)
+    def __init__(self, session: Session, classify: ClassifyModel, labels: LabelsModel) -> None:
+        super().__init__()
         self._classify, self._labels = classify, labels
         self._span, self._playback = session.span, session.playback
         self._display = session.display

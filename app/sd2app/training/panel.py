@@ -46,7 +46,6 @@ class TrainingPanel(RunPanel):
         adoption: ModelAdoption,
         display: DisplayModel,
         dialogs: TrainingDialogs,
-        parent: QWidget | None = None,
     ) -> None:
         super().__init__(
             training,
@@ -54,7 +53,6 @@ class TrainingPanel(RunPanel):
             TrainingRunView(training, adoption, display, dialogs.shell),
             "Runs: those under way, and those that have ended",
             dialogs.open_run,
-            parent,
         )
 
 
@@ -62,12 +60,7 @@ class TrainingRunView(RunView[TrainingMonitor]):
     """Curves and figures of a training, and what its model gains while it is in use."""
 
     def __init__(
-        self,
-        training: TrainingModel,
-        adoption: ModelAdoption,
-        display: DisplayModel,
-        shell: Shell,
-        parent: QWidget | None = None,
+        self, training: TrainingModel, adoption: ModelAdoption, display: DisplayModel, shell: Shell
     ) -> None:
         tell, attempt = partial(partial, training.tell), shell.attempt
         buttons = (
@@ -79,16 +72,16 @@ class TrainingRunView(RunView[TrainingMonitor]):
             Button("go_on", "Continue", "Go on training", tell("run")),
             Button("resume", "Resume", "Go on where it ended", partial(attempt, training.resume)),
         )  # fmt: skip
-        super().__init__(training, shell, buttons, parent)
+        super().__init__(training, shell, buttons)
         self._training, self._adoption = training, adoption
-        self._gain = TrainingGainView(adoption, self)
-        self._curves = ChartView(
-            display, "Errors over the epochs", training_chart(TrainingHistory()), self
-        )
+        self._gain = TrainingGainView(adoption)
+        empty = training_chart(TrainingHistory())
+        self._curves = ChartView(display, "Errors over the epochs", empty)
         self._metrics = FactRows(3, at_the_edge=False, parent=self)
         self._about = sentence("")
-        for part in (self._gain, self._curves, self._metrics, self._about, self._closing_part()):
+        for part in (self._gain, self._curves, self._metrics, self._about):
             self.column.addWidget(part)
+        self.column.addWidget(self._closing_part())
         adoption.changed.connect(self.refresh)
         self.refresh()
 
@@ -139,8 +132,8 @@ class TrainingRunView(RunView[TrainingMonitor]):
 class TrainingGainView(QWidget):
     """A view of :class:`ModelAdoption`."""
 
-    def __init__(self, adoption: ModelAdoption, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, adoption: ModelAdoption) -> None:
+        super().__init__()
         self._adoption = adoption
         self._summary = sentence("")
         self._table = FactRows(3, at_the_edge=True, parent=self)

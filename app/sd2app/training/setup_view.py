@@ -38,10 +38,8 @@ _MORE = (
 class TrainingSetupView(TrainingForm):
     """A form over :class:`TrainingSetupModel`."""
 
-    def __init__(
-        self, training: TrainingModel, dialogs: TrainingDialogs, parent: QWidget | None = None
-    ) -> None:
-        super().__init__(training.setup, dialogs.shell, parent)
+    def __init__(self, training: TrainingModel, dialogs: TrainingDialogs) -> None:
+        super().__init__(training.setup, dialogs.shell)
         self._training, self._pairs, self._dialogs = training, training.setup, dialogs
         self._menu = self.add_data(
             "Pairs",

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 from PySide6.QtCore import QEvent, QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPen, QPolygonF
-from PySide6.QtWidgets import QWidget
 
 from sd2app.widgets.plot import PointPlot, Themed, log_ticks
 from sd2app.widgets.time_axis import ticks
@@ -96,10 +95,8 @@ class ChartView(PointPlot):
     HEIGHTS_PX = (160, 176, 280)
     KEYS = frozenset({Qt.Key.Key_Home, Qt.Key.Key_End, Qt.Key.Key_Escape, *_STEPS})
 
-    def __init__(
-        self, display: Themed, name: str, chart: Chart, parent: QWidget | None = None
-    ) -> None:
-        super().__init__(display, name, parent)
+    def __init__(self, display: Themed, name: str, chart: Chart) -> None:
+        super().__init__(display, name)
         self._chart = chart
 
     def show_chart(self, chart: Chart) -> None:

@@ -64,7 +64,7 @@ class ModelMenu(QMenu):
         words: Words,
         use: Use,
         below: list[QAction],
-        parent: QWidget | None = None,
+        parent: QWidget,
     ) -> None:
         super().__init__(words.title, parent)
         self.chosen, self.words = chosen, words
@@ -101,8 +101,8 @@ class ModelMenu(QMenu):
 class ModelButton(QToolButton):
     """Button that names the model in use and opens the menu of models."""
 
-    def __init__(self, menu: ModelMenu, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, menu: ModelMenu) -> None:
+        super().__init__()
         self._chosen, self._words = menu.chosen, menu.words
         self.setObjectName("model")
         self.setMenu(menu)

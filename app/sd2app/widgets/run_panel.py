@@ -36,9 +36,8 @@ class RunPanel(QWidget):
         run: QWidget,
         tip: str,
         open_other: Callable[[], object] | None = None,
-        parent: QWidget | None = None,
     ) -> None:
-        super().__init__(parent)
+        super().__init__()
         self.setObjectName("page")
         self._runs, self._setup, self._run = runs, setup, run
         self._tip, self._open = tip, open_other
@@ -108,14 +107,8 @@ class Button(NamedTuple):
 class RunView(QWidget, Generic[Run]):
     """Progress and actions of the run in view, and why it ended; subclasses add what it made."""
 
-    def __init__(
-        self,
-        runs: Runs[Run],
-        shell: Shell,
-        buttons: Sequence[Button],
-        parent: QWidget | None = None,
-    ) -> None:
-        super().__init__(parent)
+    def __init__(self, runs: Runs[Run], shell: Shell, buttons: Sequence[Button]) -> None:
+        super().__init__()
         self._runs, self._shell = runs, shell
         tell = partial(partial, runs.tell)
         buttons = (

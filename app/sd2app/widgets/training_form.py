@@ -57,8 +57,8 @@ class Field(NamedTuple):
 class TrainingForm(QWidget):
     """Page over a :class:`Setup`; subclasses put its parts together."""
 
-    def __init__(self, setup: Setup, shell: Shell, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, setup: Setup, shell: Shell) -> None:
+        super().__init__()
         self._setup, self._shell = setup, shell
         self._shown_data: Sequence[Any] | None = None
         self._numbers: dict[str, NumberBox] = {}
