@@ -139,7 +139,7 @@ class TrainingGainView(QWidget):
         self._table = FactRows(3, at_the_edge=True, parent=self)
         self._both = QCheckBox("Show the map from before", self)
         self._both.setToolTip("Draw the map of the model before under that of this one")
-        self._both.toggled.connect(adoption.set_comparing)
+        self._both.toggled.connect(adoption.denoise.set_comparing)
         back = outlined("Go back", "Denoise with what was in use before", adoption.go_back, self)
         buttons = row_of(self._both, STRETCH, back)
         self.setLayout(
@@ -156,7 +156,7 @@ class TrainingGainView(QWidget):
         self._summary.setText(gain_summary(use.gain, use.has_radar))
         self._table.show_facts(gain_rows(use.gain) if use.gain is not None else [])
         with QSignalBlocker(self._both):
-            self._both.setChecked(use.comparing)
+            self._both.setChecked(use.denoise.comparing)
         self._both.setVisible(use.can_compare)
 
 

@@ -79,7 +79,7 @@ class ModelAdoption(QObject):
         parent: QObject | None = None,
     ) -> None:
         super().__init__(parent)
-        self._training, self._denoise, self._maps = training, denoise, maps
+        self._training, self.denoise, self._maps = training, denoise, maps
         self._models = models
         self._kept: Path | None = None
         self._run: Path | None = None
@@ -99,7 +99,7 @@ class ModelAdoption(QObject):
     @property
     def run(self) -> Path | None:
         """The run whose model is in use; None when it is another one's."""
-        return self._run if self._kept is not None and self._denoise.path == self._kept else None
+        return self._run if self._kept is not None and self.denoise.path == self._kept else None
 
     @property
     def gain(self) -> Improvement | None:
@@ -110,11 +110,6 @@ class ModelAdoption(QObject):
     def has_radar(self) -> bool:
         """True if there is a radar's map to compare with."""
         return self._maps.real.map is not None
-
-    @property
-    def comparing(self) -> bool:
-        """True if the earlier model's map is shown as well."""
-        return self._denoise.comparing
 
     @property
     def can_compare(self) -> bool:
@@ -130,8 +125,8 @@ class ModelAdoption(QObject):
             return
         try:
             kept = self._keep(run.folder.path.name, run.folder.best)
-            previous = self._denoise.path
-            self._denoise.use(kept)
+            previous = self.denoise.path
+            self.denoise.use(kept)
         except (OSError, Sd2Error) as error:
             self.failed.emit(str(error))
             return
@@ -139,26 +134,22 @@ class ModelAdoption(QObject):
         if previous != kept:
             self._previous = previous
         self._gain = self._before_mps = None
-        if self._denoise.path != kept:
+        if self.denoise.path != kept:
             self.noted.emit(
                 f"The model is kept as {kept.stem}. Open a recording to denoise it with that."
             )
         else:
-            self._denoise.set_comparing(self._previous is not None)
+            self.denoise.set_comparing(self._previous is not None)
         self._compare()
 
     def go_back(self) -> None:
         """Denoise with the model that was in use before."""
         try:
-            self._denoise.use(self._previous)
-            self._denoise.set_comparing(False)
+            self.denoise.use(self._previous)
+            self.denoise.set_comparing(False)
         except Sd2Error as error:
             self.failed.emit(str(error))
         self.changed.emit()
-
-    def set_comparing(self, comparing: bool) -> None:
-        """Show the map of the model before as well, or not."""
-        self._denoise.set_comparing(comparing)
 
     def close(self) -> None:
         """Stop comparing."""
@@ -182,7 +173,7 @@ class ModelAdoption(QObject):
     def _compare(self) -> None:
         maps = self._maps
         plain, now, radar = maps.synthetic.map, maps.denoised.map, maps.real.map
-        ready = self.run is not None and not self._denoise.busy
+        ready = self.run is not None and not self.denoise.busy
         if ready and plain is not None and now is not None and radar is not None:
             target = _radar_at(plain, radar, maps.real.offset_s)
             before = maps.before.map
