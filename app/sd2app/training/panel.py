@@ -62,15 +62,16 @@ class TrainingRunView(RunView[TrainingMonitor]):
     def __init__(
         self, training: TrainingModel, adoption: ModelAdoption, display: DisplayModel, shell: Shell
     ) -> None:
-        tell, attempt = partial(partial, training.tell), shell.attempt
+        pause, go_on = partial(training.tell, "pause"), partial(training.tell, "run")
+        resume = partial(shell.attempt, training.resume)
         buttons = (
             Button(
                 "use", "Use this model", "Denoise with it, and compare with what was there before",
                 adoption.use, primary=True,
             ),
-            Button("pause", "Pause", "Rest, and give the processor back", tell("pause")),
-            Button("go_on", "Continue", "Go on training", tell("run")),
-            Button("resume", "Resume", "Go on where it ended", partial(attempt, training.resume)),
+            Button("pause", "Pause", "Rest, and give the processor back", pause),
+            Button("go_on", "Continue", "Go on training", go_on),
+            Button("resume", "Resume", "Go on where it ended", resume),
         )  # fmt: skip
         super().__init__(training, shell, buttons)
         self._training, self._adoption = training, adoption

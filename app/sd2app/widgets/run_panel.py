@@ -110,11 +110,11 @@ class RunView(QWidget, Generic[Run]):
     def __init__(self, runs: Runs[Run], shell: Shell, buttons: Sequence[Button]) -> None:
         super().__init__()
         self._runs, self._shell = runs, shell
-        tell = partial(partial, runs.tell)
+        stop, cancel = partial(runs.tell, "stop"), partial(runs.tell, "cancel")
         buttons = (
             *buttons,
-            Button("stop", "Stop", "End it now and keep the best so far", tell("stop")),
-            Button("cancel", "Cancel", "End it now and delete what it made", tell("cancel")),
+            Button("stop", "Stop", "End it now and keep the best so far", stop),
+            Button("cancel", "Cancel", "End it now and delete what it made", cancel),
             Button("delete", "Delete…", "Delete this run with what it made", self._delete),
         )
         self._headline = title("")
@@ -126,7 +126,7 @@ class RunView(QWidget, Generic[Run]):
         self._bar.setAccessibleName("Progress of the training")
         self._time, self._reason = sentence(""), sentence("", "warning")
         self._note = sentence("")
-        self._buttons = {one.name: outlined(*one[1:4], self) for one in buttons}
+        self._buttons = {one.name: outlined(one.text, one.tip, one.run, self) for one in buttons}
         for one in buttons:
             if one.primary:
                 self._buttons[one.name].setObjectName("primary")
