@@ -14,7 +14,9 @@ from PySide6.QtWidgets import QApplication, QMainWindow, QWidget
 from sd2app.background.latest import LatestRunner
 from sd2app.settings import Settings
 from sd2app.shell.parts import Parts
+from sd2app.shell.side_panel import PageWidths, SidePanel
 from sd2app.widgets.layouts import column_of
+from sd2app.widgets.message_bar import MessageBar
 from sd2app.widgets.panel import fill, panel, splitter
 from sd2app.widgets.theme import apply_theme
 
@@ -22,7 +24,6 @@ if TYPE_CHECKING:
     from sd2app.maps.stack import MapStack
     from sd2app.session.session import Session
     from sd2app.shell.keys.bindings import KeyBindings
-    from sd2app.shell.side_panel import SidePanel
     from sd2app.shell.wiring import Features
 
 T = TypeVar("T")
@@ -101,7 +102,6 @@ class MainWindow(QMainWindow):
         from sd2app.shell.menus import Menus, in_order
         from sd2app.shell.status_bar import StatusLine
         from sd2app.shell.wiring import build_features
-        from sd2app.widgets.message_bar import MessageBar
 
         self.messages = MessageBar(self)
         self.session = s = build_session(self, self._settings)
@@ -137,7 +137,6 @@ class MainWindow(QMainWindow):
         self._importer.submit(lambda emit: import_module("sd2app.scene.view"))
 
     def _fill_panels(self) -> None:
-        from sd2app.shell.side_panel import PageWidths, SidePanel
         from sd2app.shell.wiring import side_pages, track_stack
 
         views = {name: view for feature in self.features for name, view in feature.panels().items()}
