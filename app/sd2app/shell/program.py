@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from PySide6.QtCore import SignalInstance
 from PySide6.QtWidgets import QMessageBox
 
 from sd2app.feature import Action, Feature, Shell
-from sd2app.labels.edits import LabelEdits
-from sd2app.labels.model import LabelsModel
+from sd2app.labels.feature import LabelsFeature
 from sd2app.session.session import Session
 from sd2app.shell.keys.bindings import KeyBindings
 from sd2app.shell.keys.dialog import KeysDialog
@@ -39,32 +38,24 @@ MOUSE = (
 
 
 class ProgramFeature(Feature):
-    """Actions of the program; ``dragging`` is true while an edit is being dragged."""
+    """Actions of the program; the history waits while labels are dragged."""
 
-    def __init__(
-        self,
-        session: Session,
-        shell: Shell,
-        labels: LabelsModel,
-        edits: LabelEdits,
-        dragging: Callable[[], bool],
-    ) -> None:
-        self._session, self._shell = session, shell
-        self._labels, self._edits = labels, edits
-        self._dragging = dragging
+    def __init__(self, session: Session, shell: Shell, labels: LabelsFeature) -> None:
+        self._session, self._shell, self._labels = session, shell, labels
 
     def actions(self) -> Sequence[Action]:
         """Undo, theme, keys, about, quit."""
         stack, display = self._session.document.undo_stack, self._session.display
+        dragging = self._labels.dragging
         return (
             Action("quit", "File", "Quit", ("Ctrl+Q",), "Close the window", self._quit),
             Action(
                 "undo", "Edit", "Undo", ("Ctrl+Z",), "Take back the last edit of this recording",
-                stack.undo, lambda: stack.canUndo() and not self._dragging(),
+                stack.undo, lambda: stack.canUndo() and not dragging.dragging,
             ),
             Action(
                 "redo", "Edit", "Redo", ("Ctrl+Shift+Z",), "Do again what was taken back",
-                stack.redo, lambda: stack.canRedo() and not self._dragging(),
+                stack.redo, lambda: stack.canRedo() and not dragging.dragging,
             ),
             Action(
                 "dark", "View", "Dark theme", ("Ctrl+D",), "Dark or light",
@@ -95,7 +86,7 @@ class ProgramFeature(Feature):
     def _show_keys(self) -> None:
         bindings = self._shell.keys
         assert isinstance(bindings, KeyBindings)
-        model = KeyListModel(bindings, self._labels, MOUSE, self._edits.apply)
+        model = KeyListModel(bindings, self._labels.model, MOUSE, self._labels.edits.apply)
         dialog = KeysDialog(model, bindings, self._shell.dialog_parent)
         dialog.exec()
         dialog.deleteLater()

@@ -112,13 +112,6 @@ def build_features(session: Session, shell: Shell, parts: Parts, parent: QObject
     )
     suggestions = SuggestionsFeature(session, shell, labels.edits, (classify.gestures,), parent)
     agreement = AgreementFeature(session, shell, labels.model, parent)
-    program = ProgramFeature(
-        session,
-        shell,
-        labels.model,
-        labels.edits,
-        lambda: labels.dragging.dragging,
-    )
     features = Features(
         mesh_comparison=MeshComparisonFeature(
             session,
@@ -154,7 +147,7 @@ def build_features(session: Session, shell: Shell, parts: Parts, parent: QObject
             lambda: track_words(denoise.model.card),
         ),
         playback=PlaybackFeature(session),
-        program=program,
+        program=ProgramFeature(session, shell, labels),
         files=FilesFeature(session, shell),
         scene=SceneFeature(session, shell, maps.synthesis, sensor.placements),
     )
