@@ -1,4 +1,4 @@
-"""Import of labels: reading of a file in the background, preview, and choices."""
+"""Import of labels: a file is read in the background, shown, and taken as the user chooses."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from PySide6.QtCore import QObject, QSignalBlocker, Signal
 from PySide6.QtWidgets import (
     QDialog,
     QDialogButtonBox,
@@ -50,57 +49,82 @@ def import_labels(shell: Shell, edits: LabelEdits, path: Path | None = None) -> 
         if not name:
             return
         path = Path(name)
-    file = LabelFile(path, edits.labels.labels, edits.playback.timebase, parent)
-    dialog = LabelImportDialog(file, parent)
+    dialog = LabelImportDialog(path, edits.labels.labels, edits.playback.timebase, parent)
     accepted = dialog.exec() == QDialog.DialogCode.Accepted
-    incoming, way, name = file.incoming, file.way, path.stem
-    file.close()
-    for done in (dialog, file):
-        done.deleteLater()
+    incoming, way, name = dialog.incoming, dialog.way, path.stem
+    dialog.finish()
+    dialog.deleteLater()
     if accepted and incoming is not None:
         edits.apply(lambda labels, _: take_in(labels, incoming, way, name))
 
 
-class LabelFile(QObject):
-    """Content of a label file, read again when its format is chosen."""
+def _spans(found: Incoming) -> str:
+    spans = found.labels.spans
+    if not spans:
+        return "none within this recording" if found.outside else "none"
+    end_s = max(span.end_s for span in spans)
+    return f"{len(spans):,}, from {spans[0].start_s:.3f} to {end_s:.3f} s"
 
-    changed = Signal()  # content, problem or choices
+
+def _names(names: Sequence[str]) -> str:
+    more = len(names) - _MOST_NAMED
+    shown = ", ".join(names[:_MOST_NAMED])
+    return f"{shown} and {more} more" if more > 0 else shown
+
+
+class LabelImportDialog(QDialog):
+    """Content of a label file above, choices below; read again when its format is chosen."""
 
     def __init__(
-        self, path: Path, labels: Labels, timebase: Timebase, parent: QObject | None = None
+        self, path: Path, labels: Labels, timebase: Timebase, parent: QWidget | None = None
     ) -> None:
         super().__init__(parent)
-        self.path = path
+        self._path, self._labels, self._timebase = path, labels, timebase
         self.incoming: Incoming | None = None  # fitted to the recording; None while reading
-        self.problem = ""
-        self.way: Way = "add" if labels.spans else "replace"
+        self.problem = ""  # why the file cannot be read
         self.observations: tuple[str, ...] = ()  # to choose from, where there are several videos
-        self.observation: str | None = None
-        self._labels, self._timebase = labels, timebase
-        self._format: str | None = None
+        self._observed: str | None = None
         self._runner = LatestRunner("labels", self)
         self._runner.partial.connect(self._learn)
         self._runner.finished.connect(self._receive)
         self._runner.failed.connect(self._refuse)
+        self.setWindowTitle("Import labels")
+        self._format = Choice("The program that the file is of", self)
+        self._format.addItem("found by name and content", None)
+        for one in FORMATS:
+            self._format.addItem(one.title, one.name)
+        self._format.currentIndexChanged.connect(self._read_anew)
+        self._observation = Choice("Which of the videos in the file", self)
+        self._observation.currentTextChanged.connect(self._observe)
+        self._observation_name = QLabel("Observation", self)
+        self._facts = FactRows(_MOST_FACTS, at_the_edge=False, parent=self)
+        self._said, self._consequence = sentence(""), sentence("")
+        self._way = Choice("What becomes of the labels that are there", self)
+        self._way.addItem("on tracks of their own", "add")
+        self._way.addItem("instead of all labels of this recording", "replace")
+        self._way.setCurrentIndex(0 if labels.spans else 1)
+        self._way.currentIndexChanged.connect(self._refresh)
+        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel, self)
+        self._import = buttons.addButton("Import", QDialogButtonBox.ButtonRole.AcceptRole)
+        self._import.setDefault(True)
+        buttons.accepted.connect(self.accept)
+        buttons.rejected.connect(self.reject)
+        form, take = QFormLayout(), QFormLayout()
+        for rows in (form, take):
+            rows.setHorizontalSpacing(12)
+        form.addRow("Read as", self._format)
+        form.addRow(self._observation_name, self._observation)
+        take.addRow("Take them", self._way)
+        content = form, rule(), self._said, self._facts, rule(), take, self._consequence
+        parts = title(path.name), *content, 8, buttons
+        self.setLayout(column_of(*parts, spacing_px=8, margins_px=(16, 16, 16, 16)))
         self._read()
+        self.setMinimumWidth(560)
 
-    def set_way(self, way: Way) -> None:
-        """Choose to replace the present labels or to add to them."""
-        if way != self.way:
-            self.way = way
-            self.changed.emit()
-
-    def read_as(self, name: str | None) -> None:
-        """Read the file in a named format; None: by name and content."""
-        if name != self._format:
-            self._format, self.observation, self.observations = name, None, ()
-            self._read()
-
-    def set_observation(self, name: str) -> None:
-        """Read the labels of this observation."""
-        if name != self.observation:
-            self.observation = name
-            self._read()
+    @property
+    def way(self) -> Way:
+        """Replace the present labels, or add to them."""
+        return self._way.currentData()
 
     def facts(self) -> list[tuple[str, str]]:
         """Return names and values on the content and what importing changes."""
@@ -135,13 +159,23 @@ class LabelFile(QObject):
             return "There are no labels to replace. Undo takes the import back."
         return f"The {counted(count, 'span')} of this recording go. Undo brings them back."
 
-    def close(self) -> None:
+    def finish(self) -> None:
         """Stop reading."""
         self._runner.close()
 
+    def _read_anew(self) -> None:
+        self._observed, self.observations = None, ()
+        self._read()
+
+    def _observe(self, name: str) -> None:
+        if name and name != self._observed:
+            self._observed = name
+            self._read()
+
     def _read(self) -> None:
         self.incoming, self.problem = None, ""
-        path, name, observation, base = self.path, self._format, self.observation, self._timebase
+        path, name, base = self._path, self._format.currentData(), self._timebase
+        observation = self._observed
 
         def read(emit: Emit) -> Incoming:
             chosen = name or format_for(path, writing=False).name
@@ -151,92 +185,31 @@ class LabelFile(QObject):
             return Incoming.of(labels, base)
 
         self._runner.submit(read)
-        self.changed.emit()
+        self._refresh()
 
     def _learn(self, names: tuple[str, ...]) -> None:
         self.observations = names if len(names) > 1 else ()
 
     def _receive(self, incoming: Incoming) -> None:
         self.incoming = incoming
-        self.changed.emit()
+        self._refresh()
 
     def _refuse(self, error: Exception) -> None:
-        if self.observations and self.observation is None:
+        if self.observations and self._observed is None:
             # Not a fault: the user has not chosen yet.
-            self.set_observation(self.observations[0])
+            self._observe(self.observations[0])
             return
         self.problem = str(error)
-        self.changed.emit()
-
-
-def _spans(found: Incoming) -> str:
-    spans = found.labels.spans
-    if not spans:
-        return "none within this recording" if found.outside else "none"
-    end_s = max(span.end_s for span in spans)
-    return f"{len(spans):,}, from {spans[0].start_s:.3f} to {end_s:.3f} s"
-
-
-def _names(names: Sequence[str]) -> str:
-    more = len(names) - _MOST_NAMED
-    shown = ", ".join(names[:_MOST_NAMED])
-    return f"{shown} and {more} more" if more > 0 else shown
-
-
-class LabelImportDialog(QDialog):
-    """View of :class:`LabelFile`: content above, choices below."""
-
-    def __init__(self, file: LabelFile, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self._file = file
-        self.setWindowTitle("Import labels")
-        self._format = Choice("The program that the file is of", self)
-        self._format.addItem("found by name and content", None)
-        for one in FORMATS:
-            self._format.addItem(one.title, one.name)
-        self._format.currentIndexChanged.connect(lambda _: file.read_as(self._format.currentData()))
-        self._observation = Choice("Which of the videos in the file", self)
-        self._observation.currentTextChanged.connect(
-            lambda name: file.set_observation(name) if name else None
-        )
-        self._observation_name = QLabel("Observation", self)
-        self._facts = FactRows(_MOST_FACTS, at_the_edge=False, parent=self)
-        self._said, self._consequence = sentence(""), sentence("")
-        self._way = Choice("What becomes of the labels that are there", self)
-        self._way.addItem("on tracks of their own", "add")
-        self._way.addItem("instead of all labels of this recording", "replace")
-        self._way.currentIndexChanged.connect(lambda _: file.set_way(self._way.currentData()))
-        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel, self)
-        self._import = buttons.addButton("Import", QDialogButtonBox.ButtonRole.AcceptRole)
-        self._import.setDefault(True)
-        buttons.accepted.connect(self.accept)
-        buttons.rejected.connect(self.reject)
-        form, take = QFormLayout(), QFormLayout()
-        for rows in (form, take):
-            rows.setHorizontalSpacing(12)
-        form.addRow("Read as", self._format)
-        form.addRow(self._observation_name, self._observation)
-        take.addRow("Take them", self._way)
-        content = form, rule(), self._said, self._facts, rule(), take, self._consequence
-        parts = title(file.path.name), *content, 8, buttons
-        self.setLayout(column_of(*parts, spacing_px=8, margins_px=(16, 16, 16, 16)))
-        file.changed.connect(self._refresh)
         self._refresh()
-        self.setMinimumWidth(560)
 
     def _refresh(self) -> None:
-        file = self._file
-        said = file.problem or ("" if file.incoming is not None else "Reading…")
-        say(self._said, said, "warning" if file.problem else "muted")
+        said = self.problem or ("" if self.incoming is not None else "Reading…")
+        say(self._said, said, "warning" if self.problem else "muted")
         self._said.setVisible(bool(said))
-        self._facts.show_facts(file.facts())
+        self._facts.show_facts(self.facts())
         for widget in (self._observation_name, self._observation):
-            widget.setVisible(bool(file.observations))
-        observed = file.observation
-        self._observation.offer(
-            file.observations, file.observations.index(observed) if observed else -1
-        )
-        with QSignalBlocker(self._way):
-            self._way.setCurrentIndex(self._way.findData(file.way))
-        self._consequence.setText(file.consequence())
-        self._import.setEnabled(file.incoming is not None)
+            widget.setVisible(bool(self.observations))
+        observed = self.observations.index(self._observed) if self._observed else -1
+        self._observation.offer(self.observations, observed)
+        self._consequence.setText(self.consequence())
+        self._import.setEnabled(self.incoming is not None)

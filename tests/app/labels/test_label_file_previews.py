@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from sd2app.labels.export_dialog import LabelExportDialog
-from sd2app.labels.import_dialog import LabelFile, is_label_file
+from sd2app.labels.import_dialog import LabelImportDialog, is_label_file
 from sd2app.widgets.inputs import Choice
 from sd2core.labels.formats import read_labels, write_labels
 from sd2core.labels.spans import Labels, LabelTrack, Span
@@ -27,15 +27,16 @@ def of(*spans: tuple[float, float, str]) -> Labels:
 def importing(qtbot):
     models = []
 
-    def read(path: Path, here: Labels = HERE) -> LabelFile:
-        model = LabelFile(path, here, FRAMES)
+    def read(path: Path, here: Labels = HERE) -> LabelImportDialog:
+        model = LabelImportDialog(path, here, FRAMES)
+        qtbot.addWidget(model)
         models.append(model)
         qtbot.waitUntil(lambda: bool(model.incoming or model.problem), timeout=10_000)
         return model
 
     yield read
     for model in models:
-        model.close()
+        model.finish()
 
 
 def test_the_preview_says_what_becomes_of_everything(importing, tmp_path) -> None:
@@ -53,7 +54,7 @@ def test_the_preview_says_what_becomes_of_everything(importing, tmp_path) -> Non
     }
     assert model.way == "add"
     assert "Nothing that is there changes" in model.consequence()
-    model.set_way("replace")
+    model._way.setCurrentIndex(model._way.findData("replace"))
     assert model.consequence().startswith("The 1 span of this recording go")
 
 
@@ -66,7 +67,7 @@ def test_a_bad_file_is_refused_in_the_cores_words(importing, tmp_path) -> None:
     assert "Expected" in model.problem
     # It is a table after all.
     path.write_text("start_s,end_s,label\n1,2,wave\n")
-    model.read_as("csv")
+    model._format.setCurrentIndex(model._format.findData("csv"))
     assert model.problem == ""
 
 
@@ -90,7 +91,7 @@ def test_of_several_videos_in_a_file_one_is_chosen(importing, tmp_path, qtbot) -
     model = importing(path)
     assert model.observations == (name, "later")
     assert model.incoming.labels.spans[0].start_s == 1.0
-    model.set_observation("later")
+    model._observation.setCurrentText("later")
     qtbot.waitUntil(lambda: model.incoming is not None, timeout=10_000)
     assert model.incoming.labels.spans[0].start_s == 2.0
 
