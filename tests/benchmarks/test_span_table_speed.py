@@ -9,13 +9,12 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from label_edits import label_edits
 from labelled import even, many_spans
 from PySide6.QtCore import QItemSelectionModel, Qt
 from PySide6.QtWidgets import QTableView
 
-from sd2app.labels.model import LabelsModel
 from sd2app.labels.table_model import COLUMNS, SpanFilter, SpanTableModel
-from sd2app.session.playback import PlaybackModel
 from sd2core.labels.edits import delete, resize
 from sd2core.labels.spans import Labels
 
@@ -27,9 +26,8 @@ LABEL = next(place for place, column in enumerate(COLUMNS) if column.id == "labe
 @pytest.fixture
 def shown(qtbot):
     """The view on the model, as it is in the panel."""
-    labels, playback = LabelsModel(), PlaybackModel()
-    playback.set_timebase(FRAMES)
-    model = SpanTableModel(labels, playback, lambda _: True)
+    edits = label_edits(FRAMES)
+    labels, model = edits.labels, SpanTableModel(edits)
     view = QTableView()
     qtbot.addWidget(view)
     view.setModel(model)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -11,7 +10,7 @@ from PySide6.QtCore import QObject, Qt
 from PySide6.QtGui import QIcon
 
 from sd2app.feature import Keys
-from sd2app.labels.model import LabelsModel
+from sd2app.labels.edits import LabelEdits
 from sd2app.widgets.icons import swatch_icon
 from sd2app.widgets.key_text import canonical, native
 from sd2app.widgets.record_table import Heading, Index, RecordTableModel
@@ -48,20 +47,14 @@ _COLOURS = {colour: name for name, colour in OFFERED}
 class LabelSetModel(RecordTableModel[Label]):
     """A row per label. Every change is one step; an invalid one is refused with a reason."""
 
-    def __init__(
-        self,
-        labels: LabelsModel,
-        keys: Keys,
-        apply: Callable[[Change], bool],
-        parent: QObject | None = None,
-    ) -> None:
+    def __init__(self, edits: LabelEdits, keys: Keys, parent: QObject | None = None) -> None:
         super().__init__(HEADINGS, parent)
-        self._labels, self._keys, self._apply = labels, keys, apply
-        self.label_set = labels.labels.label_set  # in its order
+        self._labels, self._apply, self._keys = edits.labels, edits.apply, keys
+        self.label_set = self._labels.labels.label_set  # in its order
         self._rows = self.label_set.labels
         self._counts: Counter[str] = Counter()
         self._alike: list[Alike] = []
-        labels.changed.connect(self._follow)
+        self._labels.changed.connect(self._follow)
 
     # --- what is there --------------------------------------------------------------------
 

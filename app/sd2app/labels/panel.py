@@ -91,11 +91,11 @@ class LabelsPanel(QWidget):
         super().__init__()
         self.setObjectName("page")
         labels = edits.labels
-        self.model = model = SpanTableModel(labels, edits.playback, edits.apply, self)
+        self.model = model = SpanTableModel(edits, self)
         model.noted.connect(shell.note)
         table = SpanTable(model, edits, session, shell, self)
         self.spans = SpanPage(model, labels, table, self)
-        set_model = LabelSetModel(labels, shell.keys, edits.apply, self)
+        set_model = LabelSetModel(edits, shell.keys, self)
         self._label_set = LabelSetPage(set_model, shell, self)
         self._count = ElidedLabel(self)
         self._count.setObjectName("muted")

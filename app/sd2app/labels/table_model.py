@@ -9,13 +9,12 @@ from typing import Any, Literal
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtGui import QIcon
 
-from sd2app.labels.model import LabelsModel
-from sd2app.session.playback import PlaybackModel
+from sd2app.labels.edits import LabelEdits
 from sd2app.widgets.icons import swatch_icon
 from sd2app.widgets.record_table import NO_PARENT, Heading, Index, RecordTableModel
 from sd2core.errors import Sd2Error
-from sd2core.labels import edits, field_edits
-from sd2core.labels.edits import Change, Edit, Side
+from sd2core.labels import field_edits
+from sd2core.labels.edits import Change, Edit, Side, resize
 from sd2core.labels.spans import Labels, Span
 from sd2core.labels.typed_times import typed_duration_end, typed_end, typed_start
 from sd2core.timebase import Timebase
@@ -39,7 +38,7 @@ class Edge:
     def typed(self, text: str, spans: Sequence[Span]) -> Change:
         """Make the edit that moves the edge."""
         span_id = spans[0].id
-        return lambda labels, base: edits.resize(
+        return lambda labels, base: resize(
             labels, base, span_id, self.side, self.when(text, labels.span(span_id), base)
         )
 
@@ -179,23 +178,17 @@ class SpanTableModel(RecordTableModel[Span]):
 
     noted = Signal(str)  # a typed time could not be reached
 
-    def __init__(
-        self,
-        labels: LabelsModel,
-        playback: PlaybackModel,
-        apply: Callable[[Change], bool],
-        parent: QObject | None = None,
-    ) -> None:
+    def __init__(self, edits: LabelEdits, parent: QObject | None = None) -> None:
         headings = [
             Heading(one.heading, one.tip, one.number, one.typed is not None) for one in COLUMNS
         ]
         super().__init__(headings, parent)
-        self._labels, self._playback, self._apply = labels, playback, apply
+        self._labels, self._playback, self._edits = edits.labels, edits.playback, edits
         self._row_of: dict[int, int] | None = None
         self._filter = SpanFilter()
         self._by, self._falling = COLUMNS[0], False
         self._following = False
-        labels.changed.connect(self._follow)
+        self._labels.changed.connect(self._follow)
 
     # --- what is shown --------------------------------------------------------------------
 
@@ -329,7 +322,7 @@ class SpanTableModel(RecordTableModel[Span]):
         spans = [span]
         if column.listed is not None and self._labels.is_selected(span.id):
             spans += [one for one in self._labels.selected if one.id != span.id]
-        done = self._apply(column.typed(text, spans))
+        done = self._edits.apply(column.typed(text, spans))
         if done and column.edge is not None:
             self._say_where(span, column.edge, text)
         return done

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
+from label_edits import label_edits
 from PySide6.QtTest import QAbstractItemModelTester
 
 from sd2app.labels.label_set_model import (
@@ -15,11 +16,8 @@ from sd2app.labels.label_set_model import (
     SPANS,
     LabelSetModel,
 )
-from sd2app.labels.model import LabelsModel
 from sd2app.settings import Settings
 from sd2app.shell.keys.bindings import KeyBindings
-from sd2core.errors import Sd2Error
-from sd2core.labels.edits import Change
 from sd2core.labels.label_set import GESTURES
 from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.timebase import Timebase
@@ -33,9 +31,11 @@ class Edited:
     """A label set with two spans of "up-to-down"."""
 
     def __init__(self) -> None:
-        self.labels, self.refused = LabelsModel(), []
+        edits = label_edits(Timebase.regular(100, 10.0))
+        self.labels, self.refused = edits.labels, []
+        edits.failed.connect(self.refused.append)
         keys = KeyBindings([Named()], self.labels, Settings.forgetful())
-        self.model = LabelSetModel(self.labels, keys, self.apply)
+        self.model = LabelSetModel(edits, keys)
         self.labels.open(
             Labels(
                 (LabelTrack("Gestures"),),
@@ -46,15 +46,6 @@ class Edited:
             )
         )
         self.model.set_watched(True)
-
-    def apply(self, change: Change) -> bool:
-        try:
-            done = change(self.labels.labels, Timebase.regular(100, 10.0))
-        except Sd2Error as error:
-            self.refused.append(str(error))
-            return False
-        self.labels.set_labels(done.labels)
-        return True
 
     def cell(self, row: int, column: int) -> str:
         return self.model.data(self.model.index(row, column))

@@ -5,15 +5,12 @@ from __future__ import annotations
 import random
 
 import pytest
+from label_edits import label_edits
 from labelled import even, imported, many_spans, random_edit
 from PySide6.QtCore import QItemSelectionModel, QPersistentModelIndex, Qt
 from PySide6.QtTest import QAbstractItemModelTester
 
-from sd2app.labels.model import LabelsModel
 from sd2app.labels.table_model import COLUMNS, SpanFilter, SpanTableModel
-from sd2app.session.playback import PlaybackModel
-from sd2core.errors import Sd2Error
-from sd2core.labels.edits import Change
 from sd2core.labels.spans import Labels, LabelTrack, Span
 
 AT = {column.id: place for place, column in enumerate(COLUMNS)}
@@ -24,23 +21,14 @@ class Table:
     """A table on labels, with what was said about edits."""
 
     def __init__(self) -> None:
-        self.labels, self.playback = LabelsModel(), PlaybackModel()
-        self.playback.set_timebase(even(300))
-        self.model = SpanTableModel(self.labels, self.playback, self.apply)
+        self.edits = label_edits(even(300))
+        self.labels, self.playback = self.edits.labels, self.edits.playback
+        self.model = SpanTableModel(self.edits)
         self.model.set_watched(True)
         self.refused: list[str] = []
         self.noted: list[str] = []
+        self.edits.failed.connect(self.refused.append)
         self.model.noted.connect(self.noted.append)
-
-    def apply(self, change: Change) -> bool:
-        try:
-            done = change(self.labels.labels, self.playback.timebase)
-        except Sd2Error as error:
-            self.refused.append(str(error))
-            return False
-        self.labels.set_labels(done.labels)
-        self.labels.select(done.ids)
-        return True
 
     def column(self, name: str) -> list[str]:
         return [self.cell(row, name) for row in range(self.model.rowCount())]

@@ -6,12 +6,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from label_edits import label_edits
 
 from sd2app.labels.dragging import LabelDragging
-from sd2app.labels.edits import LabelEdits
-from sd2app.labels.model import LabelsModel
 from sd2app.session.maps import MapModel
-from sd2app.session.playback import PlaybackModel
 from sd2app.suggestions.finders import Found, MotionFinder, Threshold
 from sd2app.suggestions.model import SuggestionsModel
 from sd2core.labels.spans import Labels, LabelTrack, Span
@@ -53,17 +51,11 @@ class KnownSpans:
 
 @pytest.fixture
 def set_up(qtbot):
-    from PySide6.QtGui import QUndoStack
-
-    recording = SimpleNamespace(labels=None)
-    document = SimpleNamespace(recording=recording, undo_stack=QUndoStack())
-    session = SimpleNamespace(refusal="", keep=lambda *_: None)
-    labels, playback = LabelsModel(), PlaybackModel()
-    playback.set_timebase(Timebase.regular(600, RATE))
+    edits = label_edits(Timebase.regular(600, RATE))
+    labels, playback = edits.labels, edits.playback
     labels.open(Labels((LabelTrack("Gestures"),), (Span(1, "Gestures", 20.0, 21.0, "up-to-down"),)))
     real = MapModel("Real")
     real.set_map(moving((100, 130, 100.0), (200, 230, 20.0), (300, 330, 100.0), (400, 420, 100.0)))
-    edits = LabelEdits(document, labels, playback, session)
     finders = MotionFinder((MapModel("Synthetic"), real)), KnownSpans(real)
     model = SuggestionsModel(edits, finders)
 
@@ -73,7 +65,7 @@ def set_up(qtbot):
 
     yield SimpleNamespace(
         model=model, labels=labels, playback=playback, real=real, edits=edits,
-        stack=document.undo_stack, look=look,
+        stack=edits.undo_stack, look=look,
     )  # fmt: skip
     model.close()
 
