@@ -13,7 +13,6 @@ from PySide6.QtWidgets import (
     QLabel,
     QPlainTextEdit,
     QProgressBar,
-    QTableView,
     QTextBrowser,
     QWidget,
 )
@@ -24,7 +23,7 @@ from sd2app.batch.text import failure_text, headline, step_facts, time_text
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.pages import InnerPage, InnerPages
 from sd2app.widgets.panel import ElidedLabel, outlined, sentence, side_by_side
-from sd2app.widgets.table import ROW_PX
+from sd2app.widgets.table import RecordTable
 
 _MOST_STEPS = 6
 _NO_DATASET = "No data set has been exported here yet."
@@ -163,19 +162,13 @@ class BatchRunView(QWidget):
             self._asks.open_result(0)
 
 
-def _result_table(open_row: Callable[[], None]) -> QTableView:
+def _result_table(open_row: Callable[[], None]) -> RecordTable:
     """Table of results, where Return or a double click opens a row."""
-    table = QTableView()
-    table.setAccessibleName("Results")
+    table = RecordTable("Results")
     table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
     table.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
-    table.setShowGrid(False)
     table.setWordWrap(False)
-    table.verticalHeader().hide()
-    table.verticalHeader().setDefaultSectionSize(ROW_PX)
     header = table.horizontalHeader()
-    header.setHighlightSections(False)
-    header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
     header.setStretchLastSection(True)
     header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
     header.setResizeContentsPrecision(50)

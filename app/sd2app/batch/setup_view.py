@@ -165,9 +165,9 @@ class BatchSetupView(QWidget):
                     allowed = percent(setup.tolerance)
                     choice.setItemText(1, _ACCURACY_TEXT["tolerance"].format(percent=allowed))
                 choice.setCurrentIndex(list(values).index(setup.value(name)))
-        _fill(self._placements, self._asks.placement_choices(), self._asks.placement_index())
+        self._placements.offer(self._asks.placement_choices(), self._asks.placement_index())
         names = list(dict.fromkeys([*self._asks.model_names(), setup.value("model")]))
-        _fill(self._model, names, names.index(setup.value("model")))
+        self._model.offer(names, names.index(setup.value("model")))
         for step, box in self._steps.items():
             with QSignalBlocker(box):
                 box.setChecked(setup.value(step))
@@ -240,11 +240,3 @@ class _Paths(QListWidget):
             self._drop()
         else:
             super().keyPressEvent(event)
-
-
-def _fill(choice: Choice, texts: Sequence[str], index: int) -> None:
-    with QSignalBlocker(choice):
-        if list(texts) != [choice.itemText(number) for number in range(choice.count())]:
-            choice.clear()
-            choice.addItems(list(texts))
-        choice.setCurrentIndex(index)
