@@ -9,7 +9,6 @@ from PySide6.QtCore import QSignalBlocker, Qt
 from PySide6.QtWidgets import (
     QCheckBox,
     QDialog,
-    QDialogButtonBox,
     QFileDialog,
     QFormLayout,
     QLabel,
@@ -21,6 +20,7 @@ from PySide6.QtWidgets import (
 from sd2app.fit.person_picker import PersonPicker
 from sd2app.fit.setup import ANGLES_DEG, DEFAULT_STATURE_M, STATURES_M, FitSetupModel
 from sd2app.palette import Palette
+from sd2app.widgets.dialogs import accepting
 from sd2app.widgets.inputs import Choice, NumberBox
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import ElidedLabel, outlined, say, sentence, side_by_side
@@ -45,11 +45,7 @@ class NewFromVideoDialog(QDialog):
         self.setWindowTitle("New from video")
         self._build_picture(palette)
         self._build_form()
-        self._buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel, self)
-        self._begin = self._buttons.addButton("Fit", QDialogButtonBox.ButtonRole.AcceptRole)
-        self._begin.setDefault(True)
-        self._buttons.accepted.connect(self.accept)
-        self._buttons.rejected.connect(self.reject)
+        self._buttons, self._begin = accepting(self, "Fit")
         self._lay_out()
         setup.changed.connect(self._refresh)
         self._refresh()

@@ -10,7 +10,6 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import (
     QCheckBox,
     QDialog,
-    QDialogButtonBox,
     QFileDialog,
     QFormLayout,
     QMessageBox,
@@ -22,6 +21,7 @@ from sd2app.feature import Shell
 from sd2app.labels.model import LabelsModel
 from sd2app.session.session import Session
 from sd2app.session.tasks import ListedRunner
+from sd2app.widgets.dialogs import accepting
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import sentence
@@ -215,11 +215,7 @@ class CutOutDialog(QDialog):
             box.setChecked(has)
             box.toggled.connect(self._refresh)
         self._size = sentence("")
-        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel, self)
-        self._go = buttons.addButton("Choose folder…", QDialogButtonBox.ButtonRole.AcceptRole)
-        self._go.setDefault(True)
-        buttons.accepted.connect(self.accept)
-        buttons.rejected.connect(self.reject)
+        buttons, self._go = accepting(self, "Choose folder…")
         form = QFormLayout()
         form.setHorizontalSpacing(16)
         form.setVerticalSpacing(8)

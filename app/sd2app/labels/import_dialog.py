@@ -8,7 +8,6 @@ from pathlib import Path
 
 from PySide6.QtWidgets import (
     QDialog,
-    QDialogButtonBox,
     QFileDialog,
     QFormLayout,
     QLabel,
@@ -18,7 +17,7 @@ from PySide6.QtWidgets import (
 from sd2app.background.latest import Emit, LatestRunner
 from sd2app.feature import Shell
 from sd2app.labels.edits import LabelEdits
-from sd2app.widgets.dialogs import LABEL_FILES, LABEL_SUFFIXES
+from sd2app.widgets.dialogs import LABEL_FILES, LABEL_SUFFIXES, accepting
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.layouts import column_of
 from sd2app.widgets.panel import FactRows, rule, say, sentence, title
@@ -104,11 +103,7 @@ class LabelImportDialog(QDialog):
         self._way.addItem("instead of all labels of this recording", "replace")
         self._way.setCurrentIndex(0 if labels.spans else 1)
         self._way.currentIndexChanged.connect(self._refresh)
-        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel, self)
-        self._import = buttons.addButton("Import", QDialogButtonBox.ButtonRole.AcceptRole)
-        self._import.setDefault(True)
-        buttons.accepted.connect(self.accept)
-        buttons.rejected.connect(self.reject)
+        buttons, self._import = accepting(self, "Import")
         form, take = QFormLayout(), QFormLayout()
         for rows in (form, take):
             rows.setHorizontalSpacing(12)

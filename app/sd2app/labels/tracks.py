@@ -8,7 +8,6 @@ from PySide6.QtGui import QAction, QActionGroup
 from PySide6.QtWidgets import (
     QCheckBox,
     QDialog,
-    QDialogButtonBox,
     QFormLayout,
     QInputDialog,
     QLineEdit,
@@ -19,6 +18,7 @@ from PySide6.QtWidgets import (
 from sd2app.feature import Shell
 from sd2app.labels.edits import LabelEdits
 from sd2app.labels.model import LabelsModel
+from sd2app.widgets.dialogs import accepting
 from sd2app.widgets.text import counted
 from sd2core.labels import field_edits
 from sd2core.labels.spans import LabelTrack, Overlap
@@ -118,13 +118,7 @@ class TrackDialog(QDialog):
         self._name.setAccessibleName("Name of the track")
         self._name.selectAll()
         self._free = QCheckBox("Spans may overlap, e.g. of two hands", self)
-        buttons = QDialogButtonBox(
-            QDialogButtonBox.StandardButton.Ok | QDialogButtonBox.StandardButton.Cancel, self
-        )
-        buttons.accepted.connect(self.accept)
-        buttons.rejected.connect(self.reject)
-        accept = buttons.button(QDialogButtonBox.StandardButton.Ok)
-        accept.setText("Add track")
+        buttons, accept = accepting(self, "Add track")
         self._name.textChanged.connect(lambda text: accept.setEnabled(bool(text.strip())))
         layout = QFormLayout(self)
         layout.addRow("Name", self._name)

@@ -5,7 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtWidgets import QDialog, QDialogButtonBox, QFileDialog, QMessageBox, QWidget
+from PySide6.QtWidgets import (
+    QDialog,
+    QDialogButtonBox,
+    QFileDialog,
+    QMessageBox,
+    QPushButton,
+    QWidget,
+)
 
 from sd2core.files.figure_files import SUFFIXES
 from sd2core.labels.formats import FORMATS
@@ -21,6 +28,16 @@ def may_delete(parent: QWidget, title: str, what: str) -> bool:
     either = buttons.Discard | buttons.Cancel
     answer = QMessageBox.question(parent, title, what, either, buttons.Cancel)
     return bool(answer == buttons.Discard)
+
+
+def accepting(dialog: QDialog, text: str) -> tuple[QDialogButtonBox, QPushButton]:
+    """Buttons Cancel and one that accepts the dialog; the latter again, to be enabled."""
+    buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel, dialog)
+    accept = buttons.addButton(text, QDialogButtonBox.ButtonRole.AcceptRole)
+    accept.setDefault(True)
+    buttons.accepted.connect(dialog.accept)
+    buttons.rejected.connect(dialog.reject)
+    return buttons, accept
 
 
 class ExportButtons(QDialogButtonBox):
