@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from PySide6.QtCore import QMimeData, QObject
+from PySide6.QtCore import QObject
 from PySide6.QtGui import QGuiApplication, QIcon
 from PySide6.QtWidgets import QAbstractItemView, QWidget
 
@@ -93,8 +93,8 @@ class StatisticsPage(QWidget):
 
     def _copy(self, separator: str) -> None:
         text = self._model.text(separator)
-        copied = QMimeData()
-        copied.setText(text)
+        clipboard = QGuiApplication.clipboard()
+        clipboard.setText(text)
         if separator == ",":
-            copied.setData("text/csv", text.encode())
-        QGuiApplication.clipboard().setMimeData(copied)
+            # The clipboard's own: data made here would be deleted after Python, with a crash.
+            clipboard.mimeData().setData("text/csv", text.encode())
