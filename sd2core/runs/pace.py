@@ -15,8 +15,8 @@ from sd2core.files.atomic import atomic_write_text
 Kind = tuple[str | int | None, ...]
 """What is done, with all that the time of an item depends on: ``("fit", "medium")``."""
 
-_SHORTEST_S = 3.0
-"""Shorter work is mostly overhead; its pace is not kept."""
+_SHORT_S = 3.0
+"""Shorter work is mostly overhead, and does not replace what longer work has measured."""
 
 _MOST_KINDS = 200
 
@@ -52,16 +52,17 @@ class Pace:
 
 def known_pace_s(kind: Kind) -> float | None:
     """Seconds per item of the last run of this kind on this machine; None if there was none."""
-    return _known().get(_name(kind))
+    return _known().get(_name(kind), (None, 0.0))[0]
 
 
 def keep_pace(kind: Kind, seconds: float, items: float) -> None:
     """Keep what a run has measured, where the user's cache can be written."""
-    if seconds < _SHORTEST_S or items <= 0:
+    if seconds <= 0 or items <= 0:
         return
     name, known = _name(kind), _known()
-    known.pop(name, None)
-    known[name] = float(f"{seconds / items:.4g}")
+    before = known.pop(name, (0.0, 0.0))
+    now = float(f"{seconds / items:.4g}"), round(seconds, 3)
+    known[name] = before if seconds < min(before[1], _SHORT_S) else now
     path, newest = _path(), list(known.items())[-_MOST_KINDS:]
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -74,10 +75,11 @@ def _name(kind: Kind) -> str:
     return " ".join(map(str, kind))
 
 
-def _known() -> dict[str, float]:
+def _known() -> dict[str, tuple[float, float]]:
+    """Seconds per item, and those of the whole work, by kind."""
     try:
         content = json.loads(_path().read_text(encoding="utf-8"))
-        return {str(name): float(each_s) for name, each_s in content.items()}
+        return {name: (float(each_s), float(all_s)) for name, (each_s, all_s) in content.items()}
     except (OSError, ValueError, TypeError, AttributeError):  # none yet, or damaged
         return {}
 

@@ -13,7 +13,6 @@ from swinging_recordings import recording
 
 from sd2core.datasets.reading import open_dataset
 from sd2core.placements.placements import PlacementGrid, write_placements
-from sd2core.runs import pace
 
 SMALL = ("--kinds", "synthetic,simulated", "--length", 30, "--overlap", 5)
 
@@ -79,7 +78,7 @@ def test_a_dry_run_says_what_would_be_written_and_writes_nothing(
 
 
 def test_a_radar_is_simulated_at_every_place_and_its_cost_said_before(
-    sd2: Sd2, people: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    sd2: Sd2, people: Path, tmp_path: Path
 ) -> None:
     grid = tmp_path / "grid.json"
     write_placements(grid, PlacementGrid((1.5, 2.5)))
@@ -90,7 +89,6 @@ def test_a_radar_is_simulated_at_every_place_and_its_cost_said_before(
     assert said["segments_of_kind"] == {"synthetic": 45, "simulated": 45}
     words = sd2("export", people, "--out", tmp_path / "s.zarr", *more, "--dry-run").out
     assert "not known before the first source is written" in words
-    monkeypatch.setattr(pace, "_SHORTEST_S", 0.0)
     assert sd2("export", people, "--out", tmp_path / "s.zarr", *more).code == 0
     # It was measured, for all that is simulated; without, it is another matter.
     told = sd2("export", people, "--out", tmp_path / "s.zarr", *more, "--dry-run", "--json")

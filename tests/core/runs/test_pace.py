@@ -28,10 +28,13 @@ def test_the_first_item_warms_up() -> None:
 
 def test_paces_are_kept_by_kind() -> None:
     assert known_pace_s(KIND) is None
-    keep_pace(KIND, 1.0, 100)  # mostly overhead
     keep_pace(KIND, 50.0, 0)
+    keep_pace(KIND, 0.0, 50)
     assert known_pace_s(KIND) is None
+    keep_pace(KIND, 1.0, 2)
+    assert known_pace_s(KIND) == 0.5
     keep_pace(KIND, 20.0, 200)
+    keep_pace(KIND, 1.0, 2)  # mostly overhead
     keep_pace(("fit", "high"), 50.0, 100)
     assert (known_pace_s(KIND), known_pace_s(("fit", "high"))) == (0.1, 0.5)
     keep_pace(KIND, 40.0, 200)
@@ -45,7 +48,7 @@ def test_the_kinds_of_long_ago_are_forgotten(monkeypatch: pytest.MonkeyPatch) ->
     assert [known_pace_s(("kind", number)) for number in (1, 2, 3)] == [1.0, None, 1.0]
 
 
-@pytest.mark.parametrize("damaged", ["", "[1]", '{"fit medium": "fast"}'])
+@pytest.mark.parametrize("damaged", ["", "[1]", '{"fit medium": "fast"}', '{"fit medium": 0.1}'])
 def test_a_damaged_file_is_an_empty_one(damaged: str) -> None:
     keep_pace(KIND, 20.0, 200)
     module._path().write_text(damaged)

@@ -93,10 +93,7 @@ def at(step: int, action: Callable[[], None]) -> Callable[[Event], None]:
 
 
 class TestLearning:
-    def test_it_beats_what_it_is_given(
-        self, pairs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        monkeypatch.setattr(pace, "_SHORTEST_S", 0.0)
+    def test_it_beats_what_it_is_given(self, pairs: Path, tmp_path: Path) -> None:
         config = settings(pairs, epochs=30, learning_rate=0.03)
         ending = begin(config, tmp_path / "run", command="sd2 train")
         epochs = curve(tmp_path / "run")
