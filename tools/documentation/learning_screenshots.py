@@ -119,7 +119,7 @@ def batch(application: QApplication, sample: Path) -> None:
     window.features.batch.show()
     wait_for(application, lambda: not model.why_not_start)
     model.start()
-    wait_for(application, lambda: model.batch is not None and model.batch.phase == "finished")
+    wait_for(application, lambda: model.run is not None and model.run.phase == "finished")
     wait_for(application, lambda: model.results.rowCount() > 0)
     wait_until_settled(application, window, LIMIT_S)
     save(window.findChild(BatchWindow), "batch.png")
