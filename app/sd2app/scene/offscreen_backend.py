@@ -8,6 +8,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 
 import numpy as np
 import vtkmodules.vtkRenderingOpenGL2 as opengl
@@ -142,21 +143,26 @@ def _off_screen_window() -> vtkRenderWindow:
     Raises NoOpenGL if no driver answers: rendering would end the program.
     """
     uses_egl = sys.platform.startswith("linux") and hasattr(opengl, "vtkEGLRenderWindow")
+    # Left to itself VTK tries the X server first and complains when there is none.
+    kind = opengl.vtkEGLRenderWindow if uses_egl else vtkRenderWindow
     with _quiet_vtk():
-        # Left to itself VTK tries the X server first and complains when there is none.
-        window = opengl.vtkEGLRenderWindow() if uses_egl else vtkRenderWindow()
-        window.SetOffScreenRendering(True)
-        window.SetMultiSamples(0)
-        window.SetSize(64, 48)
-        if _answers(window):
-            return window
-        del window  # here, where it complains unheard
-    raise NoOpenGL(GL_BROKEN)
+        if not _answers(kind):
+            raise NoOpenGL(GL_BROKEN)
+        return _small(kind)
 
 
-def _answers(window: vtkRenderWindow) -> bool:
-    """True if OpenGL works."""
-    return bool(window.SupportsOpenGL())
+def _small(kind: type[vtkRenderWindow]) -> vtkRenderWindow:
+    window = kind()
+    window.SetOffScreenRendering(True)
+    window.SetMultiSamples(0)
+    window.SetSize(64, 48)
+    return window
+
+
+@cache
+def _answers(kind: type[vtkRenderWindow]) -> bool:
+    """True if OpenGL works; asked once, because each answer costs a render window."""
+    return bool(_small(kind).SupportsOpenGL())
 
 
 @contextmanager

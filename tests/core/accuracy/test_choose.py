@@ -10,7 +10,7 @@ import pytest
 import trimesh
 from accuracy_scenes import ball, moving, plate, steady, swinging, together
 
-from sd2core.accuracy.choosing import choose, survey_scene
+from sd2core.accuracy.choosing import Survey, choose, survey_scene
 from sd2core.accuracy.plans import FRAME_RATE_FACTORS
 from sd2core.accuracy.results import relative_l1
 from sd2core.accuracy.sample import take_sample
@@ -31,12 +31,17 @@ def scene() -> MeshSequence:
     return together(ball(swinging((0, 0, 3), 1.5, 0.8)), plate((0.25, 0, 1), 0.5, 0.5))
 
 
+@pytest.fixture(scope="module")
+def survey(scene: MeshSequence) -> Survey:
+    return survey_scene(scene, CAMERA, PAPER)
+
+
 @pytest.mark.parametrize("tolerance", [0.3, 0.05, 0.01])
 def test_the_plan_holds_its_tolerance_on_the_whole_clip(
-    scene: MeshSequence, tolerance: float
+    scene: MeshSequence, survey: Survey, tolerance: float
 ) -> None:
     """Not only on the frames that were looked at: those stand for the others."""
-    choice = choose(scene, CAMERA, tolerance=tolerance)
+    choice = choose(scene, CAMERA, tolerance=tolerance, survey=survey)
     assert choice.holds
     found = synthesizer_for(choice.plan, scene, PAPER).map(CAMERA).values
     best = replace(PAPER, oversampling=8, beyond="wrap")
@@ -44,8 +49,7 @@ def test_the_plan_holds_its_tolerance_on_the_whole_clip(
     assert relative_l1(found.astype(float), truth.astype(float)) <= 1.25 * tolerance
 
 
-def test_less_accuracy_never_costs_more(scene: MeshSequence) -> None:
-    survey = survey_scene(scene, CAMERA, PAPER)
+def test_less_accuracy_never_costs_more(scene: MeshSequence, survey: Survey) -> None:
     costs = [
         choose(scene, CAMERA, tolerance=tolerance, survey=survey).cost_ms
         for tolerance in (0.5, 0.1, 0.02)
@@ -53,8 +57,7 @@ def test_less_accuracy_never_costs_more(scene: MeshSequence) -> None:
     assert costs == sorted(costs)
 
 
-def test_a_larger_budget_never_costs_accuracy(scene: MeshSequence) -> None:
-    survey = survey_scene(scene, CAMERA, PAPER)
+def test_a_larger_budget_never_costs_accuracy(scene: MeshSequence, survey: Survey) -> None:
     changes = [
         survey.forecast_error(choose(scene, CAMERA, budget_ms=budget, survey=survey).plan)
         for budget in (0.01, 0.1, 1.0, 100.0)
@@ -62,13 +65,15 @@ def test_a_larger_budget_never_costs_accuracy(scene: MeshSequence) -> None:
     assert changes == sorted(changes, reverse=True)
 
 
-def test_what_cannot_be_had_is_refused_with_the_best_there_is(scene: MeshSequence) -> None:
-    choice = choose(scene, CAMERA, tolerance=1e-9)
+def test_what_cannot_be_had_is_refused_with_the_best_there_is(
+    scene: MeshSequence, survey: Survey
+) -> None:
+    choice = choose(scene, CAMERA, tolerance=1e-9, survey=survey)
     assert not choice.holds
     assert choice.plan.visibility == "exact"
     assert choice.plan.vertices_kept == 1
     assert choice.summary.startswith("No plan holds 1e-07 %; the best is counted")
-    soon = choose(scene, CAMERA, budget_ms=1e-9)
+    soon = choose(scene, CAMERA, budget_ms=1e-9, survey=survey)
     assert not soon.holds
     assert "No plan keeps within 1e-09 ms" in soon.summary
 
@@ -143,10 +148,12 @@ def test_a_missing_number_is_named_by_its_frame_in_the_clip() -> None:
         choose(broken, CAMERA, tolerance=0.1)
 
 
-def test_a_survey_that_builds_on_another_finds_the_same(scene: MeshSequence) -> None:
+def test_a_survey_that_builds_on_another_finds_the_same(
+    scene: MeshSequence, survey: Survey
+) -> None:
     aside = VirtualSensor(position_m=(0.4, 0.0, 0.0))
     anew = survey_scene(scene, aside, PAPER)
-    built_on = survey_scene(scene, aside, PAPER, like=survey_scene(scene, CAMERA, PAPER))
+    built_on = survey_scene(scene, aside, PAPER, like=survey)
     assert built_on.change == anew.change
     assert built_on.facts == anew.facts
 

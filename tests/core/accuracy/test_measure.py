@@ -27,7 +27,7 @@ def scene() -> MeshSequence:
 
 @pytest.fixture(scope="module")
 def table(scene: MeshSequence) -> Measurement:
-    return measure(scene, CAMERA, repeats=2)
+    return measure(scene, CAMERA, repeats=1)
 
 
 def error(table: Measurement, plan: AccuracyPlan) -> float:

@@ -67,36 +67,47 @@ def certain(
         end of the ray, or it is seen edge-on within ``barycentric``.
     """
     place = vertices.astype(np.float64)
+    extended = np.linalg.norm(_normals(place[faces].transpose(1, 2, 0)), axis=0) > 0
+    faces = faces[extended]
+    corners = np.ascontiguousarray(place[faces].transpose(1, 2, 0))  # (corner, axis, F)
+    normals = _normals(corners)
+    areas = np.linalg.norm(normals, axis=0)
+    sizes = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1).max(axis=0)
     hidden, visible = np.zeros(len(which), bool), np.zeros(len(which), bool)
     for at, vertex in enumerate(which):
-        others = faces[(faces != vertex).all(axis=1)]
-        a, b, c = (place[others[:, corner]] - place[vertex] for corner in range(3))
         ray = sensor - place[vertex]
         length = np.linalg.norm(ray)
         if length <= 2 * distance_m:
             continue
         direction = ray / length
-        volumes = np.stack(
-            [np.cross(p, q) @ direction for p, q in ((b, c), (c, a), (a, b))], axis=1
-        )
-        total = volumes.sum(axis=1)
-        normal = np.cross(b - a, c - a)
-        area = np.linalg.norm(normal, axis=1)
-        edge_on = np.abs(total) <= barycentric * area
+        a, b, c = corners - place[vertex][:, None]
+        # p x q . d is p . (q x d), and q x d a product with one matrix.
+        turn = np.cross(np.eye(3), direction).T
+        turned_a, turned_b, turned_c = turn @ a, turn @ b, turn @ c
+        volumes = np.stack([(b * turned_c).sum(0), (c * turned_a).sum(0), (a * turned_b).sum(0)])
+        total = volumes.sum(axis=0)
+        others = (vertex != faces.T).all(axis=0)
+        edge_on = np.abs(total) <= barycentric * areas
         safe = np.where(total == 0, 1.0, total)
-        inside = (volumes / safe[:, None]).min(axis=1)
-        along = (normal * a).sum(axis=1) / safe
+        inside = (volumes / safe).min(axis=0)
+        along = (normals * a).sum(axis=0) / safe
         within = np.minimum(along, length - along)
         clear = ~edge_on & (inside > barycentric) & (within > distance_m)
-        possible = (inside > -barycentric) & (within > -distance_m) & (area > 0)
+        possible = (inside > -barycentric) & (within > -distance_m)
         # Edge-on, the ray meets the triangle's plane anywhere: only its extent is certain.
-        nearest = np.minimum(np.minimum((a @ direction), (b @ direction)), c @ direction)
-        aside = np.linalg.norm(np.cross(np.stack([a, b, c]), direction), axis=2).min(axis=0)
-        size = np.linalg.norm(np.stack([b - a, c - b, a - c]), axis=2).max(axis=0)
-        possible |= edge_on & (area > 0) & (aside <= size) & (nearest < length)
-        hidden[at] = clear.any()
-        visible[at] = not possible.any()
+        flat = np.flatnonzero(edge_on)
+        near = np.stack([a, b, c])[:, :, flat]
+        aside = np.linalg.norm(turn @ near, axis=1).min(axis=0)
+        nearest = (direction @ near).min(axis=0)
+        possible[flat] |= (aside <= sizes[flat]) & (nearest < length)
+        hidden[at] = (clear & others).any()
+        visible[at] = not (possible & others).any()
     return hidden, visible
+
+
+def _normals(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    a, b, c = corners
+    return np.cross(b - a, c - a, axis=0)
 
 
 def embree_visible(
