@@ -13,6 +13,9 @@ from typing import Self
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
 """Environment in which a process multiplies matrices on one thread, whichever library does it."""
 
+INTERRUPTED = 130
+"""Exit code of a command that the user stopped."""
+
 _START_TOLERANCE_S = 2.0
 """The start of a process is told by the system's clock, which may be set meanwhile."""
 

@@ -1,4 +1,4 @@
-"""Keeps a folder as ``sd2app.background.run_command --folder`` does, and learns nothing.
+"""Keeps a folder as ``sd2core.cli.background --folder`` does, and learns nothing.
 
 ``fake_class_command.py [--step-s S] [--fail TEXT] [--die-at N] FOLDER classify train|table
 DATA… --out OUT …``.
@@ -13,7 +13,7 @@ import sys
 import time
 from pathlib import Path
 
-from sd2app.background.run_command import CommandFolder
+from sd2core.runs.command_folder import CommandFolder
 
 STEPS = 6
 

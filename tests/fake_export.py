@@ -12,7 +12,7 @@ import sys
 import time
 from pathlib import Path
 
-from sd2app.background.run_command import CommandFolder
+from sd2core.runs.command_folder import CommandFolder
 
 
 def say(**content: object) -> None:

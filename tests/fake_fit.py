@@ -15,7 +15,8 @@ import sys
 import time
 from pathlib import Path
 
-from sd2app.background.run_command import CommandFolder, run_in_folder
+from sd2core.cli.background import run_in_folder
+from sd2core.runs.command_folder import CommandFolder
 
 STAGES = ["find", "refine", "fit", "write"]
 

@@ -20,8 +20,8 @@ from sd2core.cli.output import (
     print_rows,
     progress_bar,
 )
-from sd2core.cli.running import INTERRUPTED
 from sd2core.errors import Sd2Error
+from sd2core.processes import INTERRUPTED
 
 if TYPE_CHECKING:
     from sd2core.batch.estimate import BatchEstimate

@@ -9,9 +9,7 @@ import sys
 from collections.abc import Sequence
 
 from sd2core.errors import Sd2Error
-
-INTERRUPTED = 130
-"""Exit code of a command that the user stopped."""
+from sd2core.processes import INTERRUPTED
 
 _STARTS_WITH_NEGATIVE_NUMBER = re.compile(r"-\.?\d")
 

@@ -11,9 +11,9 @@ from typing import Any, ClassVar, Generic, Literal, NamedTuple, TypeVar
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from sd2app.background.latest import LatestRunner
-from sd2app.background.run_command import last_output
 from sd2core.errors import Sd2Error
 from sd2core.processes import ProcessId
+from sd2core.runs.command_folder import last_output
 from sd2core.runs.control import Word, read_control, write_control
 from sd2core.runs.folder import LIVE, RunFolder, State
 from sd2core.runs.progress import ProgressTail

@@ -6,13 +6,13 @@ from collections.abc import Callable, Sequence
 
 from PySide6.QtCore import QObject
 
-from sd2app.background.run_command import COMMAND
 from sd2app.batch.dialog import BatchWindow
 from sd2app.batch.model import BatchModel
 from sd2app.batch.questions import BatchQuestions
 from sd2app.feature import Action, Feature, Shell
 from sd2app.sensor.placements import PlacementsModel
 from sd2app.session.session import Session
+from sd2core.runs.command_folder import COMMAND
 
 
 class BatchFeature(Feature):

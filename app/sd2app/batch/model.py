@@ -8,7 +8,6 @@ from pathlib import Path
 from PySide6.QtCore import QObject
 
 from sd2app.background.latest import LatestRunner
-from sd2app.background.run_command import COMMAND, launch
 from sd2app.background.runs import KnownRun, Runs, Sentences
 from sd2app.batch.results import BatchResults
 from sd2app.batch.run import BatchMonitor, plan_of
@@ -20,6 +19,7 @@ from sd2core.batch.folder import BatchFolder
 from sd2core.batch.plan import BatchPlan
 from sd2core.batch.plan_file import write_plan
 from sd2core.errors import Sd2Error
+from sd2core.runs.command_folder import COMMAND, launch
 
 _SENTENCES = Sentences(
     busy="A process is at work in {} already.",

@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 
 from PySide6.QtCore import QObject
 
-from sd2app.background.run_command import last_output
 from sd2app.background.run_monitor import RunMonitor
 from sd2core.batch.folder import BatchFolder, BatchStatus, status_of
 from sd2core.errors import Sd2Error
 from sd2core.processes import ProcessId
+from sd2core.runs.command_folder import last_output
 from sd2core.runs.folder import State
 from sd2core.runs.progress import Event
 

@@ -9,10 +9,10 @@ from typing import Any, ClassVar, NamedTuple
 
 from PySide6.QtCore import QObject
 
-from sd2app.background.run_command import CommandFolder
 from sd2app.background.run_monitor import RunMonitor
 from sd2app.training.run import LearningHistory
 from sd2core.processes import ProcessId
+from sd2core.runs.command_folder import CommandFolder
 from sd2core.runs.pace import Pace
 
 MODEL_NAME = "classifier.safetensors"

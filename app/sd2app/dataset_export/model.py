@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.latest import Emit, LatestRunner
-from sd2app.background.run_command import COMMAND_IN_FOLDER, CommandFolder, commands_in
 from sd2app.dataset_export.run import Exported, ExportRun, user_exports_folder
 from sd2app.session.tasks import Job, TaskList
 from sd2app.widgets.text import about
@@ -23,6 +22,7 @@ from sd2core.maps import MapKind
 from sd2core.pairs.segments import LENGTH, OVERLAP
 from sd2core.progress import Cancelled
 from sd2core.recording.recording import is_recording, open_recording
+from sd2core.runs.command_folder import COMMAND_IN_FOLDER, CommandFolder, commands_in
 from sd2core.runs.pace import known_pace_s
 from sd2core.sensor import VelocityAxis
 

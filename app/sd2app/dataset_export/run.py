@@ -9,9 +9,9 @@ from typing import Any
 
 from PySide6.QtCore import QObject
 
-from sd2app.background.run_command import CommandFolder
 from sd2app.background.run_monitor import RunMonitor, take_lines
 from sd2core.processes import ProcessId
+from sd2core.runs.command_folder import CommandFolder
 
 
 def user_exports_folder() -> Path:

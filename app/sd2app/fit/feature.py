@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QObject, SignalInstance
 from PySide6.QtWidgets import QDialog, QFileDialog, QMessageBox, QWidget
 
-from sd2app.background.run_command import COMMAND_IN_FOLDER
 from sd2app.feature import Action, Feature, Shell
 from sd2app.fit.bar import FitBar
 from sd2app.fit.dialog import VIDEOS, NewFromVideoDialog
@@ -19,6 +18,7 @@ from sd2app.fit.on_screen import FitOnScreen
 from sd2app.fit.request import FitRequest
 from sd2app.fit.setup import FitSetupModel
 from sd2app.session.session import Session
+from sd2core.runs.command_folder import COMMAND_IN_FOLDER
 
 
 class FitFeature(Feature):

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.background.run_command import COMMAND_IN_FOLDER, CommandFolder
 from sd2app.fit.request import FitRequest, read_request, settled
 from sd2app.fit.run import FitProgress, FitRun
 from sd2app.settings import Settings
 from sd2core.errors import Sd2Error
+from sd2core.runs.command_folder import COMMAND_IN_FOLDER, CommandFolder
 
 State = Literal["idle", "running", "cancelling", "stopped", "failed", "finished"]
 

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject
 
-from sd2app.background.run_command import CommandFolder
 from sd2app.background.run_monitor import RunMonitor, take_lines
 from sd2core.body.track import LANDMARKS
 from sd2core.processes import ProcessId
+from sd2core.runs.command_folder import CommandFolder
 
 FORMAT, VERSION = "sd2-fit-progress", 1
 

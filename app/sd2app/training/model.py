@@ -12,7 +12,6 @@ from typing import Literal
 
 from PySide6.QtCore import QObject
 
-from sd2app.background.run_command import COMMAND, launch
 from sd2app.background.runs import KnownRun, Runs, Sentences, free_folder
 from sd2app.settings import Settings
 from sd2app.training.pair_maker import PairMaker
@@ -22,6 +21,7 @@ from sd2app.training.text import model_name, state_text
 from sd2app.widgets.text import clock_text
 from sd2core.errors import Sd2Error
 from sd2core.processes import ONE_THREAD
+from sd2core.runs.command_folder import COMMAND, launch
 from sd2core.runs.folder import LIVE
 from sd2core.train.config import DataConfig, TrainConfig, TrainingConfig
 from sd2core.train.folder import RunStatus, TrainingFolder, runs_in

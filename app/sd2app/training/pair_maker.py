@@ -8,10 +8,10 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject, QProcess, QProcessEnvironment, QTimer, Signal
 
-from sd2app.background.run_command import COMMAND
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import remove
 from sd2core.recording.recording import is_recording, open_recording
+from sd2core.runs.command_folder import COMMAND
 
 _PATIENCE_MS = 3000
 """A process that does not end within this time when it is asked to is killed."""

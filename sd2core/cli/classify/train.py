@@ -30,7 +30,7 @@ from sd2core.cli.options import (
     positive_int,
 )
 from sd2core.cli.output import finite, print_event, print_facts, print_json
-from sd2core.cli.running import INTERRUPTED
+from sd2core.processes import INTERRUPTED
 
 if TYPE_CHECKING:
     from sd2core.classify.experiment import Network

@@ -12,7 +12,6 @@ import fake_class_command
 import pytest
 from small_pairs import write_pairs
 
-from sd2app.background.run_command import CommandFolder, last_output
 from sd2app.classify.panel import recall_text
 from sd2app.classify.text import note, run_headline, run_time_text
 from sd2app.classify.training import ClassTraining
@@ -23,6 +22,7 @@ from sd2core.classify.defaults import WIDTH, pace_kind
 from sd2core.errors import Sd2Error
 from sd2core.files.resources import resource_path
 from sd2core.recording.recording import open_recording
+from sd2core.runs.command_folder import CommandFolder, last_output
 from sd2core.runs.pace import keep_pace
 from sd2core.runs.progress import ProgressTail
 

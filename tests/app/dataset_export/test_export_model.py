@@ -13,13 +13,13 @@ import pytest
 from PySide6.QtCore import QObject
 from swinging_recordings import recording
 
-from sd2app.background.run_command import commands_in
 from sd2app.dataset_export.model import ExportModel
 from sd2app.dataset_export.run import Exported, ExportRun
 from sd2app.dataset_export.text import bytes_words, label_words, size_words, split_words
 from sd2app.session.tasks import TaskList
 from sd2core.errors import Sd2Error
 from sd2core.placements.placements import PlacementGrid
+from sd2core.runs.command_folder import commands_in
 
 FAKE = Path(__file__).resolve().parents[2] / "fake_export.py"
 

@@ -12,13 +12,13 @@ import pytest
 from training_pairs import write_pairs
 
 from sd2app.background import run_monitor
-from sd2app.background.run_command import last_output, launch
 from sd2app.command_line import full_parser
 from sd2app.settings import Settings
 from sd2app.training.model import TrainingModel
 from sd2app.training.text import division_text
 from sd2core.cli.train import _config
 from sd2core.errors import Sd2Error
+from sd2core.runs.command_folder import last_output, launch
 from sd2core.runs.control import read_control
 from sd2core.runs.pace import keep_pace
 from sd2core.train.data import prepare, read_mixed

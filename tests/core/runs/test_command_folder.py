@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from sd2app.background.run_command import CommandFolder, commands_in
 from sd2app.background.run_monitor import RunMonitor
 from sd2core.errors import Sd2Error
 from sd2core.processes import ProcessId
+from sd2core.runs.command_folder import CommandFolder, commands_in
 
 
 def of_yesterday(path: Path, code: int | None) -> CommandFolder:
@@ -68,7 +68,7 @@ def test_a_process_that_reuses_a_number_is_not_waited_for(qtbot, tmp_path) -> No
 
 
 def test_a_command_is_run_in_the_background() -> None:
-    words = [sys.executable, "-m", "sd2app.background.run_command", "--version"]
+    words = [sys.executable, "-m", "sd2core.cli.background", "--version"]
     told = os.environ | {"PYTHONIOENCODING": "utf-8"}
     made = subprocess.run(words, capture_output=True, check=True, encoding="utf-8", env=told)
     assert made.stdout.startswith("SD² Studio")

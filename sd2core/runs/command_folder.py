@@ -1,21 +1,14 @@
-"""``sd2`` commands in background processes, which may outlive the window.
-
-``python -u -m sd2app.background.run_command COMMAND …`` runs a command at a lower priority;
-with ``--folder FOLDER`` in front it works in a :class:`CommandFolder`.
-"""
+"""``sd2`` commands in background processes, which may outlive the program that started them."""
 
 from __future__ import annotations
 
-import _thread
 import json
 import os
 import shutil
-import signal
 import subprocess
 import sys
-import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
@@ -23,17 +16,15 @@ from typing import Any
 
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
-from sd2core.processes import ONE_THREAD, ProcessId, lower_priority
+from sd2core.processes import INTERRUPTED, ONE_THREAD, ProcessId
 from sd2core.runs.control import read_control, write_control
 from sd2core.runs.folder import LIVE, RunFolder, State
 
-COMMAND = (sys.executable, "-u", "-m", "sd2app.background.run_command")
+COMMAND = (sys.executable, "-u", "-m", "sd2core.cli.background")
 COMMAND_IN_FOLDER = (*COMMAND, "--folder")
 
 _KEPT_BYTES = 16 * 1024
-_POLL_S = 0.2
-_INTERRUPTED = 130
-_STATES: dict[int | None, State] = {None: "starting", 0: "finished", _INTERRUPTED: "stopped"}
+_STATES: dict[int | None, State] = {None: "starting", 0: "finished", INTERRUPTED: "stopped"}
 _WINDOWS_FLAGS = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0) | getattr(
     subprocess, "CREATE_NO_WINDOW", 0
 )
@@ -207,61 +198,3 @@ def commands_in(place: Path) -> list[CommandFolder]:
     found = [CommandFolder(path) for path in place.iterdir() if path.is_dir()]
     known = [one for one in found if one.exists]
     return sorted(known, key=lambda one: one.facts.get("started_unix_s", 0.0), reverse=True)
-
-
-def main() -> int:
-    """Run the command of the command line."""
-    lower_priority()
-    words = sys.argv[1:]
-    folder = None
-    if words[:1] == ["--folder"]:
-        folder, words = CommandFolder(Path(words[1])), words[2:]
-    sys.argv[1:] = words  # files say how they were made
-
-    def command() -> int:
-        # The library's commands: none of those that open the window is run in the background.
-        from sd2core.cli import build_parser, run
-
-        return run(build_parser()[0], words)
-
-    return command() if folder is None else run_in_folder(folder, command)
-
-
-def run_in_folder(folder: CommandFolder, command: Callable[[], int]) -> int:
-    """Run a command as the process of a folder, and note its end."""
-    # What was started in the background of a script has Ctrl-C switched off.
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, signal.default_int_handler)
-    try:
-        lock = folder.lock()
-    except Sd2Error as error:
-        print(f"sd2: {error}", file=sys.stderr)
-        return 1
-    over = threading.Event()
-    try:
-        folder.set_state("running")
-        threading.Thread(target=_watch, args=(folder, over), daemon=True).start()
-        code = command()
-    except KeyboardInterrupt:
-        code = _INTERRUPTED
-    except SystemExit as error:  # what was typed wrong
-        code = error.code if isinstance(error.code, int) else 1
-    over.set()
-    folder.note_end(code)
-    lock.release()
-    return code
-
-
-def _watch(folder: CommandFolder, over: threading.Event) -> None:
-    """Interrupt the command as Ctrl-C does, once it is told to stop."""
-    while not over.wait(_POLL_S):
-        if folder.stop_wanted:
-            if sys.platform == "win32":
-                _thread.interrupt_main()
-            else:  # wakes it from what it waits for
-                signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
-            return
-
-
-if __name__ == "__main__":
-    sys.exit(main())
