@@ -56,9 +56,10 @@ class ProcessId:
                 return True
         except psutil.Error:
             return False
-        # A child that has ended keeps its number until its parent asks for its exit code.
+        # A child that has ended keeps its number until its parent asks for its exit code. There is
+        # none while a thread of it still ends, which keeps its locks.
         with suppress(ChildProcessError):
-            os.waitpid(self.pid, os.WNOHANG)
+            return os.waitpid(self.pid, os.WNOHANG)[0] == 0
         return False
 
     def is_same(self, other: ProcessId | None) -> bool:

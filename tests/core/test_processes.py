@@ -10,6 +10,7 @@ import time
 
 import pytest
 
+from sd2core.files.lock import is_locked
 from sd2core.processes import ProcessId
 
 PARENT = """
@@ -100,3 +101,34 @@ def test_the_background_gives_way() -> None:
     script = f"import os; {program}; lower_priority(); print(os.nice(0))"
     said = subprocess.run([sys.executable, "-c", script], capture_output=True, check=True).stdout
     assert int(said) == min(os.nice(0) + 10, 19)
+
+
+HOLDER = """
+import sys, threading, time
+from pathlib import Path
+from sd2core.files.lock import FileLock
+
+lock = FileLock(Path(sys.argv[1]))
+assert lock.take()
+for _ in range(200):
+    threading.Thread(target=time.sleep, args=(600,), daemon=True).start()
+print("held", flush=True)
+time.sleep(600)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there threads end with their process")
+def test_a_process_that_is_gone_holds_no_lock(tmp_path) -> None:
+    """Its first thread is gone before the others, which still hold what it had open."""
+    for _ in range(5):
+        words = [sys.executable, "-c", HOLDER, str(tmp_path / "lock")]
+        with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as started:
+            assert started.stdout is not None
+            assert started.stdout.readline() == "held\n"
+            process = ProcessId.of(started.pid)
+            assert process is not None
+            process.terminate(at_once=True)
+            while process.is_alive:
+                pass
+            assert not is_locked(tmp_path / "lock")
+            started.returncode = -signal.SIGKILL  # it has been asked for above
