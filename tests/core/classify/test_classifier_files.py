@@ -154,6 +154,6 @@ def test_other_files_are_refused(tmp_path: Path) -> None:
 def test_a_card_needs_two_classes_and_options_must_be_numbers() -> None:
     with pytest.raises(Sd2Error, match="two or more"):
         ClassifierCard("lstm", {}, features(), (), ("real",))
-    with pytest.raises(Sd2Error, match="a number"):
+    with pytest.raises(Sd2Error, match="a whole number, 1 to 1024"):
         build("lstm", 2, len(CLASSES), width="wide")
     assert ClassifierCard("lstm", {}, features(), ("a", "b"), ("real",)).background is None

@@ -7,7 +7,7 @@ import pytest
 from denoisers import trained
 from numpy.typing import NDArray
 
-from sd2core.denoise import long_maps
+from sd2core.denoise import live
 from sd2core.denoise.resample_to_model import clips
 from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import Presence
@@ -47,7 +47,7 @@ _TIMES = {
 def test_blocks_give_what_the_whole_map_gives(
     model: str, times_s: NDArray[np.float64], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(long_maps, "_BLOCK", 512)
+    monkeypatch.setattr(live, "_BLOCK", 512)
     denoiser = trained(model)
     doppler = _map(times_s)
     expected = denoiser.denoise(doppler).values.T
@@ -69,7 +69,7 @@ def test_blocks_give_what_the_whole_map_gives(
 
     there = Presence.of(doppler.present, FRAMES).there
     runs = clips(doppler.times_s, there, denoiser.card.frame_rate_hz)
-    long_maps.denoise_long(denoiser, runs, doppler.times_s, read, write)
+    live.denoise_long(denoiser, runs, doppler.times_s, read, write)
     np.testing.assert_array_equal(np.isnan(found).all(axis=1), ~there)
     np.testing.assert_allclose(
         found[there], expected[there], rtol=1e-4, atol=1e-6 * float(expected.max())
