@@ -26,9 +26,9 @@ def models_of(window: MainWindow) -> SimpleNamespace:
 
 def build_models(parent: QObject, settings: Settings, parts: Parts | None = None) -> Any:
     """Models without a window."""
-    session = build_session(parent, settings)
-    features = build_features(session, NoShell(), parts or Parts(), parent)
-    return _named(session, features)
+    session, shell = build_session(parent, settings), NoShell()
+    features = build_features(session, shell, parts or Parts(), parent)
+    return _named(session, features, shell=shell)
 
 
 def all_actions() -> tuple[Action, ...]:
@@ -45,12 +45,18 @@ def menu_of(window: MainWindow, title: str) -> QMenu:
 
 
 class NoShell:
-    """Stands in for the window where nothing asks the user."""
+    """Stands in for the window where nothing asks the user.
+
+    A warning fails the test, unless it collects them in ``warned``.
+    """
 
     dialog_parent = None
+    warned: list[str] | None = None
 
     def warn(self, text: str) -> None:
-        pass
+        if self.warned is None:
+            raise AssertionError(text)
+        self.warned.append(text)
 
     def note(self, text: str) -> None:
         pass

@@ -162,8 +162,7 @@ def test_a_missing_model_is_named_and_the_rest_works(context, models, qtbot, bal
     recording = open_recording(ball)
     recording.denoiser = tmp_path / "gone.safetensors"
     recording.save()
-    said = []
-    context.document.failed.connect(said.append)
+    said = context.shell.warned = []
     open_it(context, qtbot, ball)
     assert len(said) == 1
     assert "denoiser is not at" in said[0]
@@ -180,8 +179,7 @@ def test_a_missing_model_is_named_and_the_rest_works(context, models, qtbot, bal
 def test_a_model_that_fails_is_named_and_can_be_chosen_again(context, models, qtbot, ball):
     one = next(iter(models.cards))
     open_it(context, qtbot, ball)
-    said = []
-    context.denoise.failed.connect(said.append)
+    said = context.shell.warned = []
     models.failure = Sd2Error("The map has 25 frames/s", "30 frames/s")
     context.denoise.use(one)
     rest(context, qtbot)

@@ -323,8 +323,7 @@ def test_a_choice_that_fails_leaves_exact_visibility(context, fake, qtbot, ball)
     from sd2core.errors import Sd2Error
 
     fake.failure = Sd2Error("There is no choice")
-    failures = []
-    context.trade.failed.connect(failures.append)
+    failures = context.shell.warned = []
     open_ball(context, qtbot, ball)
     wait_until_done(context, qtbot)
     assert context.synthetic.status == "exact visibility"
