@@ -4,24 +4,18 @@ from __future__ import annotations
 
 import contextlib
 import os
+import pickle
 import subprocess
 import sys
 import threading
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2app.background.model_worker.protocol import (
-    Message,
-    packed_map,
-    read_message,
-    unpacked_map,
-    write_message,
-)
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
 from sd2core.processes import ONE_THREAD
@@ -56,27 +50,27 @@ class ModelProcess:
         """Load a classifier beside the denoisers, or raise Sd2Error."""
         return RemoteClassifier(self, path)
 
-    def ask(self, content: dict[str, Any], numbers: bytes = b"") -> Message:
-        """Ask and wait for the answer; Sd2Error is what the process reports, or that it is gone."""
+    def ask(self, do: str, *arguments: Any) -> Any:
+        """Call a method of its ``Worker``; raises what that raises, or Sd2Error if it is gone."""
         with self._lock:
             process = self._started()
             assert process.stdin is not None
             assert process.stdout is not None
             try:
-                write_message(process.stdin, content, numbers)
-                answer = read_message(process.stdout)
-            except (OSError, ValueError):  # closed from another thread
-                answer = None
-            if answer is None:
+                pickle.dump((do, arguments), process.stdin, pickle.HIGHEST_PROTOCOL)
+                process.stdin.flush()
+                answer = pickle.load(process.stdout)
+            except (OSError, EOFError, ValueError, pickle.UnpicklingError):
+                # It died, or was closed from another thread.
                 self._process = None
                 _let_go(process)
-        if answer is None:
-            raise Sd2Error(
-                "The process in which the models work has ended",
-                remedy="Choose the model again; if it ends again, there may be too little memory",
-            )
-        if "error" in answer[0]:
-            raise Sd2Error(*answer[0]["error"])
+                answer = Sd2Error(
+                    "The process in which the models work has ended",
+                    remedy="Choose the model again; if it ends again,"
+                    " there may be too little memory",
+                )
+        if isinstance(answer, Sd2Error):
+            raise answer
         return answer
 
     def close(self) -> None:
@@ -123,98 +117,78 @@ def _let_go(process: subprocess.Popen[bytes]) -> None:
 class _Remote:
     """Stand-in for a model in the model process."""
 
-    _LOAD: ClassVar[str]
-
     def __init__(self, process: ModelProcess, path: Path) -> None:
         self._process = process
         self._path = path
-        self._load()
+        self._number = self._load()
+        self._generation = process.generation
 
-    def _load(self) -> None:
-        content, _ = self._process.ask({"do": self._LOAD, "path": str(self._path)})
-        self._number: int = content["model"]
-        self._generation = self._process.generation
-        self._take(content)
-
-    def _take(self, content: dict[str, Any]) -> None:
-        """Store further facts from an answer."""
+    def _load(self) -> int:
+        """Load the model and return its number."""
+        raise NotImplementedError
 
     def _ready(self) -> int:
         """Number of the model, loaded again if its process has died."""
         if not self._process.running or self._process.generation != self._generation:
-            self._load()
+            self._number = self._load()
+            self._generation = self._process.generation
         return self._number
-
-    def _begin(self) -> int:
-        """Begin a clip whose frames come one after another; return its number."""
-        content, _ = self._process.ask({"do": "live", "model": self._ready()})
-        return int(content["live"])
 
 
 class RemoteDenoiser(_Remote):
     """Stand-in for a ``TrainedDenoiser`` that works in the model process."""
 
-    _LOAD = "load"
+    equals_batch: bool
+    frame_rate_hz: float
 
     def denoise(self, doppler: DopplerMap) -> DopplerMap:
         """Denoised map: an estimate of a radar's map from a synthetic one."""
-        content, numbers = packed_map(doppler)
-        answer, numbers = self._process.ask(
-            {"do": "denoise", "model": self._ready(), "map": content}, numbers
-        )
-        return replace(unpacked_map(answer, numbers), timebase=doppler.timebase)
+        given = replace(doppler, uncertainty=None)  # no model uses it
+        denoised: DopplerMap = self._process.ask("denoise", self._ready(), given)
+        return replace(denoised, timebase=doppler.timebase)
 
     def live(self) -> RemoteLive:
         """Session for live frames; it replaces the session before."""
-        return RemoteLive(self._process, self._begin(), self.equals_batch)
+        return RemoteLive(self._process, self._ready(), self.equals_batch)
 
-    def _take(self, content: dict[str, Any]) -> None:
-        self.equals_batch: bool = content["equals_batch"]
-        self.frame_rate_hz: float = content["frame_rate_hz"]
+    def _load(self) -> int:
+        number, self.equals_batch, self.frame_rate_hz = self._process.ask("load", self._path)
+        return int(number)
 
 
 class RemoteClassifier(_Remote):
     """Stand-in for a ``TrainedClassifier`` that works in the model process."""
 
-    _LOAD = "load_classifier"
-
     def probabilities(self, doppler: DopplerMap) -> NDArray[np.float32]:
         """Class probabilities of every frame of a map, (frames, classes)."""
-        content, numbers = packed_map(doppler)
-        _, answer = self._process.ask(
-            {"do": "classify", "model": self._ready(), "map": content}, numbers
-        )
-        return np.frombuffer(answer, np.float32).reshape(len(doppler.timebase), -1).copy()
+        given = replace(doppler, uncertainty=None)
+        found: NDArray[np.float32] = self._process.ask("classify", self._ready(), given)
+        return found
 
     def live(self) -> RemoteClasses:
         """Session for live frames of one stretch, all with a person."""
-        return RemoteClasses(self._process, self._begin())
+        return RemoteClasses(self._process, self._ready())
+
+    def _load(self) -> int:
+        return int(self._process.ask("load_classifier", self._path))
 
 
 class _RemoteSession:
     """A clip whose frames come one after another."""
 
-    def __init__(self, process: ModelProcess, number: int) -> None:
+    def __init__(self, process: ModelProcess, model: int) -> None:
         self._process = process
-        self._number = number
+        self._clip = process.ask("begin", model)
         self._generation = process.generation
 
-    def _ask(self, do: str, numbers: bytes = b"", **content: int) -> NDArray[np.float32]:
+    def _ask(self, do: str, *arguments: NDArray[Any]) -> NDArray[np.float32]:
         if self._process.generation != self._generation:
             raise Sd2Error(
                 "The process in which the models work was started again",
                 remedy="Choose the model again",
             )
-        told, answer = self._process.ask({"do": do, "live": self._number, **content}, numbers)
-        return np.frombuffer(answer, np.float32).reshape(told["shape"]).copy()
-
-    def _advance(
-        self, energies: NDArray[np.float32], present: NDArray[np.bool_]
-    ) -> NDArray[np.float32]:
-        frames, bins = energies.shape
-        values = np.ascontiguousarray(energies, np.float32)
-        numbers = np.asarray(present, np.bool_).tobytes() + values.tobytes()
-        return self._ask("advance", numbers, frames=frames, bins=bins)
+        found: NDArray[np.float32] = self._process.ask(do, self._clip, *arguments)
+        return found
 
 
 class RemoteClasses(_RemoteSession):
@@ -222,7 +196,7 @@ class RemoteClasses(_RemoteSession):
 
     def advance(self, energies: NDArray[np.float32]) -> NDArray[np.float32]:
         """Probabilities that follow from the next frames: (frames, bins) → (answers, classes)."""
-        return self._advance(energies, np.ones(len(energies), np.bool_))
+        return self._ask("advance", energies, np.ones(len(energies), np.bool_))
 
     def finish(self) -> NDArray[np.float32]:
         """Outstanding answers, as if nothing moved from now on; the session stays usable."""
@@ -232,8 +206,8 @@ class RemoteClasses(_RemoteSession):
 class RemoteLive(_RemoteSession):
     """Session that takes frames and answers each of them."""
 
-    def __init__(self, process: ModelProcess, number: int, equals_batch: bool) -> None:
-        super().__init__(process, number)
+    def __init__(self, process: ModelProcess, model: int, equals_batch: bool) -> None:
+        super().__init__(process, model)
         self.equals_batch = equals_batch
 
     def step(self, energies: NDArray[np.float32], present: bool = True) -> NDArray[np.float32]:
@@ -244,4 +218,4 @@ class RemoteLive(_RemoteSession):
         self, energies: NDArray[np.float32], present: NDArray[np.bool_]
     ) -> NDArray[np.float32]:
         """Answers to the next frames (frames, bins), one row for each."""
-        return self._advance(energies, present)
+        return self._ask("advance", energies, present)

@@ -1,12 +1,15 @@
 """The process that denoises and classifies for the window; one request after another.
 
-Run as ``python -m sd2app.background.model_worker.server``; it ends when its input does.
+Run as ``python -m sd2app.background.model_worker.server``; it ends when its input does. A request
+is the name of a method of :class:`Worker` with its arguments, pickled; the answer is what it
+returns, or the error.
 """
 
 from __future__ import annotations
 
 import contextlib
 import os
+import pickle
 import sys
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -14,15 +17,8 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2app.background.model_worker.protocol import (
-    Message,
-    packed_map,
-    read_message,
-    unpacked_map,
-    unpacked_values,
-    write_message,
-)
 from sd2core.errors import Sd2Error
+from sd2core.maps import DopplerMap
 
 _KEPT = 5
 """Models: the denoiser in use, the one before, the one that is about to be; the classifier
@@ -30,81 +26,72 @@ in use, and the next. Of clips that are gone through frame after frame as many."
 
 
 class Worker:
-    """Holds models, and what they remember of frames that come one by one."""
+    """Holds models, and what they remember of frames that come one by one.
+
+    Errors that a user can cause are raised as Sd2Error.
+    """
 
     def __init__(self) -> None:
         self._models: dict[int, Any] = {}
         self._live: dict[int, Any] = {}
         self._next = 0
 
-    def answer(self, content: dict[str, Any], numbers: bytes) -> Message:
-        """Answer a request; errors that a user can cause are raised as :class:`Sd2Error`."""
-        reply: Message = getattr(self, f"_do_{content['do']}")(content, numbers)
-        return reply
-
-    def _do_load(self, content: dict[str, Any], numbers: bytes) -> Message:
+    def load(self, path: Path) -> tuple[int, bool, float]:
+        """Number of a denoiser, whether frame by frame it gives the whole map, its frame rate."""
         from sd2core.denoise.files import load_model
 
-        model = load_model(Path(content["path"]))
-        self._models[number := self._number()] = model
-        self._forget_old(self._models)
-        about = {"equals_batch": model.live().equals_batch}
-        return about | {"model": number, "frame_rate_hz": model.card.frame_rate_hz}, b""
+        model = load_model(path)
+        number = self._keep(self._models, model)
+        return number, model.live().equals_batch, model.card.frame_rate_hz
 
-    def _do_load_classifier(self, content: dict[str, Any], numbers: bytes) -> Message:
+    def load_classifier(self, path: Path) -> int:
+        """Number of a classifier."""
         from sd2core.classify.files import load_classifier
 
-        model = load_classifier(Path(content["path"]))
-        self._models[number := self._number()] = _Classifying(model)
-        self._forget_old(self._models)
-        return {"model": number}, b""
+        return self._keep(self._models, _Classifying(load_classifier(path)))
 
-    def _do_classify(self, content: dict[str, Any], numbers: bytes) -> Message:
-        doppler = unpacked_map(content["map"], numbers)
-        return {}, self._model(content).trained.probabilities(doppler).tobytes()
+    def denoise(self, model: int, doppler: DopplerMap) -> DopplerMap:
+        """Denoised map."""
+        denoised: DopplerMap = _newest(self._models, model).denoise(doppler)
+        return denoised
 
-    def _do_denoise(self, content: dict[str, Any], numbers: bytes) -> Message:
-        return packed_map(self._model(content).denoise(unpacked_map(content["map"], numbers)))
+    def classify(self, model: int, doppler: DopplerMap) -> NDArray[np.float32]:
+        """Class probabilities of every frame of a map, (frames, classes)."""
+        found: NDArray[np.float32] = _newest(self._models, model).trained.probabilities(doppler)
+        return found
 
-    def _do_live(self, content: dict[str, Any], numbers: bytes) -> Message:
-        self._live[number := self._number()] = self._model(content).live()
-        self._forget_old(self._live)
-        return {"live": number}, b""
+    def begin(self, model: int) -> int:
+        """Number of a new clip whose frames come one after another."""
+        return self._keep(self._live, _newest(self._models, model).live())
 
-    def _do_advance(self, content: dict[str, Any], numbers: bytes) -> Message:
-        live = self._session(content)
-        frames, bins = content["frames"], content["bins"]
-        present = np.frombuffer(numbers, np.bool_, frames)
-        values = unpacked_values(numbers, (frames, bins), frames)
-        if frames == 1:
-            return _packed(live.step(values[0], bool(present[0])))
-        return _packed(live.advance(values, present))
+    def advance(
+        self, clip: int, energies: NDArray[np.float32], present: NDArray[np.bool_]
+    ) -> NDArray[np.float32]:
+        """Answers to the next frames (frames, bins) of a clip, one row for each."""
+        live = _newest(self._live, clip)
+        if len(energies) == 1:
+            return np.atleast_2d(live.step(energies[0], bool(present[0])))
+        found: NDArray[np.float32] = live.advance(energies, present)
+        return found
 
-    def _do_finish(self, content: dict[str, Any], numbers: bytes) -> Message:
-        return _packed(self._session(content).finish())
+    def finish(self, clip: int) -> NDArray[np.float32]:
+        """Outstanding answers of a clip."""
+        return np.atleast_2d(_newest(self._live, clip).finish())
 
-    def _session(self, content: dict[str, Any]) -> Any:
-        live = self._live.get(content["live"])
-        if live is None:
-            raise Sd2Error("The model is no longer loaded", remedy="Choose it again")
-        # What is used goes last, as what is forgotten goes first.
-        self._live[content["live"]] = self._live.pop(content["live"])
-        return live
-
-    def _model(self, content: dict[str, Any]) -> Any:
-        model = self._models.get(content["model"])
-        if model is None:
-            raise Sd2Error("The model is no longer loaded", remedy="Choose it again")
-        self._models[content["model"]] = self._models.pop(content["model"])  # the newest in use
-        return model
-
-    def _forget_old(self, kept: dict[int, Any]) -> None:
+    def _keep(self, kept: dict[int, Any], one: Any) -> int:
+        self._next += 1
+        kept[self._next] = one
         while len(kept) > _KEPT:
             kept.pop(next(iter(kept)))
-
-    def _number(self) -> int:
-        self._next += 1
         return self._next
+
+
+def _newest(kept: dict[int, Any], number: int) -> Any:
+    """Return what has a number, and put it last: what is forgotten goes first."""
+    if number not in kept:
+        raise Sd2Error("The model is no longer loaded", remedy="Choose it again")
+    kept[number] = kept.pop(number)
+    return kept[number]
 
 
 class _Classifying:
@@ -139,25 +126,22 @@ class _LiveClasses:
         return found
 
 
-def _packed(rows: NDArray[np.float32]) -> Message:
-    """Answer of a session; one frame of a denoiser is one row."""
-    shown = np.ascontiguousarray(np.atleast_2d(rows), np.float32)
-    return {"shape": list(shown.shape)}, shown.tobytes()
-
-
 def serve(source: BinaryIO, sink: BinaryIO) -> None:
     """Answer requests until the input is closed."""
     worker = Worker()
-    while (request := read_message(source)) is not None:
+    while True:
         try:
-            content, numbers = worker.answer(*request)
+            do, arguments = pickle.load(source)
+        except EOFError:
+            return
+        try:
+            answer = getattr(worker, do)(*arguments)
         except Sd2Error as error:
-            content = {"error": [error.found, error.expected, error.remedy]}
-            numbers = b""
+            answer = error
         except Exception as error:  # whatever a model does, the window goes on
-            content = {"error": [f"The model failed ({error!r})", "", ""]}
-            numbers = b""
-        write_message(sink, content, numbers)
+            answer = Sd2Error(f"The model failed ({error!r})")
+        pickle.dump(answer, sink, pickle.HIGHEST_PROTOCOL)
+        sink.flush()
 
 
 def main() -> int:
