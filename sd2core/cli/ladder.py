@@ -47,7 +47,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             "  sd2 ladder walk.npz --quick --tolerance 1%\n"
             "  sd2 ladder walk.sd2 --sensor 1.5,0,2 --budget-ms 0.1\n"
             "  sd2 ladder walk.npz --family fmcw\n"
-            "  sd2 ladder walk.npz --plot trade.png --json"
+            "  sd2 ladder walk.npz --plot accuracy.png --json"
         ),
     )
     add_mesh_and_sensor(parser)

@@ -44,7 +44,7 @@ def far_in_the_dark(window: MainWindow) -> None:
     window.session.display.set_mesh_colour("range")
 
 
-def trade(window: MainWindow) -> None:
+def accuracy(window: MainWindow) -> None:
     """The Accuracy panel on the sample, measured, for a tolerance of 2 %."""
     window.resize(1280, 960)
     window.session.playback.seek(1.9)
@@ -158,7 +158,7 @@ def main() -> None:
     swipes = [resource_path("swipes.sd2")]
     take(application, "sample.png", swipes, sample)
     take(application, "dark.png", swipes, far_in_the_dark)
-    take(application, "trade.png", swipes, trade)
+    take(application, "accuracy.png", swipes, accuracy)
     take(application, "labels.png", swipes, labels)
     take(application, "placements.png", swipes, placements)
     comparison(application)
