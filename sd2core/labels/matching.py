@@ -8,7 +8,6 @@ from statistics import fmean
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from sd2core.errors import Sd2Error
 from sd2core.labels.spans import Span
@@ -103,6 +102,9 @@ def _paired(
     a: Sequence[Span], b: Sequence[Span], rows: list[int], columns: list[int], min_iou: float
 ) -> list[tuple[int, int, float]]:
     """The best pairs within a group, with their IoU."""
+    # The window loads this module when it starts; importing SciPy's optimisers takes 0.2 s.
+    from scipy.optimize import linear_sum_assignment
+
     some_a, some_b = [a[row] for row in rows], [b[column] for column in columns]
     iou = iou_of(some_a, some_b)
     same = np.array([[x.label == y.label for y in some_b] for x in some_a])
