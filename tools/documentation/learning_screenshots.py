@@ -102,7 +102,7 @@ def export(application: QApplication, sample: Path) -> None:
     dialog, model = window.findChild(ExportDialog), window.features.dataset_export.model
     wait_for(application, lambda: model.ready)
     model.start(sample.with_name("gestures.zarr"))
-    wait_for(application, lambda: not model.exporting)
+    wait_for(application, lambda: not model.under_way)
     wait_until_settled(application, window, LIMIT_S)
     save(dialog, "export.png")
     dialog.close()

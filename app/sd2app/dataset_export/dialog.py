@@ -165,7 +165,7 @@ class ExportDialog(QDialog):
     def _may(self, field: QWidget) -> bool:
         """True if a field can be changed now."""
         model = self._model
-        return not model.exporting and (field is not self._sensors or model.places > 0)
+        return not model.under_way and (field is not self._sensors or model.places > 0)
 
     def _show_counts(self) -> None:
         model, forecast = self._model, self._model.forecast
@@ -189,14 +189,14 @@ class ExportDialog(QDialog):
         model = self._model
         run = model.run
         done, total = (0, 0) if run is None else (run.done, run.total)
-        self._bar.setVisible(model.exporting)
+        self._bar.setVisible(model.under_way)
         self._bar.setRange(0, total)
         self._bar.setValue(done)
-        self._stop.setVisible(model.exporting)
+        self._stop.setVisible(model.under_way)
         self._stop.setEnabled(run is None or run.phase != "stopping")
         self._export.setEnabled(model.ready)
         result = model.result
-        written = result is not None and not model.exporting
+        written = result is not None and not model.under_way
         self._open.setVisible(written)
         if written and result is not None:
             self._size.setText(

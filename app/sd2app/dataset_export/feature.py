@@ -42,7 +42,7 @@ class DatasetExportFeature(Feature):
                 return
             recording = document.recording
         opened = None if recording is None else recording.folder
-        if not self.model.exporting:
+        if not self.model.under_way:
             self.model.begin(opened)
         dialog = ExportDialog(self.model, opened, self._shell.dialog_parent)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
@@ -62,7 +62,7 @@ class DatasetExportFeature(Feature):
 
     def look_for_unfinished(self) -> None:
         """Find an export that outlived its window."""
-        self.model.look_for_export()
+        self.model.look_for_runs()
 
     def close(self) -> None:
         """Let go of the export, which goes on."""

@@ -7,12 +7,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QObject
 
 from sd2app.background.latest import Emit, LatestRunner
+from sd2app.background.runs import KnownRun, Runs, Sentences, free_folder
 from sd2app.dataset_export.run import Exported, ExportRun, user_exports_folder
 from sd2app.session.tasks import Job, TaskList
-from sd2app.widgets.text import about
+from sd2app.settings import Settings
+from sd2app.widgets.text import about, counted
 from sd2core.datasets.forecast import Counting, Forecast
 from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.recording_sources import Making
@@ -34,6 +36,14 @@ MAPS: dict[str, tuple[MapKind, ...]] = {
     "radar": ("simulated", "real"),
 }
 """Kinds of maps that are chosen together; a radar's map is simulated or real."""
+
+_SENTENCES = Sentences(
+    busy="",
+    found="{} is being written. File → Export data set… shows how far it is.",
+    finished="",
+    failed="{} was not written to its end: its process is gone. Export it again; what is complete"
+    " is kept.",
+)
 
 
 @dataclass(frozen=True)
@@ -96,16 +106,12 @@ class _Counted(NamedTuple):
     forecast: Forecast
 
 
-class ExportModel(QObject):
+class ExportModel(Runs[ExportRun]):
     """Counts while choices are made, and has one data set written at a time.
 
-    The export outlives the window and is found again by the next one. ``command`` runs ``sd2``
-    commands in a folder; ``folder`` is where running exports are noted.
+    ``command`` runs ``sd2`` commands in a folder; ``folder`` is where running exports are noted.
+    ``failed`` also says what was left out.
     """
-
-    changed = Signal()
-    noted = Signal(str)
-    failed = Signal(str)  # why it was not written, or what was left out
 
     def __init__(
         self,
@@ -114,14 +120,14 @@ class ExportModel(QObject):
         command: Sequence[str] = COMMAND_IN_FOLDER,
         folder: Path | None = None,
     ) -> None:
-        super().__init__(parent)
+        # Its folder is deleted at the end of an export: there is no last one to remember.
+        super().__init__(ExportRun, Settings.forgetful(), "run", _SENTENCES, parent)
         self._jobs, self._command = jobs, tuple(command)
         self._folder = folder or user_exports_folder()
         self.choice = ExportChoice()
         self.problem = ""  # why these choices cannot be exported
         self.places = 0  # planned besides the recordings' own sensors, the most of any
         self.result: Exported | None = None  # written last, until something else is chosen
-        self.run: ExportRun | None = None  # under way
         self._counted: _Counted | None = None
         self._runner = LatestRunner("count segments", self)
         self._runner.finished.connect(self._receive)
@@ -151,15 +157,10 @@ class ExportModel(QObject):
         return self._runner.busy
 
     @property
-    def exporting(self) -> bool:
-        """True while a data set is written."""
-        return self.run is not None
-
-    @property
     def ready(self) -> bool:
         """True if there is something to write and nothing is being written."""
         forecast = self.forecast
-        return forecast is not None and forecast.segments > 0 and not self.exporting
+        return forecast is not None and forecast.segments > 0 and not self.under_way
 
     def begin(self, place: Path | None) -> None:
         """Choose a recording or a folder and read it again; other choices stay."""
@@ -194,7 +195,7 @@ class ExportModel(QObject):
         words += ["--placements", "planned"] if choice.planned else []
         words += ["--subjects", ",".join(choice.subjects)] if choice.subjects else []
         about = {"what": "export", "out": str(out), "choice": choice.to_json()}
-        path = self._new_folder(out)
+        path = free_folder(self._folder, "export", [out])
         try:
             # It may use all processors: it gives way to whatever else wants them.
             process = CommandFolder(path).start(words, about, self._command, {})
@@ -203,19 +204,28 @@ class ExportModel(QObject):
             self.failed.emit(str(error))
             return
         self.result = None
-        self._follow(ExportRun(path, self, process=process))
+        self.follow_new(path, process)
 
     def stop(self) -> None:
         """Stop writing; what is complete stays, and the same export goes on from there."""
-        if self.run is not None:
-            self.run.stop()
+        self.tell("stop")
 
-    def look_for_export(self) -> None:
-        """At the start of the program: find what is being written, or has been meanwhile."""
+    def close(self) -> None:
+        """Stop polling; a running export goes on."""
+        self._runner.close()
+        super().close()
+
+    # --- following ------------------------------------------------------------------------
+
+    def find(self) -> Sequence[KnownRun]:
+        """Look for what is being written, or has been meanwhile."""
         # One that has ended is there again where its folder could not be deleted.
         found = [one for one in commands_in(self._folder) if one.path not in self._over]
-        one = next((folder for folder in found if folder.live), next(iter(found), None))
-        if one is None or self.exporting:
+        return [KnownRun(one.path, one.path.name, one.live) for one in found]
+
+    def _take_up(self) -> None:
+        one = self.live or next(iter(self.known), None)
+        if one is None or self.under_way:
             return
         run = ExportRun(one.path, self)
         try:
@@ -225,17 +235,41 @@ class ExportModel(QObject):
         else:
             self.places = _places(self.choice.place)
             self._count()
-        self._follow(run)
+        self.follow(run, under_way=True)  # until it is known, and said, how it has ended
         if one.live:
-            self.noted.emit(
-                f"{run.out.name} is being written. File → Export data set… shows how far it is."
-            )
+            self.noted.emit(_SENTENCES.found.format(run.out.name))
 
-    def close(self) -> None:
-        """Stop polling; a running export goes on."""
-        self._runner.close()
-        if self.run is not None:
-            self.run.close()
+    def follow(self, run: ExportRun | None, under_way: bool = False) -> None:
+        """Show an export among the tasks; after its end, look for one that ended unseen."""
+        if self._job is not None:
+            self._jobs.finish(self._job)
+            self._job = None
+        super().follow(run, under_way)
+        if run is None:
+            self.look_for_runs()
+        else:
+            self._job = self._jobs.start(f"Exporting {run.out.name}", self.stop)
+            run.changed.connect(self._report)
+
+    def _report(self) -> None:
+        if self.run is not None and self._job is not None:
+            self._jobs.report(self._job, self.run.done, self.run.total)
+
+    def say_ended(self, run: ExportRun) -> None:
+        """Tell the user what is written and what was left out, or what went wrong."""
+        self.result = result = run.written
+        if result is not None:
+            what, views = counted(result.segments, "segment"), counted(result.sources, "view")
+            self.noted.emit(f"{what} from {views} are in {result.path}.")
+            if result.left_out:
+                self.failed.emit("\n".join(f"Left out: {one}" for one in result.left_out))
+        elif run.phase == "died":
+            self.failed.emit(_SENTENCES.failed.format(run.out.name))
+        elif run.phase == "failed":
+            self.failed.emit(run.text.splitlines()[-1])
+        run.folder.discard()
+        self._over.add(run.path)
+        self.select(None)
 
     # --- inside ---------------------------------------------------------------------------
 
@@ -277,58 +311,6 @@ class ExportModel(QObject):
         self._counted = None
         self.problem = str(error)
         self.changed.emit()
-
-    def _new_folder(self, out: Path) -> Path:
-        """Free folder name."""
-        path, number = self._folder / out.name, 2
-        while path.exists() or path in self._over:
-            path, number = path.with_name(f"{out.name} {number}"), number + 1
-        return path
-
-    def _follow(self, run: ExportRun) -> None:
-        self.run = run
-        self._job = self._jobs.start(f"Exporting {run.out.name}", self.stop)
-        run.changed.connect(self._tell)
-        run.ended.connect(self._end)
-        self.changed.emit()
-
-    def _tell(self) -> None:
-        if self.run is not None and self._job is not None:
-            self._jobs.report(self._job, self.run.done, self.run.total)
-            self.changed.emit()
-
-    def _end(self) -> None:
-        run = self.run
-        if run is None:
-            return
-        self.run = None
-        if self._job is not None:
-            self._jobs.finish(self._job)
-            self._job = None
-        run.close()
-        run.folder.discard()
-        self._over.add(run.path)
-        run.deleteLater()
-        self._say_ended(run)
-        self.changed.emit()
-        self.look_for_export()  # several may have ended while no window was there
-
-    def _say_ended(self, run: ExportRun) -> None:
-        self.result = result = run.written
-        if result is not None:
-            self.noted.emit(
-                f"{result.segments:,} segment{'s' * (result.segments != 1)} from {result.sources:,}"
-                f" view{'s' * (result.sources != 1)} are in {result.path}."
-            )
-            if result.left_out:
-                self.failed.emit("\n".join(f"Left out: {one}" for one in result.left_out))
-        elif run.phase == "died":
-            self.failed.emit(
-                f"{run.out.name} was not written to its end: its process is gone. Export it again;"
-                " what is complete is kept."
-            )
-        elif run.phase not in ("stopped", "gone"):
-            self.failed.emit(run.text.splitlines()[-1])
 
 
 def _places(place: Path | None) -> int:

@@ -117,7 +117,7 @@ def test_what_cannot_be_exported_is_said(made, people, qtbot, change, problem) -
     assert model.problem == problem
     assert not model.ready
     model.start(people / "set.zarr")
-    assert not model.exporting
+    assert not model.under_way
 
 
 def test_it_is_written_by_another_process(made, people, qtbot) -> None:
@@ -130,9 +130,9 @@ def test_it_is_written_by_another_process(made, people, qtbot) -> None:
     model.noted.connect(said.append)
     model.failed.connect(said.append)
     model.start(out)
-    assert model.exporting
+    assert model.under_way
     assert not model.ready
-    qtbot.waitUntil(lambda: not model.exporting, timeout=20_000)
+    qtbot.waitUntil(lambda: not model.under_way, timeout=20_000)
     assert model.result == Exported(
         out, people / "set.card.md", people / "set.png", 7, 2, ("b: it is damaged",)
     )
@@ -167,7 +167,7 @@ def test_it_can_be_stopped(made, people, qtbot) -> None:
     model.start(people / "set.zarr")
     qtbot.waitUntil(lambda: model.run is not None and model.run.done == 500, timeout=20_000)
     model.stop()
-    qtbot.waitUntil(lambda: not model.exporting, timeout=20_000)
+    qtbot.waitUntil(lambda: not model.under_way, timeout=20_000)
     assert not said
     assert model.ready
 
@@ -186,20 +186,21 @@ def test_it_outlives_the_window_and_is_found_by_the_next(made, people, qtbot) ->
     choice = first.choice
     first.close()
     with qtbot.waitSignal(second.noted, timeout=20_000) as noted:
-        second.look_for_export()
+        second.look_for_runs()
     assert noted.args[0].startswith("set.h5 is being written.")
-    assert second.exporting
+    assert second.under_way
     assert second.choice == choice
     qtbot.waitUntil(lambda: second.run is not None and second.run.done == 500, timeout=20_000)
     counted(second, qtbot)
     assert second.forecast is not None
     assert not second.ready
     (people / "set.h5.go").touch()
-    qtbot.waitUntil(lambda: not second.exporting, timeout=20_000)
+    qtbot.waitUntil(lambda: not second.under_way, timeout=20_000)
     assert second.result.segments == 7
     third = made()
-    third.look_for_export()
-    assert not third.exporting
+    with qtbot.waitSignal(third.listed, timeout=20_000):
+        third.look_for_runs()
+    assert not third.under_way
 
 
 def test_what_was_written_meanwhile_is_said(made, people, qtbot, tmp_path) -> None:
@@ -211,8 +212,9 @@ def test_what_was_written_meanwhile_is_said(made, people, qtbot, tmp_path) -> No
     qtbot.waitUntil(lambda: folder.code is not None, timeout=20_000)
     said: list[str] = []
     second.noted.connect(said.append)
-    second.look_for_export()
-    qtbot.waitUntil(lambda: not second.exporting, timeout=20_000)
+    second.look_for_runs()
+    qtbot.waitUntil(lambda: bool(said), timeout=20_000)
+    assert not second.under_way
     assert said == [f"7 segments from 2 views are in {people / 'set.h5'}."]
 
 
@@ -234,9 +236,10 @@ def test_one_that_cannot_be_started_is_said(made, people, qtbot) -> None:
     with qtbot.waitSignal(model.failed, timeout=20_000) as failed:
         model.start(people / "set.h5")
     assert "cannot be started" in failed.args[0]
-    assert not model.exporting
-    model.look_for_export()
-    assert not model.exporting
+    assert not model.under_way
+    with qtbot.waitSignal(model.listed, timeout=20_000):
+        model.look_for_runs()
+    assert not model.under_way
 
 
 def test_lines_that_say_nothing_are_left_alone(qtbot, tmp_path) -> None:

@@ -38,9 +38,9 @@ def dialog(window, qtbot):
     qtbot.waitUntil(lambda: not models_of(window).export.counting, timeout=20_000)
     yield found
     model = models_of(window).export
-    if model.exporting:
+    if model.under_way:
         model.stop()
-        qtbot.waitUntil(lambda: not model.exporting, timeout=20_000)
+        qtbot.waitUntil(lambda: not model.under_way, timeout=20_000)
 
 
 def button(dialog: ExportDialog, text: str) -> QToolButton:
@@ -86,7 +86,7 @@ def test_counts_follow_and_the_data_set_is_written(
     qtbot.mouseClick(button(dialog, "Export…"), LEFT)
     assert dialog.findChild(QProgressBar).isVisible()
     assert not formats.isEnabled()
-    qtbot.waitUntil(lambda: not model.exporting, timeout=60_000)
+    qtbot.waitUntil(lambda: not model.under_way, timeout=60_000)
     with open_dataset(tmp_path / "s.h5") as dataset:
         assert len(dataset) == 3
         assert dataset.header.kinds == ("synthetic", "simulated")
@@ -117,13 +117,13 @@ def test_it_goes_on_when_the_dialog_is_closed_and_can_be_stopped(
     qtbot.waitUntil(lambda: model.run is not None and model.run.done == 500, timeout=20_000)
     qtbot.keyClick(dialog, Qt.Key.Key_Escape)
     qtbot.waitUntil(lambda: QApplication.activeModalWidget() is None)
-    assert model.exporting
+    assert model.under_way
     assert [job.title for job in models_of(window).jobs.jobs] == ["Exporting s.zarr"]
     window.action("export_dataset").trigger()
     again = QApplication.activeModalWidget()
     assert isinstance(again, ExportDialog)
     qtbot.mouseClick(button(again, "Stop"), LEFT)
-    qtbot.waitUntil(lambda: not model.exporting, timeout=20_000)
+    qtbot.waitUntil(lambda: not model.under_way, timeout=20_000)
     assert button(again, "Export…").isEnabled()
     assert not models_of(window).jobs.jobs
     again.close()
