@@ -173,10 +173,6 @@ def training_chart(history: TrainingHistory) -> Chart:
     ]
     # Steps scatter: they set the range only while there is little else.
     shown = [y for curve in curves[len(epochs) >= 2 :] for _, y in curve.points] or [0.1, 1.0]
-    low, high = min(shown) / _PAD, max(shown) * _PAD
-    if high < _LEAST_RATIO * low:
-        middle = math.sqrt(low * high)
-        low, high = middle / math.sqrt(_LEAST_RATIO), middle * math.sqrt(_LEAST_RATIO)
     last = max((at for at, _ in [*trained[-1:], *history.step_points[-1:]]), default=0.0)
     marks = [Mark(one.epoch, one.validation_rmse, point_text(one)) for one in epochs]
     best = next(
@@ -184,7 +180,7 @@ def training_chart(history: TrainingHistory) -> Chart:
     )
     return Chart(
         Scale(0.0, last or 1.0, whole=last >= 2),
-        Scale(low, high, log=True, text=tick_text),
+        Scale.around(shown, _PAD, _LEAST_RATIO, tick_text),
         "epochs",
         "RMSE",
         curves,

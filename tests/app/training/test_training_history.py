@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from sd2app.background.run_monitor import Phase, _Found
 from sd2app.training.run import TrainingHistory, TrainingMonitor
 from sd2app.training.text import metric_rows
-from sd2app.widgets.chart import ROUND
-from sd2app.widgets.plot import log_ticks
+from sd2app.widgets.chart import log_ticks
 from sd2app.widgets.text import duration_text
 
 START = {"event": "start", "model": "s4", "parameters": 7, "device": "cpu", "epochs": 4,
@@ -148,14 +147,14 @@ def test_points_are_kept_few() -> None:
 
 @given(st.floats(1e-4, 1e3), st.floats(1.6, 1e4), st.integers(3, 9))
 def test_an_axis_of_errors_has_values_on_it(low, ratio, most) -> None:
-    values = log_ticks(low, low * ratio, most, ROUND)
+    values = log_ticks(low, low * ratio, most)
     assert 1 <= len(values) <= most
     assert values == sorted(set(values))
     assert all(0.999 * low <= value <= 1.001 * low * ratio for value in values)
 
 
 def test_half_a_decade_has_three_values() -> None:
-    assert log_ticks(0.2, 0.8, 5, ROUND) == pytest.approx([0.2, 0.3, 0.5, 0.7])
+    assert log_ticks(0.2, 0.8, 5) == pytest.approx([0.2, 0.3, 0.5, 0.7])
 
 
 @pytest.mark.parametrize(

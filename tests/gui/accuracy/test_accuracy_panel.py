@@ -49,8 +49,12 @@ def button(panel, text):
     return found[0]
 
 
+def place(plot, result):
+    return plot.tip_place(next(mark for mark in plot.marks if mark.of is result))
+
+
 def at(plot, result):
-    return plot.point_of(result).toPoint()
+    return place(plot, result).toPoint()
 
 
 def done(window):
@@ -141,17 +145,17 @@ def test_measuring_shows_progress_and_then_the_points(panel, window, fake, qtbot
 
 def test_the_cheap_is_left_and_the_near_is_low(plot):
     cheap, exact = COUNTING[0], COUNTING[-1]
-    assert plot.point_of(cheap).x() < plot.point_of(exact).x()
-    assert plot.point_of(cheap).y() < plot.point_of(exact).y()
+    assert place(plot, cheap).x() < place(plot, exact).x()
+    assert place(plot, cheap).y() < place(plot, exact).y()
     # No error stands on the edge.
-    assert plot.point_of(exact).y() == pytest.approx(plot.plot_rect().bottom())
+    assert place(plot, exact).y() == pytest.approx(plot.plot_rect().bottom())
     for result in COUNTING:
-        assert plot.plot_rect().adjusted(-1, -1, 1, 1).contains(plot.point_of(result))
+        assert plot.plot_rect().adjusted(-1, -1, 1, 1).contains(place(plot, result))
 
 
 def test_hovering_says_what_a_point_is(plot, qtbot):
     qtbot.mouseMove(plot, at(plot, COUNTING[2]))
-    assert plot.pointed.plan == STRIDE
+    assert plot.pointed.of.plan == STRIDE
     shown = QToolTip.text()
     for words in (
         str(STRIDE),
@@ -185,15 +189,15 @@ def test_keys_go_from_point_to_point_and_use_one(plot, window, qtbot):
     trade, playback = models_of(window).trade, models_of(window).playback
     frame = playback.frame
     plot.setFocus(Qt.FocusReason.TabFocusReason)
-    assert plot.pointed.plan == EXACT
+    assert plot.pointed.of.plan == EXACT
     # The front: facing, mask every 5 frames, exact; the depth buffer is behind it.
     qtbot.keyClick(plot, Qt.Key.Key_Left)
-    assert plot.pointed.plan == STRIDE
+    assert plot.pointed.of.plan == STRIDE
     qtbot.keyClick(plot, Qt.Key.Key_Left)
     qtbot.keyClick(plot, Qt.Key.Key_Left)
-    assert plot.pointed.plan == FACING
+    assert plot.pointed.of.plan == FACING
     qtbot.keyClick(plot, Qt.Key.Key_Down)
-    assert plot.pointed.plan == COUNTING[1].plan
+    assert plot.pointed.of.plan == COUNTING[1].plan
     assert "depth 128" in plot.accessibleDescription()
     qtbot.keyClick(plot, Qt.Key.Key_Return)
     assert trade.in_use.plan == COUNTING[1].plan
