@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sd2app.denoise.library import DenoiserLibrary
+from sd2app.background.model_worker.library import DenoiserLibrary
 from sd2core.denoise.card import ModelCard
 from sd2core.denoise.scaling import Compression, Scaling
 from sd2core.errors import Sd2Error

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sd2core.classify.card import ClassifierCard
-from sd2core.denoise.weights import Shapes, read_header, read_weights, write_weights
+from sd2core.denoise.files import readable, user_models_folder
+from sd2core.denoise.weights import SUFFIX, Shapes, read_header, read_weights, write_weights
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
@@ -54,6 +55,16 @@ def load_classifier(path: Path) -> TrainedClassifier:
         ) from error
     read_weights(path, network, card.model, shapes, _EXPECTED)
     return TrainedClassifier(network, card)
+
+
+def available_classifiers() -> list[ClassifierCard]:
+    """Cards of the user's classifiers; damaged files are left out."""
+    return readable(sorted(user_classifiers_folder().glob(f"*{SUFFIX}")), describe_classifier)
+
+
+def user_classifiers_folder() -> Path:
+    """Folder of the user's classifiers; it may not exist yet."""
+    return user_models_folder().parent / "classifiers"
 
 
 def _read_header(path: Path) -> tuple[ClassifierCard, Shapes]:

@@ -92,6 +92,10 @@ class TrainedClassifier:
         found[known:] = self.finish(memory)
         return found
 
+    def live(self) -> LiveClasses:
+        """Session for the frames of one stretch, all with a person."""
+        return LiveClasses(self)
+
     def initial_memory(self) -> Memory:
         """Return the state before the first frame of a clip."""
         with torch.no_grad():
@@ -147,6 +151,23 @@ class TrainedClassifier:
             answer, state = self.network.chunk(torch.from_numpy(shown)[None], memory.network)
             found: Probabilities = probabilities_of(answer[0]).numpy()
         return found[max(self.card.delay_frames - memory.owed, 0) :], state
+
+
+class LiveClasses:
+    """Session that takes the frames of one stretch, all with a person, as they come."""
+
+    def __init__(self, classifier: TrainedClassifier) -> None:
+        self._classifier = classifier
+        self._memory = classifier.initial_memory()
+
+    def advance(self, energies: NDArray[np.float32]) -> Probabilities:
+        """Process the next frames, (frames, bins) → (answers, classes)."""
+        answers, self._memory = self._classifier.advance(energies, self._memory)
+        return answers
+
+    def finish(self) -> Probabilities:
+        """Return the outstanding answers, as if silence followed; the session stays usable."""
+        return self._classifier.finish(self._memory)
 
 
 def judge(classifier: TrainedClassifier, clips: Sequence[Clip], known: ClipSet) -> Score:

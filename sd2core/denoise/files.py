@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from sd2core.denoise.card import ModelCard
 from sd2core.denoise.weights import SUFFIX, Shapes, read_header, read_weights, write_weights
@@ -13,6 +14,8 @@ from sd2core.files.resources import bundled_files
 
 if TYPE_CHECKING:
     from sd2core.denoise.live import TrainedDenoiser
+
+Card = TypeVar("Card")
 
 DEFAULT_NAME = "denoiser"
 """Name of the model that is used when none is named."""
@@ -106,10 +109,15 @@ def find_model(model: Path | str) -> Path:
 
 def available_models() -> list[ModelCard]:
     """Cards of the bundled and the user's models; damaged files are left out."""
+    return readable(_known_files().values(), describe_model)
+
+
+def readable(paths: Iterable[Path], describe: Callable[[Path], Card]) -> list[Card]:
+    """Cards of model files; damaged ones are left out."""
     cards = []
-    for path in _known_files().values():
+    for path in paths:
         try:
-            cards.append(describe_model(path))
+            cards.append(describe(path))
         except (Sd2Error, OSError):
             continue
     return cards

@@ -8,9 +8,9 @@ from pathlib import Path
 from PySide6.QtCore import QObject, SignalInstance
 from PySide6.QtWidgets import QMenu, QWidget
 
+from sd2app.background.model_worker.library import ClassifierLibrary
 from sd2app.classify.dialogs import ClassifyDialogs
 from sd2app.classify.finder import GestureFinder
-from sd2app.classify.library import ClassifierLibrary
 from sd2app.classify.model import ClassifyModel
 from sd2app.classify.panel import ClassPanel
 from sd2app.classify.strip import ClassStrip

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from sd2app.background.latest import LatestRunner
-from sd2app.classify.library import Classifier, ClassifierLibrary
+from sd2app.background.model_worker.client import RemoteClassifier
+from sd2app.background.model_worker.library import ClassifierLibrary
 from sd2app.classify.track import ClassReading, ClassTrack
 from sd2app.denoise.validity import MapValidity
 from sd2app.labels.model import LabelsModel
@@ -27,7 +28,7 @@ _MODEL, _SHOWN = "classify/model", "classify/shown"
 
 class _Loaded(NamedTuple):
     card: ClassifierCard
-    classifier: Classifier
+    classifier: RemoteClassifier
 
 
 class ClassifyModel(QObject):

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from sd2app.background.latest import Emit, LatestRunner
-from sd2app.classify.library import Classifier, LiveClasses
+from sd2app.background.model_worker.client import RemoteClasses, RemoteClassifier
 from sd2app.denoise.map import AT_ONCE, cut_out
 from sd2app.session.maps import MapModel
 from sd2core.denoise.resample_to_model import check_bins, is_regular, stretches
@@ -49,7 +49,7 @@ class ClassReading:
 class _Going(NamedTuple):
     """Session of a stretch that is classified up to a frame."""
 
-    session: LiveClasses
+    session: RemoteClasses
     start: int
     next: int
     answered: int
@@ -76,7 +76,7 @@ class ClassTrack(QObject):
         super().__init__(parent)
         self._counts = counts
         self._source: MapModel | None = None
-        self._classifier: Classifier | None = None
+        self._classifier: RemoteClassifier | None = None
         self._card: ClassifierCard | None = None
         self._problem = ""
         self._runner = LatestRunner("classify", self)
@@ -176,7 +176,7 @@ class ClassTrack(QObject):
 
     # --- requests -------------------------------------------------------------------------
 
-    def use(self, classifier: Classifier | None, card: ClassifierCard | None) -> None:
+    def use(self, classifier: RemoteClassifier | None, card: ClassifierCard | None) -> None:
         """Use another classifier, or none."""
         self._classifier, self._card = classifier, card if classifier is not None else None
         self._restart()
@@ -334,7 +334,7 @@ class ClassTrack(QObject):
 
 
 def _in_order(
-    classifier: Classifier,
+    classifier: RemoteClassifier,
     doppler: DopplerMap,
     stretch: tuple[int, int],
     grows: bool,

@@ -9,12 +9,12 @@ from typing import Any
 from PySide6.QtCore import QObject
 
 from sd2app.background.runs import KnownRun, Runs, Sentences, free_folder
-from sd2app.classify.library import user_classifiers_folder
 from sd2app.classify.run import MODEL_NAME, TABLE_NAME, ClassRun
 from sd2app.classify.setup import ClassSetup
 from sd2app.settings import Settings
 from sd2app.training.model import quoted
 from sd2app.widgets.text import clock_text
+from sd2core.classify.files import user_classifiers_folder
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
 from sd2core.runs.command_folder import COMMAND_IN_FOLDER, CommandFolder, commands_in

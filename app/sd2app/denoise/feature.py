@@ -8,7 +8,7 @@ from pathlib import Path
 from PySide6.QtCore import QObject, SignalInstance
 from PySide6.QtWidgets import QFileDialog, QMenu
 
-from sd2app.denoise.library import DenoiserLibrary
+from sd2app.background.model_worker.library import DenoiserLibrary
 from sd2app.denoise.live import LiveDenoiseModel
 from sd2app.denoise.model import DenoiseModel
 from sd2app.denoise.text import denoiser_page, kind_words, origin_words

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.latest import LatestRunner
-from sd2app.denoise.library import Denoiser, LiveSession
+from sd2app.background.model_worker.client import RemoteDenoiser, RemoteLive
 from sd2app.denoise.map import presence
 from sd2app.denoise.model import DenoiseModel
 from sd2app.session.session import Session
@@ -22,7 +22,7 @@ _JUMP_S = 1.0
 
 
 class _Stepped(NamedTuple):
-    session: LiveSession
+    session: RemoteLive
     start: int
     values: NDArray[np.float32]
     cost_s: float
@@ -43,8 +43,8 @@ class LiveDenoiseModel(QObject):
         self._playback, self._synthetic = session.playback, session.maps.synthetic
         self._settings, self._denoise = session.settings, denoise
         self.wanted = session.settings.flag(_WANTED, False)  # by the user
-        self._denoiser: Denoiser | None = None
-        self._session: LiveSession | None = None
+        self._denoiser: RemoteDenoiser | None = None
+        self._session: RemoteLive | None = None
         self._next = 0
         self._fresh = True
         self._runner = LatestRunner("live", self)

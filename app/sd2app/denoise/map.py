@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from sd2app.background.latest import LatestRunner
-from sd2app.denoise.library import Denoiser, LiveSession
+from sd2app.background.model_worker.client import RemoteDenoiser, RemoteLive
 from sd2app.maps.partial_map import View
 from sd2app.maps.quality import Companion
 from sd2app.session.content import reference_of
@@ -45,7 +45,7 @@ CONTEXT = 288
 class Swept(NamedTuple):
     """Denoised preview of a part of the map."""
 
-    denoiser: Denoiser
+    denoiser: RemoteDenoiser
     doppler: DopplerMap
 
 
@@ -56,7 +56,7 @@ class _Answer(NamedTuple):
     values: NDArray[np.float32]  # (bins, n)
     like: DopplerMap  # map with their unit and axis
     revision: int  # of the synthetic map that they were made from
-    session: LiveSession | None = None  # at the end of the piece, where pieces follow in order
+    session: RemoteLive | None = None  # at the end of the piece, where pieces follow in order
 
 
 class DenoisedMap(QObject):
@@ -86,7 +86,7 @@ class DenoisedMap(QObject):
         self._view = view
         self._jobs = jobs
         self._job: Job | None = None
-        self.denoiser: Denoiser | None = None  # the model in use
+        self.denoiser: RemoteDenoiser | None = None  # the model in use
         self.words = ""
         self._held = False
         self._runner = LatestRunner("denoise", self)
@@ -120,7 +120,7 @@ class DenoisedMap(QObject):
         self._begin_order()
 
     def _begin_order(self) -> None:
-        self._session: LiveSession | None = None
+        self._session: RemoteLive | None = None
         self._in_order = 0
 
     # --- what is known --------------------------------------------------------------------
@@ -143,7 +143,7 @@ class DenoisedMap(QObject):
 
     # --- requests -------------------------------------------------------------------------
 
-    def use(self, denoiser: Denoiser | None, words: str = "") -> None:
+    def use(self, denoiser: RemoteDenoiser | None, words: str = "") -> None:
         """Denoise with another model, called ``words`` on the track, or not at all."""
         self._stop()
         self._took_s.clear()

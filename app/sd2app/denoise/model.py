@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from sd2app.background.latest import LatestRunner
-from sd2app.denoise.library import Denoiser, DenoiserLibrary
+from sd2app.background.model_worker.client import RemoteDenoiser
+from sd2app.background.model_worker.library import DenoiserLibrary
 from sd2app.denoise.map import DenoisedMap
 from sd2app.denoise.text import origin_words, track_words
 from sd2app.maps.model import SynthesisModel
@@ -33,7 +34,7 @@ class Loaded:
     """A loaded model with its card."""
 
     card: ModelCard
-    denoiser: Denoiser
+    denoiser: RemoteDenoiser
 
 
 class DenoiseModel(QObject):

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
 
-from PySide6.QtCore import QPointF, QRectF, QSignalBlocker, Qt, SignalInstance
+from PySide6.QtCore import QPointF, QRectF, QSignalBlocker, Qt
 from PySide6.QtGui import QAction, QColor, QMouseEvent, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QLabel, QSlider, QToolButton, QWidget
 
+from sd2app.labels.loop import SpanLoop
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.session import Session
 from sd2app.widgets.layouts import Part, row_of
@@ -20,24 +20,8 @@ from sd2app.widgets.time_axis import (
     tick_step,
     ticks,
 )
-from sd2core.labels.spans import Span
 
 _BUTTONS = ("first_frame", "previous_frame", "play", "next_frame", "last_frame", "loop")
-
-
-class Looped(Protocol):
-    """Span that is played in a loop."""
-
-    @property
-    def changed(self) -> SignalInstance:
-        """Emitted when a loop begins or ends."""
-
-    @property
-    def span(self) -> Span | None:
-        """The span, or None."""
-
-    def end(self) -> None:
-        """Leave the loop and play on."""
 
 
 class TransportBar(QWidget):
@@ -46,7 +30,7 @@ class TransportBar(QWidget):
     def __init__(
         self,
         playback: PlaybackModel,
-        looped: Looped,
+        looped: SpanLoop,
         action: Callable[[str], QAction],
         parent: QWidget | None = None,
     ) -> None:

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from sd2app.accuracy.library import AccuracyLibrary
-    from sd2app.classify.library import ClassifierLibrary
-    from sd2app.denoise.library import DenoiserLibrary
+    from sd2app.background.model_worker.library import ClassifierLibrary, DenoiserLibrary
 
 
 @dataclass(frozen=True)

@@ -11,12 +11,11 @@ from PySide6.QtWidgets import QWidget
 from sd2app.accuracy.feature import AccuracyFeature
 from sd2app.agreement.feature import AgreementFeature
 from sd2app.background.model_worker.client import ModelProcess
+from sd2app.background.model_worker.library import core_classifiers, core_denoisers
 from sd2app.batch.feature import BatchFeature
 from sd2app.classify.feature import ClassifyFeature
-from sd2app.classify.library import core_classifiers
 from sd2app.dataset_export.feature import DatasetExportFeature
 from sd2app.denoise.feature import DenoiseFeature
-from sd2app.denoise.library import core_library
 from sd2app.denoise.text import track_words
 from sd2app.denoise.validity import MapValidity
 from sd2app.feature import Feature, Shell
@@ -80,7 +79,7 @@ def build_features(session: Session, shell: Shell, parts: Parts, parent: QObject
     process = ModelProcess()
     accuracy = AccuracyFeature(session, shell, parts.accuracy, parent)
     maps = MapsFeature(session, shell, accuracy.model, parent)
-    denoisers = parts.denoisers or core_library(process)
+    denoisers = parts.denoisers or core_denoisers(process)
     denoise = DenoiseFeature(session, shell, maps.synthesis, denoisers, parent)
     fit = FitFeature(session, shell, parts.fit_command, parent)
     video = VideoFeature(session, shell, fit, parent)

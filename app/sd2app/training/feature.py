@@ -7,12 +7,13 @@ from collections.abc import Sequence
 from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QWidget
 
+from sd2app.denoise.model import DenoiseModel
 from sd2app.feature import Action, Feature, Shell
 from sd2app.session.session import Session
 from sd2app.training.dialogs import TrainingDialogs
 from sd2app.training.model import COMMAND, TrainingModel
 from sd2app.training.panel import TrainingPanel
-from sd2app.training.result import Denoising, ModelAdoption
+from sd2app.training.result import ModelAdoption
 from sd2core.denoise.files import user_models_folder
 
 
@@ -23,7 +24,7 @@ class TrainingFeature(Feature):
         self,
         session: Session,
         shell: Shell,
-        denoise: Denoising,
+        denoise: DenoiseModel,
         command: Sequence[str] | None,
         parent: QObject,
     ) -> None:

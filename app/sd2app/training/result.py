@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QObject, QTimer, Signal, SignalInstance
+from PySide6.QtCore import QObject, QTimer, Signal
 
+from sd2app.denoise.model import DenoiseModel
 from sd2app.session.session import Maps
 from sd2app.training.model import TrainingModel
 from sd2core.errors import Sd2Error
@@ -36,30 +36,6 @@ class Improvement:
     simulated: bool
 
 
-class Denoising(Protocol):
-    """Interface of the model that denoises the recording."""
-
-    changed: SignalInstance
-
-    @property
-    def path(self) -> Path | None:
-        """File of the model in use."""
-
-    @property
-    def busy(self) -> bool:
-        """True while a map is computed."""
-
-    @property
-    def comparing(self) -> bool:
-        """True if the earlier model's map is shown as well."""
-
-    def use(self, path: Path | None) -> None:
-        """Denoise with a model, or with none."""
-
-    def set_comparing(self, comparing: bool) -> None:
-        """Show the map of the model before as well, or not."""
-
-
 class ModelAdoption(QObject):
     """Keeps the best model of a run among the user's models, and denoises with it.
 
@@ -73,7 +49,7 @@ class ModelAdoption(QObject):
     def __init__(
         self,
         training: TrainingModel,
-        denoise: Denoising,
+        denoise: DenoiseModel,
         maps: Maps,
         models: Callable[[], Path],
         parent: QObject | None = None,

@@ -174,12 +174,12 @@ def test_the_window_itself_never_loads_torch():
         "import sd2app.shell.wiring\n"
         # It comes last, in a thread: everything else is usable while it loads.
         "assert 'vtkmodules' not in sys.modules, 'vtkmodules'\n"
-        "import sd2app.denoise.model, sd2app.denoise.library as library\n"
-        "import sd2app.classify.library as classifiers\n"
+        "import sd2app.denoise.model\n"
+        "import sd2app.background.model_worker.library as library\n"
         "from sd2app.background.model_worker.client import ModelProcess\n"
         "process = ModelProcess()\n"
-        "library.core_library(process).available()\n"
-        "classifiers.core_classifiers(process).available()\n"
+        "library.core_denoisers(process).available()\n"
+        "library.core_classifiers(process).available()\n"
         "assert 'torch' not in sys.modules, 'torch'\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)

@@ -181,7 +181,7 @@ class _RemoteSession:
         self._clip = process.ask("begin", model)
         self._generation = process.generation
 
-    def _ask(self, do: str, *arguments: NDArray[Any]) -> NDArray[np.float32]:
+    def _ask(self, do: str, *arguments: Any) -> NDArray[np.float32]:
         if self._process.generation != self._generation:
             raise Sd2Error(
                 "The process in which the models work was started again",
@@ -196,7 +196,7 @@ class RemoteClasses(_RemoteSession):
 
     def advance(self, energies: NDArray[np.float32]) -> NDArray[np.float32]:
         """Probabilities that follow from the next frames: (frames, bins) → (answers, classes)."""
-        return self._ask("advance", energies, np.ones(len(energies), np.bool_))
+        return self._ask("advance", energies)
 
     def finish(self) -> NDArray[np.float32]:
         """Outstanding answers, as if nothing moved from now on; the session stays usable."""
@@ -212,7 +212,7 @@ class RemoteLive(_RemoteSession):
 
     def step(self, energies: NDArray[np.float32], present: bool = True) -> NDArray[np.float32]:
         """Answer to the next frame (bins,)."""
-        return self.advance(energies[None], np.array([present]))[0]
+        return self._ask("step", energies, present)
 
     def advance(
         self, energies: NDArray[np.float32], present: NDArray[np.bool_]

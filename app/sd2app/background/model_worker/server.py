@@ -48,7 +48,7 @@ class Worker:
         """Number of a classifier."""
         from sd2core.classify.files import load_classifier
 
-        return self._keep(self._models, _Classifying(load_classifier(path)))
+        return self._keep(self._models, load_classifier(path))
 
     def denoise(self, model: int, doppler: DopplerMap) -> DopplerMap:
         """Denoised map."""
@@ -57,26 +57,26 @@ class Worker:
 
     def classify(self, model: int, doppler: DopplerMap) -> NDArray[np.float32]:
         """Class probabilities of every frame of a map, (frames, classes)."""
-        found: NDArray[np.float32] = _newest(self._models, model).trained.probabilities(doppler)
+        found: NDArray[np.float32] = _newest(self._models, model).probabilities(doppler)
         return found
 
     def begin(self, model: int) -> int:
         """Number of a new clip whose frames come one after another."""
         return self._keep(self._live, _newest(self._models, model).live())
 
-    def advance(
-        self, clip: int, energies: NDArray[np.float32], present: NDArray[np.bool_]
-    ) -> NDArray[np.float32]:
-        """Answers to the next frames (frames, bins) of a clip, one row for each."""
-        live = _newest(self._live, clip)
-        if len(energies) == 1:
-            return np.atleast_2d(live.step(energies[0], bool(present[0])))
-        found: NDArray[np.float32] = live.advance(energies, present)
+    def step(self, clip: int, energies: NDArray[np.float32], present: bool) -> NDArray[np.float32]:
+        """Answer to the next frame (bins,) of a denoiser's clip."""
+        found: NDArray[np.float32] = _newest(self._live, clip).step(energies, present)
+        return found
+
+    def advance(self, clip: int, *frames: NDArray[Any]) -> NDArray[np.float32]:
+        """Answers to the next frames (frames, bins) of a clip, with a mask for a denoiser."""
+        found: NDArray[np.float32] = _newest(self._live, clip).advance(*frames)
         return found
 
     def finish(self, clip: int) -> NDArray[np.float32]:
         """Outstanding answers of a clip."""
-        return np.atleast_2d(_newest(self._live, clip).finish())
+        return _newest(self._live, clip).finish()
 
     def _keep(self, kept: dict[int, Any], one: Any) -> int:
         self._next += 1
@@ -92,38 +92,6 @@ def _newest(kept: dict[int, Any], number: int) -> Any:
         raise Sd2Error("The model is no longer loaded", remedy="Choose it again")
     kept[number] = kept.pop(number)
     return kept[number]
-
-
-class _Classifying:
-    """Classifier with the interface of a denoiser."""
-
-    def __init__(self, trained: Any) -> None:
-        self.trained = trained
-
-    def live(self) -> _LiveClasses:
-        return _LiveClasses(self.trained)
-
-
-class _LiveClasses:
-    """Frames of one stretch, all with a person, as they come."""
-
-    def __init__(self, trained: Any) -> None:
-        self._trained = trained
-        self._memory = trained.initial_memory()
-
-    def step(self, energies: NDArray[np.float32], present: bool) -> NDArray[np.float32]:
-        return self.advance(energies[None], np.array([present]))
-
-    def advance(
-        self, energies: NDArray[np.float32], present: NDArray[np.bool_]
-    ) -> NDArray[np.float32]:
-        found: NDArray[np.float32]
-        found, self._memory = self._trained.advance(energies, self._memory)
-        return found
-
-    def finish(self) -> NDArray[np.float32]:
-        found: NDArray[np.float32] = self._trained.finish(self._memory)
-        return found
 
 
 def serve(source: BinaryIO, sink: BinaryIO) -> None:
