@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from PySide6.QtCore import SignalInstance
 from PySide6.QtGui import QAction
@@ -92,6 +92,11 @@ class Feature:
     panels and bars are made by their methods, which are called once.
     """
 
+    changing: Sequence[SignalInstance] = ()
+    """Signals after which an action may be possible that was not, or the reverse."""
+    closing: Sequence[Any] = ()
+    """Models with a method ``close``, closed with the window in this order."""
+
     @property
     def busy(self) -> bool:
         """True while something is being computed that a picture of the window should wait for."""
@@ -116,10 +121,6 @@ class Feature:
         """Bars above the content, hidden while they have nothing to say."""
         return ()
 
-    def changes(self) -> Sequence[SignalInstance]:
-        """Signals after which an action may be possible that was not, or the reverse."""
-        return ()
-
     def take_over(self) -> None:
         """Follow a recording that has just been opened."""
 
@@ -136,3 +137,5 @@ class Feature:
 
     def close(self) -> None:
         """Stop every thread and let go of files."""
+        for model in self.closing:
+            model.close()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from PySide6.QtCore import QObject, SignalInstance
+from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QWidget
 
 from sd2app.accuracy.library import AccuracyLibrary
@@ -26,6 +26,8 @@ class AccuracyFeature(Feature):
         )
         self.model.failed.connect(shell.warn)
         self.model.noted.connect(shell.note)
+        self.changing = (self.model.plan_changed, self.model.measured.changed)
+        self.closing = (self.model,)
 
     def actions(self) -> Sequence[Action]:
         """Panel and measurement."""
@@ -51,11 +53,3 @@ class AccuracyFeature(Feature):
         """The panel at the side."""
         measure = self._shell.action("measure")
         return {"Accuracy": AccuracyPanel(self.model, self._session.display, measure)}
-
-    def changes(self) -> Sequence[SignalInstance]:
-        """Plans and measurements."""
-        return self.model.plan_changed, self.model.measured.changed
-
-    def close(self) -> None:
-        """Stop choosing and measuring."""
-        self.model.close()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from PySide6.QtCore import QObject, SignalInstance
+from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QFileDialog, QWidget
 
 from sd2app.agreement.model import AgreementModel
@@ -25,6 +25,8 @@ class AgreementFeature(Feature):
     ) -> None:
         self._session, self._shell = session, shell
         self.model = AgreementModel(session, labels, parent)
+        self.changing = (self.model.changed,)
+        self.closing = (self.model,)
 
     def actions(self) -> Sequence[Action]:
         """Comparison of labels."""
@@ -73,14 +75,6 @@ class AgreementFeature(Feature):
             "other labels": OtherTimeline(s, self.model),
         }
 
-    def changes(self) -> Sequence[SignalInstance]:
-        """The comparison."""
-        return (self.model.changed,)
-
     def take_over(self) -> None:
         """Forget the comparison of the recording before."""
         self.model.clear()
-
-    def close(self) -> None:
-        """Stop reading labels."""
-        self.model.close()

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QObject, QTimer, Signal
 
 from sd2core.progress import Cancelled
 
@@ -15,6 +15,13 @@ Emit = Callable[[Any], None]
 """Hands an intermediate result to the window; raises Cancelled when it is stale."""
 
 Task = Callable[[Emit], Any]
+
+
+def delayed(work: Callable[[], object], delay_ms: int, parent: QObject) -> QTimer:
+    """Timer that does some work once, so long after it was last started."""
+    timer = QTimer(parent, singleShot=True, interval=delay_ms)
+    timer.timeout.connect(work)
+    return timer
 
 
 class LatestRunner(QObject):

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QTimer
 from PySide6.QtGui import QHideEvent, QShowEvent
 from PySide6.QtWidgets import QDialog, QStackedWidget, QWidget
 
+from sd2app.background.latest import delayed
 from sd2app.batch.model import BatchModel
 from sd2app.batch.questions import BatchQuestions
 from sd2app.batch.run_view import BatchRunView
@@ -35,10 +35,7 @@ class BatchWindow(QDialog):
         parts = (row_of((self._title, 1), another), self._warning, (self._pages, 1))
         self.setLayout(column_of(*parts, spacing_px=10, margins_px=(16, 12, 16, 16)))
         # Not while the user still changes a number.
-        self._patience = QTimer(self)
-        self._patience.setSingleShot(True)
-        self._patience.setInterval(_ESTIMATE_MS)
-        self._patience.timeout.connect(self._estimate)
+        self._patience = delayed(self._estimate, _ESTIMATE_MS, self)
         batch.changed.connect(self._refresh)
         batch.setup.changed.connect(self._patience.start)
         self.resize(620, 640)

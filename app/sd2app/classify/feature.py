@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from PySide6.QtCore import QObject, SignalInstance
+from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QMenu, QWidget
 
 from sd2app.background.model_worker.library import ClassifierLibrary
@@ -61,6 +61,8 @@ class ClassifyFeature(Feature):
         self.training.failed.connect(shell.warn)
         self.training.noted.connect(shell.note)
         self._menu: ModelMenu | None = None
+        self.changing = (self.model.changed,)
+        self.closing = (self.training, self.model)  # runs go on
 
     @property
     def busy(self) -> bool:
@@ -130,15 +132,6 @@ class ClassifyFeature(Feature):
         """Use a classifier that was dropped."""
         return path.suffix == ".safetensors" and self.dialogs.take_dropped(path)
 
-    def changes(self) -> Sequence[SignalInstance]:
-        """The classifier."""
-        return (self.model.changed,)
-
     def look_for_unfinished(self) -> None:
         """Find runs under way and ended."""
         self.training.look_for_runs()
-
-    def close(self) -> None:
-        """Stop classifying; runs go on."""
-        self.training.close()
-        self.model.close()

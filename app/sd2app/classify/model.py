@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtCore import QObject, Signal
 
-from sd2app.background.latest import LatestRunner
+from sd2app.background.latest import LatestRunner, delayed
 from sd2app.background.model_worker.client import RemoteClassifier
 from sd2app.background.model_worker.library import ClassifierLibrary
 from sd2app.classify.track import ClassReading, ClassTrack
@@ -63,10 +63,7 @@ class ClassifyModel(QObject):
         self._runner = LatestRunner("classifier", self)
         self._runner.finished.connect(self._set_loaded)
         self._runner.failed.connect(self._fail)
-        self._patience = QTimer(self)
-        self._patience.setSingleShot(True)
-        self._patience.setInterval(_PATIENCE_MS)
-        self._patience.timeout.connect(self._load)
+        self._patience = delayed(self._load, _PATIENCE_MS, self)
         self.track.changed.connect(self.moved)
         for track in self._maps:
             track.changed.connect(self._follow)

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtCore import QObject, Signal
 
-from sd2app.background.latest import Emit, LatestRunner
+from sd2app.background.latest import Emit, LatestRunner, delayed
 from sd2app.background.model_worker.client import RemoteClasses, RemoteClassifier
 from sd2app.denoise.map import AT_ONCE, cut_out
 from sd2app.session.maps import MapModel
@@ -83,10 +83,7 @@ class ClassTrack(QObject):
         self._runner.partial.connect(self._receive)
         self._runner.finished.connect(self._finish)
         self._runner.failed.connect(self._fail)
-        self._calm = QTimer(self)
-        self._calm.setSingleShot(True)
-        self._calm.setInterval(_BETWEEN_MS)
-        self._calm.timeout.connect(self._go_on)
+        self._calm = delayed(self._go_on, _BETWEEN_MS, self)
         self._forget()
 
     def _forget(self) -> None:

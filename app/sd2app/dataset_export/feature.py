@@ -21,6 +21,7 @@ class DatasetExportFeature(Feature):
         self.model = ExportModel(session.jobs, parent)
         self.model.failed.connect(shell.warn)
         self.model.noted.connect(shell.note)
+        self.closing = (self.model,)  # an export goes on
 
     def actions(self) -> Sequence[Action]:
         """The dialog."""
@@ -63,7 +64,3 @@ class DatasetExportFeature(Feature):
     def look_for_unfinished(self) -> None:
         """Find an export that outlived its window."""
         self.model.look_for_runs()
-
-    def close(self) -> None:
-        """Let go of the export, which goes on."""
-        self.model.close()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from PySide6.QtCore import QObject, SignalInstance
+from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QFileDialog, QMenu
 
 from sd2app.background.model_worker.library import DenoiserLibrary
@@ -48,6 +48,8 @@ class DenoiseFeature(Feature):
         self.model.noted.connect(shell.note)
         self.live = LiveDenoiseModel(session, self.model, parent)
         self._menu: ModelMenu | None = None
+        self.changing = (self.model.changed, self.live.changed)
+        self.closing = (self.live, self.model)
 
     @property
     def busy(self) -> bool:
@@ -132,12 +134,3 @@ class DenoiseFeature(Feature):
         path = ask_map(self._shell.dialog_parent, "Export denoised map", "denoised.npz")
         if path is not None:
             self._shell.attempt(lambda: self.model.export(path))
-
-    def changes(self) -> Sequence[SignalInstance]:
-        """Model and live denoising."""
-        return self.model.changed, self.live.changed
-
-    def close(self) -> None:
-        """Stop denoising."""
-        self.live.close()
-        self.model.close()

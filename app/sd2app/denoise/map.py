@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtCore import QObject, Signal
 
-from sd2app.background.latest import LatestRunner
+from sd2app.background.latest import LatestRunner, delayed
 from sd2app.background.model_worker.client import RemoteDenoiser, RemoteLive
 from sd2app.maps.partial_map import View
 from sd2app.maps.quality import Companion
@@ -93,10 +93,7 @@ class DenoisedMap(QObject):
         self._runner.finished.connect(self._receive)
         self._runner.failed.connect(lambda error: self._fail(str(error)))
         self._stumbled.connect(self._fail)
-        self._again = QTimer(self)
-        self._again.setSingleShot(True)
-        self._again.setInterval(_BETWEEN_MS)
-        self._again.timeout.connect(self._go_on)
+        self._again = delayed(self._go_on, _BETWEEN_MS, self)
         self._took_s: deque[float] = deque(maxlen=5)
         self._forget()
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtCore import QObject, Signal
 
-from sd2app.background.latest import LatestRunner
+from sd2app.background.latest import LatestRunner, delayed
 from sd2app.background.model_worker.client import RemoteDenoiser
 from sd2app.background.model_worker.library import DenoiserLibrary
 from sd2app.denoise.map import DenoisedMap
@@ -66,10 +66,7 @@ class DenoiseModel(QObject):
         self._runner = LatestRunner("denoiser", self)
         self._runner.finished.connect(self._set_model)
         self._runner.failed.connect(self._fail)
-        self._patience = QTimer(self)
-        self._patience.setSingleShot(True)
-        self._patience.setInterval(_PATIENCE_MS)
-        self._patience.timeout.connect(self._wake)
+        self._patience = delayed(self._wake, _PATIENCE_MS, self)
         self.map.failed.connect(self._say_problem)
         self.map.idle.connect(self.changed)
         self.before_map.failed.connect(lambda _: self.set_comparing(False))

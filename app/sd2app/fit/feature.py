@@ -31,6 +31,8 @@ class FitFeature(Feature):
         self.model = FitModel(session.settings, parent, command or COMMAND_IN_FOLDER)
         self.on_screen = FitOnScreen(session, self.model, parent)
         self.on_screen.noted.connect(shell.note)
+        self.changing = (self.model.state_changed,)
+        self.closing = (self.model,)  # a fit stops, and can be continued
 
     @property
     def landmarks_changed(self) -> tuple[SignalInstance, ...]:
@@ -64,10 +66,6 @@ class FitFeature(Feature):
                 resume=self._resume,
             ),
         )
-
-    def changes(self) -> Sequence[SignalInstance]:
-        """State of the fit."""
-        return (self.model.state_changed,)
 
     def take_over(self) -> None:
         """Follow the fit again: staying elsewhere was a wish about the recording before."""
@@ -135,7 +133,3 @@ class FitFeature(Feature):
             buttons.Ok,
         )
         return answer == buttons.Ok
-
-    def close(self) -> None:
-        """Stop the fit; it can be continued."""
-        self.model.close()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from PySide6.QtCore import QObject, QTimer, SignalInstance
+from PySide6.QtCore import QObject, QTimer
 from PySide6.QtWidgets import QMenu, QWidget
 
 from sd2app.feature import Action, Feature, Shell
@@ -64,6 +64,15 @@ class LabelsFeature(Feature):
             model.failed.connect(shell.warn)
             model.noted.connect(shell.note)
         s.document.changed.connect(self._follow_capture)
+        self.changing = (
+            self.autosave.changed,
+            labels.changed,
+            labels.selection_changed,
+            labels.marks_changed,
+            self.dragging.changed,
+            self.loop.changed,
+        )
+        self.closing = (self.cut_out, self.autosave)
 
     # --- menus ----------------------------------------------------------------------------
 
@@ -354,19 +363,3 @@ class LabelsFeature(Feature):
         # A dialog during the drop would keep the program waiting that it came from.
         QTimer.singleShot(0, lambda: import_labels(self._shell, self.edits, path))
         return True
-
-    def changes(self) -> Sequence[SignalInstance]:
-        """Labels, selection and marks."""
-        return (
-            self.autosave.changed,
-            self.model.changed,
-            self.model.selection_changed,
-            self.model.marks_changed,
-            self.dragging.changed,
-            self.loop.changed,
-        )
-
-    def close(self) -> None:
-        """Stop cutting out, and let go of the labels."""
-        self.cut_out.close()
-        self.autosave.close()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from PySide6.QtCore import QObject, SignalInstance
+from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QWidget
 
 from sd2app.accuracy.model import AccuracyModel
@@ -36,6 +36,12 @@ class MapsFeature(Feature):
         session.document.changed.connect(session.follow_capture)
         self.synthesis.failed.connect(shell.warn)
         self.uncertainty.failed.connect(shell.warn)
+        self.changing = (
+            self.synthesis.completed,
+            self.uncertainty.changed,
+            self.difference.state_changed,
+        )
+        self.closing = (self.uncertainty, self.synthesis)
 
     @property
     def busy(self) -> bool:
@@ -93,16 +99,7 @@ class MapsFeature(Feature):
         levels = LevelBar(self._session, self._shell.action("uncertain"))
         return {"spectrum": pane((SpectrumView(self._session), 1), levels)}
 
-    def changes(self) -> Sequence[SignalInstance]:
-        """Maps that are complete, and what is shown of them."""
-        return self.synthesis.completed, self.uncertainty.changed, self.difference.state_changed
-
     def take_over(self) -> None:
         """Compute the map of the recording that was opened."""
         self._session.follow_capture(new=True)
         self.synthesis.take_over()
-
-    def close(self) -> None:
-        """Stop computing."""
-        self.uncertainty.close()
-        self.synthesis.close()

@@ -7,9 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtCore import QObject, Signal
 
 from sd2app.accuracy.model import AccuracyModel
+from sd2app.background.latest import delayed
 from sd2app.maps.partial_map import FINAL, Part, ShownMap, View
 from sd2app.maps.quality import (
     Companion,
@@ -78,10 +79,7 @@ class SynthesisModel(QObject):
         self._runner.cancelled.connect(self._say_quality)
         self._compiler = CompilerModel(self)
         self._compiler.finished.connect(self._follow)
-        self._rest = QTimer(self)
-        self._rest.setSingleShot(True)
-        self._rest.setInterval(_REST_MS)
-        self._rest.timeout.connect(self._settle)
+        self._rest = delayed(self._settle, _REST_MS, self)
         session.sensor.changed.connect(self._follow)
         session.sensor.dragging_changed.connect(self._follow)
         session.span.changed.connect(self._reorder)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import SignalInstance
-
 from sd2app.feature import Action, Feature
 from sd2app.session.session import Session
 
@@ -15,10 +13,7 @@ class PlaybackFeature(Feature):
 
     def __init__(self, session: Session) -> None:
         self._session = session
-
-    def changes(self) -> Sequence[SignalInstance]:
-        """Playing and looping."""
-        return self._session.playback.playing_changed, self._session.playback.loop_changed
+        self.changing = (session.playback.playing_changed, session.playback.loop_changed)
 
     def actions(self) -> Sequence[Action]:
         """Play, step, speed, zoom."""

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import SignalInstance
 from PySide6.QtWidgets import QWidget
 
 from sd2app.feature import Action, Feature, Shell
@@ -51,6 +50,7 @@ class SceneFeature(Feature):
         self._session, self._shell = session, shell
         self._synthesis, self._placements = synthesis, placements
         self.view: SceneView | None = None
+        self.changing = (session.display.mesh_changed,)
 
     @property
     def busy(self) -> bool:
@@ -97,10 +97,6 @@ class SceneFeature(Feature):
 
         self.view = SceneView(self._session, self._synthesis, self._placements)
         return pane(SceneBar(self._session.display, self._shell.action), (self.view, 1))
-
-    def changes(self) -> Sequence[SignalInstance]:
-        """Colour and dots."""
-        return (self._session.display.mesh_changed,)
 
     def close(self) -> None:
         """Release VTK."""

@@ -12,13 +12,14 @@ from functools import cache
 
 import numpy as np
 import vtkmodules.vtkRenderingOpenGL2 as opengl
-from PySide6.QtCore import QSize, Qt, QTimer
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QImage, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QWidget
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkLogger, vtkObject, vtkUnsignedCharArray
 from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindow
 
+from sd2app.background.latest import delayed
 from sd2app.scene.backend import GL_BROKEN, GL_MISSING, NoOpenGL, Prepare, missing_library
 
 _IDLE_MS = 160
@@ -53,10 +54,7 @@ class ImageBackend(QWidget):
         self._dirty = True
         self._fine = False
         self.renderings = 0  # number of times the scene was rendered
-        self._idle = QTimer(self)
-        self._idle.setSingleShot(True)
-        self._idle.setInterval(_IDLE_MS)
-        self._idle.timeout.connect(self._refine)
+        self._idle = delayed(self._refine, _IDLE_MS, self)
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setMouseTracking(True)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)

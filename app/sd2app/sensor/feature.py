@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
-from PySide6.QtCore import QObject, SignalInstance
+from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QWidget
 
 from sd2app.accuracy.model import AccuracyModel
@@ -33,6 +33,8 @@ class SensorFeature(Feature):
         self._synthesis, self._make_batch = synthesis, make_batch
         self.placements = PlacementsModel(session, accuracy, parent)
         self.placements.failed.connect(shell.warn)
+        self.changing = (self.placements.changed,)
+        self.closing = (self.placements,)
 
     @property
     def busy(self) -> bool:
@@ -86,11 +88,3 @@ class SensorFeature(Feature):
                 InnerPage("Placements", "Many places around the body, for a map each", placements),
             )
         }
-
-    def changes(self) -> Sequence[SignalInstance]:
-        """Planned placements."""
-        return (self.placements.changed,)
-
-    def close(self) -> None:
-        """Stop checking placements."""
-        self.placements.close()

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from PySide6.QtCore import SignalInstance
 from PySide6.QtWidgets import QFileDialog, QMenu, QMessageBox
 
 from sd2app.feature import Action, Feature, Shell
@@ -26,6 +25,8 @@ class FilesFeature(Feature):
         self._document = session.document
         self._document.failed.connect(shell.warn)
         self._document.noted.connect(shell.note)
+        self.changing = (self._document.changed,)
+        self.closing = (self._document,)
 
     def actions(self) -> Sequence[Action]:
         """Open, add, find, save."""
@@ -168,14 +169,6 @@ class FilesFeature(Feature):
     def may_close(self) -> bool:
         """Ask what becomes of unsaved edits."""
         return self.may_discard()
-
-    def changes(self) -> Sequence[SignalInstance]:
-        """The recording that is open."""
-        return (self._document.changed,)
-
-    def close(self) -> None:
-        """Let go of the files."""
-        self._document.close()
 
     def _ask_files(self, title: str) -> list[Path]:
         names, _ = QFileDialog.getOpenFileNames(self._shell.dialog_parent, title, "", _FILES)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import SignalInstance
 from PySide6.QtWidgets import QMessageBox
 
 from sd2app.feature import Action, Feature, Shell
@@ -42,6 +41,8 @@ class ProgramFeature(Feature):
 
     def __init__(self, session: Session, shell: Shell, labels: LabelsFeature) -> None:
         self._session, self._shell, self._labels = session, shell, labels
+        stack = session.document.undo_stack
+        self.changing = (stack.indexChanged, stack.cleanChanged, session.display.theme_changed)
 
     def actions(self) -> Sequence[Action]:
         """Undo, theme, keys, about, quit."""
@@ -74,11 +75,6 @@ class ProgramFeature(Feature):
         """Choose the theme and remember it."""
         self._session.settings.dark = dark
         self._session.display.set_dark(dark)
-
-    def changes(self) -> Sequence[SignalInstance]:
-        """History, theme."""
-        stack = self._session.document.undo_stack
-        return stack.indexChanged, stack.cleanChanged, self._session.display.theme_changed
 
     def _quit(self) -> None:
         self._shell.dialog_parent.close()

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QLabel, QProgressBar, QToolButton, QWidget
 
 from sd2app.accuracy.model import AccuracyModel
+from sd2app.background.latest import delayed
 from sd2app.maps.model import SynthesisModel
 from sd2app.session.maps import Reading
 from sd2app.session.session import Session
@@ -49,10 +49,7 @@ class StatusLine(QWidget):
             widget.hide()
         self.setFixedHeight(28)
         # Work that is over at once should not flicker.
-        self._delay = QTimer(self)
-        self._delay.setSingleShot(True)
-        self._delay.setInterval(_QUIET_MS)
-        self._delay.timeout.connect(self._show_job)
+        self._delay = delayed(self._show_job, _QUIET_MS, self)
         session.pointer.changed.connect(self._read)
         for signal in (accuracy.changed, accuracy.plan_changed, synthesis.moving_changed):
             signal.connect(self._show_plan)

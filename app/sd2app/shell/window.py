@@ -155,7 +155,7 @@ class MainWindow(QMainWindow):
     def _connect(self) -> None:
         s, features = self.session, self.features
         for feature in features:
-            for signal in feature.changes():
+            for signal in feature.changing:
                 signal.connect(self._refresh)
         self.keys.changed.connect(self._refresh)
         s.document.opened.connect(self._show_document)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from PySide6.QtCore import QObject, SignalInstance
+from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QWidget
 
 from sd2app.feature import Action, Feature, Shell
@@ -30,6 +30,8 @@ class SuggestionsFeature(Feature):
         self._shell, self._edits, maps = shell, edits, session.maps
         finders = (MotionFinder((maps.synthetic, maps.denoised, maps.real)), *others)
         self.model = SuggestionsModel(edits, finders, parent)
+        self.changing = (self.model.changed,)
+        self.closing = (self.model,)
 
     def actions(self) -> Sequence[Action]:
         """Find, accept, reject."""
@@ -68,14 +70,6 @@ class SuggestionsFeature(Feature):
         """The bar below the maps."""
         return {"suggestions": SuggestionBar(self.model, self._shell.action)}
 
-    def changes(self) -> Sequence[SignalInstance]:
-        """The suggestions."""
-        return (self.model.changed,)
-
     def take_over(self) -> None:
         """Begin without suggestions."""
         self.model.open()
-
-    def close(self) -> None:
-        """Stop finding."""
-        self.model.close()

@@ -35,6 +35,7 @@ class TrainingFeature(Feature):
         for model in (self.model, self.adoption):
             model.failed.connect(shell.warn)
             model.noted.connect(shell.note)
+        self.closing = (self.adoption, self.model)  # runs go on
 
     def actions(self) -> Sequence[Action]:
         """The panel."""
@@ -57,8 +58,3 @@ class TrainingFeature(Feature):
     def may_close(self) -> bool:
         """Ask what becomes of a run under way."""
         return self._dialogs.may_leave()
-
-    def close(self) -> None:
-        """Let go of the runs, which go on."""
-        self.adoption.close()
-        self.model.close()

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtCore import QObject, Signal
 
+from sd2app.background.latest import delayed
 from sd2app.denoise.model import DenoiseModel
 from sd2app.session.session import Maps
 from sd2app.training.model import TrainingModel
@@ -63,10 +64,7 @@ class ModelAdoption(QObject):
         self._gain: Improvement | None = None
         self._before_mps: float | None = None
         # Maps change many times while one is denoised piece by piece.
-        self._calm = QTimer(self)
-        self._calm.setSingleShot(True)
-        self._calm.setInterval(CALM_MS)
-        self._calm.timeout.connect(self._compare)
+        self._calm = delayed(self._compare, CALM_MS, self)
         for one in (denoise, maps.denoised, maps.before, maps.real):
             one.changed.connect(self._wait)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from PySide6.QtCore import QObject, SignalInstance
+from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QWidget
 
 from sd2app.feature import Action, Feature, Shell
@@ -23,6 +23,8 @@ class VideoFeature(Feature):
         self._session, self._shell, self._landmarks = session, shell, landmarks
         self.overlay = OverlayModel(session.settings, parent)
         session.video.failed.connect(shell.warn)
+        self.changing = (self.overlay.changed,)
+        self.closing = (session.video,)
 
     @property
     def busy(self) -> bool:
@@ -50,14 +52,6 @@ class VideoFeature(Feature):
         """The video under its bar."""
         view = VideoView(self._session, self.overlay, self._landmarks)
         return {"video": pane(VideoBar(self.overlay, self._shell.action), (view, 1))}
-
-    def changes(self) -> Sequence[SignalInstance]:
-        """Style of the overlay."""
-        return (self.overlay.changed,)
-
-    def close(self) -> None:
-        """Close the video."""
-        self._session.video.close()
 
     def _has_mesh(self) -> bool:
         return self._session.has_mesh
