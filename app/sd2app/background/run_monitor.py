@@ -58,6 +58,28 @@ def take_lines(target: T, readers: Readers[T], events: Iterable[dict[str, Any]])
     return taken
 
 
+class History:
+    """What the lines of a run have told; of a run that tells nothing, that it works.
+
+    Damaged lines are left out.
+    """
+
+    readers: ClassVar[Readers[Any]] = {}
+    begun = True  # the process has said that it works
+    paused = False  # the process has said that it pauses
+    saving = False  # a result is written that a stop would lose
+    error = ""  # reason of a failure as the run reported it
+
+    @property
+    def share(self) -> float | None:
+        """Share of the whole that is done; None while that is not known."""
+        return None
+
+    def take(self, events: Iterable[dict[str, Any]]) -> bool:
+        """Take lines; True if any of them was of use."""
+        return take_lines(self, self.readers, events)
+
+
 class _Found(NamedTuple):
     """One look at the folder of a run."""
 
@@ -74,8 +96,8 @@ class _Found(NamedTuple):
 class RunMonitor(QObject, Generic[F]):
     """State and progress of one run, and orders to its process.
 
-    Subclasses read its lines (:meth:`on_events`). The folder may be missing at first;
-    ``process`` is one that was just started for it.
+    ``history`` reads its lines. The folder may be missing at first; ``process`` is one that was
+    just started for it.
     """
 
     changed = Signal()
@@ -84,6 +106,8 @@ class RunMonitor(QObject, Generic[F]):
 
     stop_patience_s: ClassVar[float | None] = None
     """A process that does not stop within this time is killed; None: it may take its time."""
+    history: History
+    """What it has told."""
     facts: Any = None
     """Newest result of :meth:`inspect`."""
 
@@ -92,11 +116,13 @@ class RunMonitor(QObject, Generic[F]):
         folder: F,
         parent: QObject | None = None,
         *,
+        history: History | None = None,
         process: ProcessId | None = None,
         poll_ms: int | None = None,
     ) -> None:
         super().__init__(parent)
         self.folder: F = folder
+        self.history = history or History()
         self._launched = process
         self._clock_s = time.monotonic
         self._tail = ProgressTail(folder.progress)
@@ -119,36 +145,21 @@ class RunMonitor(QObject, Generic[F]):
 
     def on_events(self, events: Sequence[dict[str, Any]]) -> bool:
         """Read new lines of progress; True if any was of use."""
-        return bool(events)
+        return self.history.take(events)
 
     def inspect(self) -> Any:
         """Read further :attr:`facts` from disk, in the background."""
         return None
 
     @property
-    def has_started(self) -> bool:
-        """True once the process has said that it works."""
-        return True
-
-    @property
-    def is_paused(self) -> bool:
-        """True while the process has said that it pauses."""
-        return False
-
-    @property
     def share(self) -> float | None:
         """Share of the whole that is done; None while that is not known."""
-        return None
-
-    @property
-    def is_saving(self) -> bool:
-        """True while a result is written that a stop would lose."""
-        return False
+        return self.history.share
 
     @property
     def error(self) -> str:
         """Reason of a failure as the run reported it; empty without one."""
-        return ""
+        return self.history.error
 
     # --- what is known ----------------------------------------------------------------------
 
@@ -196,7 +207,7 @@ class RunMonitor(QObject, Generic[F]):
         """Give the process an order, or raise OSError; only a cancel may follow a stop."""
         if not self.under_way or (self._wish in ("stop", "cancel") and word != "cancel"):
             return
-        if word == "stop" and self.is_saving:
+        if word == "stop" and self.history.saving:
             return
         self._wish = word
         if word == "cancel" and self._cancelled_s is None:
@@ -295,13 +306,13 @@ class RunMonitor(QObject, Generic[F]):
         return "died"
 
     def _phase_under_way(self, word: Word) -> Phase:
-        if not self.has_started:
+        if not self.history.begun:
             return "starting"
         if word == "cancel":
             return "cancelling"
         if word == "stop":
             return "stopping"
-        if self.is_paused:
+        if self.history.paused:
             return "paused" if word == "pause" else "resuming"
         return "pausing" if word == "pause" else "running"
 

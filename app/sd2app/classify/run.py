@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
@@ -42,7 +41,6 @@ class ClassHistory(LearningHistory):
         self.total = 0
         self.losses: list[LossPoint] = []
         self.checks: list[CheckPoint] = []
-        self.saving = False
         self._pace = Pace()
 
     @property
@@ -99,6 +97,7 @@ class ClassHistory(LearningHistory):
 class ClassRun(RunMonitor[CommandFolder]):
     """A training or a comparison."""
 
+    history: ClassHistory
     facts = False  # there is a result
 
     def __init__(
@@ -106,8 +105,7 @@ class ClassRun(RunMonitor[CommandFolder]):
     ) -> None:
         folder = CommandFolder(path)
         self.about = folder.facts
-        self.history = ClassHistory()
-        super().__init__(folder, parent, process=process)
+        super().__init__(folder, parent, history=ClassHistory(), process=process)
 
     @property
     def compares(self) -> bool:
@@ -118,25 +116,6 @@ class ClassRun(RunMonitor[CommandFolder]):
     def result(self) -> Path | None:
         """The model, or the folder with the tables; None where there is none."""
         return self.path / self._result_name if self.facts else None
-
-    def on_events(self, events: Sequence[dict[str, Any]]) -> bool:
-        """Read steps, checks and trainings that are done."""
-        return self.history.take(events)
-
-    @property
-    def has_started(self) -> bool:
-        """True once the data has been read."""
-        return self.history.begun
-
-    @property
-    def share(self) -> float | None:
-        """Share of the whole that is done; None while that is not known."""
-        return self.history.share
-
-    @property
-    def is_saving(self) -> bool:
-        """True while the model is written."""
-        return self.history.saving
 
     def inspect(self) -> bool:
         """Check for a model, or a complete table."""

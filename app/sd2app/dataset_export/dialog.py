@@ -188,7 +188,7 @@ class ExportDialog(QDialog):
     def _show_writing(self) -> None:
         model = self._model
         run = model.run
-        done, total = (0, 0) if run is None else (run.done, run.total)
+        done, total = (0, 0) if run is None else (run.history.done, run.history.total)
         self._bar.setVisible(model.under_way)
         self._bar.setRange(0, total)
         self._bar.setValue(done)

@@ -144,7 +144,7 @@ class ExportModel(Runs[ExportRun]):
     def time(self) -> str:
         """Time of the whole export before it starts, and what is left of it while it runs."""
         if self.run is not None:
-            left_s = self.run.left_s
+            left_s = self.run.history.left_s
             return "" if left_s is None else f"{about(left_s)} left"
         each_s = known_pace_s(self.choice.making.pace_kind)
         if each_s is None or self.forecast is None:
@@ -253,11 +253,12 @@ class ExportModel(Runs[ExportRun]):
 
     def _report(self) -> None:
         if self.run is not None and self._job is not None:
-            self._jobs.report(self._job, self.run.done, self.run.total)
+            history = self.run.history
+            self._jobs.report(self._job, history.done, history.total)
 
     def say_ended(self, run: ExportRun) -> None:
         """Tell the user what is written and what was left out, or what went wrong."""
-        self.result = result = run.written
+        self.result = result = run.history.written
         if result is not None:
             what, views = counted(result.segments, "segment"), counted(result.sources, "view")
             self.noted.emit(f"{what} from {views} are in {result.path}.")

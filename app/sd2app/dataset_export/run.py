@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from PySide6.QtCore import QObject
 
-from sd2app.background.run_monitor import RunMonitor, take_lines
+from sd2app.background.run_monitor import History, RunMonitor
 from sd2core.processes import ProcessId
 from sd2core.runs.command_folder import CommandFolder
 
@@ -33,42 +33,13 @@ class Exported:
     left_out: tuple[str, ...] = ()  # sources that could not be made, each with its reason
 
 
-class ExportRun(RunMonitor[CommandFolder]):
-    """An export; its folder is that of the command, not the data set.
+class ExportHistory(History):
+    """Steps of an export, and the data set at its end."""
 
-    ``done`` and ``total`` count steps; 0 of 0 while the preview sheet is drawn.
-    """
-
-    def __init__(
-        self, path: Path, parent: QObject | None = None, *, process: ProcessId | None = None
-    ) -> None:
-        folder = CommandFolder(path)
-        self.about = folder.facts
-        self.done = self.total = 0
+    def __init__(self) -> None:
+        self.done = self.total = 0  # steps; 0 of 0 while the preview sheet is drawn
         self.left_s: float | None = None
         self.written: Exported | None = None
-        self._refused = ""
-        super().__init__(folder, parent, process=process)
-
-    @property
-    def out(self) -> Path:
-        """The data set."""
-        return Path(str(self.about.get("out", "data set")))
-
-    @property
-    def choice(self) -> Mapping[str, Any]:
-        """Content that was chosen, as it was noted at the start."""
-        choice = self.about.get("choice")
-        return choice if isinstance(choice, dict) else {}
-
-    @property
-    def error(self) -> str:
-        """Sentence of the command on what is wrong."""
-        return self._refused
-
-    def on_events(self, events: Sequence[dict[str, Any]]) -> bool:
-        """Read progress, the result, or a refusal."""
-        return take_lines(self, _READERS, events)
 
     def _progress(self, event: dict[str, Any]) -> None:
         self.done, self.total = int(event["done"]), int(event["total"])
@@ -86,11 +57,30 @@ class ExportRun(RunMonitor[CommandFolder]):
         )
 
     def _refuse(self, event: dict[str, Any]) -> None:
-        self._refused = str(event["text"])
+        self.error = str(event["text"])
+
+    readers: ClassVar = {"progress": _progress, "done": _done, "error": _refuse}
 
 
-_READERS = {
-    "progress": ExportRun._progress,
-    "done": ExportRun._done,
-    "error": ExportRun._refuse,
-}
+class ExportRun(RunMonitor[CommandFolder]):
+    """An export; its folder is that of the command, not the data set."""
+
+    history: ExportHistory
+
+    def __init__(
+        self, path: Path, parent: QObject | None = None, *, process: ProcessId | None = None
+    ) -> None:
+        folder = CommandFolder(path)
+        self.about = folder.facts
+        super().__init__(folder, parent, history=ExportHistory(), process=process)
+
+    @property
+    def out(self) -> Path:
+        """The data set."""
+        return Path(str(self.about.get("out", "data set")))
+
+    @property
+    def choice(self) -> Mapping[str, Any]:
+        """Content that was chosen, as it was noted at the start."""
+        choice = self.about.get("choice")
+        return choice if isinstance(choice, dict) else {}

@@ -56,7 +56,7 @@ class FitModel(QObject):
     @property
     def progress(self) -> FitProgress | None:
         """Progress over all stages."""
-        return self._run.progress if self._run else None
+        return self._run.history if self._run else None
 
     @property
     def notes(self) -> str:
@@ -194,8 +194,8 @@ class FitModel(QObject):
 
     def _tell(self) -> None:
         self.changed.emit()
-        if self._run is not None and self._run.progress.newest is not None:
-            newest, self._run.progress.newest = self._run.progress.newest, None
+        if self._run is not None and self._run.history.newest is not None:
+            newest, self._run.history.newest = self._run.history.newest, None
             self.advanced.emit(newest)
 
     def _end(self) -> None:

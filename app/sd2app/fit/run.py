@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Callable
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject
 
-from sd2app.background.run_monitor import RunMonitor, take_lines
+from sd2app.background.run_monitor import History, RunMonitor
 from sd2core.body.track import LANDMARKS
 from sd2core.processes import ProcessId
 from sd2core.runs.command_folder import CommandFolder
@@ -38,7 +38,7 @@ _POLL_MS = 100
 _PATIENCE_S = 3.0
 
 
-class FitProgress:
+class FitProgress(History):
     """What the lines of one fit tell: its stages, its landmarks, and notes for the user.
 
     Landmarks are added to the given dict by their frame, each of shape (33, 3): x and y in pixels
@@ -60,11 +60,6 @@ class FitProgress:
         self.done = self.total = 0  # in this stage; a total of 0 is not known
         self.newest: int | None = None  # frame of the landmarks that came last
         self.notes: list[str] = []
-        self.error = ""
-
-    def take(self, events: Sequence[dict[str, Any]]) -> bool:
-        """Read new lines, leaving out what cannot be read; True if any was of use."""
-        return take_lines(self, _READERS, events)
 
     def _start(self, event: dict[str, Any]) -> None:
         if event["format"] != FORMAT or event["version"] > VERSION:
@@ -137,19 +132,19 @@ class FitProgress:
         unit = {"frame": "frame ", "step": "step "}.get(self.unit, "")
         return f"{words}, {unit}{self.done} of {self.total}"
 
-
-_READERS = {
-    "start": FitProgress._start,
-    "progress": FitProgress._report,
-    "landmarks": FitProgress._find,
-    "note": FitProgress._note,
-    "error": FitProgress._refuse,
-}
+    readers: ClassVar = {
+        "start": _start,
+        "progress": _report,
+        "landmarks": _find,
+        "note": _note,
+        "error": _refuse,
+    }
 
 
 class FitRun(RunMonitor[CommandFolder]):
     """A fit with its progress."""
 
+    history: FitProgress
     stop_patience_s = _PATIENCE_S
 
     def __init__(
@@ -160,14 +155,5 @@ class FitRun(RunMonitor[CommandFolder]):
         *,
         process: ProcessId | None = None,
     ) -> None:
-        self.progress = FitProgress(landmarks)
-        super().__init__(folder, parent, process=process, poll_ms=_POLL_MS)
-
-    @property
-    def error(self) -> str:
-        """Sentence of the command on what is wrong."""
-        return self.progress.error
-
-    def on_events(self, events: Sequence[dict[str, Any]]) -> bool:
-        """Read stages, counts, landmarks and notes."""
-        return self.progress.take(events)
+        history = FitProgress(landmarks)
+        super().__init__(folder, parent, history=history, process=process, poll_ms=_POLL_MS)

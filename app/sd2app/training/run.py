@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import Any, ClassVar, Literal, NamedTuple, TypeVar, get_args
 
 from PySide6.QtCore import QObject
 
-from sd2app.background.run_monitor import RunMonitor, take_lines
+from sd2app.background.run_monitor import History, RunMonitor
 from sd2core.errors import Sd2Error
 from sd2core.processes import ProcessId
 from sd2core.train.config import TrainConfig, read_config
@@ -24,21 +23,14 @@ _MOST_POINTS = 2000
 """Limit of kept steps; beyond it, every second one is dropped."""
 
 
-class LearningHistory:
-    """Steps of a training, read from its lines; damaged lines are left out."""
-
-    readers: ClassVar[Mapping[str, Callable[[Any, dict[str, Any]], None]]]
-    """Method that takes a line, by the name of the line's event."""
+class LearningHistory(History):
+    """Steps of a training."""
 
     def __init__(self) -> None:
         self.begun = False
         self.steps_done = 0
         self.elapsed_s: float | None = None
         self._stride, self._skipped = 1, 0
-
-    def take(self, events: Iterable[dict[str, Any]]) -> bool:
-        """Take lines; True if any of them was of use."""
-        return take_lines(self, self.readers, events)
 
     def _advance(self, steps: int, elapsed_s: float) -> None:
         self.steps_done = steps
@@ -86,13 +78,11 @@ class TrainingHistory(LearningHistory):
         self.minutes = 0.0
         self.steps_per_epoch = 0
         self.segments = 0
-        self.paused = False
         self.left_s: float | None = None
         self.step_points: list[StepPoint] = []
         self.epoch_points: list[EpochPoint] = []
         self.epoch = 0  # under way, from 1; zero before the first
         self.outcome: Outcome | None = None
-        self.error = ""
 
     @property
     def best(self) -> EpochPoint | None:
@@ -162,7 +152,9 @@ class TrainingHistory(LearningHistory):
         outcome = event["outcome"]
         if outcome not in get_args(Outcome):
             raise ValueError(f"outcome {outcome!r}")
-        self.outcome, self.paused, self.left_s = outcome, False, None
+        # Lines before the next start do not say that it works.
+        self.begun, self.paused, self.left_s = False, False, None
+        self.outcome = outcome
         error = event.get("error")
         if isinstance(error, dict):
             parts = (str(error.get(key) or "") for key in ("found", "expected", "remedy"))
@@ -193,17 +185,14 @@ class _Facts(NamedTuple):
 class TrainingMonitor(RunMonitor[TrainingFolder]):
     """A training run with its settings and its history of epochs."""
 
+    history: TrainingHistory
     facts = _Facts(None, False, False)
 
     def __init__(
         self, path: Path, parent: QObject | None = None, *, process: ProcessId | None = None
     ) -> None:
-        self.history = TrainingHistory()
-        super().__init__(TrainingFolder(path), parent, process=process)
-
-    def on_events(self, events: Sequence[dict[str, Any]]) -> bool:
-        """Read steps, epochs and the end."""
-        return self.history.take(events)
+        history = TrainingHistory()
+        super().__init__(TrainingFolder(path), parent, history=history, process=process)
 
     def inspect(self) -> _Facts:
         """Read the settings, and look which models are there."""
@@ -212,26 +201,6 @@ class TrainingMonitor(RunMonitor[TrainingFolder]):
             with suppress(Sd2Error):  # not written yet
                 config = read_config(folder.config)
         return _Facts(config, folder.best.exists(), folder.last.exists())
-
-    @property
-    def has_started(self) -> bool:
-        """True once it trains; lines before the last resume do not count."""
-        return self.history.begun and self.history.outcome is None
-
-    @property
-    def is_paused(self) -> bool:
-        """True while it pauses."""
-        return self.history.paused
-
-    @property
-    def share(self) -> float | None:
-        """Share of the whole that is done; None while that is not known."""
-        return self.history.share
-
-    @property
-    def error(self) -> str:
-        """Reason of a failure, from its last line."""
-        return self.history.error
 
     @property
     def config(self) -> TrainConfig | None:

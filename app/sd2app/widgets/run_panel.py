@@ -191,5 +191,5 @@ class RunView(QWidget, Generic[Run]):
             if name == "cancel":
                 button.setEnabled(run.phase != "cancelling")
             elif name in ("pause", "go_on", "stop"):
-                button.setEnabled(not ending and not run.is_saving)
+                button.setEnabled(not ending and not run.history.saving)
         self.show_made(run)

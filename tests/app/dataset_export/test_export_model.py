@@ -165,7 +165,7 @@ def test_it_can_be_stopped(made, people, qtbot) -> None:
     said: list[str] = []
     model.failed.connect(said.append)
     model.start(people / "set.zarr")
-    qtbot.waitUntil(lambda: model.run is not None and model.run.done == 500, timeout=20_000)
+    qtbot.waitUntil(lambda: model.run is not None and model.run.history.done == 500, timeout=20_000)
     model.stop()
     qtbot.waitUntil(lambda: not model.under_way, timeout=20_000)
     assert not said
@@ -177,7 +177,7 @@ def begun(model: ExportModel, people: Path, qtbot) -> None:
     model.choose(length=30, overlap=5, maps=frozenset({"synthetic"}), subjects=("a", "b"))
     counted(model, qtbot)
     model.start(people / "set.h5")
-    qtbot.waitUntil(lambda: model.run is not None and model.run.done == 500, timeout=20_000)
+    qtbot.waitUntil(lambda: model.run is not None and model.run.history.done == 500, timeout=20_000)
 
 
 def test_it_outlives_the_window_and_is_found_by_the_next(made, people, qtbot) -> None:
@@ -190,7 +190,9 @@ def test_it_outlives_the_window_and_is_found_by_the_next(made, people, qtbot) ->
     assert noted.args[0].startswith("set.h5 is being written.")
     assert second.under_way
     assert second.choice == choice
-    qtbot.waitUntil(lambda: second.run is not None and second.run.done == 500, timeout=20_000)
+    qtbot.waitUntil(
+        lambda: second.run is not None and second.run.history.done == 500, timeout=20_000
+    )
     counted(second, qtbot)
     assert second.forecast is not None
     assert not second.ready
@@ -246,7 +248,7 @@ def test_lines_that_say_nothing_are_left_alone(qtbot, tmp_path) -> None:
     run = ExportRun(tmp_path)
     for told in ({}, {"event": "else"}, {"event": "done"}, {"event": []}):
         assert not run.on_events([told])
-    assert run.written is None
+    assert run.history.written is None
     run.close()
 
 

@@ -114,7 +114,7 @@ def test_it_goes_on_when_the_dialog_is_closed_and_can_be_stopped(
     out = tmp_path / "s.zarr"
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_, **__: (str(out), ""))
     qtbot.mouseClick(button(dialog, "Export…"), LEFT)
-    qtbot.waitUntil(lambda: model.run is not None and model.run.done == 500, timeout=20_000)
+    qtbot.waitUntil(lambda: model.run is not None and model.run.history.done == 500, timeout=20_000)
     qtbot.keyClick(dialog, Qt.Key.Key_Escape)
     qtbot.waitUntil(lambda: QApplication.activeModalWidget() is None)
     assert model.under_way
