@@ -35,6 +35,8 @@ SLOW_POLL_MS = 1000
 _ASK_AGAIN_S = 15.0
 _GIVE_UP_S = 30.0
 """After that a process that does not react to its cancellation is killed."""
+_CLOSING_S = 10.0
+"""A killed process is gone at once, unless the machine is busy."""
 _SILENT = "It ended without saying why."
 
 T = TypeVar("T")
@@ -245,6 +247,16 @@ class RunMonitor(QObject, Generic[F]):
         """Stop following the run; its process goes on."""
         self._timer.stop()
         self._looker.close()
+
+    def kill(self) -> None:
+        """Stop following the run, and end its process at once."""
+        self.close()
+        process = self.process
+        if process is not None:
+            process.terminate(at_once=True)
+            until_s = time.monotonic() + _CLOSING_S
+            while process.is_alive and time.monotonic() < until_s:
+                time.sleep(0.01)
 
     # --- looking ----------------------------------------------------------------------------
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
@@ -18,9 +17,6 @@ from sd2core.errors import Sd2Error
 from sd2core.runs.command_folder import COMMAND_IN_FOLDER, CommandFolder
 
 State = Literal["idle", "running", "cancelling", "stopped", "failed", "finished"]
-
-_CLOSING_S = 10.0
-"""A killed process is gone at once, unless the machine is busy."""
 
 
 class FitModel(QObject):
@@ -159,15 +155,10 @@ class FitModel(QObject):
 
     def close(self) -> None:
         """End the process at once; what it has done is kept."""
-        if self._run is None:
-            return
-        self._run.close()
-        process = self._run.process
-        if self.busy and process is not None:
-            process.terminate(at_once=True)
-            until_s = time.monotonic() + _CLOSING_S
-            while process.is_alive and time.monotonic() < until_s:
-                time.sleep(0.01)
+        if self._run is not None and self.busy:
+            self._run.kill()
+        elif self._run is not None:
+            self._run.close()
 
     # --- the process ----------------------------------------------------------------------
 

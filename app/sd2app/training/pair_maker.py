@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from PySide6.QtCore import QObject, QProcess, QProcessEnvironment, QTimer, Signal
+from PySide6.QtCore import QObject, Signal
 
+from sd2app.background.run_monitor import RunMonitor
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import remove
 from sd2core.recording.recording import is_recording, open_recording
-from sd2core.runs.command_folder import COMMAND
+from sd2core.runs.command_folder import COMMAND, CommandFolder
 
-_PATIENCE_MS = 3000
-"""A process that does not end within this time when it is asked to is killed."""
+
+class PairRun(RunMonitor[CommandFolder]):
+    """Run that makes pairs."""
+
+    stop_patience_s = 3.0
 
 
 class PairMaker(QObject):
@@ -35,98 +38,69 @@ class PairMaker(QObject):
     ) -> None:
         super().__init__(parent)
         self._folder = folder
-        self._command = tuple(command)
-        self._process: QProcess | None = None
-        self._patience = QTimer(self, singleShot=True, interval=_PATIENCE_MS)
-        self._patience.timeout.connect(self._kill)
-        self._out: Path | None = None
-        self._cancelled = False
-
-    @property
-    def out(self) -> Path | None:
-        """Store that is being made."""
-        return self._out
-
-    @property
-    def cancelling(self) -> bool:
-        """True once it has been asked to end."""
-        return self._out is not None and self._cancelled
+        self._command = (*command, "--folder")
+        self._run: PairRun | None = None
+        self.out: Path | None = None  # store that is being made
+        self.cancelling = False  # it has been asked to end
 
     def make(self, place: Path) -> None:
         """Make pairs of a recording, or of all recordings in a folder.
 
-        Raises Sd2Error if there is none with a mesh and a radar capture, or some are being made;
-        OSError if the folder cannot be read, or that of the pairs not be made.
+        Raises Sd2Error if there is none with a mesh and a radar capture, some are being made, or
+        it cannot be started; OSError if the folder cannot be read, or that of the pairs not be
+        made.
         """
-        if self._out is not None:
-            raise Sd2Error(
-                f"{self._out.stem} is being made already", "one at a time", "Wait for it"
-            )
+        if self.out is not None:
+            raise Sd2Error(f"{self.out.stem} is being made already", "one at a time", "Wait for it")
         recordings = usable_recordings(place)
         self._folder.mkdir(parents=True, exist_ok=True)
-        self._out = _free(self._folder, place.stem)
-        self._cancelled = False
-        program, *words = self._command
-        words += ["pairs", "recordings", *map(str, recordings), "--out", str(self._out)]
-        environment = QProcessEnvironment.systemEnvironment()
-        environment.insert("PYTHONIOENCODING", "utf-8")
-        self._process = process = QProcess(self)
-        process.setProcessEnvironment(environment)
-        process.setStandardOutputFile(QProcess.nullDevice())
-        process.finished.connect(self._end)
-        process.errorOccurred.connect(self._refuse)
-        process.start(program, words)
-        process.closeWriteChannel()
+        out = _free(self._folder, place.stem)
+        folder = CommandFolder(out.with_name(f".{out.stem}"))
+        words = ["pairs", "recordings", *map(str, recordings), "--out", str(out)]
+        try:
+            process = folder.start(words, {"what": "pairs"}, self._command, {})
+        except Sd2Error:
+            folder.discard()
+            raise
+        self._run = run = PairRun(folder, self, process=process)
+        self.out, self.cancelling = out, False
+        run.ended.connect(self._end)
         self.changed.emit()
 
     def cancel(self) -> None:
         """Cancel, and remove the unfinished pairs."""
-        if self._process is not None and not self._cancelled:
-            self._cancelled = True
-            if sys.platform == "win32":  # nothing there listens to a request
-                self._kill()
-            else:
-                self._process.terminate()
-                self._patience.start()
+        if self._run is not None and not self.cancelling:
+            self.cancelling = True
+            self._run.stop()
             self.changed.emit()
 
     def close(self) -> None:
         """End the process at once."""
-        if self._process is not None:
-            self._process.blockSignals(True)
-            self._kill()
-            self._process.waitForFinished(2000)
-            self._let_go()
+        if self._run is not None:
+            self._run.kill()
+            self._let_go(self._run)
 
-    def _kill(self) -> None:
-        if self._process is not None:
-            self._process.kill()
-
-    def _refuse(self, error: QProcess.ProcessError) -> None:
-        # Every other error is followed by `finished`.
-        if error == QProcess.ProcessError.FailedToStart and self._process is not None:
-            self._end(1, QProcess.ExitStatus.CrashExit)
-
-    def _end(self, code: int, status: QProcess.ExitStatus) -> None:
-        out, process = self._out, self._process
+    def _end(self) -> None:
+        out, run = self.out, self._run
         assert out is not None
-        assert process is not None
-        if code == 0 and status == QProcess.ExitStatus.NormalExit:
-            self._process, self._out = None, None
+        assert run is not None
+        run.close()
+        if run.phase == "finished":
+            self.out = None  # it is kept
+        self._let_go(run)
+        if run.phase == "finished":
             self.made.emit(out)
-        else:
-            errors = bytes(process.readAllStandardError().data()).decode("utf-8", "replace")
-            said = errors.strip().splitlines() or [f"{out.stem} could not be made."]
-            self._let_go()
-            if not self._cancelled:
-                self.failed.emit(said[-1].removeprefix("sd2: "))
-        self._patience.stop()
-        process.deleteLater()
+        elif not self.cancelling:
+            said = run.text.splitlines() or [f"{out.stem} could not be made."]
+            self.failed.emit(said[-1].removeprefix("sd2: "))
+        self.cancelling = False
         self.changed.emit()
 
-    def _let_go(self) -> None:
+    def _let_go(self, run: PairRun) -> None:
         """Forget the process, and remove what it left."""
-        out, self._process, self._out = self._out, None, None
+        out, self._run, self.out = self.out, None, None
+        run.deleteLater()
+        run.folder.discard()
         if out is not None and out.exists():
             remove(out)
 

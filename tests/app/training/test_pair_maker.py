@@ -7,18 +7,23 @@ from pathlib import Path
 
 import pytest
 
-from sd2app.training.pair_maker import PairMaker, usable_recordings
+from sd2app.training.pair_maker import PairMaker, PairRun, usable_recordings
 from sd2core.errors import Sd2Error
 from sd2core.recording.recording import Recording
 
 SCRIPT = """
 import pathlib, sys, time
-words = sys.argv[1:]
+from sd2core.runs.command_folder import CommandFolder
+assert sys.argv[1] == "--folder"
+folder, words = CommandFolder(pathlib.Path(sys.argv[2])), sys.argv[3:]
 assert words[:2] == ["pairs", "recordings"]
 out = pathlib.Path(words[words.index("--out") + 1])
 out.mkdir()
 (out / "recordings").write_text("\\n".join(words[2 : words.index("--out")]))
 """
+
+
+END = "lock = folder.lock(); folder.set_state('running'); folder.note_end(0)"
 
 
 def recording(folder: Path, *, radar: bool = True) -> Path:
@@ -35,7 +40,7 @@ def recording(folder: Path, *, radar: bool = True) -> Path:
 def made(qtbot, tmp_path):
     makers: list[PairMaker] = []
 
-    def make(more: str = "") -> PairMaker:
+    def make(more: str = END) -> PairMaker:
         maker = PairMaker(tmp_path / "pairs", None, (sys.executable, "-c", SCRIPT + more))
         maker.told = []
         maker.made.connect(maker.told.append)
@@ -93,12 +98,12 @@ def test_cancelling_leaves_nothing_and_says_nothing(made, qtbot, tmp_path) -> No
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="nothing can refuse there")
-def test_one_that_will_not_stop_is_ended(made, qtbot, tmp_path) -> None:
+def test_one_that_will_not_stop_is_ended(made, qtbot, tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(PairRun, "stop_patience_s", 0.05)
     maker = made(
         "import signal; signal.signal(signal.SIGTERM, signal.SIG_IGN)\n"
         "(out / 'deaf').touch(); time.sleep(3600)"
     )
-    maker._patience.setInterval(50)
     maker.make(recording(tmp_path / "a.sd2"))
     qtbot.waitUntil((maker.out / "deaf").exists, timeout=10_000)
     maker.cancel()
@@ -113,9 +118,10 @@ def test_a_process_that_dies_or_does_not_start_is_told(made, qtbot, tmp_path) ->
     qtbot.waitUntil(lambda: maker.out is None, timeout=10_000)
     assert maker.told == ["ü"]
     maker._command = ("/no/such/program",)
-    maker.make(place)
-    qtbot.waitUntil(lambda: len(maker.told) == 2, timeout=10_000)
-    assert maker.told[1] == "a could not be made."
+    with pytest.raises(Sd2Error, match="cannot be started"):
+        maker.make(place)
+    assert maker.out is None
+    assert not list((tmp_path / "pairs").iterdir())
 
 
 def test_closing_ends_it_and_says_nothing(made, qtbot, tmp_path) -> None:
