@@ -114,7 +114,7 @@ def batch(application: QApplication, sample: Path) -> None:
     window = opened(application, [sample])
     model = window.features.batch.model
     grid = PlacementGrid((1.5, 2.2, 3.0), (-30.0, 0.0, 30.0))
-    model.setup.add([sample])
+    model.setup.add(sample)
     model.setup.set_placements(grid, "grid.json")
     window.features.batch.show()
     wait_for(application, lambda: not model.why_not_start)

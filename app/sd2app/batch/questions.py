@@ -63,22 +63,22 @@ class BatchQuestions(QObject):
     def add_what_is_open(self) -> None:
         """Work on the open recording, where nothing has been chosen yet."""
         content = self._session.document.content
-        new = self._batch.run is None and not self._batch.setup.entries
+        new = self._batch.run is None and not self._batch.setup.data
         if new and content is not None and content.saved:
-            self._batch.setup.add([content.recording.folder])
+            self._batch.setup.add(content.recording.folder)
 
     # --- setting up -----------------------------------------------------------------------
 
     def add_files(self) -> None:
         """Let the user choose recordings, videos or meshes."""
         names, _ = QFileDialog.getOpenFileNames(self._over, "Recordings to work on", "", _FILES)
-        self._batch.setup.add([_meant(Path(name)) for name in names])
+        self._batch.setup.add(*map(Path, names))
 
     def add_folder(self) -> None:
         """Let the user choose a folder of recordings, videos or meshes."""
         name = QFileDialog.getExistingDirectory(self._over, "A recording, or a folder of some")
         if name:
-            self._batch.setup.add([Path(name)])
+            self._batch.setup.add(Path(name))
 
     def placement_choices(self) -> Sequence[str]:
         """Choices of sensor placements in words."""
@@ -220,11 +220,6 @@ def paths_of(result: Result) -> list[Path]:
 def _count_text(placements: Placements) -> str:
     # There may be ten thousand, and this is asked for whenever something changes.
     return counted(len(placements.places()), "placement")
-
-
-def _meant(path: Path) -> Path:
-    """The folder that a file inside of a recording or of a Zarr group stands for."""
-    return path.parent if path.name in ("recording.json", "zarr.json") else path
 
 
 def _show_in_files(folder: Path) -> None:

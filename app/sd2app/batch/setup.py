@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import glob
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, get_args
 
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QObject
 
-from sd2app.background.latest import LatestRunner
+from sd2app.background.run_setup import RunSetup
 from sd2app.settings import Settings, StoredChoices
 from sd2core.batch.plan import BatchPlan, Denoise, Export, Fit, Recordings, Synthesise
 from sd2core.errors import Sd2Error
@@ -27,6 +26,7 @@ FORMATS: tuple[Literal["zarr", "h5", "npz"], ...] = ("zarr", "h5", "npz")
 SUBJECTS: tuple[Literal["recording", "folder"], ...] = ("recording", "folder")
 
 _USABLE = ("recording", "video", "mesh")
+_RECORDINGS = "batch/recordings"
 _DEFAULTS: dict[str, Any] = {
     "fit": True,
     "denoise": True,
@@ -49,25 +49,26 @@ class Entry:
     problem: str = ""  # why it cannot be used
 
 
-class BatchSetupModel(QObject):
+class BatchSetupModel(RunSetup[Entry]):
     """Choices of a batch; all but the placements are kept from one start to the next."""
 
-    changed = Signal()
-
     def __init__(self, settings: Settings, parent: QObject | None = None) -> None:
-        super().__init__(parent)
-        self._settings = settings
         known = {"accuracy": ACCURACIES, "format": FORMATS, "subjects": SUBJECTS}
-        self._values = StoredChoices(settings, "batch", _DEFAULTS, known)
-        # Recordings, videos and meshes to work on.
-        self.entries = tuple(Entry(path) for path in settings.paths("batch/recordings"))
+        values = StoredChoices(settings, "batch", _DEFAULTS, known)
+        entries = [Entry(path) for path in settings.paths(_RECORDINGS)]
         out = settings.stored("batch/out", "")
         self._out = Path(out) if out else None
         self.placements: Placements | None = None  # None: each recording's own
         self.placed = ""  # where the placements are from, in words
-        self._runner = LatestRunner("batch files", self)
-        self._runner.finished.connect(self._take)
-        self._look()
+        super().__init__(settings, values, _RECORDINGS, entries, parent)
+
+    def unread(self, path: Path) -> Entry:
+        """Recording, video, mesh or folder of some that has not been looked at."""
+        return Entry(path)
+
+    def look_into(self, source: Entry) -> Entry:
+        """Count what there is, once."""
+        return _looked_at(source.path) if source.count is None else source
 
     # --- what is chosen -------------------------------------------------------------------
 
@@ -76,9 +77,9 @@ class BatchSetupModel(QObject):
         """Folder of the results; one beside the first recording until another is chosen."""
         if self._out is not None:
             return self._out
-        if not self.entries:
+        if not self._data:
             return None
-        first = self.entries[0].path
+        first = self._data[0].path
         return first.parent / f"{first.stem} batch"
 
     @property
@@ -91,15 +92,6 @@ class BatchSetupModel(QObject):
         """Processes that share the work."""
         return min(max(self._values["workers"], 1), most_workers())
 
-    def value(self, name: str) -> Any:
-        """One of the other choices."""
-        return self._values[name]
-
-    def set_value(self, name: str, value: Any) -> None:
-        """Choose something; KeyError if there is no such choice."""
-        if self._values.set(name, value):
-            self.changed.emit()
-
     def set_out(self, folder: Path) -> None:
         """Put the results elsewhere."""
         self._out = plain_path(folder)
@@ -111,42 +103,24 @@ class BatchSetupModel(QObject):
         self.placements, self.placed = placements, placed
         self.changed.emit()
 
-    def add(self, paths: Sequence[Path]) -> None:
-        """Work on these as well: recordings, videos, meshes, or folders of some."""
-        known = {entry.path for entry in self.entries}
-        new = [path for path in dict.fromkeys(map(plain_path, paths)) if path not in known]
-        if new:
-            self.entries += tuple(map(Entry, new))
-            self._keep()
-            self._look()
-
-    def remove(self, paths: Sequence[Path]) -> None:
-        """Remove recordings, videos, meshes or folders."""
-        self.entries = tuple(entry for entry in self.entries if entry.path not in paths)
-        self._keep()
-
-    def close(self) -> None:
-        """Stop looking."""
-        self._runner.close()
-
     # --- what follows ---------------------------------------------------------------------
 
     @property
     def problem(self) -> str:
         """Reason why there is no plan; empty when there is one."""
-        if not self.entries:
+        if not self._data:
             return "Add recordings to work on."
-        bad = [entry.problem for entry in self.entries if entry.problem]
+        bad = [entry.problem for entry in self._data if entry.problem]
         if bad:
             return bad[0]
-        if any(entry.count is None for entry in self.entries):
+        if any(entry.count is None for entry in self._data):
             return "Looking for recordings…"
         return ""
 
     @property
     def files(self) -> int:
         """Number of recordings that were found."""
-        return sum(entry.count or 0 for entry in self.entries)
+        return sum(entry.count or 0 for entry in self._data)
 
     def plan(self) -> BatchPlan:
         """Plan in the form that the library takes; Sd2Error if something is missing."""
@@ -159,7 +133,7 @@ class BatchSetupModel(QObject):
         return BatchPlan(
             out=str(self.out),
             recordings=Recordings(
-                files=tuple(pattern for entry in self.entries for pattern in entry.patterns),
+                files=tuple(pattern for entry in self._data for pattern in entry.patterns),
                 subjects=values["subjects"],
             ),
             placements=where,
@@ -168,21 +142,6 @@ class BatchSetupModel(QObject):
             denoise=Denoise(model=values["model"]) if values["denoise"] else None,
             export=Export(format=values["format"]) if values["export"] else None,
         )
-
-    # --- looking --------------------------------------------------------------------------
-
-    def _keep(self) -> None:
-        self._settings.set_paths("batch/recordings", [entry.path for entry in self.entries])
-        self.changed.emit()
-
-    def _look(self) -> None:
-        paths = [entry.path for entry in self.entries if entry.count is None]
-        if paths:
-            self._runner.submit(lambda emit: {path: _looked_at(path) for path in paths})
-
-    def _take(self, found: dict[Path, Entry]) -> None:
-        self.entries = tuple(found.get(entry.path, entry) for entry in self.entries)
-        self.changed.emit()
 
 
 def most_workers() -> int:

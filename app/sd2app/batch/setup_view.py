@@ -153,7 +153,7 @@ class BatchSetupView(QWidget):
         if self._batch.run is not None:
             return
         setup = self._setup
-        self._list.show_entries([(e.path, entry_text(e), bool(e.problem)) for e in setup.entries])
+        self._list.show_entries([(e.path, entry_text(e), bool(e.problem)) for e in setup.data])
         self._follow_selection()
         for name, choice, values in (
             ("subjects", self._subjects, SUBJECTS),
@@ -186,7 +186,7 @@ class BatchSetupView(QWidget):
         self._facts.show_facts(() if made is None else estimate_facts(made)[:_MOST_FACTS])
         text = why_not if made is None else unusable_text(made)
         bad = made is not None or batch.refused
-        bad |= any(entry.problem for entry in self._setup.entries)
+        bad |= any(entry.problem for entry in self._setup.data)
         say(self._problem, text, "warning" if bad else "muted")
         self._problem.setVisible(bool(text))
         self._start.setEnabled(not why_not)
@@ -196,7 +196,7 @@ class BatchSetupView(QWidget):
         self._remove.setEnabled(bool(self._list.selectedItems()))
 
     def _drop(self) -> None:
-        self._setup.remove(self._list.chosen)
+        self._setup.remove(*self._list.chosen)
 
 
 class _Paths(QListWidget):

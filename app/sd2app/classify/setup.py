@@ -10,8 +10,8 @@ from typing import Any
 
 from PySide6.QtCore import QObject
 
+from sd2app.background.run_setup import RunSetup
 from sd2app.settings import Settings, StoredChoices
-from sd2app.training.setup import LearningSetup
 from sd2app.widgets.text import counted, duration_text
 from sd2core.classify.defaults import DELAY_S, LONGEST_DELAY_S, MODELS, WIDTH, pace_kind
 from sd2core.datasets.labelled import (
@@ -88,7 +88,7 @@ class DataSource:
         return all(name in one.maps for one in self.facts)
 
 
-class ClassSetup(LearningSetup[DataSource]):
+class ClassSetup(RunSetup[DataSource]):
     """Labelled data and settings for a classifier."""
 
     def __init__(self, settings: Settings, parent: QObject | None = None) -> None:

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Generic, Protocol, TypeVar
 
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QObject
 
-from sd2app.background.latest import LatestRunner
+from sd2app.background.run_setup import RunSetup
 from sd2app.settings import Settings, StoredChoices
 from sd2app.widgets.text import counted, duration_text
 from sd2core.errors import Sd2Error
-from sd2core.files.paths import plain_path
 from sd2core.pairs.summary import PairFacts, pair_facts
 from sd2core.runs.pace import known_pace_s
 from sd2core.train.config import (
@@ -39,105 +36,6 @@ _DEFAULTS: dict[str, str | int | float] = {
     "seed": TrainingConfig().seed,
 }
 """Defaults, from the paper where it has them; 0 epochs of patience: no early stopping."""
-
-
-class Source(Protocol):
-    """Something to learn from."""
-
-    @property
-    def path(self) -> Path:
-        """Its file or folder."""
-
-    @property
-    def problem(self) -> str:
-        """Reason why it cannot be used; empty where it can."""
-
-
-D = TypeVar("D", bound=Source)
-
-
-class LearningSetup(QObject, Generic[D]):
-    """Choices for a training and the data to learn from, kept from one start to the next.
-
-    The paths of the data are kept in the settings under ``stored``.
-    """
-
-    changed = Signal()
-
-    def __init__(
-        self,
-        settings: Settings,
-        values: StoredChoices,
-        stored: str,
-        data: Sequence[D],
-        parent: QObject | None = None,
-    ) -> None:
-        super().__init__(parent)
-        self._settings, self._values, self._stored = settings, values, stored
-        self._data = tuple(data)
-        self._runner = LatestRunner("training data", self)
-        self._runner.finished.connect(self._take)
-        self.refresh()
-
-    # --- what subclasses say ----------------------------------------------------------------
-
-    def unread(self, path: Path) -> D:
-        """Data that has not been looked into."""
-        raise NotImplementedError
-
-    def look_into(self, source: D) -> D:
-        """Read the content of data from disk, in the background."""
-        raise NotImplementedError
-
-    # --- what is chosen ---------------------------------------------------------------------
-
-    @property
-    def data(self) -> tuple[D, ...]:
-        """Data to learn from."""
-        return self._data
-
-    def value(self, name: str) -> Any:
-        """One of the settings."""
-        return self._values[name]
-
-    def set_value(self, name: str, value: Any) -> None:
-        """Choose a setting; KeyError if there is no such setting."""
-        if self._values.set(name, value):
-            self.changed.emit()
-
-    def add(self, path: Path) -> None:
-        """Add data."""
-        path = plain_path(path)
-        if path.name in ("zarr.json", "recording.json"):
-            path = path.parent
-        if path not in [one.path for one in self._data]:
-            self.keep((*self._data, self.unread(path)))
-
-    def remove(self, path: Path) -> None:
-        """Remove data."""
-        self.keep(tuple(one for one in self._data if one.path != path))
-
-    def keep(self, data: tuple[D, ...]) -> None:
-        """Learn from this data, and remember it."""
-        self._runner.cancel()
-        self._data = data
-        self._settings.set_paths(self._stored, [one.path for one in data])
-        self.refresh()
-        self.changed.emit()
-
-    def refresh(self) -> None:
-        """Read the data again: a campaign grows while it is being made."""
-        chosen = self._data
-        if chosen:
-            self._runner.submit(lambda emit: tuple(map(self.look_into, chosen)))
-
-    def close(self) -> None:
-        """Stop reading."""
-        self._runner.close()
-
-    def _take(self, data: tuple[D, ...]) -> None:
-        self._data = data
-        self.changed.emit()
 
 
 @dataclass(frozen=True)
@@ -173,7 +71,7 @@ class Estimate:
     step_s: float | None  # None until a run of the kind has measured it
 
 
-class TrainingSetupModel(LearningSetup[Store]):
+class TrainingSetupModel(RunSetup[Store]):
     """Pairs and settings for a denoiser."""
 
     def __init__(self, settings: Settings, parent: QObject | None = None) -> None:

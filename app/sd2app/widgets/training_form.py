@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 from PySide6.QtCore import QSignalBlocker, Qt
 from PySide6.QtWidgets import (
@@ -17,28 +16,12 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from sd2app.background.run_setup import RunSetup
 from sd2app.feature import Shell
 from sd2app.widgets.inputs import Choice, NumberBox
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import ElidedLabel, outlined, sentence, side_by_side, title
 from sd2app.widgets.text import about
-
-
-class Setup(Protocol):
-    """Model of a page: data, each with path, text and problem, and settings by their names."""
-
-    @property
-    def data(self) -> Sequence[Any]:
-        """Data to learn from."""
-
-    def value(self, name: str) -> Any:
-        """One of the settings."""
-
-    def set_value(self, name: str, value: Any) -> None:
-        """Choose a setting."""
-
-    def remove(self, path: Path) -> None:
-        """Remove data."""
 
 
 class Field(NamedTuple):
@@ -55,9 +38,9 @@ class Field(NamedTuple):
 
 
 class TrainingForm(QWidget):
-    """Page over a :class:`Setup`; subclasses put its parts together."""
+    """Page over a :class:`RunSetup`; subclasses put its parts together."""
 
-    def __init__(self, setup: Setup, shell: Shell) -> None:
+    def __init__(self, setup: RunSetup[Any], shell: Shell) -> None:
         super().__init__()
         self._setup, self._shell = setup, shell
         self._shown_data: Sequence[Any] | None = None

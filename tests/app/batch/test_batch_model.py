@@ -79,11 +79,11 @@ def made(qtbot):
 
 
 def looked(qtbot, setup: BatchSetupModel) -> None:
-    qtbot.waitUntil(lambda: all(e.count is not None or e.problem for e in setup.entries))
+    qtbot.waitUntil(lambda: all(e.count is not None or e.problem for e in setup.data))
 
 
 def begin(qtbot, model: BatchModel, files: list[Path]) -> None:
-    model.setup.add(files)
+    model.setup.add(*files)
     looked(qtbot, model.setup)
     model.ask_estimate()
     qtbot.waitUntil(lambda: not model.why_not_start, timeout=20_000)
@@ -103,9 +103,9 @@ def until(qtbot, model: BatchModel, phase: str) -> None:
 def test_what_is_added_is_looked_at_and_becomes_a_plan(qtbot, meshes, tmp_path):
     setup = BatchSetupModel(Settings.forgetful())
     assert setup.problem == "Add recordings to work on."
-    setup.add([*meshes[:2], meshes[0]])
+    setup.add(*meshes[:2], meshes[0])
     looked(qtbot, setup)
-    assert [entry.path for entry in setup.entries] == meshes[:2]
+    assert [entry.path for entry in setup.data] == meshes[:2]
     assert setup.files == 2
     plan = setup.plan()
     assert plan.recordings.files == tuple(map(str, meshes[:2]))
@@ -125,7 +125,7 @@ def test_what_is_added_is_looked_at_and_becomes_a_plan(qtbot, meshes, tmp_path):
     assert plan.denoise is plan.export is None
     assert plan.out == str(tmp_path / "made")
     assert plan.placement_count == 2
-    setup.remove([meshes[0]])
+    setup.remove(meshes[0])
     assert setup.plan().recordings.files == (str(meshes[1]),)
     setup.close()
 
@@ -137,7 +137,7 @@ def test_a_folder_stands_for_the_recordings_below_it(qtbot, tmp_path):
         (folder / name / "recording.json").write_text("{}")
     (folder / "one" / "walk.mp4").write_bytes(b"")
     setup = BatchSetupModel(Settings.forgetful())
-    setup.add([folder])
+    setup.add(folder)
     looked(qtbot, setup)
     assert setup.files == 2
     (pattern,) = setup.plan().recordings.files
@@ -157,19 +157,19 @@ def test_what_cannot_be_worked_on_is_said(qtbot, tmp_path):
         ("nowhere", "does not exist"),
         ("nothing", "nothing"),
     ):
-        setup.add([tmp_path / name])
+        setup.add(tmp_path / name)
         looked(qtbot, setup)
         assert words in setup.problem
         with pytest.raises(Sd2Error, match=words):
             setup.plan()
-        setup.remove([tmp_path / name])
+        setup.remove(tmp_path / name)
     setup.close()
 
 
 def test_choices_are_kept_from_one_start_to_the_next(qtbot, meshes, tmp_path):
     settings = Settings.forgetful()
     first = BatchSetupModel(settings)
-    first.add(meshes)
+    first.add(*meshes)
     first.set_out(tmp_path / "made")
     first.set_value("format", "h5")
     first.set_value("fit", False)
@@ -177,7 +177,7 @@ def test_choices_are_kept_from_one_start_to_the_next(qtbot, meshes, tmp_path):
     first.close()
     again = BatchSetupModel(settings)
     looked(qtbot, again)
-    assert [entry.path for entry in again.entries] == meshes
+    assert [entry.path for entry in again.data] == meshes
     assert (again.out, again.workers) == (tmp_path / "made", 1)
     assert (again.value("format"), again.value("fit"), again.value("denoise")) == (
         "h5",
@@ -196,7 +196,7 @@ def test_choices_are_kept_from_one_start_to_the_next(qtbot, meshes, tmp_path):
 def test_a_start_waits_for_the_estimate_of_what_is_set_up(qtbot, made, meshes):
     model = made()
     assert "Add recordings" in model.why_not_start
-    model.setup.add(meshes)
+    model.setup.add(*meshes)
     looked(qtbot, model.setup)
     assert "have not been counted" in model.why_not_start
     with pytest.raises(Sd2Error, match="have not been counted"):
@@ -237,7 +237,7 @@ def test_an_estimate_in_words():
 
 def test_a_refused_estimate_is_said(qtbot, made, meshes):
     model = made()
-    model.setup.add(meshes)
+    model.setup.add(*meshes)
     model.setup.set_value("model", "nobody's")
     looked(qtbot, model.setup)
     model.ask_estimate()
@@ -317,7 +317,7 @@ def test_stop_keeps_what_is_done_and_the_same_goes_on(qtbot, made, meshes):
 
 def test_a_stop_before_there_is_a_folder_is_heard(qtbot, made, meshes):
     model = made("--slow-start-s", 1.0, "--step-s", 5)
-    model.setup.add(meshes)
+    model.setup.add(*meshes)
     looked(qtbot, model.setup)
     model.ask_estimate()
     qtbot.waitUntil(lambda: not model.why_not_start, timeout=20_000)

@@ -104,7 +104,7 @@ def test_a_batch_is_set_up_started_and_its_results_opened(
     batch = models_of(window).batch
     dialog = begin(window)
     # What is open is taken along.
-    assert batch.setup.entries[0].path == recording_copy
+    assert batch.setup.data[0].path == recording_copy
     another = shutil.copytree(recording_copy, tmp_path / "more" / "other.sd2")
     monkeypatch.setattr(
         QFileDialog,

@@ -1,0 +1,120 @@
+"""Set-up of a run: its choices and its data, which is looked into in the background."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Generic, Protocol, TypeVar
+
+from PySide6.QtCore import QObject, Signal
+
+from sd2app.background.latest import LatestRunner
+from sd2app.settings import Settings, StoredChoices
+from sd2core.files.paths import plain_path
+
+
+class Source(Protocol):
+    """Something that a run works on."""
+
+    @property
+    def path(self) -> Path:
+        """Its file or folder."""
+
+    @property
+    def problem(self) -> str:
+        """Reason why it cannot be used; empty where it can."""
+
+
+D = TypeVar("D", bound=Source)
+
+
+class RunSetup(QObject, Generic[D]):
+    """Choices for a run and the data that it works on, kept from one start to the next.
+
+    The paths of the data are kept in the settings under ``stored``.
+    """
+
+    changed = Signal()
+
+    def __init__(
+        self,
+        settings: Settings,
+        values: StoredChoices,
+        stored: str,
+        data: Sequence[D],
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._settings, self._values, self._stored = settings, values, stored
+        self._data = tuple(data)
+        self._runner = LatestRunner("data of a run", self)
+        self._runner.finished.connect(self._take)
+        self.refresh()
+
+    # --- what subclasses say ----------------------------------------------------------------
+
+    def unread(self, path: Path) -> D:
+        """Data that has not been looked into."""
+        raise NotImplementedError
+
+    def look_into(self, source: D) -> D:
+        """Read the content of data from disk, in the background."""
+        raise NotImplementedError
+
+    # --- what is chosen ---------------------------------------------------------------------
+
+    @property
+    def data(self) -> tuple[D, ...]:
+        """Data to work on."""
+        return self._data
+
+    def value(self, name: str) -> Any:
+        """One of the settings."""
+        return self._values[name]
+
+    def set_value(self, name: str, value: Any) -> None:
+        """Choose a setting; KeyError if there is no such setting."""
+        if self._values.set(name, value):
+            self.changed.emit()
+
+    def add(self, *paths: Path) -> None:
+        """Add data; a file inside of a recording or of a Zarr group stands for that."""
+        plain = [plain_path(path) for path in paths]
+        meant = [
+            one.parent if one.name in ("zarr.json", "recording.json") else one for one in plain
+        ]
+        known = {one.path for one in self._data}
+        new = [path for path in dict.fromkeys(meant) if path not in known]
+        if new:
+            self.keep((*self._data, *map(self.unread, new)))
+
+    def remove(self, *paths: Path) -> None:
+        """Remove data."""
+        self.keep(tuple(one for one in self._data if one.path not in paths))
+
+    def keep(self, data: tuple[D, ...]) -> None:
+        """Work on this data, and remember it."""
+        self._runner.cancel()
+        self._data = data
+        self._settings.set_paths(self._stored, [one.path for one in data])
+        self.refresh()
+        self.changed.emit()
+
+    def refresh(self) -> None:
+        """Read the data again: a campaign grows while it is being made."""
+        chosen = self._data
+        if chosen:
+            self._runner.submit(lambda emit: tuple(map(self.look_into, chosen)))
+
+    def close(self) -> None:
+        """Stop reading."""
+        self._runner.close()
+
+    def _take(self, data: tuple[D, ...]) -> None:
+        self._data = data
+        self.changed.emit()
+
+
+def _meant(path: Path) -> Path:
+    path = plain_path(path)
+    return path.parent if path.name in ("zarr.json", "recording.json") else path
