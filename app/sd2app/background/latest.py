@@ -46,14 +46,9 @@ class LatestRunner(QObject):
         self._revision = 0
         self._pending: tuple[int, Task] | None = None
         self._closed = False
-        self._busy = False
+        self.busy = False  # true while the newest request waits for its result
         self._thread: threading.Thread | None = None
         self._posted.connect(self._deliver)
-
-    @property
-    def busy(self) -> bool:
-        """True while the newest request waits for its result."""
-        return self._busy
 
     def submit(self, task: Task) -> int:
         """Ask for ``task(emit)`` in the background; returns its revision number."""
@@ -130,6 +125,6 @@ class LatestRunner(QObject):
             self.failed.emit(value)
 
     def _set_busy(self, busy: bool) -> None:
-        if busy != self._busy:
-            self._busy = busy
+        if busy != self.busy:
+            self.busy = busy
             self.idle_changed.emit(not busy)

@@ -129,8 +129,9 @@ class RunMonitor(QObject, Generic[F]):
         self._clock_s = time.monotonic
         self._tail = ProgressTail(folder.progress)
         self._phase: Phase = "starting"
-        self._loaded = self._has_begun = False
-        self._text = ""
+        self.loaded = False  # true once the folder has been read
+        self.text = ""  # why it failed
+        self._has_begun = False
         self._wish: Word | None = None
         self._cancelled_s: float | None = None
         self._stopped_s: float | None = None
@@ -176,11 +177,6 @@ class RunMonitor(QObject, Generic[F]):
         return self._launched or self.folder.process
 
     @property
-    def loaded(self) -> bool:
-        """True once the folder has been read."""
-        return self._loaded
-
-    @property
     def phase(self) -> Phase:
         """Current phase; an order that was just given counts at once."""
         if self._phase not in UNDER_WAY or self._wish is None:
@@ -197,11 +193,6 @@ class RunMonitor(QObject, Generic[F]):
     def under_way(self) -> bool:
         """True while a process works on it."""
         return self._phase in UNDER_WAY
-
-    @property
-    def text(self) -> str:
-        """Reason why it failed."""
-        return self._text
 
     # --- steering ---------------------------------------------------------------------------
 
@@ -282,8 +273,8 @@ class RunMonitor(QObject, Generic[F]):
         self.facts = found.facts
         if self._launched is None or found.live or _is_begun_by(found.process, self._launched):
             self._has_begun = True
-        before, was_loaded = self._phase, self._loaded
-        self._phase, self._loaded = self._phase_of(found), True
+        before, was_loaded = self._phase, self.loaded
+        self._phase, self.loaded = self._phase_of(found), True
         self._obey(found)
         another = self._phase != before or not was_loaded
         if another:
@@ -361,18 +352,18 @@ class RunMonitor(QObject, Generic[F]):
         output = self.folder.output
         lines = [line for line in last_output(output).splitlines() if not line.startswith("{")]
         said = "\n".join(lines)
-        self._text = ""
+        self.text = ""
         if self._phase == "failed":
-            self._text = self.error or said.removeprefix("sd2: ") or _SILENT
+            self.text = self.error or said.removeprefix("sd2: ") or _SILENT
         elif self._phase == "died":
-            self._text = lines[-1] if lines else ""
+            self.text = lines[-1] if lines else ""
         if self._phase in ("finished", "stopped", "gone") and output.parent != self.path:
             output.unlink(missing_ok=True)
 
     def _fail(self, error: Exception) -> None:
         # The disk is away for a moment; it is looked at again.
-        if self._text != str(error):
-            self._text = str(error)
+        if self.text != str(error):
+            self.text = str(error)
             self.changed.emit()
 
 

@@ -46,7 +46,7 @@ class RunSetup(QObject, Generic[D]):
     ) -> None:
         super().__init__(parent)
         self._settings, self._values, self._stored = settings, values, stored
-        self._data = tuple(data)
+        self.data = tuple(data)  # to work on
         self._runner = LatestRunner("data of a run", self)
         self._runner.finished.connect(self._take)
         self.refresh()
@@ -63,11 +63,6 @@ class RunSetup(QObject, Generic[D]):
 
     # --- what is chosen ---------------------------------------------------------------------
 
-    @property
-    def data(self) -> tuple[D, ...]:
-        """Data to work on."""
-        return self._data
-
     def value(self, name: str) -> Any:
         """One of the settings."""
         return self._values[name]
@@ -83,26 +78,26 @@ class RunSetup(QObject, Generic[D]):
         meant = [
             one.parent if one.name in ("zarr.json", "recording.json") else one for one in plain
         ]
-        known = {one.path for one in self._data}
+        known = {one.path for one in self.data}
         new = [path for path in dict.fromkeys(meant) if path not in known]
         if new:
-            self.keep((*self._data, *map(self.unread, new)))
+            self.keep((*self.data, *map(self.unread, new)))
 
     def remove(self, *paths: Path) -> None:
         """Remove data."""
-        self.keep(tuple(one for one in self._data if one.path not in paths))
+        self.keep(tuple(one for one in self.data if one.path not in paths))
 
     def keep(self, data: tuple[D, ...]) -> None:
         """Work on this data, and remember it."""
         self._runner.cancel()
-        self._data = data
+        self.data = data
         self._settings.set_paths(self._stored, [one.path for one in data])
         self.refresh()
         self.changed.emit()
 
     def refresh(self) -> None:
         """Read the data again: a campaign grows while it is being made."""
-        chosen = self._data
+        chosen = self.data
         if chosen:
             self._runner.submit(lambda emit: tuple(map(self.look_into, chosen)))
 
@@ -111,7 +106,7 @@ class RunSetup(QObject, Generic[D]):
         self._runner.close()
 
     def _take(self, data: tuple[D, ...]) -> None:
-        self._data = data
+        self.data = data
         self.changed.emit()
 
 

@@ -61,9 +61,10 @@ class Runs(QObject, Generic[Run]):
         super().__init__(parent)
         self._monitor_of, self._sentences = follow, sentences
         self._settings, self._remembered = settings, remembered
-        self._run: Run | None = None
-        self._under_way = self._taking_up = self._watched = False
-        self._known: tuple[KnownRun, ...] = ()
+        self.run: Run | None = None  # in view; none while a new one is being set up
+        self.under_way = False  # true while the run in view has a process
+        self.known: tuple[KnownRun, ...] = ()  # on disk, the newest first
+        self._taking_up = self._watched = False
         self._lister = LatestRunner("runs", self)
         self._lister.finished.connect(self._list)
         # The disk may be away for a moment; it is looked at again.
@@ -81,40 +82,25 @@ class Runs(QObject, Generic[Run]):
     # --- what is known ----------------------------------------------------------------------
 
     @property
-    def run(self) -> Run | None:
-        """The run in view; None while a new one is being set up."""
-        return self._run
-
-    @property
-    def known(self) -> tuple[KnownRun, ...]:
-        """Runs on disk, the newest first."""
-        return self._known
-
-    @property
     def live(self) -> KnownRun | None:
         """The newest run on disk that is under way, apart from the one in view."""
-        here = None if self._run is None else self._run.path
-        return next((one for one in self._known if one.live and one.path != here), None)
-
-    @property
-    def under_way(self) -> bool:
-        """True while the run in view has a process."""
-        return self._under_way
+        here = None if self.run is None else self.run.path
+        return next((one for one in self.known if one.live and one.path != here), None)
 
     @property
     def busy(self) -> str:
         """Reason why no other run can be started; empty when one can."""
-        other = self._run if self._under_way else self.live
+        other = self.run if self.under_way else self.live
         return self._sentences.busy.format(other.path.name) if other is not None else ""
 
     @property
     def mark(self) -> str:
         """Share of the run in view that is done, as text; empty when none is under way."""
-        if self._run is None or not self._under_way:
+        if self.run is None or not self.under_way:
             return ""
-        if self._run.phase == "paused":
+        if self.run.phase == "paused":
             return "paused"
-        share = self._run.share
+        share = self.run.share
         return "…" if share is None else f"{100 * share:.0f} %"
 
     # --- one run after another --------------------------------------------------------------
@@ -139,7 +125,7 @@ class Runs(QObject, Generic[Run]):
         """Show a run; None is a new one, to be set up."""
         if path is None:
             self.follow(None)
-        elif self._run is None or self._run.path != path:
+        elif self.run is None or self.run.path != path:
             self.follow(self._monitor_of(path, self))
 
     def follow_new(self, path: Path, process: ProcessId) -> None:
@@ -149,13 +135,13 @@ class Runs(QObject, Generic[Run]):
 
     def tell(self, word: Word) -> None:
         """Give the run in view an order."""
-        run = self._run
+        run = self.run
         if run is not None:
             self._attempt(lambda: run.tell(word))
 
     def delete(self) -> None:
         """Delete the run in view, which has ended, with what it made."""
-        run = self._run
+        run = self.run
         if run is not None and not run.under_way:
             self._attempt(run.delete)
             self.select(None)
@@ -165,17 +151,17 @@ class Runs(QObject, Generic[Run]):
         """Stop looking; a process under way goes on."""
         self._timer.stop()
         self._lister.close()
-        if self._run is not None:
-            self._run.close()
+        if self.run is not None:
+            self.run.close()
 
     # --- following --------------------------------------------------------------------------
 
     def follow(self, run: Run | None, under_way: bool = False) -> None:
         """Show a run that is being followed; None is a new one, to be set up."""
-        if self._run is not None:
-            self._run.close()
-            self._run.deleteLater()
-        self._run, self._under_way = run, under_way
+        if self.run is not None:
+            self.run.close()
+            self.run.deleteLater()
+        self.run, self.under_way = run, under_way
         self._settings.set_value(self._remembered, "" if run is None else str(run.path))
         if run is not None:
             run.changed.connect(self.changed)
@@ -184,15 +170,15 @@ class Runs(QObject, Generic[Run]):
 
     def _notice(self) -> None:
         """Follow another phase of the run in view."""
-        run = self._run
+        run = self.run
         if run is None:
             return
         self.refresh()
         if run.phase == "gone":
             self.select(None)
             return
-        ended = self._under_way and not run.under_way
-        self._under_way = run.under_way and (run.loaded or self._under_way)
+        ended = self.under_way and not run.under_way
+        self.under_way = run.under_way and (run.loaded or self.under_way)
         if ended and not self._watched:
             self.say_ended(run)
 
@@ -204,8 +190,8 @@ class Runs(QObject, Generic[Run]):
             self.failed.emit(self._sentences.failed.format(run.path.name))
 
     def _list(self, known: tuple[KnownRun, ...]) -> None:
-        if known != self._known:
-            self._known = known
+        if known != self.known:
+            self.known = known
             self.changed.emit()
         if self._taking_up:
             self._taking_up = False

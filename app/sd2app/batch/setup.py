@@ -77,9 +77,9 @@ class BatchSetupModel(RunSetup[Entry]):
         """Folder of the results; one beside the first recording until another is chosen."""
         if self._out is not None:
             return self._out
-        if not self._data:
+        if not self.data:
             return None
-        first = self._data[0].path
+        first = self.data[0].path
         return first.parent / f"{first.stem} batch"
 
     @property
@@ -108,19 +108,19 @@ class BatchSetupModel(RunSetup[Entry]):
     @property
     def problem(self) -> str:
         """Reason why there is no plan; empty when there is one."""
-        if not self._data:
+        if not self.data:
             return "Add recordings to work on."
-        bad = [entry.problem for entry in self._data if entry.problem]
+        bad = [entry.problem for entry in self.data if entry.problem]
         if bad:
             return bad[0]
-        if any(entry.count is None for entry in self._data):
+        if any(entry.count is None for entry in self.data):
             return "Looking for recordings…"
         return ""
 
     @property
     def files(self) -> int:
         """Number of recordings that were found."""
-        return sum(entry.count or 0 for entry in self._data)
+        return sum(entry.count or 0 for entry in self.data)
 
     def plan(self) -> BatchPlan:
         """Plan in the form that the library takes; Sd2Error if something is missing."""
@@ -133,7 +133,7 @@ class BatchSetupModel(RunSetup[Entry]):
         return BatchPlan(
             out=str(self.out),
             recordings=Recordings(
-                files=tuple(pattern for entry in self._data for pattern in entry.patterns),
+                files=tuple(pattern for entry in self.data for pattern in entry.patterns),
                 subjects=values["subjects"],
             ),
             placements=where,

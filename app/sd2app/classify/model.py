@@ -55,10 +55,11 @@ class ClassifyModel(QObject):
         self._maps = (maps.synthetic, maps.denoised, maps.real)
         self._labels, self._library = labels, library
         self.track = ClassTrack(validity.is_current, self)
-        self._path: Path | None = next(iter(self._settings.paths(_MODEL)), None)
-        self._card: ClassifierCard | None = None
+        # The classifier that is in use or being loaded, and the card of the one in use.
+        self.path: Path | None = next(iter(self._settings.paths(_MODEL)), None)
+        self.card: ClassifierCard | None = None
         self._problem = ""
-        self._shown = self._settings.flag(_SHOWN, True)
+        self.shown = self._settings.flag(_SHOWN, True)  # under the maps, as the user wants it
         self._chosen: MapModel | None = None
         self._runner = LatestRunner("classifier", self)
         self._runner.finished.connect(self._set_loaded)
@@ -72,16 +73,6 @@ class ClassifyModel(QObject):
         self.counts_changed.connect(self.moved)
 
     # --- what is known --------------------------------------------------------------------
-
-    @property
-    def path(self) -> Path | None:
-        """File of the classifier that is in use or being loaded."""
-        return self._path
-
-    @property
-    def card(self) -> ClassifierCard | None:
-        """Card of the classifier in use."""
-        return self._card
 
     @property
     def loading(self) -> bool:
@@ -119,14 +110,9 @@ class ClassifyModel(QObject):
         return self.source is not None and self._knows(self.source)
 
     @property
-    def shown(self) -> bool:
-        """True if the probabilities are to be shown under the maps."""
-        return self._shown
-
-    @property
     def visible(self) -> bool:
         """True if there are probabilities and they are to be shown."""
-        return self._shown and self._path is not None and self.source is not None
+        return self.shown and self.path is not None and self.source is not None
 
     @property
     def reading(self) -> ClassReading | None:
@@ -136,8 +122,8 @@ class ClassifyModel(QObject):
     def available(self) -> Sequence[ClassifierCard]:
         """The user's classifiers, and the one in use."""
         cards = list(self._library.available())
-        if self._card is not None and self._card.path not in {card.path for card in cards}:
-            cards.append(self._card)
+        if self.card is not None and self.card.path not in {card.path for card in cards}:
+            cards.append(self.card)
         return cards
 
     def label_of(self, name: str) -> str:
@@ -157,8 +143,8 @@ class ClassifyModel(QObject):
     def use(self, path: Path | None) -> None:
         """Classify with a file, or with none; Sd2Error if the file is no classifier."""
         card = self.describe(path) if path is not None else None
-        self._path = None if path is None else Path(path).absolute()
-        self._settings.set_paths(_MODEL, [self._path] if self._path is not None else [])
+        self.path = None if path is None else Path(path).absolute()
+        self._settings.set_paths(_MODEL, [self.path] if self.path is not None else [])
         self._set_card(card)
         self.track.use(None, None)
         if path is not None:
@@ -175,8 +161,8 @@ class ClassifyModel(QObject):
 
     def set_shown(self, shown: bool) -> None:
         """Show the probabilities under the maps, or not."""
-        if shown != self._shown:
-            self._shown = shown
+        if shown != self.shown:
+            self.shown = shown
             self._settings.set_value(_SHOWN, shown)
             self.changed.emit()
 
@@ -192,14 +178,14 @@ class ClassifyModel(QObject):
         kinds = {track.map.kind} if track.map is not None else set()
         if track is self._real:
             kinds |= {"simulated", "real"}
-        return self._card is not None and bool(kinds & set(self._card.trained_on))
+        return self.card is not None and bool(kinds & set(self.card.trained_on))
 
     def _follow(self) -> None:
         source = self.source
         if source is not self.track.source:
             self.track.look_at(source)
             self.changed.emit()
-        waiting = self._path is not None and self.track.card is None and not self._problem
+        waiting = self.path is not None and self.track.card is None and not self._problem
         about_to = self._runner.busy or self._patience.isActive()
         if waiting and source is not None and not about_to:
             self._patience.start()
@@ -208,13 +194,13 @@ class ClassifyModel(QObject):
         self._patience.stop()
         self._runner.cancel()
         self._problem = ""
-        path, library = self._path, self._library
+        path, library = self.path, self._library
         if path is not None and self.source is not None:
             self._runner.submit(lambda emit: _Loaded(library.describe(path), library.load(path)))
         self.changed.emit()
 
     def _set_card(self, card: ClassifierCard | None) -> None:
-        self._card = card
+        self.card = card
         self.track.look_at(self.source)
 
     def _set_loaded(self, loaded: _Loaded) -> None:
@@ -224,6 +210,6 @@ class ClassifyModel(QObject):
 
     def _fail(self, error: Exception) -> None:
         self._problem = str(error)
-        self._card = None
+        self.card = None
         self.failed.emit(str(error))
         self.changed.emit()

@@ -41,17 +41,12 @@ class ConfusionView(QWidget):
         self._display = display
         display.theme_changed.connect(self.update)
         self._classes: tuple[str, ...] = ()
-        self._matrix: Matrix | None = None
+        self.matrix: Matrix | None = None  # that is shown
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-
-    @property
-    def matrix(self) -> Matrix | None:
-        """Matrix that is shown."""
-        return self._matrix
 
     def show_matrix(self, matrix: Matrix, classes: tuple[str, ...]) -> None:
         """Show another matrix."""
-        self._matrix, self._classes = matrix, classes
+        self.matrix, self._classes = matrix, classes
         self.setAccessibleName(f"Confusion matrix: {matrix.title}")
         self.setAccessibleDescription(
             "; ".join(
@@ -80,7 +75,7 @@ class ConfusionView(QWidget):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Paint names, cells and numbers."""
-        if self._matrix is None:
+        if self.matrix is None:
             return
         palette, (left, top) = self._display.palette, self._margins()
         width = min((self.width() - left) / len(self._classes), 1.5 * _CELL_PX[0])
@@ -106,8 +101,8 @@ class ConfusionView(QWidget):
                     self._paint_cell(painter, box, number, column)
 
     def _paint_cell(self, painter: QPainter, box: QRectF, row: int, column: int) -> None:
-        assert self._matrix is not None
-        palette, value = self._display.palette, self._matrix.cell(row, column)
+        assert self.matrix is not None
+        palette, value = self._display.palette, self.matrix.cell(row, column)
         tint = QColor(palette.accent if row == column else palette.real)
         share = value.mean if value.mean == value.mean else 0.0
         tint.setAlpha(round(_STRONGEST * min(max(share, 0.0), 1.0)))

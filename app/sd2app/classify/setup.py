@@ -128,24 +128,24 @@ class ClassSetup(RunSetup[DataSource]):
         """Name the person of a source's recordings or radar files; empty: the stored name."""
         # The command takes a person as PERSON=PATH.
         name = name.translate(str.maketrans("=/", "--")).strip()
-        known = {one.path: one.person for one in self._data}
+        known = {one.path: one.person for one in self.data}
         if known.get(path, name) != name:
             named = DataSource(path, name)
-            self.keep(tuple(named if one.path == path else one for one in self._data))
+            self.keep(tuple(named if one.path == path else one for one in self.data))
 
     # --- what follows ---------------------------------------------------------------------
 
     @property
     def problem(self) -> str:
         """Reason why nothing can be started; empty when something can."""
-        if not self._data:
+        if not self.data:
             return "Add labelled data to learn from."
-        problems = [one.problem for one in self._data if one.problem]
+        problems = [one.problem for one in self.data if one.problem]
         if problems:
             return problems[0]
-        if any(not one.facts for one in self._data):
+        if any(not one.facts for one in self.data):
             return "Reading the data…"
-        return why_not_together(self._data)
+        return why_not_together(self.data)
 
     @property
     def train_problem(self) -> str:
@@ -154,12 +154,12 @@ class ClassSetup(RunSetup[DataSource]):
             return self.problem
         if not self.maps:
             return "Choose maps to learn from."
-        return why_not_together(self._data, self.maps)
+        return why_not_together(self.data, self.maps)
 
     @property
     def division(self) -> Split | None:
         """Division of people in a training; None until the data is known and fits together."""
-        return None if self.problem else division_of(self._data)
+        return None if self.problem else division_of(self.data)
 
     @property
     def step_s(self) -> float | None:
@@ -197,7 +197,7 @@ class ClassSetup(RunSetup[DataSource]):
 
     @property
     def _sources(self) -> list[str]:
-        return [f"{one.person}={one.path}" if one.person else str(one.path) for one in self._data]
+        return [f"{one.person}={one.path}" if one.person else str(one.path) for one in self.data]
 
 
 def _people(text: str) -> dict[str, str]:

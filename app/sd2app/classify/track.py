@@ -75,10 +75,10 @@ class ClassTrack(QObject):
     def __init__(self, counts: Callable[[MapModel], bool], parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._counts = counts
-        self._source: MapModel | None = None
+        self.source: MapModel | None = None  # the map that is looked at
         self._classifier: RemoteClassifier | None = None
-        self._card: ClassifierCard | None = None
-        self._problem = ""
+        self.card: ClassifierCard | None = None  # of the classifier at work
+        self.problem = ""  # why this map cannot be classified
         self._runner = LatestRunner("classify", self)
         self._runner.partial.connect(self._receive)
         self._runner.finished.connect(self._finish)
@@ -89,8 +89,10 @@ class ClassTrack(QObject):
     def _forget(self) -> None:
         self._given: DopplerMap | None = None
         self._known = np.zeros(0, bool)
-        self._shares = np.zeros((0, 0), np.float32)
-        self._done = np.zeros(0, bool)
+        # Probabilities, (frames, classes), and the frames, (frames,), whose answer is of the map as
+        # it is now; those of the others are older.
+        self.shares = np.zeros((0, 0), np.float32)
+        self.done = np.zeros(0, bool)
         self._revision = -1
         self._going: _Going | None = None
         self._until = 0
@@ -99,92 +101,67 @@ class ClassTrack(QObject):
     # --- what is known --------------------------------------------------------------------
 
     @property
-    def card(self) -> ClassifierCard | None:
-        """Card of the classifier at work."""
-        return self._card
-
-    @property
     def busy(self) -> bool:
         """True while frames are being classified or about to be."""
         return self._runner.busy or self._calm.isActive()
 
     @property
-    def problem(self) -> str:
-        """Reason why this map cannot be classified; empty where it can."""
-        return self._problem
-
-    @property
     def complete(self) -> bool:
         """True once every frame of the current map is classified."""
-        source = self._source
+        source = self.source
         whole = source is not None and source.map is not None and source.covered is None
-        return whole and self.current and self._done.size > 0 and bool(self._done.all())
-
-    @property
-    def shares(self) -> NDArray[np.float32]:
-        """Probabilities, (frames, classes); of frames that are not :attr:`done` older ones."""
-        return self._shares
-
-    @property
-    def done(self) -> NDArray[np.bool_]:
-        """Frames whose answer is of the map as it is now, (frames,)."""
-        return self._done
-
-    @property
-    def source(self) -> MapModel | None:
-        """The map that is looked at."""
-        return self._source
+        return whole and self.current and self.done.size > 0 and bool(self.done.all())
 
     @property
     def current(self) -> bool:
         """True while the map is current for the sensor."""
-        return self._source is not None and self._counts(self._source)
+        return self.source is not None and self._counts(self.source)
 
     def at(self, time_s: float) -> ClassReading | None:
         """Classes of the frame at a time of the recording; None where they are not known.
 
         Of a map that is still growing up to there, what its newest frames show.
         """
-        frame = self._source.frame_at(time_s) if self._source is not None else None
-        if frame is None or self._card is None or frame >= len(self._shares):
+        frame = self.source.frame_at(time_s) if self.source is not None else None
+        if frame is None or self.card is None or frame >= len(self.shares):
             return None
         asked, frame = frame, self._newest(frame)
-        shares = self._shares[frame]
+        shares = self.shares[frame]
         if np.isnan(shares).any():
             return None
         assert self._given is not None
         present, times_s = self._given.present, self._given.times_s
         return ClassReading(
-            self._card.classes,
+            self.card.classes,
             tuple(map(float, shares)),
-            bool(self._done[frame]) and self.current,
+            bool(self.done[frame]) and self.current,
             present is not None and not present[frame],
-            float(times_s[asked] - times_s[frame]) if self._card.delay_frames else 0.0,
+            float(times_s[asked] - times_s[frame]) if self.card.delay_frames else 0.0,
         )
 
     def _newest(self, frame: int) -> int:
         """The newest frame up to this one that is done, if it is hardly earlier."""
         assert self._given is not None
-        assert self._card is not None
-        late_s = self._card.delay_s + _LATER_S if self._card.delay_frames else _LATE_S
+        assert self.card is not None
+        late_s = self.card.delay_s + _LATER_S if self.card.delay_frames else _LATE_S
         late = round(late_s * self._given.timebase.frames_per_s)
-        done = np.flatnonzero(self._done[max(frame - late, 0) : frame + 1])
+        done = np.flatnonzero(self.done[max(frame - late, 0) : frame + 1])
         return max(frame - late, 0) + int(done[-1]) if done.size else frame
 
     # --- requests -------------------------------------------------------------------------
 
     def use(self, classifier: RemoteClassifier | None, card: ClassifierCard | None) -> None:
         """Use another classifier, or none."""
-        self._classifier, self._card = classifier, card if classifier is not None else None
+        self._classifier, self.card = classifier, card if classifier is not None else None
         self._restart()
 
     def look_at(self, source: MapModel | None) -> None:
         """Look at another map, or at none."""
-        if source is self._source:
+        if source is self.source:
             return
-        if self._source is not None:
-            self._source.changed.disconnect(self._follow)
-        self._source = source
+        if self.source is not None:
+            self.source.changed.disconnect(self._follow)
+        self.source = source
         if source is not None:
             source.changed.connect(self._follow)
         self._restart()
@@ -200,12 +177,12 @@ class ClassTrack(QObject):
         self._runner.cancel()
         self._calm.stop()
         self._forget()
-        self._problem = ""
+        self.problem = ""
         self._follow()
         self.changed.emit()
 
     def _follow(self) -> None:
-        source, card = self._source, self._card
+        source, card = self.source, self.card
         if source is None or source.map is None or card is None:
             if self._given is not None:
                 self._runner.cancel()
@@ -224,7 +201,7 @@ class ClassTrack(QObject):
         self._take(source.map, source.known)
         if self._again:
             return
-        if np.count_nonzero(self._known & ~self._done) <= AT_ONCE:
+        if np.count_nonzero(self._known & ~self.done) <= AT_ONCE:
             self._calm.stop()
             self._go_on()
         elif not self._calm.isActive():
@@ -232,11 +209,11 @@ class ClassTrack(QObject):
 
     def _take(self, doppler: DopplerMap, known: NDArray[np.bool_]) -> None:
         """Copy values, which may change while they are classified."""
-        assert self._card is not None
+        assert self.card is not None
         before = self._given
         if before is None or not np.array_equal(before.times_s, doppler.times_s):
-            self._shares = np.full((len(known), len(self._card.classes)), np.nan, np.float32)
-            self._done = np.zeros(len(known), bool)
+            self.shares = np.full((len(known), len(self.card.classes)), np.nan, np.float32)
+            self.done = np.zeros(len(known), bool)
             first, values = 0, doppler.values.copy()
         else:
             # Of a long map little is known while it grows frame by frame: no more is looked at.
@@ -245,10 +222,10 @@ class ClassTrack(QObject):
             differs = self._differs(before, doppler, known, slice(start, stop))
             first = start + int(differs.argmax()) if differs.any() else len(known)
             values = before.values
-        self._problem = ""
+        self.problem = ""
         # What was known of this frame and is another now has been seen by earlier answers.
         seen = first < len(known) and before is not None and bool(self._known[first])
-        self._done[first - (min(self._card.delay_frames, first) if seen else 0) :] = False
+        self.done[first - (min(self.card.delay_frames, first) if seen else 0) :] = False
         # What is under way is still right where the map only grew behind it.
         self._again = self._runner.busy and first >= self._until
         if self._runner.busy and not self._again:
@@ -263,8 +240,8 @@ class ClassTrack(QObject):
         self._given, self._known = replace(doppler, values=values), known.copy()
         if doppler.present is not None:
             nobody = known & ~doppler.present
-            self._shares[nobody] = self._card.no_person()
-            self._done[nobody] = True
+            self.shares[nobody] = self.card.no_person()
+            self.done[nobody] = True
         self.changed.emit()
 
     def _differs(
@@ -280,10 +257,10 @@ class ClassTrack(QObject):
     # --- classifying ----------------------------------------------------------------------
 
     def _go_on(self) -> None:
-        doppler, classifier, card = self._given, self._classifier, self._card
+        doppler, classifier, card = self._given, self._classifier, self.card
         if doppler is None or classifier is None or card is None:
             return
-        waiting = self._known & ~self._done
+        waiting = self._known & ~self.done
         numbers = np.flatnonzero(waiting)
         if not numbers.size:
             return
@@ -310,8 +287,8 @@ class ClassTrack(QObject):
 
     def _receive(self, piece: _Piece) -> None:
         stop = piece.start + len(piece.shares)
-        self._shares[piece.start : stop] = piece.shares
-        self._done[piece.start : stop] = True
+        self.shares[piece.start : stop] = piece.shares
+        self.done[piece.start : stop] = True
         self._going = piece.going
         self.changed.emit()
 
@@ -326,7 +303,7 @@ class ClassTrack(QObject):
         self._runner.cancel()
         self._forget()
         self._revision = revision
-        self._problem = str(error)
+        self.problem = str(error)
         self.changed.emit()
 
 

@@ -99,7 +99,7 @@ class TrainingSetupModel(RunSetup[Store]):
     @property
     def known(self) -> list[Path]:
         """Pairs that were chosen before."""
-        chosen = {store.path for store in self._data}
+        chosen = {store.path for store in self.data}
         return [path for path in self._settings.paths(_KNOWN) if path not in chosen]
 
     @property
@@ -118,13 +118,13 @@ class TrainingSetupModel(RunSetup[Store]):
     @property
     def problem(self) -> str:
         """Reason why it cannot be started; empty when it can."""
-        if not self._data:
+        if not self.data:
             return "Add pairs to learn from."
-        problems = [store.problem for store in self._data if store.problem]
+        problems = [store.problem for store in self.data if store.problem]
         if problems:
             return problems[0]
-        facts = [store.facts for store in self._data if store.facts is not None]
-        if len(facts) < len(self._data):
+        facts = [store.facts for store in self.data if store.facts is not None]
+        if len(facts) < len(self.data):
             return "Reading the pairs…"
         if len({(one.bins, one.v_max_mps, one.frame_rate_hz) for one in facts}) > 1:
             return (
@@ -142,7 +142,7 @@ class TrainingSetupModel(RunSetup[Store]):
         """Configuration in the form that the library takes; Sd2Error if it cannot be started."""
         if self.problem:
             raise Sd2Error(self.problem)
-        return self._config(tuple(store.path for store in self._data))
+        return self._config(tuple(store.path for store in self.data))
 
     def _config(self, pairs: tuple[Path, ...]) -> TrainConfig:
         values = self._values
@@ -174,7 +174,7 @@ class TrainingSetupModel(RunSetup[Store]):
 
     def _people(self) -> list[tuple[str, PairFacts, str]]:
         """All people as the library names them, with store and name in it."""
-        found = [store.facts for store in self._data if store.facts is not None]
+        found = [store.facts for store in self.data if store.facts is not None]
         names = [subject for facts in found for subject in facts.subjects]
         return [
             (

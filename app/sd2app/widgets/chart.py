@@ -159,7 +159,7 @@ class ChartView(QWidget):
     ) -> None:
         super().__init__(parent)
         self._display, self._chart = display, chart
-        self._pointed: Mark | None = None
+        self.pointed: Mark | None = None  # under the pointer, or where the keyboard is
         self.setMouseTracking(True)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
@@ -174,10 +174,10 @@ class ChartView(QWidget):
 
     def show_chart(self, chart: Chart) -> None:
         """Show other curves; what was pointed at stays so."""
-        self._chart, before = chart, self._pointed
+        self._chart, before = chart, self.pointed
         if before is not None:
             same = (mark for mark in chart.marks if (mark.x, mark.of) == (before.x, before.of))
-            self._pointed = next(same, None)
+            self.pointed = next(same, None)
         self.update()
 
     def plot_rect(self) -> QRectF:
@@ -205,21 +205,16 @@ class ChartView(QWidget):
         """Points that can be pointed at."""
         return self._chart.marks
 
-    @property
-    def pointed(self) -> Mark | None:
-        """The mark under the pointer, or the one the keyboard is at."""
-        return self._pointed
-
     def point_at(self, mark: Mark | None) -> None:
         """Point at a mark, or at nothing."""
-        if mark is not self._pointed:
-            self._pointed = mark
+        if mark is not self.pointed:
+            self.pointed = mark
             self.setAccessibleDescription(mark.words if mark is not None else "")
             self.update()
 
     def explain(self) -> None:
         """Show what is pointed at in words, beside it."""
-        mark = self._pointed
+        mark = self.pointed
         if mark is None:
             QToolTip.hideText()
             return
@@ -411,7 +406,7 @@ class ChartView(QWidget):
 
     def _next(self, along: Sequence[Mark], key: Qt.Key) -> Mark | None:
         """The mark that a key goes to; from one that it does not go through, the nearest."""
-        here = self._pointed
+        here = self.pointed
         if key in (Qt.Key.Key_Home, Qt.Key.Key_End):
             return along[0 if key == Qt.Key.Key_Home else -1]
         if here is None:
