@@ -11,6 +11,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 
 from sd2app.background.latest import LatestRunner
 from sd2app.background.run_monitor import RunMonitor
+from sd2app.background.run_setup import RunSetup
 from sd2app.settings import Settings
 from sd2core.errors import Sd2Error
 from sd2core.processes import ProcessId
@@ -65,6 +66,7 @@ class Runs(QObject, Generic[Run]):
         self.under_way = False  # true while the run in view has a process
         self.known: tuple[KnownRun, ...] = ()  # on disk, the newest first
         self._taking_up = self._watched = False
+        self._set_up: RunSetup[Any] | None = None
         self._lister = LatestRunner("runs", self)
         self._lister.finished.connect(self._list)
         # The disk may be away for a moment; it is looked at again.
@@ -103,6 +105,11 @@ class Runs(QObject, Generic[Run]):
         share = self.run.share
         return "…" if share is None else f"{100 * share:.0f} %"
 
+    def follow_setup(self, setup: RunSetup[Any]) -> None:
+        """Follow the set-up of a new run; its data is read again whenever runs become visible."""
+        self._set_up = setup
+        setup.changed.connect(self.changed)
+
     # --- one run after another --------------------------------------------------------------
 
     def set_watched(self, watched: bool) -> None:
@@ -110,6 +117,8 @@ class Runs(QObject, Generic[Run]):
         self._watched = watched
         if watched:
             self.refresh()
+            if self._set_up is not None:
+                self._set_up.refresh()
 
     def look_for_runs(self) -> None:
         """At the start of the program: find what is under way, or what was in view last."""
@@ -151,6 +160,8 @@ class Runs(QObject, Generic[Run]):
         """Stop looking; a process under way goes on."""
         self._timer.stop()
         self._lister.close()
+        if self._set_up is not None:
+            self._set_up.close()
         if self.run is not None:
             self.run.close()
 

@@ -53,8 +53,8 @@ class BatchModel(Runs[BatchMonitor]):
         self._estimating = LatestRunner("estimate", self)
         self._estimating.finished.connect(self._take_estimate)
         self._estimating.failed.connect(self._refuse_estimate)
-        for signal in (self.setup.changed, self.results.changed):
-            signal.connect(self.changed)
+        self.follow_setup(self.setup)
+        self.results.changed.connect(self.changed)
 
     # --- the set-up -------------------------------------------------------------------------
 
@@ -131,7 +131,6 @@ class BatchModel(Runs[BatchMonitor]):
     def close(self) -> None:
         """Stop polling; a running batch goes on."""
         self._estimating.close()
-        self.setup.close()
         self.results.close()
         super().close()
 

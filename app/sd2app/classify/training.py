@@ -47,7 +47,7 @@ class ClassTraining(Runs[ClassRun]):
         self._use, self._command = use, tuple(command)
         self._folder = folder or user_classifiers_folder()
         self.setup = ClassSetup(settings, self)
-        self.setup.changed.connect(self.changed)
+        self.follow_setup(self.setup)
         self._used: Path | None = None
 
     # --- what is known --------------------------------------------------------------------
@@ -73,12 +73,6 @@ class ClassTraining(Runs[ClassRun]):
         return quoted(self.setup.train_arguments(Path(MODEL_NAME)))
 
     # --- one run after another ------------------------------------------------------------
-
-    def set_watched(self, watched: bool) -> None:
-        """Note that the panel is visible or hidden."""
-        super().set_watched(watched)
-        if watched:
-            self.setup.refresh()
 
     def find(self) -> Sequence[KnownRun]:
         """Read the folder of runs."""
@@ -125,11 +119,6 @@ class ClassTraining(Runs[ClassRun]):
         self._use(kept)
         self._used = run.path
         self.changed.emit()
-
-    def close(self) -> None:
-        """Stop polling; a running process goes on."""
-        self.setup.close()
-        super().close()
 
     def _start(self, path: Path, arguments: list[str], about: dict[str, Any]) -> None:
         self.follow_new(path, CommandFolder(path).start(arguments, about, self._command))

@@ -60,7 +60,7 @@ class TrainingModel(Runs[TrainingMonitor]):
         self._folder = folder or (Path(chosen) if chosen else user_runs_folder())
         self._statuses: dict[Path, tuple[object, RunStatus]] = {}
         self.setup = TrainingSetupModel(settings, self)
-        self.setup.changed.connect(self.changed)
+        self.follow_setup(self.setup)
         self.pair_maker = PairMaker(self._folder.parent / "pairs", self, command)
         self.pair_maker.changed.connect(self.changed)
         self.pair_maker.made.connect(self.setup.add)
@@ -101,12 +101,6 @@ class TrainingModel(Runs[TrainingMonitor]):
         config = self.setup.config
         return quoted(train_arguments(config, Path(_new_run(Path(), config).name)))
 
-    def set_watched(self, watched: bool) -> None:
-        """Note that the panel is visible or hidden."""
-        super().set_watched(watched)
-        if watched:
-            self.setup.refresh()
-
     # --- one run after another ------------------------------------------------------------
 
     def open_run(self, path: Path) -> None:
@@ -140,7 +134,6 @@ class TrainingModel(Runs[TrainingMonitor]):
     def close(self) -> None:
         """Stop polling; a running training goes on."""
         self.pair_maker.close()
-        self.setup.close()
         super().close()
 
     # --- listing --------------------------------------------------------------------------
