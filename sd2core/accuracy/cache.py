@@ -16,6 +16,7 @@ from sd2core.accuracy.results import Machine, Measurement
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
+from sd2core.files.paths import user_cache
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics.compiled import worker_count
 from sd2core.sensor import VirtualSensor
@@ -108,9 +109,7 @@ def store_measurement(mesh: MeshSequence, measurement: Measurement) -> None:
 
 
 def _place(mesh: MeshSequence, family: Family) -> Path:
-    import platformdirs
-
-    folder = Path(platformdirs.user_cache_dir("sd2-studio", appauthor=False)) / "ladder"
+    folder = user_cache("ladder")
     return folder / f"{family}-{clip_fingerprint(mesh)}.json"
 
 

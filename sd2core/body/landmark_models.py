@@ -20,6 +20,7 @@ from pathlib import Path
 
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
+from sd2core.files.paths import user_cache
 from sd2core.progress import Progress, silent
 
 ENVIRONMENT = "SD2_MODELS"
@@ -66,9 +67,7 @@ class LandmarkModels:
 
 def default_folder() -> Path:
     """Folder of the models in the user's cache."""
-    import platformdirs
-
-    return Path(platformdirs.user_cache_dir("sd2-studio", appauthor=False)) / "models"
+    return user_cache("models")
 
 
 def landmark_models(

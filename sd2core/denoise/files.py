@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, TypeVar
 from sd2core.denoise.card import ModelCard
 from sd2core.denoise.weights import SUFFIX, Shapes, read_header, read_weights, write_weights
 from sd2core.errors import Sd2Error
+from sd2core.files.paths import user_data
 from sd2core.files.resources import bundled_files
 
 if TYPE_CHECKING:
@@ -125,9 +126,7 @@ def readable(paths: Iterable[Path], describe: Callable[[Path], Card]) -> list[Ca
 
 def user_models_folder() -> Path:
     """Folder of the user's models; it may not exist yet."""
-    import platformdirs
-
-    return Path(platformdirs.user_data_dir("sd2-studio", appauthor=False)) / "models"
+    return user_data("models")
 
 
 def _known_files() -> dict[str, Path]:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from sd2core.files.atomic import atomic_write_text
+from sd2core.files.paths import user_cache
 
 Signature = list[list[Any]]
 """Per file or folder: path, size, time of the last change in ns, inode."""
@@ -101,9 +102,7 @@ def _tree(path: Path) -> Iterable[Path]:
 
 
 def _place(path: Path) -> Path:
-    import platformdirs
-
-    folder = Path(platformdirs.user_cache_dir("sd2-studio", appauthor=False)) / "contents"
+    folder = user_cache("contents")
     return folder / f"{hashlib.sha256(str(path).encode()).hexdigest()[:32]}.json"
 
 

@@ -11,6 +11,20 @@ from pathlib import Path, PurePath, PurePosixPath, PureWindowsPath
 from sd2core.progress import Progress
 
 
+def user_data(name: str) -> Path:
+    """Folder of the user's data of one kind; it may not exist yet."""
+    import platformdirs
+
+    return Path(platformdirs.user_data_dir("sd2-studio", appauthor=False)) / name
+
+
+def user_cache(name: str) -> Path:
+    """Folder of one kind of what can be made again; it may not exist yet."""
+    import platformdirs
+
+    return Path(platformdirs.user_cache_dir("sd2-studio", appauthor=False)) / name
+
+
 def plain_path(path: Path) -> Path:
     """Absolute, with links in the folders (not the name itself) resolved, so that .. is true."""
     path = Path(os.path.abspath(path))

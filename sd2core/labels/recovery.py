@@ -32,6 +32,7 @@ from pydantic import ValidationError
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text, remove_leftovers
 from sd2core.files.lock import FileLock, is_locked
+from sd2core.files.paths import user_data
 from sd2core.labels.entries import first_fault
 from sd2core.labels.journal import SUFFIX, Journal, Replayed, replay, unpacked
 from sd2core.labels.spans import Labels
@@ -152,9 +153,7 @@ _HOLDER_NAME = "holder.json"
 
 def recovery_folder() -> Path:
     """Return the user's recovery folder, which may not exist yet."""
-    import platformdirs
-
-    return Path(platformdirs.user_data_dir("sd2-studio", appauthor=False)) / "recovery"
+    return user_data("recovery")
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ import platform
 from pathlib import Path
 
 from sd2core.files.atomic import atomic_write_text
+from sd2core.files.paths import user_cache
 
 Kind = tuple[str | int | None, ...]
 """What is done, with all that the time of an item depends on: ``("fit", "medium")``."""
@@ -85,8 +86,5 @@ def _known() -> dict[str, tuple[float, float]]:
 
 
 def _path() -> Path:
-    import platformdirs
-
     # A home folder may be shared by machines of different speed.
-    folder = Path(platformdirs.user_cache_dir("sd2-studio", appauthor=False))
-    return folder / "pace" / f"{platform.node() or 'here'}.json"
+    return user_cache("pace") / f"{platform.node() or 'here'}.json"

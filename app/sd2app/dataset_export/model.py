@@ -11,7 +11,7 @@ from PySide6.QtCore import QObject
 
 from sd2app.background.latest import Emit, LatestRunner
 from sd2app.background.runs import KnownRun, Runs, Sentences, free_folder
-from sd2app.dataset_export.run import Exported, ExportRun, user_exports_folder
+from sd2app.dataset_export.run import Exported, ExportRun
 from sd2app.session.tasks import Job, TaskList
 from sd2app.settings import Settings
 from sd2app.widgets.text import about, counted
@@ -20,6 +20,7 @@ from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.recording_sources import Making
 from sd2core.datasets.sources import gather, recordings_in
 from sd2core.errors import Sd2Error
+from sd2core.files.paths import user_data
 from sd2core.maps import MapKind
 from sd2core.pairs.segments import LENGTH, OVERLAP
 from sd2core.progress import Cancelled
@@ -123,7 +124,7 @@ class ExportModel(Runs[ExportRun]):
         # Its folder is deleted at the end of an export: there is no last one to remember.
         super().__init__(ExportRun, Settings.forgetful(), "run", _SENTENCES, parent)
         self._jobs, self._command = jobs, tuple(command)
-        self._folder = folder or user_exports_folder()
+        self._folder = folder or user_data("exports")
         self.choice = ExportChoice()
         self.problem = ""  # why these choices cannot be exported
         self.places = 0  # planned besides the recordings' own sensors, the most of any

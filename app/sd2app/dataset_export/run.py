@@ -14,13 +14,6 @@ from sd2core.processes import ProcessId
 from sd2core.runs.command_folder import CommandFolder
 
 
-def user_exports_folder() -> Path:
-    """Folder in which exports under way are noted; it need not be there yet."""
-    import platformdirs
-
-    return Path(platformdirs.user_data_dir("sd2-studio", appauthor=False)) / "exports"
-
-
 @dataclass(frozen=True)
 class Exported:
     """A finished data set."""

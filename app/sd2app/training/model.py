@@ -20,6 +20,7 @@ from sd2app.training.setup import TrainingSetupModel
 from sd2app.training.text import model_name, state_text
 from sd2app.widgets.text import clock_text
 from sd2core.errors import Sd2Error
+from sd2core.files.paths import user_data
 from sd2core.processes import ONE_THREAD
 from sd2core.runs.command_folder import COMMAND, launch
 from sd2core.runs.folder import LIVE
@@ -57,7 +58,7 @@ class TrainingModel(Runs[TrainingMonitor]):
         super().__init__(TrainingMonitor, settings, "training/run", _SENTENCES, parent)
         self._command = tuple(command)
         chosen = settings.stored("training/folder", "")
-        self._folder = folder or (Path(chosen) if chosen else user_runs_folder())
+        self._folder = folder or (Path(chosen) if chosen else user_data("runs"))
         self._statuses: dict[Path, tuple[object, RunStatus]] = {}
         self.setup = TrainingSetupModel(settings, self)
         self.follow_setup(self.setup)
@@ -167,13 +168,6 @@ class TrainingModel(Runs[TrainingMonitor]):
         if (status.state in LIVE) == live:
             self._statuses[run.path] = ((stamps, live), status)
         return status
-
-
-def user_runs_folder() -> Path:
-    """Default folder of runs."""
-    import platformdirs
-
-    return Path(platformdirs.user_data_dir("sd2-studio", appauthor=False)) / "runs"
 
 
 def train_arguments(config: TrainConfig, run: Path) -> list[str]:
