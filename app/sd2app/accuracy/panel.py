@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QSignalBlocker, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QGridLayout, QLabel, QProgressBar, QSizePolicy, QToolButton, QWidget
 
-from sd2app.accuracy.measurements import FAMILIES
 from sd2app.accuracy.model import PRESETS, AccuracyModel
 from sd2app.accuracy.plot import AccuracyPlot
 from sd2app.accuracy.text import deviation
@@ -78,11 +77,8 @@ class AccuracyPanel(QWidget):
         measured = self._accuracy.measured
         self._empty, self._source = sentence(""), sentence("")
         self._plot = AccuracyPlot(self._accuracy, display, self)
-        self._family = Choice("Plans of which signal model", self)
-        for family in FAMILIES:
-            self._family.addItem(_FAMILY_TEXT[family], family)
-        self._family.currentIndexChanged.connect(
-            lambda _: measured.set_family(self._family.currentData())
+        self._family = Choice(
+            "Plans of which signal model", self, _FAMILY_TEXT, measured.set_family
         )
         self._measure = outlined("", measure.toolTip(), measure.trigger, self)
         self._bar = QProgressBar(self)
@@ -145,8 +141,7 @@ class AccuracyPanel(QWidget):
     def _refresh_plot(self) -> None:
         measured = self._accuracy.measured
         measurement, job = measured.measurement, measured.job
-        with QSignalBlocker(self._family):
-            self._family.setCurrentIndex(FAMILIES.index(measured.family))
+        self._family.show_value(measured.family)
         self._empty.setText(_NOT_MEASURED[measured.family])
         self._empty.setVisible(measurement is None)
         self._measure.setText("Measure this scene" if measurement is None else "Measure again")

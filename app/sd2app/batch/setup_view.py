@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QSignalBlocker, QSize, Qt
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
-    QCheckBox,
     QFormLayout,
     QHBoxLayout,
     QListWidget,
@@ -19,16 +19,9 @@ from PySide6.QtWidgets import (
 
 from sd2app.batch.model import BatchModel
 from sd2app.batch.questions import BatchQuestions
-from sd2app.batch.setup import (
-    ACCURACIES,
-    FORMATS,
-    SUBJECTS,
-    Accuracy,
-    OptionalStep,
-    most_workers,
-)
+from sd2app.batch.setup import Accuracy, OptionalStep, most_workers
 from sd2app.batch.text import entry_text, estimate_facts, estimate_headline, unusable_text
-from sd2app.widgets.inputs import Choice, NumberBox
+from sd2app.widgets.inputs import CheckBox, Choice, NumberBox
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import (
     ElidedLabel,
@@ -94,24 +87,22 @@ class BatchSetupView(QWidget):
         form.setHorizontalSpacing(16)
         form.setVerticalSpacing(6)
         form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
-        self._subjects = self._choice("subjects", "Who is who", SUBJECTS, _SUBJECT_TEXT)
+        set_value = self._setup.set_value
+        self._subjects = Choice("Who is who", self, _SUBJECT_TEXT, partial(set_value, "subjects"))
         form.addRow("People", self._subjects)
         self._placements = Choice("Where sensors are put", self)
         self._placements.activated.connect(self._asks.choose_placements)
         form.addRow("Sensors", self._placements)
-        self._steps: dict[OptionalStep, QCheckBox] = {}
+        self._steps: dict[OptionalStep, CheckBox] = {}
         for step, (text, tip) in _STEP_TEXT.items():
-            box = QCheckBox(text, self)
-            box.setToolTip(tip)
+            box = self._steps[step] = CheckBox(text, self, partial(set_value, step), tip)
             box.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-            box.toggled.connect(lambda on, step=step: self._setup.set_value(step, on))
-            self._steps[step] = box
-        self._accuracy = self._choice("accuracy", "How exactly", ACCURACIES, _ACCURACY_TEXT)
+        self._accuracy = Choice("How exactly", self, _ACCURACY_TEXT, partial(set_value, "accuracy"))
         self._model = Choice("Model to denoise with", self)
-        self._model.currentTextChanged.connect(
-            lambda name: name and self._setup.set_value("model", name)
+        self._model.currentTextChanged.connect(lambda name: name and set_value("model", name))
+        self._format = Choice(
+            "Format of the data set", self, _FORMAT_TEXT, partial(set_value, "format")
         )
-        self._format = self._choice("format", "Format of the data set", FORMATS, _FORMAT_TEXT)
         form.addRow("Videos", self._steps["fit"])
         form.addRow("Synthesise", self._accuracy)
         form.addRow("Then", side_by_side(self._steps["denoise"], self._model))
@@ -122,22 +113,9 @@ class BatchSetupView(QWidget):
         self._workers = NumberBox(
             1, most_workers(), "", "Processes that share the work", decimals=0, step=1.0
         )
-        self._workers.valueChanged.connect(lambda value: self._setup.set_value("workers", value))
+        self._workers.valueChanged.connect(partial(set_value, "workers"))
         form.addRow("Workers", side_by_side(self._workers))
         return form
-
-    def _choice(
-        self,
-        name: str,
-        tip: str,
-        values: Sequence[str],
-        texts: dict[str, str] | dict[Accuracy, str],
-    ) -> Choice:
-        choice = Choice(tip, self)
-        for value in values:
-            choice.addItem(texts[value], value)  # type: ignore[index]
-        choice.currentIndexChanged.connect(lambda index: self._setup.set_value(name, values[index]))
-        return choice
 
     def _buttons(self) -> QHBoxLayout:
         asks = self._asks
@@ -155,22 +133,16 @@ class BatchSetupView(QWidget):
         setup = self._setup
         self._list.show_entries([(e.path, entry_text(e), bool(e.problem)) for e in setup.data])
         self._follow_selection()
-        for name, choice, values in (
-            ("subjects", self._subjects, SUBJECTS),
-            ("accuracy", self._accuracy, ACCURACIES),
-            ("format", self._format, FORMATS),
-        ):
-            with QSignalBlocker(choice):
-                if values is ACCURACIES:
-                    allowed = percent(setup.tolerance)
-                    choice.setItemText(1, _ACCURACY_TEXT["tolerance"].format(percent=allowed))
-                choice.setCurrentIndex(list(values).index(setup.value(name)))
+        allowed = percent(setup.tolerance)
+        self._accuracy.setItemText(1, _ACCURACY_TEXT["tolerance"].format(percent=allowed))
+        self._subjects.show_value(setup.value("subjects"))
+        self._accuracy.show_value(setup.value("accuracy"))
+        self._format.show_value(setup.value("format"))
         self._placements.offer(self._asks.placement_choices(), self._asks.placement_index())
         names = list(dict.fromkeys([*self._asks.model_names(), setup.value("model")]))
         self._model.offer(names, names.index(setup.value("model")))
         for step, box in self._steps.items():
-            with QSignalBlocker(box):
-                box.setChecked(setup.value(step))
+            box.show_checked(setup.value(step))
         self._model.setEnabled(setup.value("denoise"))
         self._format.setEnabled(setup.value("export"))
         self._out.setText(str(setup.out or "–"))

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from functools import partial
 
-from PySide6.QtCore import QSignalBlocker, Qt
-from PySide6.QtWidgets import QCheckBox, QGridLayout, QLabel, QWidget
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 
 from sd2app.classify.dialogs import ClassifyDialogs
 from sd2app.classify.setup import MAPS, DataSource
 from sd2app.classify.text import FEATURE_WORDS, MODEL_WORDS
 from sd2app.classify.training import ClassTraining
 from sd2app.training.text import division_text
-from sd2app.widgets.inputs import TypedLine
+from sd2app.widgets.inputs import CheckBox, TypedLine
 from sd2app.widgets.layouts import row_of
 from sd2app.widgets.panel import outlined, rule, sentence, side_by_side, title
 from sd2app.widgets.text import counted
@@ -74,13 +74,11 @@ class ClassSetupView(TrainingForm):
         menu.aboutToShow.connect(lambda: this.setEnabled(self._dialogs.has_this()))
 
     def _add_network(self) -> None:
-        self._boxes: dict[str, QCheckBox] = {}
+        self._boxes: dict[str, CheckBox] = {}
         for name in MAPS:
-            box = QCheckBox(name, self)
-            box.setToolTip(_MAP_TIPS[name])
+            chosen = partial(self._labelled.set_map, name)
+            box = self._boxes[name] = CheckBox(name, self, chosen, _MAP_TIPS[name])
             box.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-            box.toggled.connect(lambda on, name=name: self._labelled.set_map(name, on))
-            self._boxes[name] = box
         grid = QGridLayout()
         grid.setHorizontalSpacing(8)
         grid.setVerticalSpacing(4)
@@ -103,12 +101,13 @@ class ClassSetupView(TrainingForm):
         self.column.addLayout(grid)
 
     def _add_comparison(self) -> None:
-        self._quick = QCheckBox("Quick: fewer trainings, to see how it looks", self)
-        self._quick.setToolTip("Two seeds instead of five, and fewer shares of the radar's data")
-        self._quick.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-        self._quick.toggled.connect(
-            lambda on: self._labelled.set_value("quick", "yes" if on else "no")
+        self._quick = CheckBox(
+            "Quick: fewer trainings, to see how it looks",
+            self,
+            lambda on: self._labelled.set_value("quick", "yes" if on else "no"),
+            "Two seeds instead of five, and fewer shares of the radar's data",
         )
+        self._quick.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         tip = "Train and compare in the background"
         self._compare = outlined(
             "Compare", tip, partial(self._shell.attempt, self._training.compare), self
@@ -131,10 +130,8 @@ class ClassSetupView(TrainingForm):
             )
         )
         for name, box in self._boxes.items():
-            with QSignalBlocker(box):
-                box.setChecked(name in setup.maps)
-        with QSignalBlocker(self._quick):
-            self._quick.setChecked(setup.value("quick") == "yes")
+            box.show_checked(name in setup.maps)
+        self._quick.show_checked(setup.value("quick") == "yes")
         steps = 0 if setup.problem else setup.value("steps")
         count = f"The data is read first; then {counted(steps, 'step')}"
         self.show_estimate(count, steps, setup.step_s)

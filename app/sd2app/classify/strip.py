@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QRectF, QSignalBlocker, QSize, Qt
+from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import (
     QBrush,
     QColor,
@@ -74,12 +74,8 @@ class ClassStrip(QWidget):
         model = self._classify
         self.setVisible(model.visible)
         titles = [f"on {track.title.lower()}" for track in model.sources]
-        with QSignalBlocker(self._source):
-            if titles != [self._source.itemText(at) for at in range(self._source.count())]:
-                self._source.clear()
-                self._source.addItems(titles)
-            if model.source in model.sources:
-                self._source.setCurrentIndex(model.sources.index(model.source))
+        place = model.sources.index(model.source) if model.source in model.sources else -1
+        self._source.offer(titles, place)
         self._source.setVisible(bool(titles))
         self._say()
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from PySide6.QtCore import QSignalBlocker, Qt, QUrl
+from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QDesktopServices, QPixmap
 from PySide6.QtWidgets import (
-    QCheckBox,
     QDialog,
     QFileDialog,
     QFormLayout,
@@ -18,11 +17,12 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from sd2app.dataset_export.model import ENDINGS, MAPS, ExportModel
+from sd2app.dataset_export.model import MAPS, ExportModel
 from sd2app.dataset_export.text import label_words, size_words, split_words
-from sd2app.widgets.inputs import Choice, NumberBox
+from sd2app.widgets.inputs import CheckBox, Choice, NumberBox
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import ElidedLabel, outlined, rule, sentence, side_by_side
+from sd2app.widgets.text import counted
 from sd2core.recording.recording import is_recording
 
 _FORMATS = {
@@ -68,24 +68,19 @@ class ExportDialog(QDialog):
         self._people.setAccessibleName("Who each recording is of")
         self._people.setPlaceholderText("each a different person; or names, as anna, anna, ben")
         self._people.editingFinished.connect(self._name_people)
-        self._boxes = {name: QCheckBox(name, self) for name in MAPS}
-        for box in self._boxes.values():
-            box.toggled.connect(self._choose_maps)
-        self._sensors = Choice("From which sensors the maps are seen", self)
-        self._sensors.addItem("each recording's own", False)
-        self._sensors.addItem("", True)
-        self._sensors.currentIndexChanged.connect(
-            lambda at: model.choose(planned=self._sensors.itemData(at))
+        self._boxes = {name: CheckBox(name, self, self._choose_maps) for name in MAPS}
+        self._sensors = Choice(
+            "From which sensors the maps are seen",
+            self,
+            {False: "each recording's own", True: ""},
+            lambda planned: model.choose(planned=planned),
         )
         self._length = self._frames("Frames of a segment", 2)
         self._overlap = self._frames("Frames that neighbouring segments share", 0)
         self._length.valueChanged.connect(lambda _: self._choose_frames())
         self._overlap.valueChanged.connect(lambda _: self._choose_frames())
-        self._format = Choice("Format of the data set", self)
-        for ending in ENDINGS:
-            self._format.addItem(_FORMATS[ending], ending)
-        self._format.currentIndexChanged.connect(
-            lambda at: model.choose(ending=self._format.itemData(at))
+        self._format = Choice(
+            "Format of the data set", self, _FORMATS, lambda ending: model.choose(ending=ending)
         )
         where = row_of((self._place, 1), self._this, self._other, spacing_px=8)
         self._form = QFormLayout()
@@ -139,21 +134,17 @@ class ExportDialog(QDialog):
         if not self._people.hasFocus():
             self._people.setText(", ".join(choice.subjects))
         for name, box in self._boxes.items():
-            with QSignalBlocker(box):
-                box.setChecked(name in choice.maps)
-        with QSignalBlocker(self._sensors):
-            self._sensors.setItemText(
-                1, f"its own, and {model.places} planned place{'s' * (model.places != 1)}"
-            )
-            self._sensors.setCurrentIndex(int(choice.planned))
+            box.show_checked(name in choice.maps)
+        planned = counted(model.places, "planned place")
+        self._sensors.setItemText(1, f"its own, and {planned}")
+        self._sensors.show_value(choice.planned)
         self._sensors.setToolTip(
             "From which sensors the maps are seen" if model.places
             else "No places are planned: Edit → Placements…"
         )  # fmt: skip
         self._length.show_value(choice.length)
         self._overlap.show_value(choice.overlap)
-        with QSignalBlocker(self._format):
-            self._format.setCurrentIndex(ENDINGS.index(choice.ending))
+        self._format.show_value(choice.ending)
         for field in (
             self._this, self._other, self._sensors, self._length, self._overlap, self._format,
             self._people, *self._boxes.values(),
@@ -226,7 +217,7 @@ class ExportDialog(QDialog):
 
     # --- what is clicked ------------------------------------------------------------------
 
-    def _choose_maps(self) -> None:
+    def _choose_maps(self, _: bool) -> None:
         chosen = frozenset(name for name, box in self._boxes.items() if box.isChecked())
         self._model.choose(maps=chosen)
 

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Any, ClassVar
 
-from PySide6.QtCore import QSignalBlocker, QSize, Qt
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import (
-    QCheckBox,
     QDialog,
     QFormLayout,
     QLabel,
@@ -21,13 +19,13 @@ from PySide6.QtWidgets import (
 from sd2app.figures.model import DrawnFigure, MapFigure, StripModel
 from sd2app.palette import Palette
 from sd2app.widgets.dialogs import ExportButtons, ask_figure
-from sd2app.widgets.inputs import Choice, NumberBox
+from sd2app.widgets.inputs import CheckBox, Choice, NumberBox
 from sd2app.widgets.layouts import column_of, row_of
 from sd2app.widgets.mesh_painting import paint_picture
 from sd2app.widgets.panel import side_by_side
 
-_WAYS = (("spread", "spread evenly"), ("around", "around the cursor"), ("list", "list or ranges"))
-_ROWS = (("video", "video"), ("mesh", "mesh"), ("overlay", "mesh over video"))
+_WAYS = {"spread": "spread evenly", "around": "around the cursor", "list": "list or ranges"}
+_ROWS = {"video": "video", "mesh": "mesh", "overlay": "mesh over video"}
 
 
 class FigurePreview(QWidget):
@@ -91,22 +89,6 @@ class FigureDialog(QDialog):
 
     # --- parts of the choices -------------------------------------------------------------
 
-    def _box(self, text: str, chosen: Callable[[bool], object], checked: bool = True) -> QCheckBox:
-        box = QCheckBox(text, self)
-        box.setChecked(checked)
-        box.toggled.connect(chosen)
-        return box
-
-    def _list(
-        self, tip: str, entries: Iterable[tuple[Any, str]], chosen: Callable[[Any], object]
-    ) -> Choice:
-        """A list of values, each with its text."""
-        choice = Choice(tip, self)
-        for value, text in entries:
-            choice.addItem(text, value)
-        choice.currentIndexChanged.connect(lambda at: chosen(choice.itemData(at)))
-        return choice
-
     @staticmethod
     def _form() -> QFormLayout:
         form = QFormLayout()
@@ -128,21 +110,27 @@ class MapFigureDialog(FigureDialog):
 
     def _choices(self) -> QLayout:
         model = self._model
-        maps = [self._box(title, partial(model.set_shown, title)) for title in model.titles]
-        stretches = ((False, "what is in view"), (True, "the whole recording"))
-        stretch = self._list(
-            "Time range of the recording", stretches, lambda whole: model.choose(whole=whole)
+        maps = [CheckBox(title, self, partial(model.set_shown, title)) for title in model.titles]
+        time_range = Choice(
+            "Time range of the recording",
+            self,
+            {False: "what is in view", True: "the whole recording"},
+            lambda whole: model.choose(whole=whole),
         )
         more = []
         if model.has_labels:
-            more.append(self._box("labels", lambda on: model.choose(with_labels=on)))
+            more.append(CheckBox("labels", self, lambda on: model.choose(with_labels=on)))
         if model.has_difference:
             more.append(
-                self._box("difference to the radar", lambda on: model.choose(with_difference=on))
+                CheckBox(
+                    "difference to the radar", self, lambda on: model.choose(with_difference=on)
+                )
             )
+        for box in (*maps, *more):
+            box.show_checked(True)
         form = self._form()
         form.addRow("Maps", side_by_side(*maps, spacing_px=16))
-        form.addRow("Stretch", side_by_side(stretch, spacing_px=16))
+        form.addRow("Time range", side_by_side(time_range, spacing_px=16))
         if more:
             form.addRow("With", side_by_side(*more, spacing_px=16))
         return form
@@ -161,7 +149,7 @@ class StripDialog(FigureDialog):
 
     def _choices(self) -> QLayout:
         model = self._model
-        self._way = self._list("Which frames", _WAYS, lambda way: model.choose(way=way))
+        self._way = Choice("Which frames", self, _WAYS, lambda way: model.choose(way=way))
         self._count = NumberBox(1, 100, " frames", "How many frames", decimals=0, step=1)
         self._count.valueChanged.connect(lambda value: model.choose(count=int(value)))
         self._step = NumberBox(1, 1000, " apart", "How many frames apart", decimals=0, step=1)
@@ -175,26 +163,30 @@ class StripDialog(FigureDialog):
         )
         self._columns.valueChanged.connect(lambda value: model.set_options(columns=int(value)))
         self._rows = {
-            row: self._box(text, partial(model.set_row, row), checked=False) for row, text in _ROWS
+            row: CheckBox(text, self, partial(model.set_row, row)) for row, text in _ROWS.items()
         }
         for row, box in self._rows.items():
             box.setEnabled(row in model.available)
-        self._shape = self._list(
+        self._shape = Choice(
             "How the mesh is drawn",
-            ((False, "surface"), (True, "dots")),
+            self,
+            {False: "surface", True: "dots"},
             lambda as_dots: model.set_options(as_dots=as_dots),
         )
-        self._colour = self._list(
+        self._colour = Choice(
             "What the colour of the mesh means",
-            (("velocity", "radial velocity"), ("plain", "plain")),
+            self,
+            {"velocity": "radial velocity", "plain": "plain"},
             lambda colour: model.set_options(colour=colour),
         )
         self._limit = NumberBox(0.1, 20.0, " m/s", "Where the colours end", decimals=1, step=0.5)
         self._limit.valueChanged.connect(lambda value: model.set_options(v_max_mps=value))
-        self._whole = self._box(
-            "whole picture", lambda whole: model.set_options(whole=whole), checked=False
+        self._whole = CheckBox(
+            "whole picture",
+            self,
+            lambda whole: model.set_options(whole=whole),
+            "Otherwise what is around the body in these frames",
         )
-        self._whole.setToolTip("Otherwise what is around the body in these frames")
         left, right = self._form(), self._form()
         left.addRow("Frames", side_by_side(self._way, self._count, self._step, self._typed))
         left.addRow("Columns", side_by_side(self._columns))
@@ -206,19 +198,12 @@ class StripDialog(FigureDialog):
     def _refresh(self) -> None:
         super()._refresh()
         choice, options = self._model.choice, self._model.options
-        for combo, value in (
-            (self._way, choice.way),
-            (self._shape, options.as_dots),
-            (self._colour, options.colour),
-        ):
-            with QSignalBlocker(combo):
-                combo.setCurrentIndex(combo.findData(value))
-        for box, checked in (
-            (self._whole, options.whole),
-            *((box, row in options.rows) for row, box in self._rows.items()),
-        ):
-            with QSignalBlocker(box):
-                box.setChecked(checked)
+        self._way.show_value(choice.way)
+        self._shape.show_value(options.as_dots)
+        self._colour.show_value(options.colour)
+        self._whole.show_checked(options.whole)
+        for row, box in self._rows.items():
+            box.show_checked(row in options.rows)
         self._count.show_value(choice.count)
         self._count.setVisible(choice.way != "list")
         self._step.show_value(choice.step)

@@ -7,7 +7,6 @@ from pathlib import Path
 
 from PySide6.QtCore import QSignalBlocker, Qt
 from PySide6.QtWidgets import (
-    QCheckBox,
     QDialog,
     QFileDialog,
     QFormLayout,
@@ -21,17 +20,17 @@ from sd2app.fit.person_picker import PersonPicker
 from sd2app.fit.setup import ANGLES_DEG, DEFAULT_STATURE_M, STATURES_M, FitSetupModel
 from sd2app.palette import Palette
 from sd2app.widgets.dialogs import accepting
-from sd2app.widgets.inputs import Choice, NumberBox
+from sd2app.widgets.inputs import CheckBox, Choice, NumberBox
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import ElidedLabel, outlined, say, sentence, side_by_side
 from sd2app.widgets.time_axis import clock_text
 
 VIDEOS = "Video (*.mp4 *.mkv *.mov *.avi *.webm *.m4v *.mpg *.ts *.wmv);;All files (*)"
-_CAMERAS = (
-    ("file", "as the file says, else {angle:.0f}°"),
-    ("angle", "field of view"),
-    ("focal", "focal length"),
-)
+_CAMERAS = {
+    "file": "as the file says, else {angle:.0f}°",
+    "angle": "field of view",
+    "focal": "focal length",
+}
 
 
 class NewFromVideoDialog(QDialog):
@@ -78,15 +77,17 @@ class NewFromVideoDialog(QDialog):
         self._stature = NumberBox(*STATURES_M, " m", "Height of the person", step=0.01)
         self._stature.setValue(DEFAULT_STATURE_M)
         self._stature.valueChanged.connect(lambda value_m: setup.change(stature_m=value_m))
-        self._known = QCheckBox("known:", self)
-        self._known.toggled.connect(
-            lambda known: setup.change(stature_m=self._stature.value() if known else None)
+        self._known = CheckBox(
+            "known:",
+            self,
+            lambda known: setup.change(stature_m=self._stature.value() if known else None),
         )
-        self._camera = Choice("How the focal length of the camera is known", self)
-        for way, text in _CAMERAS:
-            self._camera.addItem(text.format(angle=setup.choices.angle_deg), way)
-        self._camera.currentIndexChanged.connect(
-            lambda _: setup.change(camera=self._camera.currentData())
+        angle = setup.choices.angle_deg
+        self._camera = Choice(
+            "How the focal length of the camera is known",
+            self,
+            {way: text.format(angle=angle) for way, text in _CAMERAS.items()},
+            lambda way: setup.change(camera=way),
         )
         self._angle = NumberBox(
             *ANGLES_DEG, "°", "Field of view across the longer side", decimals=1, step=1.0
@@ -147,13 +148,11 @@ class NewFromVideoDialog(QDialog):
             "who is seen best" if person is None else f"in the rectangle in frame {person.frame}"
         )
         self._clear.setVisible(person is not None)
-        with QSignalBlocker(self._known):
-            self._known.setChecked(choices.stature_m is not None)
+        self._known.show_checked(choices.stature_m is not None)
         self._stature.setEnabled(choices.stature_m is not None)
         if choices.stature_m is not None:
             self._stature.show_value(choices.stature_m)
-        with QSignalBlocker(self._camera):
-            self._camera.setCurrentIndex(self._camera.findData(choices.camera))
+        self._camera.show_value(choices.camera)
         self._angle.setVisible(choices.camera == "angle")
         self._angle.show_value(choices.angle_deg)
         self._focal.setVisible(choices.camera == "focal")

@@ -28,6 +28,10 @@ from sd2core.labels.import_labels import Incoming, Way, set_after, take_in
 from sd2core.labels.spans import Labels
 from sd2core.timebase import Timebase
 
+_WAYS: dict[Way, str] = {
+    "add": "on tracks of their own",
+    "replace": "instead of all labels of this recording",
+}
 _MOST_NAMED = 6
 _MOST_FACTS = 6
 
@@ -88,20 +92,23 @@ class LabelImportDialog(QDialog):
         self._runner.finished.connect(self._receive)
         self._runner.failed.connect(self._refuse)
         self.setWindowTitle("Import labels")
-        self._format = Choice("The program that the file is of", self)
-        self._format.addItem("found by name and content", None)
-        for one in FORMATS:
-            self._format.addItem(one.title, one.name)
-        self._format.currentIndexChanged.connect(self._read_anew)
+        self._format = Choice(
+            "The program that the file is of",
+            self,
+            {None: "found by name and content", **{one.name: one.title for one in FORMATS}},
+            self._read_as,
+        )
         self._observation = Choice("Which of the videos in the file", self)
         self._observation.currentTextChanged.connect(self._observe)
         self._observation_name = QLabel("Observation", self)
         self._facts = FactRows(_MOST_FACTS, at_the_edge=False, parent=self)
         self._said, self._consequence = sentence(""), sentence("")
-        self._way = Choice("What becomes of the labels that are there", self)
-        self._way.addItem("on tracks of their own", "add")
-        self._way.addItem("instead of all labels of this recording", "replace")
-        self._way.setCurrentIndex(0 if labels.spans else 1)
+        ways = {
+            "add": "on tracks of their own",
+            "replace": "instead of all labels of this recording",
+        }
+        self._way = Choice("What becomes of the labels that are there", self, ways)
+        self._way.show_value("add" if labels.spans else "replace")
         self._way.currentIndexChanged.connect(self._refresh)
         buttons, self._import = accepting(self, "Import")
         form, take = QFormLayout(), QFormLayout()
@@ -158,7 +165,7 @@ class LabelImportDialog(QDialog):
         """Stop reading."""
         self._runner.close()
 
-    def _read_anew(self) -> None:
+    def _read_as(self, _: str | None) -> None:
         self._observed, self.observations = None, ()
         self._read()
 

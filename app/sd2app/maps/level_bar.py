@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from PySide6.QtCore import QRectF, QSignalBlocker, QSize
+from PySide6.QtCore import QRectF, QSize
 from PySide6.QtGui import QAction, QColor, QImage, QPainter, QPaintEvent
 from PySide6.QtWidgets import QWidget
 
@@ -59,12 +59,18 @@ class LevelBar(QWidget):
         )
         self._low.valueChanged.connect(lambda value: set_levels(low_db=value))
         self._high.valueChanged.connect(lambda value: set_levels(high_db=value))
-        self._scale = Choice("Logarithmic or linear levels, for all heatmaps", self)
-        self._scale.addItems(["dB", "linear"])
-        self._scale.currentTextChanged.connect(lambda text: set_levels(scale=text))
-        self._colours = Choice("Colour map of all heatmaps", self)
-        self._colours.addItems(list(COLOUR_MAPS))
-        self._colours.currentTextChanged.connect(lambda text: set_levels(colour_map=text))
+        self._scale = Choice(
+            "Logarithmic or linear levels, for all heatmaps",
+            self,
+            {name: name for name in ("dB", "linear")},
+            lambda scale: set_levels(scale=scale),
+        )
+        self._colours = Choice(
+            "Colour map of all heatmaps",
+            self,
+            {name: name for name in COLOUR_MAPS},
+            lambda name: set_levels(colour_map=name),
+        )
         # One line each: the plot above needs the height.
         self._references = [ElidedLabel(self) for _ in self._tracks]
         for label in self._references:
@@ -86,9 +92,8 @@ class LevelBar(QWidget):
         self._low.show_value(levels.low_db)
         self._high.show_value(levels.high_db)
         self._low.setEnabled(levels.scale == "dB")
-        for combo, text in ((self._scale, levels.scale), (self._colours, levels.colour_map)):
-            with QSignalBlocker(combo):
-                combo.setCurrentText(text)
+        self._scale.show_value(levels.scale)
+        self._colours.show_value(levels.colour_map)
         for label, track in zip(self._references, self._tracks, strict=True):
             label.setVisible(track.map is not None)
             if track.map is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from PySide6.QtCore import QSignalBlocker, Qt, Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QAction, QCloseEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QWidget
 
@@ -71,7 +71,6 @@ class ComparisonWindow(QWidget):
             Choice.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
         )
         self._reference.setMinimumContentsLength(14)
-        self._reference.addItems(list(self._model.labels))
         self._reference.currentIndexChanged.connect(self._model.set_reference)
         tip = "Write maps and velocities of both (.png, .svg, .pdf)"
         self._export = outlined("Export figure…", tip, self._ask, self)
@@ -82,8 +81,7 @@ class ComparisonWindow(QWidget):
 
     def _refresh(self) -> None:
         model, comparison = self._model, self._model.comparison
-        with QSignalBlocker(self._reference):
-            self._reference.setCurrentIndex(model.reference)
+        self._reference.offer(list(model.labels), model.reference)
         self._reference.setEnabled(comparison is not None)
         self._export.setEnabled(comparison is not None and not model.busy)
         self._summary.setText(self._words())

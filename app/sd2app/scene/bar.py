@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from PySide6.QtCore import QSignalBlocker, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QLabel, QMenu, QToolButton, QWidget
 
@@ -13,12 +13,12 @@ from sd2app.widgets.inputs import Choice, action_button
 from sd2app.widgets.layouts import STRETCH, row_of
 from sd2app.widgets.panel import title
 
-_COLOURS = (
-    ("velocity", "radial velocity"),
-    ("range", "range"),
-    ("visibility", "visibility"),
-    ("plain", "plain"),
-)
+_COLOURS = {
+    "velocity": "radial velocity",
+    "range": "range",
+    "visibility": "visibility",
+    "plain": "plain",
+}
 _VIEWS = ("view_three_quarter", "view_camera", "view_sensor", "view_side", "view_top")
 
 
@@ -28,11 +28,8 @@ class SceneBar(QWidget):
     def __init__(self, display: DisplayModel, action: Callable[[str], QAction]) -> None:
         super().__init__()
         self._display = display
-        self._colour = Choice("What the colour of the mesh means (1 to 4)", self)
-        for value, text in _COLOURS:
-            self._colour.addItem(text, value)
-        self._colour.currentIndexChanged.connect(
-            lambda _: display.set_mesh_colour(self._colour.currentData())
+        self._colour = Choice(
+            "What the colour of the mesh means (1 to 4)", self, _COLOURS, display.set_mesh_colour
         )
         colour = (QLabel("colour", self), self._colour, action_button(action("dots"), "Dots"))
         parts = (title("Scene"), 8, *colour, STRETCH, _view_menu(action))
@@ -41,8 +38,7 @@ class SceneBar(QWidget):
         self._refresh()
 
     def _refresh(self) -> None:
-        with QSignalBlocker(self._colour):
-            self._colour.setCurrentIndex(self._colour.findData(self._display.mesh_colour))
+        self._colour.show_value(self._display.mesh_colour)
 
 
 def _view_menu(action: Callable[[str], QAction]) -> QToolButton:

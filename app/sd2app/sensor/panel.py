@@ -6,12 +6,11 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from PySide6.QtCore import QSignalBlocker, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QComboBox, QFormLayout, QGridLayout, QLabel, QWidget
 
 from sd2app.maps.model import SynthesisModel
-from sd2app.session.content import CLUTTER_CHOICES
 from sd2app.session.session import Session
 from sd2app.widgets.inputs import Choice, NumberBox
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
@@ -140,15 +139,12 @@ class SensorPanel(QWidget):
             -1e5, 1e5, " s", "Time of the first radar frame here", decimals=3, step=0.01
         )
         self._offset.valueChanged.connect(edits.set_radar_offset)
-        self._clutter = Choice("How echoes that do not move are removed", self)
-        for choice in CLUTTER_CHOICES:
-            self._clutter.addItem(_CLUTTER_TEXT[choice], choice)
+        self._clutter = Choice(
+            "How echoes that do not move are removed", self, _CLUTTER_TEXT, edits.set_clutter
+        )
         self._clutter.setMinimumContentsLength(8)
         self._clutter.setSizeAdjustPolicy(
             QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
-        )
-        self._clutter.currentIndexChanged.connect(
-            lambda _: edits.set_clutter(self._clutter.currentData())
         )
         form = _form()
         form.addRow("Offset", self._offset)
@@ -225,8 +221,7 @@ class SensorPanel(QWidget):
         self._capture_title.setText("Simulated radar" if capture.simulated else "Real radar")
         self._capture_title.setToolTip(capture.config.name)
         self._offset.show_value(recording.radar_offset_s)
-        with QSignalBlocker(self._clutter):
-            self._clutter.setCurrentIndex(CLUTTER_CHOICES.index(document.clutter))
+        self._clutter.show_value(document.clutter)
         for name, (_, text_of) in _LIMITS.items():
             self._limits[name].setText(text_of(capture.config))
         blind = len(radar_map.unseen_bins) if radar_map is not None else 0

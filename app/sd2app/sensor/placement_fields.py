@@ -12,7 +12,6 @@ from sd2core.files.number_lists import format_numbers, parse_interval, parse_num
 from sd2core.placements.placements import PlacementCloud, PlacementGrid, Placements
 
 Kind = Literal["none", "grid", "cloud"]
-KINDS: tuple[Kind, ...] = get_args(Kind)
 Name = Literal["range", "azimuth", "elevation", "count", "seed"]
 NAMES: tuple[Name, ...] = get_args(Name)
 

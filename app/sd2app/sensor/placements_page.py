@@ -7,13 +7,13 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from PySide6.QtCore import QRectF, QSignalBlocker, QSize, Qt
+from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent
-from PySide6.QtWidgets import QCheckBox, QFileDialog, QGridLayout, QLabel, QWidget
+from PySide6.QtWidgets import QFileDialog, QGridLayout, QLabel, QWidget
 
 from sd2app.accuracy.model import AccuracyModel
 from sd2app.feature import Shell
-from sd2app.sensor.placement_fields import KINDS, NAMES, Kind, Name, PlacementFields
+from sd2app.sensor.placement_fields import NAMES, Kind, Name, PlacementFields
 from sd2app.sensor.placements import (
     PlacementsModel,
     cost_source_text,
@@ -23,7 +23,7 @@ from sd2app.sensor.placements import (
     limit_facts,
     limits_text,
 )
-from sd2app.widgets.inputs import Choice, TypedLine
+from sd2app.widgets.inputs import CheckBox, Choice, TypedLine
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import FactRows, outlined, rule, sentence, title
 from sd2core.figures.colours import SEQUENTIAL
@@ -67,10 +67,7 @@ class PlacementsPage(QWidget):
         self.setObjectName("page")
         self._model, self._accuracy, self._shell = placements, accuracy, shell
         self._fields = PlacementFields(placements, self)
-        self._kind = Choice("What is planned", self)
-        for kind in KINDS:
-            self._kind.addItem(_KIND_TEXT[kind], kind)
-        self._kind.currentIndexChanged.connect(lambda index: self._fields.set_kind(KINDS[index]))
+        self._kind = Choice("What is planned", self, _KIND_TEXT, self._fields.set_kind)
         self._nothing = sentence("")
         self._planned = self._plan_part()
         self._take = outlined("Import…", "Take a plan from a file", self._import_plan, self)
@@ -106,10 +103,8 @@ class PlacementsPage(QWidget):
         self._scale = RangeScale(self)
         self._limits = FactRows(3, at_the_edge=True, parent=self)
         self._radar, self._source = sentence(""), sentence("")
-        self._shown = QCheckBox("In the scene", self)
-        self._shown.setToolTip("Draw them in the scene")
+        self._shown = CheckBox("In the scene", self, model.set_shown, "Draw them in the scene")
         self._shown.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-        self._shown.toggled.connect(model.set_shown)
         self._current = sentence("", "plain")
         back, on = (
             outlined(text, "Put the sensor there", partial(model.step, by), self)
@@ -187,8 +182,7 @@ class PlacementsPage(QWidget):
     def _refresh(self) -> None:
         model, fields = self._model, self._fields
         planned = fields.kind != "none"
-        with QSignalBlocker(self._kind):
-            self._kind.setCurrentIndex(KINDS.index(fields.kind))
+        self._kind.show_value(fields.kind)
         self._kind.setEnabled(model.possible)
         self._nothing.setText(_NOTHING if model.possible else _NO_BODY)
         self._nothing.setVisible(not planned)
@@ -208,8 +202,7 @@ class PlacementsPage(QWidget):
         self._limits.show_facts(limit_facts(model))
         _say(self._radar, limits_text(model))
         self._show_current()
-        with QSignalBlocker(self._shown):
-            self._shown.setChecked(model.shown)
+        self._shown.show_checked(model.shown)
         cost, in_use = model.cost, self._accuracy.in_use
         self._cost.setText("Their cost is being computed…" if cost is None else cost_text(cost))
         known = cost is not None and in_use is not None

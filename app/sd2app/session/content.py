@@ -36,8 +36,6 @@ _TOLD: dict[str, tuple[str, str]] = {
 }
 """Message and remedy for known kinds of files that are no part of a recording."""
 
-CLUTTER_CHOICES: tuple[Clutter, ...] = ("mean", "moving", "none")
-
 
 @dataclass(frozen=True, eq=False)
 class Content:

@@ -34,7 +34,6 @@ class SuggestionBar(QWidget):
         self._source = Choice("The map in which suggestions are looked for", self)
         self._source.activated.connect(lambda at: model.set_source(model.finder.sources[at]))
         self._by = Choice("What suggests spans: motion in a map, or the classifier", self)
-        self._by.addItems([f"by {finder.title}" for finder in model.finders])
         self._by.activated.connect(lambda at: model.set_finder(model.finders[at]))
         self._threshold = NumberBox(0.0, 100.0, "", "")
         self._threshold.valueChanged.connect(model.set_threshold)
@@ -65,8 +64,8 @@ class SuggestionBar(QWidget):
         place = sources.index(source) if source in sources else -1
         self._source.offer([track.title for track in sources], place)
         self._source.setVisible(len(sources) > 1)
-        with QSignalBlocker(self._by):
-            self._by.setCurrentIndex(model.finders.index(model.finder))
+        finders = [f"by {finder.title}" for finder in model.finders]
+        self._by.offer(finders, model.finders.index(model.finder))
         box, limits = self._threshold, model.finder.threshold
         with QSignalBlocker(box):
             box.setRange(limits.low, limits.high)

@@ -6,14 +6,13 @@ import math
 from collections.abc import Collection
 from functools import partial
 
-from PySide6.QtCore import QSignalBlocker
-from PySide6.QtWidgets import QCheckBox, QWidget
+from PySide6.QtWidgets import QWidget
 
 from sd2app.background.run_monitor import UNDER_WAY
 from sd2app.feature import Shell
 from sd2app.session.display import DisplayModel
 from sd2app.training.dialogs import TrainingDialogs
-from sd2app.training.model import CLOSING, TrainingModel
+from sd2app.training.model import TrainingModel
 from sd2app.training.result import ModelAdoption, gain_rows, gain_summary
 from sd2app.training.run import TrainingHistory, TrainingMonitor
 from sd2app.training.setup_view import TrainingSetupView
@@ -26,7 +25,7 @@ from sd2app.training.text import (
     time_text,
 )
 from sd2app.widgets.chart import Chart, ChartView, Curve, Mark, Scale
-from sd2app.widgets.inputs import Choice
+from sd2app.widgets.inputs import CheckBox, Choice
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import FactRows, outlined, sentence, title
 from sd2app.widgets.plot import tick_text
@@ -88,11 +87,11 @@ class TrainingRunView(RunView[TrainingMonitor]):
 
     def _closing_part(self) -> QWidget:
         self._closing = QWidget(self)
-        self._choice = Choice("What happens to the training when the window is closed", self)
-        for name in CLOSING:
-            self._choice.addItem(_CLOSING_TEXT[name], name)
-        self._choice.currentIndexChanged.connect(
-            lambda index: self._training.set_closing(CLOSING[index])
+        self._choice = Choice(
+            "What happens to the training when the window is closed",
+            self,
+            _CLOSING_TEXT,
+            self._training.set_closing,
         )
         self._closing.setLayout(
             row_of(sentence("When closing:"), (self._choice, 1), margins_px=(0, 0, 0, 0))
@@ -126,8 +125,7 @@ class TrainingRunView(RunView[TrainingMonitor]):
         self._metrics.show_facts(metric_rows(history))
         self._about.setText(about_text(run))
         self._closing.setVisible(run.phase in UNDER_WAY)
-        with QSignalBlocker(self._choice):
-            self._choice.setCurrentIndex(CLOSING.index(self._training.closing))
+        self._choice.show_value(self._training.closing)
 
 
 class TrainingGainView(QWidget):
@@ -138,9 +136,12 @@ class TrainingGainView(QWidget):
         self._adoption = adoption
         self._summary = sentence("")
         self._table = FactRows(3, at_the_edge=True, parent=self)
-        self._both = QCheckBox("Show the map from before", self)
-        self._both.setToolTip("Draw the map of the model before under that of this one")
-        self._both.toggled.connect(adoption.denoise.set_comparing)
+        self._both = CheckBox(
+            "Show the map from before",
+            self,
+            adoption.denoise.set_comparing,
+            "Draw the map of the model before under that of this one",
+        )
         back = outlined("Go back", "Denoise with what was in use before", adoption.go_back, self)
         buttons = row_of(self._both, STRETCH, back)
         self.setLayout(
@@ -156,8 +157,7 @@ class TrainingGainView(QWidget):
         use = self._adoption
         self._summary.setText(gain_summary(use.gain, use.has_radar))
         self._table.show_facts(gain_rows(use.gain) if use.gain is not None else [])
-        with QSignalBlocker(self._both):
-            self._both.setChecked(use.denoise.comparing)
+        self._both.show_checked(use.denoise.comparing)
         self._both.setVisible(use.can_compare)
 
 

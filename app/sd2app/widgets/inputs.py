@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import Any
 
 from PySide6.QtCore import QEvent, QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QAction, QFocusEvent, QKeyEvent, QWheelEvent
-from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QLineEdit, QToolButton, QWidget
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QComboBox,
+    QDoubleSpinBox,
+    QLineEdit,
+    QToolButton,
+    QWidget,
+)
 
 _STEP_KEYS = (
     Qt.Key.Key_Up,
@@ -99,13 +107,31 @@ class NumberBox(QDoubleSpinBox):
 
 
 class Choice(QComboBox):
-    """A list to choose from; the wheel and the keyboard belong to the window."""
+    """A list to choose from; the wheel and the keyboard belong to the window.
 
-    def __init__(self, tip: str, parent: QWidget | None = None) -> None:
+    ``texts`` are those of the values, in order; ``chosen`` is called with another value.
+    """
+
+    def __init__(
+        self,
+        tip: str,
+        parent: QWidget | None = None,
+        texts: Mapping[Any, str] | None = None,
+        chosen: Callable[[Any], object] | None = None,
+    ) -> None:
         super().__init__(parent)
         self.setToolTip(tip)
         self.setAccessibleName(tip)
         self.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+        for value, text in (texts or {}).items():
+            self.addItem(text, value)
+        if chosen is not None:
+            self.currentIndexChanged.connect(lambda place: chosen(self.itemData(place)))
+
+    def show_value(self, value: Any) -> None:
+        """Follow a model; emits nothing."""
+        with QSignalBlocker(self):
+            self.setCurrentIndex(self.findData(value))
 
     def offer(self, texts: Sequence[str], place: int) -> None:
         """Follow a model: list these texts, with the one at a place chosen; emits nothing."""
@@ -118,6 +144,22 @@ class Choice(QComboBox):
     def wheelEvent(self, event: QWheelEvent) -> None:
         """Scroll what is behind it."""
         event.ignore()
+
+
+class CheckBox(QCheckBox):
+    """A box to tick; ``chosen`` is called with whether it is."""
+
+    def __init__(
+        self, text: str, parent: QWidget, chosen: Callable[[bool], object], tip: str = ""
+    ) -> None:
+        super().__init__(text, parent)
+        self.setToolTip(tip)
+        self.toggled.connect(chosen)
+
+    def show_checked(self, checked: bool) -> None:
+        """Follow a model; emits nothing."""
+        with QSignalBlocker(self):
+            self.setChecked(checked)
 
 
 def action_button(action: QAction, text: str, *, outlined: bool = False) -> QToolButton:

@@ -7,7 +7,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Generic, NamedTuple
 
-from PySide6.QtCore import QSignalBlocker
 from PySide6.QtGui import QHideEvent, QShowEvent
 from PySide6.QtWidgets import QProgressBar, QSizePolicy, QWidget
 
@@ -57,19 +56,15 @@ class RunPanel(QWidget):
         self._run.setVisible(here is not None)
         self._new.setVisible(here is not None)
         self._paths = [None, *(one.path for one in self._runs.known)]
-        texts = [_NEW, *(one.title for one in self._runs.known)]
+        self._texts = [_NEW, *(one.title for one in self._runs.known)]
         if here is not None and here not in self._paths:
             # Just begun: it is not in the list yet.
             self._paths.insert(1, here)
-            texts.insert(1, here.name)
+            self._texts.insert(1, here.name)
         if self._open is not None:
-            texts.append("Open a run…")
+            self._texts.append("Open a run…")
         self._list.setToolTip(str(here) if here is not None else self._tip)
-        with QSignalBlocker(self._list):
-            if texts != [self._list.itemText(at) for at in range(self._list.count())]:
-                self._list.clear()
-                self._list.addItems(texts)
-            self._list.setCurrentIndex(self._paths.index(here))
+        self._list.offer(self._texts, self._paths.index(here))
 
     @property
     def _here(self) -> Path | None:
@@ -80,11 +75,10 @@ class RunPanel(QWidget):
             self._runs.select(self._paths[at])
         elif self._open is not None:
             self._open()
-            with QSignalBlocker(self._list):
-                self._list.setCurrentIndex(self._paths.index(self._here))
+            self._list.offer(self._texts, self._paths.index(self._here))
 
     def showEvent(self, event: QShowEvent) -> None:
-        """Read the runs again, and time a step where that is unknown."""
+        """Read the runs again, and follow them while the panel is shown."""
         super().showEvent(event)
         self._runs.set_watched(True)
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
-from PySide6.QtCore import QSignalBlocker, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QApplication,
     QGridLayout,
@@ -74,19 +75,14 @@ class TrainingForm(QWidget):
         )  # fmt: skip
         box.setMinimumWidth(64)
         box.setGroupSeparatorShown(field.decimals == 0 and field.name != "seed")
-        box.valueChanged.connect(lambda value: self._setup.set_value(field.name, value))
+        box.valueChanged.connect(partial(self._setup.set_value, field.name))
         self._numbers[field.name] = box
         return box
 
     def choice(self, name: str, tip: str, words: Mapping[str, str]) -> Choice:
         """Make the list of a setting; ``words`` are the texts of its values."""
-        choice = Choice(tip, self)
-        for value, text in words.items():
-            choice.addItem(text, value)
+        choice = Choice(tip, self, words, partial(self._setup.set_value, name))
         choice.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        choice.currentIndexChanged.connect(
-            lambda at: self._setup.set_value(name, choice.itemData(at))
-        )
         self._choices[name] = choice
         return choice
 
@@ -124,8 +120,7 @@ class TrainingForm(QWidget):
         self._division.setText(division)
         self._division.setVisible(bool(division))
         for name, choice in self._choices.items():
-            with QSignalBlocker(choice):
-                choice.setCurrentIndex(choice.findData(self._setup.value(name)))
+            choice.show_value(self._setup.value(name))
         for name, box in self._numbers.items():
             box.show_value(self._setup.value(name))
 
