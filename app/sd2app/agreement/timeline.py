@@ -3,45 +3,38 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent
-from PySide6.QtWidgets import QSizePolicy, QWidget
+from PySide6.QtGui import QColor, QMouseEvent, QPainter
+from PySide6.QtWidgets import QSizePolicy
 
 from sd2app.agreement.model import AgreementModel
 from sd2app.labels.painting import LabelRows, paint_tracks
 from sd2app.session.session import Session
-from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, TimeScale, paint_cursor
+from sd2app.widgets.time_axis import GUTTER_PX, paint_cursor
+from sd2app.widgets.time_plot import TimePlot
 
 _MARKS_PX = 7.0
 
 
-class OtherTimeline(QWidget):
+class OtherTimeline(TimePlot):
     """Hatched rows, as they cannot be edited; a line over them marks differences.
 
     A click goes to that time.
     """
 
     def __init__(self, session: Session, model: AgreementModel) -> None:
-        super().__init__()
+        super().__init__(session.span)
         self._session, self._model = session, model
         self._rows = LabelRows((), ())
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         model.changed.connect(self._follow)
-        for signal in (
-            session.span.changed,
-            session.playback.frame_changed,
-            session.display.theme_changed,
-        ):
-            signal.connect(self.update)
+        self.follow(
+            session.span.changed, session.playback.frame_changed, session.display.theme_changed
+        )
         self._follow()
 
     def sizeHint(self) -> QSize:
         """Return the height of the tracks and the marks over them."""
         return QSize(640, round(_MARKS_PX + self._rows.height_px))
-
-    @property
-    def scale(self) -> TimeScale:
-        """Time axis of this widget."""
-        return TimeScale(self._session.span.start_s, self._session.span.end_s, self.width())
 
     def _follow(self) -> None:
         model, other = self._model, self._model.other
@@ -54,16 +47,10 @@ class OtherTimeline(QWidget):
 
     # --- painting -------------------------------------------------------------------------
 
-    def paintEvent(self, event: QPaintEvent) -> None:
+    def paint(self, painter: QPainter) -> None:
         """Paint marks, names, spans and the cursor."""
-        with QPainter(self) as painter:
-            self._paint(painter)
-
-    def _paint(self, painter: QPainter) -> None:
-        palette, scale = self._session.display.palette, self.scale
+        palette, scale, whole = self._session.display.palette, self.scale, self.plot_rect()
         painter.fillRect(self.rect(), QColor(palette.panel))
-        width = self.width() - GUTTER_PX - MARGIN_PX
-        whole = QRectF(GUTTER_PX, 0, width, self.height())
         painter.save()
         painter.setClipRect(whole)
         for one in self._model.disagreements:
@@ -73,7 +60,7 @@ class OtherTimeline(QWidget):
                 painter.fillRect(mark, QColor(palette.warning))
         painter.restore()
         painter.translate(0.0, _MARKS_PX)
-        plot = QRectF(GUTTER_PX, 0, width, self._rows.height_px)
+        plot = QRectF(GUTTER_PX, 0, whole.width(), self._rows.height_px)
         other, rows = self._model.other, self._rows.tracks
         paint_tracks(painter, plot, scale, other, rows, palette, foreign=self._model.name)
         painter.translate(0.0, -_MARKS_PX)

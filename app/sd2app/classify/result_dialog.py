@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from PySide6.QtCore import QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QColor, QPainter, QPen
 from PySide6.QtWidgets import (
     QDialog,
     QDialogButtonBox,
@@ -17,6 +17,7 @@ from PySide6.QtWidgets import (
 
 from sd2app.classify.result import ClassResult, Matrix
 from sd2app.session.display import DisplayModel
+from sd2app.widgets.canvas import Canvas
 from sd2app.widgets.chart import Chart, ChartView, Curve, Mark, Scale
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
@@ -33,13 +34,13 @@ _ASIDE_PX = 8
 _PAD = 1.15
 
 
-class ConfusionView(QWidget):
+class ConfusionView(Canvas):
     """Confusion matrix: true classes from top to bottom, answers from left to right."""
 
     def __init__(self, display: DisplayModel) -> None:
         super().__init__()
         self._display = display
-        display.theme_changed.connect(self.update)
+        self.follow(display.theme_changed)
         self._classes: tuple[str, ...] = ()
         self.matrix: Matrix | None = None  # that is shown
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
@@ -73,7 +74,7 @@ class ConfusionView(QWidget):
         widest = max(map(metrics.horizontalAdvance, self._classes), default=0)
         return widest + 2 * _GAP_PX, 2 * metrics.height() + _GAP_PX
 
-    def paintEvent(self, event: QPaintEvent) -> None:
+    def paint(self, painter: QPainter) -> None:
         """Paint names, cells and numbers."""
         if self.matrix is None:
             return
@@ -81,24 +82,23 @@ class ConfusionView(QWidget):
         width = min((self.width() - left) / len(self._classes), 1.5 * _CELL_PX[0])
         height, line = _CELL_PX[1], self.fontMetrics().height()
         centre = Qt.AlignmentFlag.AlignCenter
-        with QPainter(self) as painter:
+        painter.setPen(QColor(palette.muted))
+        painter.drawText(
+            QRectF(0, 0, left + width * len(self._classes), line),
+            Qt.AlignmentFlag.AlignLeft,
+            "each true class (a row) was taken for, %",
+        )
+        for number, name in enumerate(self._classes):
             painter.setPen(QColor(palette.muted))
+            painter.drawText(QRectF(left + number * width, line, width, line), centre, name)
             painter.drawText(
-                QRectF(0, 0, left + width * len(self._classes), line),
-                Qt.AlignmentFlag.AlignLeft,
-                "each true class (a row) was taken for, %",
+                QRectF(0, top + number * height, left - _GAP_PX, height),
+                Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter,
+                name,
             )
-            for number, name in enumerate(self._classes):
-                painter.setPen(QColor(palette.muted))
-                painter.drawText(QRectF(left + number * width, line, width, line), centre, name)
-                painter.drawText(
-                    QRectF(0, top + number * height, left - _GAP_PX, height),
-                    Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter,
-                    name,
-                )
-                for column in range(len(self._classes)):
-                    box = QRectF(left + column * width, top + number * height, width, height)
-                    self._paint_cell(painter, box, number, column)
+            for column in range(len(self._classes)):
+                box = QRectF(left + column * width, top + number * height, width, height)
+                self._paint_cell(painter, box, number, column)
 
     def _paint_cell(self, painter: QPainter, box: QRectF, row: int, column: int) -> None:
         assert self.matrix is not None

@@ -13,7 +13,6 @@ from PySide6.QtGui import (
     QImage,
     QMouseEvent,
     QPainter,
-    QPaintEvent,
     QWheelEvent,
 )
 from PySide6.QtWidgets import QSizePolicy, QWidget
@@ -24,12 +23,13 @@ from sd2app.classify.track import ClassReading
 from sd2app.labels.model import LabelsModel
 from sd2app.session.display import DisplayModel
 from sd2app.session.session import Session
-from sd2app.widgets.cached_paint import CachedPaint
+from sd2app.widgets.canvas import Canvas
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.layouts import column_of, row_of
 from sd2app.widgets.model_menu import ModelButton
 from sd2app.widgets.panel import ElidedLabel, title
-from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, TimeScale, paint_cursor, turn_wheel
+from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, paint_cursor, turn_wheel
+from sd2app.widgets.time_plot import TimePlot
 from sd2core.labels.label_set import LabelSet
 
 _PLOT_PX = 30
@@ -95,7 +95,7 @@ class ClassStrip(QWidget):
             self._status.setText(late if model.knows_source else other)
 
 
-class ClassReadout(QWidget):
+class ClassReadout(Canvas):
     """A bar for every class, and the most probable one in words; grey while it is not current.
 
     Where there is no room for the bars there are the words alone.
@@ -145,23 +145,22 @@ class ClassReadout(QWidget):
         self.setAccessibleName(f"Gesture: {self.text or 'not known'}")
         self.update()
 
-    def paintEvent(self, event: QPaintEvent) -> None:
+    def paint(self, painter: QPainter) -> None:
         """Paint bars with their names, then the text."""
         reading, palette = self._shown, self._display.palette
         if reading is None:
             return
-        with QPainter(self) as painter:
-            if self.width() >= self._bars_px + self._words_px:
-                self._paint_bars(painter, reading)
-            font = painter.font()
-            font.setBold(reading.current)
-            painter.setFont(font)
-            painter.setPen(QColor(palette.text if reading.current else palette.muted))
-            painter.drawText(
-                self.rect(),
-                Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignRight,
-                reading_text(reading) if reading.current else "…",
-            )
+        if self.width() >= self._bars_px + self._words_px:
+            self._paint_bars(painter, reading)
+        font = painter.font()
+        font.setBold(reading.current)
+        painter.setFont(font)
+        painter.setPen(QColor(palette.text if reading.current else palette.muted))
+        painter.drawText(
+            self.rect(),
+            Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignRight,
+            reading_text(reading) if reading.current else "…",
+        )
 
     def _paint_bars(self, painter: QPainter, reading: ClassReading) -> None:
         palette, offered = self._display.palette, self._labels.labels.label_set
@@ -182,15 +181,16 @@ class ClassReadout(QWidget):
             x += _BAR_PX[0] + _GAP_PX
 
 
-class ClassPlot(QWidget):
+class ClassPlot(TimePlot):
     """Probabilities over time, stacked: the background at the bottom. Click or drag seeks."""
 
+    TOP_PX, BOTTOM_PX = 1, 3
+
     def __init__(self, session: Session, classify: ClassifyModel, labels: LabelsModel) -> None:
-        super().__init__()
+        super().__init__(session.span)
         self._classify, self._labels = classify, labels
         self._span, self._playback = session.span, session.playback
         self._display = session.display
-        self._still = CachedPaint(self)
         self.setFixedHeight(_PLOT_PX)
         self.setAccessibleName("Probability of each gesture over time")
         for signal in (
@@ -201,29 +201,16 @@ class ClassPlot(QWidget):
             self._span.changed,
             self._display.theme_changed,
         ):
-            signal.connect(self._redraw)
-        self._playback.frame_changed.connect(self.update)
+            signal.connect(self.redraw)
+        self.follow(self._playback.frame_changed)
 
-    @property
-    def scale(self) -> TimeScale:
-        """Time axis of this widget."""
-        return TimeScale(self._span.start_s, self._span.end_s, self.width())
-
-    def _redraw(self) -> None:
-        self._still.forget()
-        self.update()
-
-    def _plot_rect(self) -> QRectF:
-        return QRectF(GUTTER_PX, 1, max(self.width() - GUTTER_PX - MARGIN_PX, 1), self.height() - 4)
-
-    def paintEvent(self, event: QPaintEvent) -> None:
+    def paint(self, painter: QPainter) -> None:
         """Paint the strip and the cursor."""
-        with QPainter(self) as painter:
-            self._still.paint(painter, self._paint)
-            paint_cursor(painter, self._plot_rect(), self.scale.x_of(self._playback.time_s))
+        self.paint_kept(painter, self._paint_strip)
+        paint_cursor(painter, self.plot_rect(), self.scale.x_of(self._playback.time_s))
 
-    def _paint(self, painter: QPainter) -> None:
-        palette, plot = self._display.palette, self._plot_rect()
+    def _paint_strip(self, painter: QPainter) -> None:
+        palette, plot = self._display.palette, self.plot_rect()
         painter.fillRect(self.rect(), QColor(palette.panel))
         painter.fillRect(plot, QColor(palette.well))
         painter.setPen(QColor(palette.muted))

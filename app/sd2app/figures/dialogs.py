@@ -6,7 +6,7 @@ from functools import partial
 from typing import Any, ClassVar
 
 from PySide6.QtCore import QSize, Qt
-from PySide6.QtGui import QColor, QPainter, QPaintEvent
+from PySide6.QtGui import QColor, QPainter
 from PySide6.QtWidgets import (
     QDialog,
     QFormLayout,
@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
 
 from sd2app.figures.model import DrawnFigure, MapFigure, StripModel
 from sd2app.palette import Palette
+from sd2app.widgets.canvas import Canvas
 from sd2app.widgets.dialogs import ExportButtons, ask_figure
 from sd2app.widgets.inputs import CheckBox, Choice, NumberBox
 from sd2app.widgets.layouts import column_of, row_of
@@ -28,7 +29,7 @@ _WAYS = {"spread": "spread evenly", "around": "around the cursor", "list": "list
 _ROWS = {"video": "video", "mesh": "mesh", "overlay": "mesh over video"}
 
 
-class FigurePreview(QWidget):
+class FigurePreview(Canvas):
     """A figure on its own background, as large as there is room."""
 
     def __init__(self, model: DrawnFigure, palette: Palette, parent: QWidget) -> None:
@@ -36,25 +37,23 @@ class FigurePreview(QWidget):
         self._model, self._colours = model, palette
         self.setAccessibleName("Preview of the figure")
         self.setMinimumSize(480, 200)
-        model.drawn.connect(self.update)
-        model.changed.connect(self.update)
+        self.follow(model.drawn, model.changed)
 
     def sizeHint(self) -> QSize:
         """Wide size, as figures have."""
         return QSize(960, 320)
 
-    def paintEvent(self, event: QPaintEvent) -> None:
+    def paint(self, painter: QPainter) -> None:
         """Paint the figure, or a message."""
-        with QPainter(self) as painter:
-            painter.fillRect(self.rect(), QColor(self._colours.well))
-            picture = self._model.picture
-            if picture is not None and not self._model.problem:
-                paint_picture(painter, self.rect().adjusted(8, 8, -8, -8), picture, enlarge=False)
-                return
-            painter.setPen(QColor(self._colours.muted))
-            text = self._model.problem or "Drawing…"
-            flags = Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap
-            painter.drawText(self.rect().adjusted(16, 16, -16, -16), flags, text)
+        painter.fillRect(self.rect(), QColor(self._colours.well))
+        picture = self._model.picture
+        if picture is not None and not self._model.problem:
+            paint_picture(painter, self.rect().adjusted(8, 8, -8, -8), picture, enlarge=False)
+            return
+        painter.setPen(QColor(self._colours.muted))
+        text = self._model.problem or "Drawing…"
+        flags = Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap
+        painter.drawText(self.rect().adjusted(16, 16, -16, -16), flags, text)
 
 
 class FigureDialog(QDialog):

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPainterPath, QPaintEvent, QPen
+from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPainterPath, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from sd2app.fit.setup import FitSetupModel
 from sd2app.palette import Palette
+from sd2app.widgets.canvas import Canvas
 
 _DIMMED = 110
 
 
-class PersonPicker(QWidget):
+class PersonPicker(Canvas):
     """Picture on which a drag draws a rectangle and a click removes it."""
 
     def __init__(
@@ -28,8 +29,7 @@ class PersonPicker(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setCursor(Qt.CursorShape.CrossCursor)
         self.setAccessibleName("Drag a rectangle around the person")
-        setup.changed.connect(self.update)
-        setup.picture_changed.connect(self.update)
+        self.follow(setup.changed, setup.picture_changed)
 
     def sizeHint(self) -> QSize:
         """Size a little below VGA."""
@@ -78,12 +78,8 @@ class PersonPicker(QWidget):
         )
         self._setup.set_person(x0, y0, x1, y1)
 
-    def paintEvent(self, event: QPaintEvent) -> None:
+    def paint(self, painter: QPainter) -> None:
         """Paint the picture, dimmed outside the rectangle."""
-        with QPainter(self) as painter:
-            self._paint(painter)
-
-    def _paint(self, painter: QPainter) -> None:
         painter.fillRect(self.rect(), QColor(self._colours.well))
         picture = self._setup.picture
         if picture is None:

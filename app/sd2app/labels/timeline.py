@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Literal, NamedTuple
 
 from PySide6.QtCore import QEvent, QObject, QRectF, QSize, Qt, QTimer
-from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QResizeEvent, QWheelEvent
-from PySide6.QtWidgets import QFrame, QScrollArea, QScrollBar, QSizePolicy, QWidget
+from PySide6.QtGui import QColor, QMouseEvent, QPainter, QResizeEvent, QWheelEvent
+from PySide6.QtWidgets import QFrame, QScrollArea, QScrollBar, QSizePolicy
 
 from sd2app.labels.dragging import MOVED_PX, LabelDragging, attraction_s
 from sd2app.labels.edits import LabelEdits
@@ -14,8 +14,8 @@ from sd2app.labels.loop import SpanLoop
 from sd2app.labels.model import LabelsModel
 from sd2app.labels.painting import ROW_PX, LabelRows, lane_box, paint_span, paint_tracks
 from sd2app.session.session import Session
-from sd2app.widgets.cached_paint import CachedPaint
-from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, TimeScale, paint_cursor, turn_wheel
+from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, paint_cursor, turn_wheel
+from sd2app.widgets.time_plot import TimePlot
 from sd2core.labels.spans import Span
 
 _EDGE_PX = 5.0
@@ -42,7 +42,7 @@ def _tip_of(target: HitTarget) -> str:
 _SCROLL_MS, _SCROLL_SHARE = 30, 0.03
 
 
-class LabelTimeline(QWidget):
+class LabelTimeline(TimePlot):
     """A row per track. Drag an empty place, a span or an edge of it; with Alt nothing snaps.
 
     With Shift a new span is drawn over others, which it cuts. A click selects a span and goes to
@@ -53,7 +53,7 @@ class LabelTimeline(QWidget):
     def __init__(
         self, session: Session, edits: LabelEdits, dragging: LabelDragging, loop: SpanLoop
     ) -> None:
-        super().__init__()
+        super().__init__(session.span)
         self._session, self._edits, self._dragging, self._loop = session, edits, dragging, loop
         self._labels = labels = edits.labels
         self._span, self._playback = session.span, session.playback
@@ -61,7 +61,6 @@ class LabelTimeline(QWidget):
         self._pointer_px = 0.0
         self._within_s, self._cutting = 0.0, False
         self.rows = LabelRows.of(labels.labels.tracks, labels.arrays, labels.marks)
-        self._still = CachedPaint(self)
         self._scroll = QTimer(self)
         self._scroll.setInterval(_SCROLL_MS)
         self._scroll.timeout.connect(self._scroll_on)
@@ -78,45 +77,36 @@ class LabelTimeline(QWidget):
             session.span.changed,
             session.display.theme_changed,
         ):
-            signal.connect(self._redraw)
-        session.playback.frame_changed.connect(self.update)
+            signal.connect(self.redraw)
+        self.follow(session.playback.frame_changed)
         self._follow()
 
     def sizeHint(self) -> QSize:
         """Return the height of all tracks."""
         return QSize(640, round(self.rows.height_px))
 
-    @property
-    def scale(self) -> TimeScale:
-        """Time axis of this widget."""
-        return TimeScale(self._span.start_s, self._span.end_s, self.width())
-
     # --- painting -------------------------------------------------------------------------
 
-    def paintEvent(self, event: QPaintEvent) -> None:
+    def paint(self, painter: QPainter) -> None:
         """Paint names, spans, marks and the cursor."""
         scale, model, rows = self.scale, self._labels, self.rows
-        plot = self._plot_rect()
-        with QPainter(self) as painter:
-            self._still.paint(painter, self._paint)
-            painter.setClipRect(plot)
-            if not (model.labels.spans or model.marks or self._edits.refusal) and rows.tracks:
-                self._paint_hint(painter, QRectF(0, 0, self.width(), ROW_PX))
-            for mark, lane in zip(model.marks, rows.mark_lanes, strict=True):
-                left, right = sorted((scale.x_of(mark.start_s), scale.x_of(self._playback.time_s)))
-                box = lane_box(rows.row_of(mark.track), lane, left, right)
-                colour, palette = model.colour_of(mark.label), self._session.display.palette
-                paint_span(painter, box, f"{mark.label} …", colour, palette, selected=True)
-            paint_cursor(painter, plot, scale.x_of(self._playback.time_s))
+        plot = self.plot_rect()
+        self.paint_kept(painter, self._paint_rows)
+        painter.setClipRect(plot)
+        if not (model.labels.spans or model.marks or self._edits.refusal) and rows.tracks:
+            self._paint_hint(painter, QRectF(0, 0, self.width(), ROW_PX))
+        for mark, lane in zip(model.marks, rows.mark_lanes, strict=True):
+            left, right = sorted((scale.x_of(mark.start_s), scale.x_of(self._playback.time_s)))
+            box = lane_box(rows.row_of(mark.track), lane, left, right)
+            colour, palette = model.colour_of(mark.label), self._session.display.palette
+            paint_span(painter, box, f"{mark.label} …", colour, palette, selected=True)
+        paint_cursor(painter, plot, scale.x_of(self._playback.time_s))
 
-    def _plot_rect(self) -> QRectF:
-        return QRectF(GUTTER_PX, 0, self.width() - GUTTER_PX - MARGIN_PX, self.height())
-
-    def _paint(self, painter: QPainter) -> None:
+    def _paint_rows(self, painter: QPainter) -> None:
         """Paint the parts that do not move: names, rows, spans."""
         palette = self._session.display.palette
         painter.fillRect(self.rect(), QColor(palette.panel))
-        plot, rows = self._plot_rect(), self.rows.tracks
+        plot, rows = self.plot_rect(), self.rows.tracks
         paint_tracks(painter, plot, self.scale, self._labels, rows, palette)
 
     def _paint_hint(self, painter: QPainter, row: QRectF) -> None:
@@ -133,11 +123,7 @@ class LabelTimeline(QWidget):
         labels = self._labels
         self.rows = LabelRows.of(labels.labels.tracks, labels.arrays, labels.marks)
         self.setFixedHeight(self.sizeHint().height())
-        self._redraw()
-
-    def _redraw(self) -> None:
-        self._still.forget()
-        self.update()
+        self.redraw()
 
     # --- the hand -------------------------------------------------------------------------
 

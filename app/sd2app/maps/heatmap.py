@@ -6,17 +6,15 @@ import math
 from collections.abc import Sequence
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QBrush, QColor, QMouseEvent, QPainter, QPaintEvent, QPen, QWheelEvent
+from PySide6.QtGui import QBrush, QColor, QMouseEvent, QPainter, QPen, QWheelEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from sd2app.maps.heatmap_image import MapWidget
 from sd2app.session.maps import UNCERTAIN_SHARE, MapModel, Reading
 from sd2app.session.session import Session
-from sd2app.widgets.cached_paint import CachedPaint
 from sd2app.widgets.colour_maps import lookup_table
 from sd2app.widgets.time_axis import (
     GUTTER_PX,
-    TimeScale,
     paint_cursor,
     paint_title,
     signed_text,
@@ -54,20 +52,14 @@ class HeatmapView(MapWidget):
         self._button: QWidget | None = None
         self.setMinimumHeight(96)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self._still = CachedPaint(self)
         self._room_px = 0
         self._span.changed.connect(self.invalidate)
         track.status_changed.connect(self.redraw)
-        self._pointer.changed.connect(self.update)
+        self.follow(self._pointer.changed)
 
     def sizeHint(self) -> QSize:
         """Size with room for 32 bins of 5 pixels."""
         return QSize(640, _HEADER_PX + 160)
-
-    def redraw(self) -> None:
-        """Draw overlays and surroundings of the map again."""
-        self._still.forget()
-        self.update()
 
     def set_hint(self, hint: str) -> None:
         """Text shown while there is no map."""
@@ -100,11 +92,6 @@ class HeatmapView(MapWidget):
         )
 
     @property
-    def scale(self) -> TimeScale:
-        """Time axis of this widget."""
-        return TimeScale(self._span.start_s, self._span.end_s, self.width())
-
-    @property
     def _map(self) -> DopplerMap:
         """The map, where there is one."""
         assert self._track.map is not None
@@ -122,16 +109,15 @@ class HeatmapView(MapWidget):
 
     # --- painting -------------------------------------------------------------------------
 
-    def paintEvent(self, event: QPaintEvent) -> None:
+    def paint(self, painter: QPainter) -> None:
         """Header, map, marked bins, axis, labels; over what is kept of them, the cursors."""
         if self._button_px != self._room_px:
-            self._still.forget()
-        with QPainter(self) as painter:
-            self._still.paint(painter, self._paint)
-            if self._track.map is not None:
-                self._paint_cursors(painter, self.plot_rect())
+            self._kept = None
+        self.paint_kept(painter, self._paint_map)
+        if self._track.map is not None:
+            self._paint_cursors(painter, self.plot_rect())
 
-    def _paint(self, painter: QPainter) -> None:
+    def _paint_map(self, painter: QPainter) -> None:
         colours = self._display.palette
         painter.fillRect(self.rect(), QColor(colours.panel))
         if self._track.map is None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from sd2app.session.display import HeatmapLevels
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
 from sd2app.widgets.colour_maps import lookup_table, uncertain_table
-from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, TimeScale
+from sd2app.widgets.time_axis import TimeScale
 from sd2app.widgets.time_plot import Overlay, TimePlot
 
 _NOBODY = "no person"
@@ -173,11 +173,10 @@ def image_of(colours: NDArray[np.uint32]) -> QImage:
 class MapWidget(TimePlot):
     """Keeps the picture of a map until map, stretch, levels, theme or size change."""
 
-    TOP_PX: ClassVar[int]
-    """Room above the map."""
+    BOTTOM_PX = 4
 
     def __init__(self, track: MapModel, session: Session, overlays: Sequence[Overlay] = ()) -> None:
-        super().__init__()
+        super().__init__(session.span)
         self._track = track
         self._session = session
         self._span, self._playback = session.span, session.playback
@@ -188,24 +187,15 @@ class MapWidget(TimePlot):
         self.setMouseTracking(True)
         for signal in (track.changed, display.levels_changed, display.theme_changed):
             signal.connect(self.invalidate)
-        self._playback.frame_changed.connect(self.update)
+        self.follow(self._playback.frame_changed)
         for overlay in overlays:
             for signal in overlay.changed:
                 signal.connect(self.redraw)
-
-    def plot_rect(self) -> QRectF:
-        """Rectangle of the map, in pixels."""
-        width, height = self.width() - GUTTER_PX - MARGIN_PX, self.height() - self.TOP_PX - 4
-        return QRectF(GUTTER_PX, self.TOP_PX, max(width, 1), max(height, 1))
 
     def invalidate(self) -> None:
         """Draw the map again, and all that is around it."""
         self._image = None
         self.redraw()
-
-    def redraw(self) -> None:
-        """Draw overlays and surroundings of the map again."""
-        self.update()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Draw the map again for the new number of columns."""

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 from PySide6.QtCore import QRectF, QSize
-from PySide6.QtGui import QAction, QColor, QImage, QPainter, QPaintEvent
+from PySide6.QtGui import QAction, QColor, QImage, QPainter
 from PySide6.QtWidgets import QWidget
 
 from sd2app.session.display import COLOUR_MAPS
 from sd2app.session.session import Session
+from sd2app.widgets.canvas import Canvas
 from sd2app.widgets.colour_maps import lookup_table, uncertain_table
 from sd2app.widgets.inputs import Choice, NumberBox, action_button
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
@@ -17,24 +18,19 @@ from sd2app.widgets.panel import ElidedLabel
 _STRIP_PX = 14
 
 
-class _ColourStrip(QWidget):
+class _ColourStrip(Canvas):
     """The colours of the levels; below them those of uncertain cells, where there are any."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._display, self._tracks = session.display, session.maps.all
         self.setFixedHeight(_STRIP_PX)
-        for signal in (self._display.levels_changed, *(track.changed for track in self._tracks)):
-            signal.connect(self.update)
+        self.follow(self._display.levels_changed, *(track.changed for track in self._tracks))
 
     def sizeHint(self) -> QSize:
         return QSize(200, _STRIP_PX)
 
-    def paintEvent(self, event: QPaintEvent) -> None:
-        with QPainter(self) as painter:
-            self._paint(painter)
-
-    def _paint(self, painter: QPainter) -> None:
+    def paint(self, painter: QPainter) -> None:
         name = self._display.levels.colour_map
         strips = [lookup_table(name)]
         if any(track.uncertainty is not None for track in self._tracks):

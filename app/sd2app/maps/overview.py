@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from PySide6.QtCore import QRectF, Qt
-from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPen
 
 from sd2app.maps.heatmap_image import MapWidget
 from sd2app.session.maps import MapModel
@@ -25,7 +25,7 @@ class Overview(MapWidget):
     def __init__(self, session: Session, overlays: Sequence[Overlay] = ()) -> None:
         super().__init__(session.maps.synthetic, session, overlays)
         self.setFixedHeight(40)
-        self._span.changed.connect(self.update)
+        self.follow(self._span.changed)
 
     def set_track(self, track: MapModel) -> None:
         """Show another track."""
@@ -39,12 +39,8 @@ class Overview(MapWidget):
         """Time axis of this widget: always everything."""
         return TimeScale(*self._span.extent_s, self.width())
 
-    def paintEvent(self, event: QPaintEvent) -> None:
+    def paint(self, painter: QPainter) -> None:
         """Small map, spans, frame around the time window, cursor."""
-        with QPainter(self) as painter:
-            self._paint(painter)
-
-    def _paint(self, painter: QPainter) -> None:
         colours, scale, plot = self._display.palette, self.scale, self.plot_rect()
         painter.fillRect(self.rect(), QColor(colours.panel))
         painter.setPen(QColor(colours.muted))

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QBrush, QColor, QFontMetrics, QPainter, QPaintEvent, QPen, QPolygonF
-from PySide6.QtWidgets import QWidget
+from PySide6.QtGui import QBrush, QColor, QFontMetrics, QPainter, QPen, QPolygonF
 
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
+from sd2app.widgets.canvas import Canvas
 from sd2app.widgets.plot import paint_axes
 from sd2app.widgets.time_axis import paint_title, signed_text, ticks
 from sd2core.maps import DopplerMap
@@ -36,7 +36,7 @@ class _Curve:
         return self.frame is not None and present is not None and not present[self.frame]
 
 
-class SpectrumView(QWidget):
+class SpectrumView(Canvas):
     """Level to the right, velocity upwards like in the heatmaps beside it."""
 
     def __init__(self, session: Session) -> None:
@@ -44,14 +44,13 @@ class SpectrumView(QWidget):
         self._maps, self._playback = session.maps, session.playback
         self._display, self._pointer = session.display, session.pointer
         self.setMinimumSize(180, 160)
-        for signal in (
+        self.follow(
             session.playback.frame_changed,
             session.display.levels_changed,
             session.display.theme_changed,
             session.pointer.changed,
             *(track.changed for track in session.maps.all),
-        ):
-            signal.connect(self.update)
+        )
 
     def sizeHint(self) -> QSize:
         """Width of the level bar below."""
@@ -66,12 +65,9 @@ class SpectrumView(QWidget):
             if track.map is not None
         ]
 
-    def paintEvent(self, event: QPaintEvent) -> None:
+    def paint(self, painter: QPainter) -> None:
         """Axes, marked bins and curves."""
-        with QPainter(self) as painter:
-            self._paint(painter, self._curves())
-
-    def _paint(self, painter: QPainter, curves: list[_Curve]) -> None:
+        curves = self._curves()
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         colours = self._display.palette
         painter.fillRect(self.rect(), QColor(colours.panel))

@@ -6,29 +6,23 @@ import math
 
 import numpy as np
 from PySide6.QtCore import QPointF, QRect, QRectF, QSignalBlocker, QSize, Qt
-from PySide6.QtGui import QBrush, QColor, QMouseEvent, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QBrush, QColor, QMouseEvent, QPainter, QPen
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
     QTableWidget,
     QTableWidgetItem,
-    QWidget,
 )
 
 from sd2app.mesh_comparison.model import ComparisonModel, JointRow, joint_words
 from sd2app.session.display import DisplayModel
 from sd2app.session.session import Session
 from sd2app.video.overlay_settings import OverlayModel
+from sd2app.widgets.canvas import Canvas
 from sd2app.widgets.mesh_painting import draw_mesh, paint_picture
 from sd2app.widgets.plot import paint_axes
-from sd2app.widgets.time_axis import (
-    GUTTER_PX,
-    MARGIN_PX,
-    TimeScale,
-    paint_title,
-    signed_text,
-    ticks,
-)
+from sd2app.widgets.time_axis import paint_title, signed_text, ticks
+from sd2app.widgets.time_plot import TimePlot
 from sd2core.mesh.presence import runs
 
 _TITLE_PX = 24
@@ -45,7 +39,7 @@ def colour_of(display: DisplayModel, number: int) -> QColor:
     return QColor(display.palette.synthetic if number == 0 else display.palette.real)
 
 
-class ComparedPicture(QWidget):
+class ComparedPicture(Canvas):
     """One of the two meshes over the picture on screen."""
 
     def __init__(
@@ -57,24 +51,19 @@ class ComparedPicture(QWidget):
         self.setMinimumSize(240, 180)
         # With a video the picture is what one waits for.
         clock = session.playback if session.video.reader is None else session.video
-        for signal in (
+        self.follow(
             comparison.changed,
             session.display.theme_changed,
             overlay.changed,
             clock.frame_changed,
-        ):
-            signal.connect(self.update)
+        )
 
     def sizeHint(self) -> QSize:
         """Half of VGA, and its title."""
         return QSize(400, 300 + _TITLE_PX)
 
-    def paintEvent(self, event: QPaintEvent) -> None:
+    def paint(self, painter: QPainter) -> None:
         """Title, and the picture below."""
-        with QPainter(self) as painter:
-            self._paint(painter)
-
-    def _paint(self, painter: QPainter) -> None:
         s, comparison = self._session, self._comparison
         colours, colour = s.display.palette, colour_of(s.display, self._number)
         painter.fillRect(self.rect(), QColor(colours.panel))
@@ -98,31 +87,27 @@ class ComparedPicture(QWidget):
         draw_mesh(painter, box, comparison.mesh(self._number), time_s, camera, colour, opacity)
 
 
-class JointCurves(QWidget):
+class JointCurves(TimePlot):
     """Velocity of one joint towards the sensor, from both meshes; click or drag seeks."""
 
+    TOP_PX, BOTTOM_PX = _TITLE_PX, 4
+
     def __init__(self, comparison: ComparisonModel, session: Session) -> None:
-        super().__init__()
-        self._comparison, self._span = comparison, session.span
+        super().__init__(session.span)
+        self._comparison = comparison
         self._playback, self._display = session.playback, session.display
         self.setMinimumHeight(96)
         self.setCursor(Qt.CursorShape.CrossCursor)
-        for signal in (
+        self.follow(
             comparison.changed,
             session.span.changed,
             session.playback.frame_changed,
             session.display.theme_changed,
-        ):
-            signal.connect(self.update)
+        )
 
     def sizeHint(self) -> QSize:
         """Width of the maps above."""
         return QSize(640, 140)
-
-    @property
-    def scale(self) -> TimeScale:
-        """Time axis of this widget."""
-        return TimeScale(self._span.start_s, self._span.end_s, self.width())
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         """Seek."""
@@ -133,20 +118,15 @@ class JointCurves(QWidget):
         if event.buttons() & Qt.MouseButton.LeftButton:
             self._playback.seek(self.scale.time_of(event.position().x()))
 
-    def paintEvent(self, event: QPaintEvent) -> None:
+    def paint(self, painter: QPainter) -> None:
         """Title, axis, lines, cursor."""
-        with QPainter(self) as painter:
-            self._paint(painter)
-
-    def _paint(self, painter: QPainter) -> None:
-        colours, scale = self._display.palette, self.scale
+        colours, scale, plot = self._display.palette, self.scale, self.plot_rect()
         painter.fillRect(self.rect(), QColor(colours.panel))
         heading = QRectF(8, 0, self.width() - 16, _TITLE_PX)
         paint_title(painter, heading, joint_words(self._comparison.joint), colours.text)
         painter.setPen(QColor(colours.muted))
         flags = Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignRight
         painter.drawText(heading, flags, "towards the sensor +  /  away −   m/s")
-        plot = QRectF(self.rect()).adjusted(GUTTER_PX, _TITLE_PX, -MARGIN_PX, -4)
         curves = [self._comparison.curve(number) for number in (0, 1)]
         known = np.concatenate([velocity[np.isfinite(velocity)] for _, velocity in curves])
         limit = max(1.1 * float(np.abs(known).max(initial=0.0)), _LEAST_MPS)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from PySide6.QtCore import QPointF, QRectF, QSignalBlocker, Qt
-from PySide6.QtGui import QAction, QColor, QMouseEvent, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QAction, QColor, QMouseEvent, QPainter, QPen
 from PySide6.QtWidgets import QLabel, QSlider, QToolButton, QWidget
 
 from sd2app.labels.loop import SpanLoop
@@ -20,6 +20,7 @@ from sd2app.widgets.time_axis import (
     tick_step,
     ticks,
 )
+from sd2app.widgets.time_plot import TimePlot
 
 _BUTTONS = ("first_frame", "previous_frame", "play", "next_frame", "last_frame", "loop")
 
@@ -94,33 +95,23 @@ class TransportBar(QWidget):
             self._stretch.setAccessibleName(f"End the loop of {span.label}, {stretch}")
 
 
-class TimeRuler(QWidget):
+class TimeRuler(TimePlot):
     """Seconds under the tracks; click or drag seeks."""
 
     def __init__(self, session: Session) -> None:
-        super().__init__()
+        super().__init__(session.span)
         self._span, self._playback = session.span, session.playback
         self._display = session.display
         self.setFixedHeight(24)
-        for signal in (
+        self.follow(
             self._span.changed,
             self._playback.frame_changed,
             self._playback.stretch_changed,
             self._display.theme_changed,
-        ):
-            signal.connect(self.update)
+        )
 
-    @property
-    def scale(self) -> TimeScale:
-        """Time axis of this widget."""
-        return TimeScale(self._span.start_s, self._span.end_s, self.width())
-
-    def paintEvent(self, event: QPaintEvent) -> None:
+    def paint(self, painter: QPainter) -> None:
         """Ticks with times, and the cursor."""
-        with QPainter(self) as painter:
-            self._paint(painter)
-
-    def _paint(self, painter: QPainter) -> None:
         colours, scale = self._display.palette, self.scale
         painter.fillRect(self.rect(), QColor(colours.panel))
         self._paint_stretch(painter, scale)

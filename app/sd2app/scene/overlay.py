@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QFont, QFontMetricsF, QImage, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QColor, QFont, QFontMetricsF, QImage, QPainter, QPen
 from PySide6.QtWidgets import QWidget
 
 from sd2app.scene.colours import Colouring, SceneColours
 from sd2app.scene.navigation import Navigator
 from sd2app.scene.scene import Scene
-from sd2app.widgets.cached_paint import CachedPaint
+from sd2app.widgets.canvas import Canvas
 from sd2app.widgets.time_axis import tick_step, ticks
 from sd2core.figures.colours import DIVERGING, SEQUENTIAL, Rgb
 
@@ -56,7 +56,7 @@ class _Bar:
         return None
 
 
-class Overlay(QWidget):
+class Overlay(Canvas):
     """Colour bar, metre labels, axes and the sensor's coordinates."""
 
     def __init__(self, scene: Scene, navigator: Navigator, parent: QWidget) -> None:
@@ -67,7 +67,6 @@ class Overlay(QWidget):
         self.marker_words: list[str] = []
         self._legend = QRectF()
         self._state: tuple[object, ...] | None = None
-        self._still = CachedPaint(self)
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
 
@@ -81,7 +80,7 @@ class Overlay(QWidget):
         words = QFontMetricsF(self._font()).horizontalAdvance(_VELOCITY_TITLE)
         return words + 2 * _PAD + 2 * _GAP + 4.0
 
-    def paintEvent(self, event: QPaintEvent) -> None:
+    def paint(self, painter: QPainter) -> None:
         """Paint all texts; repainted only after a change."""
         scene, navigator, colouring = self._scene, self._navigator, self._scene.colouring
         state = (
@@ -102,9 +101,8 @@ class Overlay(QWidget):
         )
         if state != self._state:
             self._state = state
-            self._still.forget()
-        with QPainter(self) as painter:
-            self._still.paint(painter, self._paint_all)
+            self._kept = None
+        self.paint_kept(painter, self._paint_all)
 
     def _paint_all(self, painter: QPainter) -> None:
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)

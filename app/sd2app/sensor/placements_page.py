@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 from PySide6.QtCore import QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent
+from PySide6.QtGui import QColor, QImage, QPainter
 from PySide6.QtWidgets import QFileDialog, QGridLayout, QLabel, QWidget
 
 from sd2app.accuracy.model import AccuracyModel
@@ -23,6 +23,7 @@ from sd2app.sensor.placements import (
     limit_facts,
     limits_text,
 )
+from sd2app.widgets.canvas import Canvas
 from sd2app.widgets.inputs import CheckBox, Choice, TypedLine
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import FactRows, outlined, rule, sentence, title
@@ -213,7 +214,7 @@ class PlacementsPage(QWidget):
             self._current.setText(current_text(self._model))
 
 
-class RangeScale(QWidget):
+class RangeScale(Canvas):
     """Colour scale of the placements in the scene: near to far."""
 
     _BAR = 8
@@ -241,9 +242,8 @@ class RangeScale(QWidget):
         """Size of one line."""
         return QSize(60, self.fontMetrics().height() + 2)
 
-    def paintEvent(self, event: QPaintEvent) -> None:
+    def paint(self, painter: QPainter) -> None:
         """Paint a colour bar between two texts."""
-        painter = QPainter(self)
         painter.setPen(QColor(self.palette().text().color()))
         near, far = self._ends
         flags = Qt.AlignmentFlag.AlignVCenter

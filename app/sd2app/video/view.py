@@ -8,12 +8,13 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QRectF, QSignalBlocker, QSize, Qt, SignalInstance
-from PySide6.QtGui import QAction, QColor, QPainter, QPaintEvent
+from PySide6.QtGui import QAction, QColor, QPainter
 from PySide6.QtWidgets import QSlider, QWidget
 
 from sd2app.session.session import Session
 from sd2app.video.landmark_overlay import draw_landmarks
 from sd2app.video.overlay_settings import OverlayModel
+from sd2app.widgets.canvas import Canvas
 from sd2app.widgets.inputs import action_button
 from sd2app.widgets.layouts import STRETCH, row_of
 from sd2app.widgets.mesh_painting import draw_mesh, paint_picture
@@ -33,32 +34,27 @@ class Landmarks(Protocol):
         """Landmarks of a frame, or None where none are to be shown."""
 
 
-class VideoView(QWidget):
+class VideoView(Canvas):
     """Fits the picture into the space there is."""
 
     def __init__(self, session: Session, overlay: OverlayModel, landmarks: Landmarks) -> None:
         super().__init__()
         self._session, self._overlay, self._found = session, overlay, landmarks
         self.setMinimumSize(200, 150)
-        for signal in (
+        self.follow(
             session.video.frame_changed,
             session.display.theme_changed,
             session.document.changed,
             overlay.changed,
             *landmarks.landmarks_changed,
-        ):
-            signal.connect(self.update)
+        )
 
     def sizeHint(self) -> QSize:
         """Size of two thirds of VGA."""
         return QSize(427, 320)
 
-    def paintEvent(self, event: QPaintEvent) -> None:
+    def paint(self, painter: QPainter) -> None:
         """Paint the picture, or why there is none."""
-        with QPainter(self) as painter:
-            self._paint(painter)
-
-    def _paint(self, painter: QPainter) -> None:
         colours, video = self._session.display.palette, self._session.video
         painter.fillRect(self.rect(), QColor(colours.well))
         if video.picture is None:

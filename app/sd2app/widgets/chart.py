@@ -15,12 +15,12 @@ from PySide6.QtGui import (
     QKeyEvent,
     QMouseEvent,
     QPainter,
-    QPaintEvent,
     QPen,
     QPolygonF,
 )
 from PySide6.QtWidgets import QSizePolicy, QToolTip, QWidget
 
+from sd2app.widgets.canvas import Canvas
 from sd2app.widgets.plot import Themed, paint_axes
 from sd2app.widgets.time_axis import ticks
 
@@ -136,7 +136,7 @@ class Chart:
     scattered: bool = False  # marks stand above each other: the nearest is not just that across
 
 
-class ChartView(QWidget):
+class ChartView(Canvas):
     """Curves with a legend.
 
     Left and Right go from mark to mark, Home and End to the first and the last. Escape gives
@@ -166,7 +166,7 @@ class ChartView(QWidget):
         self.setMinimumHeight(self.HEIGHTS_PX[0])
         self.setMaximumHeight(self.HEIGHTS_PX[2])
         self.setAccessibleName(name)
-        display.theme_changed.connect(self.update)
+        self.follow(display.theme_changed)
 
     def sizeHint(self) -> QSize:
         """Size a little wider than high."""
@@ -248,16 +248,15 @@ class ChartView(QWidget):
 
     # --- painting -------------------------------------------------------------------------
 
-    def paintEvent(self, event: QPaintEvent) -> None:
+    def paint(self, painter: QPainter) -> None:
         """The chart, in a frame while it has the keyboard."""
-        with QPainter(self) as painter:
-            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-            painter.fillRect(self.rect(), QColor(self._display.palette.panel))
-            self.paint_chart(painter)
-            if self.hasFocus():
-                painter.setPen(QPen(QColor(self._display.palette.accent), 1))
-                painter.setBrush(Qt.BrushStyle.NoBrush)
-                painter.drawRect(QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5))
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.fillRect(self.rect(), QColor(self._display.palette.panel))
+        self.paint_chart(painter)
+        if self.hasFocus():
+            painter.setPen(QPen(QColor(self._display.palette.accent), 1))
+            painter.setBrush(Qt.BrushStyle.NoBrush)
+            painter.drawRect(QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5))
 
     def paint_chart(self, painter: QPainter) -> None:
         """Axes, legend, curves, the best mark, and what is pointed at."""

@@ -100,8 +100,16 @@ def paint_title(painter: QPainter, box: QRectF, text: str, colour: str) -> int:
 _ZOOM_PER_NOTCH = 0.8
 
 
-class _Window(Protocol):
-    """Part of the time on screen that can be moved and zoomed."""
+class ShownTime(Protocol):
+    """Part of the recording on screen, which can be moved and zoomed."""
+
+    @property
+    def start_s(self) -> float:
+        """Left edge of the part."""
+
+    @property
+    def end_s(self) -> float:
+        """Right edge of the part."""
 
     @property
     def duration_s(self) -> float:
@@ -114,7 +122,7 @@ class _Window(Protocol):
         """Scale its length about a time."""
 
 
-def turn_wheel(event: QWheelEvent, span: _Window, scale: TimeScale) -> None:
+def turn_wheel(event: QWheelEvent, span: ShownTime, scale: TimeScale) -> None:
     """Zoom about the pointer, or pan with Shift or a sideways wheel."""
     delta = event.angleDelta()
     sideways = delta.x() or (
