@@ -22,7 +22,7 @@ from sd2app.batch.questions import BatchQuestions
 from sd2app.batch.setup import Accuracy, OptionalStep, most_workers
 from sd2app.batch.text import entry_text, estimate_facts, estimate_headline, unusable_text
 from sd2app.widgets.inputs import CheckBox, Choice, NumberBox
-from sd2app.widgets.layouts import STRETCH, column_of, row_of
+from sd2app.widgets.layouts import STRETCH, column_of, form_of, row_of
 from sd2app.widgets.panel import (
     ElidedLabel,
     FactRows,
@@ -83,16 +83,10 @@ class BatchSetupView(QWidget):
         return row_of((title("Recordings"), 1), add, folder, self._remove, spacing_px=6)
 
     def _form(self) -> QFormLayout:
-        form = QFormLayout()
-        form.setHorizontalSpacing(16)
-        form.setVerticalSpacing(6)
-        form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
         set_value = self._setup.set_value
         self._subjects = Choice("Who is who", self, _SUBJECT_TEXT, partial(set_value, "subjects"))
-        form.addRow("People", self._subjects)
         self._placements = Choice("Where sensors are put", self)
         self._placements.activated.connect(self._asks.choose_placements)
-        form.addRow("Sensors", self._placements)
         self._steps: dict[OptionalStep, CheckBox] = {}
         for step, (text, tip) in _STEP_TEXT.items():
             box = self._steps[step] = CheckBox(text, self, partial(set_value, step), tip)
@@ -103,19 +97,23 @@ class BatchSetupView(QWidget):
         self._format = Choice(
             "Format of the data set", self, _FORMAT_TEXT, partial(set_value, "format")
         )
-        form.addRow("Videos", self._steps["fit"])
-        form.addRow("Synthesise", self._accuracy)
-        form.addRow("Then", side_by_side(self._steps["denoise"], self._model))
-        form.addRow("", side_by_side(self._steps["export"], self._format))
         self._out = ElidedLabel(self)
         choose = outlined("Choose…", "Put the results elsewhere", self._asks.choose_out, self)
-        form.addRow("Results in", row_of((self._out, 1), choose, spacing_px=8))
         self._workers = NumberBox(
             1, most_workers(), "", "Processes that share the work", decimals=0, step=1.0
         )
         self._workers.valueChanged.connect(partial(set_value, "workers"))
-        form.addRow("Workers", side_by_side(self._workers))
-        return form
+        return form_of(
+            ("People", self._subjects),
+            ("Sensors", self._placements),
+            ("Videos", self._steps["fit"]),
+            ("Synthesise", self._accuracy),
+            ("Then", side_by_side(self._steps["denoise"], self._model)),
+            ("", side_by_side(self._steps["export"], self._format)),
+            ("Results in", row_of((self._out, 1), choose, spacing_px=8)),
+            ("Workers", side_by_side(self._workers)),
+            gaps_px=(16, 6),
+        )
 
     def _buttons(self) -> QHBoxLayout:
         asks = self._asks

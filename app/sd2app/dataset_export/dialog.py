@@ -9,7 +9,6 @@ from PySide6.QtGui import QDesktopServices, QPixmap
 from PySide6.QtWidgets import (
     QDialog,
     QFileDialog,
-    QFormLayout,
     QLabel,
     QLineEdit,
     QProgressBar,
@@ -20,7 +19,7 @@ from PySide6.QtWidgets import (
 from sd2app.dataset_export.model import MAPS, ExportModel
 from sd2app.dataset_export.text import label_words, size_words, split_words
 from sd2app.widgets.inputs import CheckBox, Choice, NumberBox
-from sd2app.widgets.layouts import STRETCH, column_of, row_of
+from sd2app.widgets.layouts import STRETCH, column_of, form_of, row_of
 from sd2app.widgets.panel import ElidedLabel, outlined, rule, sentence, side_by_side
 from sd2app.widgets.text import counted
 from sd2core.recording.recording import is_recording
@@ -83,18 +82,15 @@ class ExportDialog(QDialog):
             "Format of the data set", self, _FORMATS, lambda ending: model.choose(ending=ending)
         )
         where = row_of((self._place, 1), self._this, self._other, spacing_px=8)
-        self._form = QFormLayout()
-        self._form.setHorizontalSpacing(16)
-        self._form.setVerticalSpacing(8)
-        self._form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
-        self._form.addRow("From", where)
-        self._form.addRow("People", self._people)
-        self._form.addRow("Maps", side_by_side(*self._boxes.values(), spacing_px=16))
-        self._form.addRow("Sensors", side_by_side(self._sensors))
-        self._form.addRow(
-            "Segments", side_by_side(self._length, QLabel("overlap", self), self._overlap)
+        segments = side_by_side(self._length, QLabel("overlap", self), self._overlap)
+        self._form = form_of(
+            ("From", where),
+            ("People", self._people),
+            ("Maps", side_by_side(*self._boxes.values(), spacing_px=16)),
+            ("Sensors", side_by_side(self._sensors)),
+            ("Segments", segments),
+            ("Format", side_by_side(self._format)),
         )
-        self._form.addRow("Format", side_by_side(self._format))
 
     def _build_foot(self) -> None:
         self._size, self._labels, self._splits = sentence("", "plain"), sentence(""), sentence("")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from typing import Any, ClassVar
 
@@ -9,7 +10,6 @@ from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QColor, QPainter
 from PySide6.QtWidgets import (
     QDialog,
-    QFormLayout,
     QLabel,
     QLayout,
     QLineEdit,
@@ -21,7 +21,7 @@ from sd2app.palette import Palette
 from sd2app.widgets.canvas import Canvas
 from sd2app.widgets.dialogs import ExportButtons, ask_figure
 from sd2app.widgets.inputs import CheckBox, Choice, NumberBox
-from sd2app.widgets.layouts import column_of, row_of
+from sd2app.widgets.layouts import column_of, form_of, row_of
 from sd2app.widgets.mesh_painting import paint_picture
 from sd2app.widgets.panel import side_by_side
 
@@ -86,15 +86,6 @@ class FigureDialog(QDialog):
         if path is not None:
             self._model.export(path)
 
-    # --- parts of the choices -------------------------------------------------------------
-
-    @staticmethod
-    def _form() -> QFormLayout:
-        form = QFormLayout()
-        form.setHorizontalSpacing(16)
-        form.setVerticalSpacing(8)
-        return form
-
 
 class MapFigureDialog(FigureDialog):
     """Choices of a :class:`MapFigure`."""
@@ -127,12 +118,12 @@ class MapFigureDialog(FigureDialog):
             )
         for box in (*maps, *more):
             box.show_checked(True)
-        form = self._form()
-        form.addRow("Maps", side_by_side(*maps, spacing_px=16))
-        form.addRow("Time range", side_by_side(time_range, spacing_px=16))
+        rows: dict[str, Sequence[QWidget]] = {"Maps": maps, "Time range": [time_range]}
         if more:
-            form.addRow("With", side_by_side(*more, spacing_px=16))
-        return form
+            rows["With"] = more
+        return form_of(
+            *((name, side_by_side(*fields, spacing_px=16)) for name, fields in rows.items())
+        )
 
 
 class StripDialog(FigureDialog):
@@ -186,12 +177,16 @@ class StripDialog(FigureDialog):
             lambda whole: model.set_options(whole=whole),
             "Otherwise what is around the body in these frames",
         )
-        left, right = self._form(), self._form()
-        left.addRow("Frames", side_by_side(self._way, self._count, self._step, self._typed))
-        left.addRow("Columns", side_by_side(self._columns))
-        right.addRow("Rows", side_by_side(*self._rows.values()))
-        right.addRow("Mesh", side_by_side(self._shape, QLabel("colour"), self._colour, self._limit))
-        right.addRow("Part", side_by_side(self._whole))
+        left = form_of(
+            ("Frames", side_by_side(self._way, self._count, self._step, self._typed)),
+            ("Columns", side_by_side(self._columns)),
+        )
+        mesh = side_by_side(self._shape, QLabel("colour"), self._colour, self._limit)
+        right = form_of(
+            ("Rows", side_by_side(*self._rows.values())),
+            ("Mesh", mesh),
+            ("Part", side_by_side(self._whole)),
+        )
         return row_of((left, 1), (right, 1), spacing_px=32)
 
     def _refresh(self) -> None:

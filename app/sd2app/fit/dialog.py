@@ -9,7 +9,6 @@ from PySide6.QtCore import QSignalBlocker, Qt
 from PySide6.QtWidgets import (
     QDialog,
     QFileDialog,
-    QFormLayout,
     QLabel,
     QSlider,
     QToolButton,
@@ -21,7 +20,7 @@ from sd2app.fit.setup import ANGLES_DEG, DEFAULT_STATURE_M, STATURES_M, FitSetup
 from sd2app.palette import Palette
 from sd2app.widgets.dialogs import accepting
 from sd2app.widgets.inputs import CheckBox, Choice, NumberBox
-from sd2app.widgets.layouts import STRETCH, column_of, row_of
+from sd2app.widgets.layouts import STRETCH, column_of, form_of, row_of
 from sd2app.widgets.panel import ElidedLabel, outlined, say, sentence, side_by_side
 from sd2app.widgets.time_axis import clock_text
 
@@ -105,23 +104,22 @@ class NewFromVideoDialog(QDialog):
         return button
 
     def _lay_out(self) -> None:
-        form = QFormLayout()
-        form.setVerticalSpacing(12)
-        form.setHorizontalSpacing(16)
-        form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
-        form.addRow("Video", row_of((self._video, 1), self._other_video, spacing_px=8))
-        form.addRow("Person", row_of((self._person, 1), self._clear, spacing_px=8))
-        form.addRow("", _hint("Drag a rectangle around the person, where there are several."))
-        form.addRow("Body height", side_by_side(self._known, self._stature))
-        form.addRow(
-            "",
-            _hint(
-                f"{DEFAULT_STATURE_M:g} m where it is not known. It fixes the scale: all distances"
-                " and velocities are proportional to it."
+        form = form_of(
+            ("Video", row_of((self._video, 1), self._other_video, spacing_px=8)),
+            ("Person", row_of((self._person, 1), self._clear, spacing_px=8)),
+            ("", _hint("Drag a rectangle around the person, where there are several.")),
+            ("Body height", side_by_side(self._known, self._stature)),
+            (
+                "",
+                _hint(
+                    f"{DEFAULT_STATURE_M:g} m where it is not known. It fixes the scale: all"
+                    " distances and velocities are proportional to it."
+                ),
             ),
+            ("Camera", side_by_side(self._camera, self._angle, self._focal)),
+            ("Save as", row_of((self._folder, 1), self._other_folder, spacing_px=8)),
+            gaps_px=(16, 12),
         )
-        form.addRow("Camera", side_by_side(self._camera, self._angle, self._focal))
-        form.addRow("Save as", row_of((self._folder, 1), self._other_folder, spacing_px=8))
         left = column_of((self.picker, 1), row_of((self._slider, 1), self._where))
         right = column_of(form, STRETCH, self._message)
         columns = row_of((left, 3), (right, 2), spacing_px=24)

@@ -8,10 +8,8 @@ from typing import NamedTuple
 
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import (
-    QCheckBox,
     QDialog,
     QFileDialog,
-    QFormLayout,
     QMessageBox,
     QWidget,
 )
@@ -22,9 +20,9 @@ from sd2app.labels.model import LabelsModel
 from sd2app.session.session import Session
 from sd2app.session.tasks import ListedRunner
 from sd2app.widgets.dialogs import accepting
-from sd2app.widgets.inputs import Choice
-from sd2app.widgets.layouts import STRETCH, column_of, row_of
-from sd2app.widgets.panel import sentence
+from sd2app.widgets.inputs import CheckBox, Choice
+from sd2app.widgets.layouts import STRETCH, column_of, form_of
+from sd2app.widgets.panel import sentence, side_by_side
 from sd2app.widgets.text import counted
 from sd2core.cutouts.cutting import Cut, cut_out, plan_cuts
 from sd2core.cutouts.source import CutSource, Part
@@ -208,19 +206,15 @@ class CutOutDialog(QDialog):
             "mesh": ("mesh", source.mesh is not None),
             "maps": (f"maps: {maps}" if maps else "maps", bool(maps)),
         }
-        self._parts: dict[Part, QCheckBox] = {}
+        self._parts: dict[Part, CheckBox] = {}
         for part, (text, has) in there.items():
-            box = self._parts[part] = QCheckBox(text, self)
+            box = self._parts[part] = CheckBox(text, self, lambda _: self._refresh())
             box.setEnabled(has)
-            box.setChecked(has)
-            box.toggled.connect(self._refresh)
+            box.show_checked(has)
         self._size = sentence("")
         buttons, self._go = accepting(self, "Choose folder…")
-        form = QFormLayout()
-        form.setHorizontalSpacing(16)
-        form.setVerticalSpacing(8)
-        form.addRow("Spans", self._which)
-        form.addRow("Parts", row_of(*self._parts.values(), STRETCH, spacing_px=16))
+        parts = side_by_side(*self._parts.values(), spacing_px=16)
+        form = form_of(("Spans", self._which), ("Parts", parts))
         content = form, self._size, sentence(_ABOUT), STRETCH, buttons
         self.setLayout(column_of(*content, spacing_px=12, margins_px=(16, 16, 16, 16)))
         self._refresh()

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QDialog, QFileDialog, QFormLayout, QWidget
+from PySide6.QtWidgets import QDialog, QFileDialog, QWidget
 
 from sd2app.background.latest import Emit, LatestRunner
 from sd2app.feature import Shell
@@ -14,7 +14,7 @@ from sd2app.labels.model import LabelsModel
 from sd2app.session.session import Session
 from sd2app.widgets.dialogs import ExportButtons
 from sd2app.widgets.inputs import Choice
-from sd2app.widgets.layouts import STRETCH, column_of
+from sd2app.widgets.layouts import STRETCH, column_of, form_of
 from sd2app.widgets.panel import rule, say, sentence
 from sd2app.widgets.text import counted
 from sd2core.errors import Sd2Error
@@ -76,10 +76,14 @@ class LabelExportDialog(QDialog):
         self._format.currentIndexChanged.connect(self._look)
         self._about, self._said = sentence(""), sentence("")
         self._buttons = ExportButtons(self, self._ask)
-        form = QFormLayout()
-        form.setHorizontalSpacing(12)
-        form.addRow("For", self._format)
-        parts = form, self._about, rule(), self._said, STRETCH, self._buttons
+        parts = (
+            form_of(("For", self._format)),
+            self._about,
+            rule(),
+            self._said,
+            STRETCH,
+            self._buttons,
+        )
         self.setLayout(column_of(*parts, spacing_px=8, margins_px=(16, 16, 16, 16)))
         self._look()
         self.resize(560, 300)

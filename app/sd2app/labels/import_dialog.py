@@ -9,7 +9,6 @@ from pathlib import Path
 from PySide6.QtWidgets import (
     QDialog,
     QFileDialog,
-    QFormLayout,
     QLabel,
     QWidget,
 )
@@ -19,7 +18,7 @@ from sd2app.feature import Shell
 from sd2app.labels.edits import LabelEdits
 from sd2app.widgets.dialogs import LABEL_FILES, LABEL_SUFFIXES, accepting
 from sd2app.widgets.inputs import Choice
-from sd2app.widgets.layouts import column_of
+from sd2app.widgets.layouts import column_of, form_of
 from sd2app.widgets.panel import FactRows, rule, say, sentence, title
 from sd2app.widgets.text import counted
 from sd2core.labels.formats import FORMATS, format_for, read_labels
@@ -111,12 +110,8 @@ class LabelImportDialog(QDialog):
         self._way.show_value("add" if labels.spans else "replace")
         self._way.currentIndexChanged.connect(self._refresh)
         buttons, self._import = accepting(self, "Import")
-        form, take = QFormLayout(), QFormLayout()
-        for rows in (form, take):
-            rows.setHorizontalSpacing(12)
-        form.addRow("Read as", self._format)
-        form.addRow(self._observation_name, self._observation)
-        take.addRow("Take them", self._way)
+        form = form_of(("Read as", self._format), (self._observation_name, self._observation))
+        take = form_of(("Take them", self._way))
         content = form, rule(), self._said, self._facts, rule(), take, self._consequence
         parts = title(path.name), *content, 8, buttons
         self.setLayout(column_of(*parts, spacing_px=8, margins_px=(16, 16, 16, 16)))

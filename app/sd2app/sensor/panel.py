@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QComboBox, QFormLayout, QGridLayout, QLabel, QWidg
 from sd2app.maps.model import SynthesisModel
 from sd2app.session.session import Session
 from sd2app.widgets.inputs import Choice, NumberBox
-from sd2app.widgets.layouts import STRETCH, column_of, row_of
+from sd2app.widgets.layouts import STRETCH, column_of, form_of, row_of
 from sd2app.widgets.panel import outlined, rule, sentence, title
 from sd2core.radar_config import RadarConfig
 from sd2core.sensor import aimed_at, position_from_spherical, spherical_from_position
@@ -125,12 +125,12 @@ class SensorPanel(QWidget):
         )
         field.setText("drawn, not applied")
         self._beyond_name = QLabel(self)
-        form = _form()
-        form.addRow("Range to torso", self._torso)
-        form.addRow("Visible", self._visible)
-        form.addRow(self._beyond_name, self._beyond)
-        form.addRow("Field of view", field)
-        return form
+        return _form_of(
+            ("Range to torso", self._torso),
+            ("Visible", self._visible),
+            (self._beyond_name, self._beyond),
+            ("Field of view", field),
+        )
 
     def _capture_part(self) -> QWidget:
         edits, part = self._session.edits, QWidget(self)
@@ -146,9 +146,7 @@ class SensorPanel(QWidget):
         self._clutter.setSizeAdjustPolicy(
             QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
         )
-        form = _form()
-        form.addRow("Offset", self._offset)
-        form.addRow("Clutter", self._clutter)
+        form = _form_of(("Offset", self._offset), ("Clutter", self._clutter))
         limits = QGridLayout()
         limits.setHorizontalSpacing(12)
         limits.setVerticalSpacing(3)
@@ -231,10 +229,8 @@ class SensorPanel(QWidget):
         )
 
 
-def _form() -> QFormLayout:
-    form = QFormLayout()
-    form.setHorizontalSpacing(12)
-    form.setVerticalSpacing(3)
+def _form_of(*rows: tuple[str | QWidget, QWidget]) -> QFormLayout:
+    form = form_of(*rows, gaps_px=(12, 3))
     form.setLabelAlignment(Qt.AlignmentFlag.AlignLeft)
     return form
 

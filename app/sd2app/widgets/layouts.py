@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
-from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QBoxLayout,
+    QFormLayout,
+    QHBoxLayout,
+    QLayout,
+    QVBoxLayout,
+    QWidget,
+)
 
 Part = QWidget | QLayout | int | tuple[QWidget | QLayout | None, int]
 """A widget or a layout, perhaps with its share of what room is left over; or pixels of a gap."""
@@ -28,6 +35,19 @@ def column_of(
     layout = QVBoxLayout()
     _fill(layout, parts, spacing_px, margins_px)
     return layout
+
+
+def form_of(
+    *rows: tuple[str | QWidget, QWidget | QLayout], gaps_px: tuple[int, int] = (16, 8)
+) -> QFormLayout:
+    """Fields below each other, each with its name; gaps across and down."""
+    form = QFormLayout()
+    form.setHorizontalSpacing(gaps_px[0])
+    form.setVerticalSpacing(gaps_px[1])
+    form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
+    for name, field in rows:
+        form.addRow(name, field)
+    return form
 
 
 def pane(*parts: Part) -> QWidget:
