@@ -40,12 +40,10 @@ class MeasuredModel(QObject):
         self._scene: tuple[MeshSequence, SynthesisOptions] | None = None
         self._place: VirtualSensor | None = None
         self._known: dict[Family, Measurement] = {}
-        self._meter = ListedRunner("measure", jobs, self)
-        self._meter.finished.connect(self._receive)
+        self._meter = ListedRunner("measure", jobs, self, self._receive)
         for signal in (self._meter.partial, self._meter.idle_changed):
             signal.connect(self.changed)
-        self._memory = LatestRunner("remember", self)
-        self._memory.finished.connect(self._receive_remembered)
+        self._memory = LatestRunner("remember", self, self._receive_remembered)
         for runner in (self._meter, self._memory):
             runner.failed.connect(lambda error: self.failed.emit(str(error)))
 

@@ -71,9 +71,7 @@ class AccuracyModel(QObject):
         self.measured.failed.connect(self.failed)
         self.tolerance = settings.tolerance  # relative L1 after smoothing that the user accepts
         self._scene: tuple[MeshSequence, SynthesisOptions] | None = None
-        self._runner = ListedRunner("choose", jobs, self)
-        self._runner.finished.connect(self._decide)
-        self._runner.failed.connect(self._fail)
+        self._runner = ListedRunner("choose", jobs, self, self._decide, self._fail)
         self._runner.cancelled.connect(self._decide)
         self._runner.idle_changed.connect(self.changed)
         self._forget()

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 from PySide6.QtCore import QObject
-from PySide6.QtWidgets import QFileDialog, QWidget
+from PySide6.QtWidgets import QWidget
 
 from sd2app.agreement.model import AgreementModel
 from sd2app.agreement.panel import AgreementPanel
@@ -14,7 +13,7 @@ from sd2app.agreement.timeline import OtherTimeline
 from sd2app.feature import Action, Feature, Shell
 from sd2app.labels.model import LabelsModel
 from sd2app.session.session import Session
-from sd2app.widgets.dialogs import LABEL_FILES
+from sd2app.widgets.dialogs import LABEL_FILES, ask_file
 
 
 class AgreementFeature(Feature):
@@ -60,11 +59,10 @@ class AgreementFeature(Feature):
         return bool(self.model.disagreements)
 
     def _compare(self) -> None:
-        name, _ = QFileDialog.getOpenFileName(
-            self._shell.dialog_parent, "Compare with another's labels", "", LABEL_FILES
-        )
-        if name:
-            self.model.open(Path(name))
+        parent = self._shell.dialog_parent
+        path = ask_file(parent, "Compare with another's labels", LABEL_FILES)
+        if path is not None:
+            self.model.open(path)
             self._shell.bring_up("Agree")
 
     def panels(self) -> Mapping[str, QWidget]:

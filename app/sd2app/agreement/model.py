@@ -38,10 +38,8 @@ class AgreementModel(QObject):
         self.left_out = 0  # spans of theirs outside the recording
         self.found: Agreement | None = None  # until it is computed
         self.disagreements: tuple[Disagreement, ...] = ()  # in order
-        self._reader = LatestRunner("labels", self)
-        self._reader.finished.connect(self._receive)
-        self._comparer = LatestRunner("agreement", self)
-        self._comparer.finished.connect(self._take)
+        self._reader = LatestRunner("labels", self, self._receive)
+        self._comparer = LatestRunner("agreement", self, self._take)
         for runner in (self._reader, self._comparer):
             runner.failed.connect(lambda error: self.failed.emit(str(error)))
         labels.changed.connect(self._compare)

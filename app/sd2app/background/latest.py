@@ -29,7 +29,7 @@ class LatestRunner(QObject):
 
     Results of a cancelled task are dropped by their revision number, so a
     listener sees only what belongs to the newest request. Signals arrive in
-    the thread that owns the runner.
+    the thread that owns the runner; ``take`` and ``refuse`` get results and errors.
     """
 
     partial = Signal(object)
@@ -39,7 +39,13 @@ class LatestRunner(QObject):
 
     _posted = Signal(int, str, object)
 
-    def __init__(self, name: str, parent: QObject | None = None) -> None:
+    def __init__(
+        self,
+        name: str,
+        parent: QObject | None = None,
+        take: Callable[[Any], object] | None = None,
+        refuse: Callable[[Exception], object] | None = None,
+    ) -> None:
         super().__init__(parent)
         self._name = name
         self._wakeup = threading.Condition()
@@ -49,6 +55,10 @@ class LatestRunner(QObject):
         self.busy = False  # true while the newest request waits for its result
         self._thread: threading.Thread | None = None
         self._posted.connect(self._deliver)
+        if take is not None:
+            self.finished.connect(take)
+        if refuse is not None:
+            self.failed.connect(refuse)
 
     def submit(self, task: Task) -> int:
         """Ask for ``task(emit)`` in the background; returns its revision number."""

@@ -136,9 +136,7 @@ class RunMonitor(QObject, Generic[F]):
         self._cancelled_s: float | None = None
         self._stopped_s: float | None = None
         self._poll_ms = poll_ms or POLL_MS
-        self._looker = LatestRunner("run", self)
-        self._looker.finished.connect(self._take)
-        self._looker.failed.connect(self._fail)
+        self._looker = LatestRunner("run", self, self._take, self._fail)
         self._timer = QTimer(self)
         self._timer.timeout.connect(self.poll)
         self._timer.start(self._poll_ms)

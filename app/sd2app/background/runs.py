@@ -67,12 +67,10 @@ class Runs(QObject, Generic[Run]):
         self.known: tuple[KnownRun, ...] = ()  # on disk, the newest first
         self._taking_up = self._watched = False
         self._set_up: RunSetup[Any] | None = None
-        self._lister = LatestRunner("runs", self)
-        self._lister.finished.connect(self._list)
+        self._lister = LatestRunner("runs", self, self._list)
         # The disk may be away for a moment; it is looked at again.
         self._lister.failed.connect(lambda error: self.listed.emit())
-        self._timer = QTimer(self)
-        self._timer.setInterval(_LIST_MS)
+        self._timer = QTimer(self, interval=_LIST_MS)
         self._timer.timeout.connect(self.refresh)
 
     # --- what subclasses say ----------------------------------------------------------------

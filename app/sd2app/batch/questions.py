@@ -15,6 +15,7 @@ from sd2app.batch.results import Result
 from sd2app.feature import Shell
 from sd2app.sensor.placements import PlacementsModel
 from sd2app.session.session import Session
+from sd2app.widgets.dialogs import ask_file, ask_folder, ask_new
 from sd2app.widgets.text import counted
 from sd2core.batch.plan_file import write_plan
 from sd2core.errors import Sd2Error
@@ -76,9 +77,9 @@ class BatchQuestions(QObject):
 
     def add_folder(self) -> None:
         """Let the user choose a folder of recordings, videos or meshes."""
-        name = QFileDialog.getExistingDirectory(self._over, "A recording, or a folder of some")
-        if name:
-            self._batch.setup.add(Path(name))
+        path = ask_folder(self._over, "A recording, or a folder of some")
+        if path is not None:
+            self._batch.setup.add(path)
 
     def placement_choices(self) -> Sequence[str]:
         """Choices of sensor placements in words."""
@@ -113,12 +114,12 @@ class BatchQuestions(QObject):
         self._batch.changed.emit()  # the choice goes back where nothing was chosen
 
     def _ask_placements(self) -> None:
-        name, _ = QFileDialog.getOpenFileName(self._over, "Placements", "", _PLACEMENTS)
-        if name:
+        path = ask_file(self._over, "Placements", _PLACEMENTS)
+        if path is not None:
             found: list[Placements] = []
-            self._attempt(lambda: found.append(read_placements(Path(name))))
+            self._attempt(lambda: found.append(read_placements(path)))
             if found:
-                self._batch.setup.set_placements(found[0], Path(name).name)
+                self._batch.setup.set_placements(found[0], path.name)
 
     def _follow_plan(self) -> None:
         """Follow the plan of the open recording, if that was chosen."""
@@ -133,18 +134,15 @@ class BatchQuestions(QObject):
     def choose_out(self) -> None:
         """Let the user choose the folder of the results."""
         start = str(self._batch.setup.out or "")
-        name, _ = QFileDialog.getSaveFileName(self._over, "Folder of the results", start)
-        if name:
-            self._batch.setup.set_out(Path(name))
+        folder = ask_new(self._over, "Folder of the results", start)
+        if folder is not None:
+            self._batch.setup.set_out(folder)
 
     def save_plan(self) -> None:
         """Let the user choose a file for the plan."""
-        name, _ = QFileDialog.getSaveFileName(
-            self._over, "Save plan", "plan.toml", "Plan of a batch (*.toml)"
-        )
-        if name:
-            path = Path(name)
-            path = path if path.suffix == ".toml" else path.with_name(path.name + ".toml")
+        kinds = "Plan of a batch (*.toml)"
+        path = ask_new(self._over, "Save plan", "plan.toml", kinds, ".toml")
+        if path is not None:
             self._attempt(lambda: write_plan(path, self._batch.setup.plan()))
 
     def start(self) -> None:
@@ -155,9 +153,9 @@ class BatchQuestions(QObject):
 
     def open_batch(self) -> None:
         """Let the user choose a batch in another folder, such as one started in a terminal."""
-        name = QFileDialog.getExistingDirectory(self._over, "Folder of a batch")
-        if name:
-            self._attempt(lambda: self._batch.open_batch(Path(name)))
+        path = ask_folder(self._over, "Folder of a batch")
+        if path is not None:
+            self._attempt(lambda: self._batch.open_batch(path))
 
     def resume(self) -> None:
         """Resume the batch in view."""

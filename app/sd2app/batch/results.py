@@ -44,8 +44,7 @@ class BatchResults(RecordTableModel[Result]):
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__([Heading(text) for text in _COLUMNS], parent)
         self.card = ""  # of the exported data set, as Markdown; empty where there is none
-        self._runner = LatestRunner("results", self)
-        self._runner.finished.connect(self._take)
+        self._runner = LatestRunner("results", self, self._take)
         # There may be none, or the disk is away.
         self._runner.failed.connect(lambda error: self.forget())
 

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from PySide6.QtWidgets import QFileDialog
-
 from sd2app.classify.model import ClassifyModel
 from sd2app.classify.text import classifier_page
 from sd2app.classify.training import ClassTraining
 from sd2app.feature import Shell
 from sd2app.session.content import UNTITLED
 from sd2app.session.session import Session
+from sd2app.widgets.dialogs import ask_file, ask_folder
 from sd2app.widgets.model_card_dialog import ModelCardDialog
 from sd2core.errors import Sd2Error
 
@@ -33,9 +32,9 @@ class ClassifyDialogs:
     def open_classifier(self) -> None:
         """Choose a file, and use it."""
         start = str(self._classify.path or "")
-        name, _ = QFileDialog.getOpenFileName(self._parent, "Open classifier file", start, _FILES)
-        if name:
-            self.use(Path(name))
+        path = ask_file(self._parent, "Open classifier file", _FILES, start)
+        if path is not None:
+            self.use(path)
 
     def use(self, path: Path | None) -> None:
         """Classify with a file, or not at all."""
@@ -60,20 +59,16 @@ class ClassifyDialogs:
 
     def add_folder(self) -> None:
         """Let the user choose a folder with labelled data."""
-        name = QFileDialog.getExistingDirectory(
-            self._parent,
-            "A campaign, a data set, a recording, or a folder of recordings",
-        )
-        if name:
-            self._training.setup.add(Path(name))
+        title = "A campaign, a data set, a recording, or a folder of recordings"
+        path = ask_folder(self._parent, title)
+        if path is not None:
+            self._training.setup.add(path)
 
     def add_file(self) -> None:
         """Let the user choose a data set or a labelled radar file."""
-        name, _ = QFileDialog.getOpenFileName(
-            self._parent, "Data set or labelled radar file", "", _DATA
-        )
-        if name:
-            self._training.setup.add(Path(name))
+        path = ask_file(self._parent, "Data set or labelled radar file", _DATA)
+        if path is not None:
+            self._training.setup.add(path)
 
     def add_this(self) -> None:
         """Learn from the recording that is open."""
@@ -94,9 +89,9 @@ class ClassifyDialogs:
 
     def open_result(self) -> None:
         """Let the user choose a result, and show it."""
-        name, _ = QFileDialog.getOpenFileName(self._parent, "Open a result", "", _RESULTS)
-        if name:
-            self._show(Path(name))
+        path = ask_file(self._parent, "Open a result", _RESULTS)
+        if path is not None:
+            self._show(path)
 
     def _show(self, path: Path) -> None:
         # Imported here because a result needs what loads torch.

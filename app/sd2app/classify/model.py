@@ -61,9 +61,7 @@ class ClassifyModel(QObject):
         self._problem = ""
         self.shown = self._settings.flag(_SHOWN, True)  # under the maps, as the user wants it
         self._chosen: MapModel | None = None
-        self._runner = LatestRunner("classifier", self)
-        self._runner.finished.connect(self._set_loaded)
-        self._runner.failed.connect(self._fail)
+        self._runner = LatestRunner("classifier", self, self._set_loaded, self._fail)
         self._patience = delayed(self._load, _PATIENCE_MS, self)
         self.track.changed.connect(self.moved)
         for track in self._maps:

@@ -79,10 +79,8 @@ class ClassTrack(QObject):
         self._classifier: RemoteClassifier | None = None
         self.card: ClassifierCard | None = None  # of the classifier at work
         self.problem = ""  # why this map cannot be classified
-        self._runner = LatestRunner("classify", self)
+        self._runner = LatestRunner("classify", self, self._finish, self._fail)
         self._runner.partial.connect(self._receive)
-        self._runner.finished.connect(self._finish)
-        self._runner.failed.connect(self._fail)
         self._calm = delayed(self._go_on, _BETWEEN_MS, self)
         self._forget()
 

@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
 
 from sd2app.dataset_export.model import MAPS, ExportModel
 from sd2app.dataset_export.text import label_words, size_words, split_words
+from sd2app.widgets.dialogs import ask_folder, with_suffix
 from sd2app.widgets.inputs import CheckBox, Choice, NumberBox
 from sd2app.widgets.layouts import STRETCH, column_of, form_of, row_of
 from sd2app.widgets.panel import ElidedLabel, outlined, rule, sentence, side_by_side
@@ -227,9 +228,9 @@ class ExportDialog(QDialog):
         self._model.choose(subjects=names)
 
     def _ask_place(self) -> None:
-        name = QFileDialog.getExistingDirectory(self, "A recording, or a folder of recordings")
-        if name:
-            self._model.begin(Path(name))
+        path = ask_folder(self, "A recording, or a folder of recordings")
+        if path is not None:
+            self._model.begin(path)
 
     def _ask_out(self) -> None:
         choice = self._model.choice
@@ -242,10 +243,7 @@ class ExportDialog(QDialog):
             options=QFileDialog.Option.DontConfirmOverwrite,
         )  # fmt: skip
         if name:
-            path = Path(name)
-            if path.suffix.lower() != choice.ending:
-                path = path.with_name(path.name + choice.ending)
-            self._model.start(path)
+            self._model.start(with_suffix(Path(name), choice.ending))
 
     def _show_folder(self) -> None:
         result = self._model.result

@@ -130,9 +130,7 @@ class ExportModel(Runs[ExportRun]):
         self.places = 0  # planned besides the recordings' own sensors, the most of any
         self.result: Exported | None = None  # written last, until something else is chosen
         self._counted: _Counted | None = None
-        self._runner = LatestRunner("count segments", self)
-        self._runner.finished.connect(self._receive)
-        self._runner.failed.connect(self._refuse)
+        self._runner = LatestRunner("count segments", self, self._receive, self._refuse)
         self._job: Job | None = None
         self._over: set[Path] = set()
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from PySide6.QtCore import QObject
-from PySide6.QtWidgets import QFileDialog, QMenu
+from PySide6.QtWidgets import QMenu
 
 from sd2app.background.model_worker.library import DenoiserLibrary
 from sd2app.denoise.live import LiveDenoiseModel
@@ -16,7 +16,7 @@ from sd2app.feature import Action, Feature, Shell
 from sd2app.maps.model import SynthesisModel
 from sd2app.maps.stack import MapStack
 from sd2app.session.session import Session
-from sd2app.widgets.dialogs import ask_map
+from sd2app.widgets.dialogs import ask_file, ask_map
 from sd2app.widgets.model_card_dialog import ModelCardDialog
 from sd2app.widgets.model_menu import ModelButton, ModelMenu, Words
 
@@ -120,11 +120,9 @@ class DenoiseFeature(Feature):
 
     def _open(self) -> None:
         start = str(self.model.path or "")
-        name, _ = QFileDialog.getOpenFileName(
-            self._shell.dialog_parent, "Open model file", start, _MODELS
-        )
-        if name:
-            self.use(Path(name))
+        path = ask_file(self._shell.dialog_parent, "Open model file", _MODELS, start)
+        if path is not None:
+            self.use(path)
 
     def _show_card(self) -> None:
         if self.model.card is not None:

@@ -47,8 +47,7 @@ class LiveDenoiseModel(QObject):
         self._session: RemoteLive | None = None
         self._next = 0
         self._fresh = True
-        self._runner = LatestRunner("live", self)
-        self._runner.finished.connect(self._receive)
+        self._runner = LatestRunner("live", self, self._receive)
         self._runner.failed.connect(self._end)
         self._playback.playing_changed.connect(self._follow)
         self._playback.frame_changed.connect(self._advance)

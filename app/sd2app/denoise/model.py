@@ -63,9 +63,7 @@ class DenoiseModel(QObject):
         self._before: Loaded | None = None
         self._comparing = False
         self._awake = False
-        self._runner = LatestRunner("denoiser", self)
-        self._runner.finished.connect(self._set_model)
-        self._runner.failed.connect(self._fail)
+        self._runner = LatestRunner("denoiser", self, self._set_model, self._fail)
         self._patience = delayed(self._wake, _PATIENCE_MS, self)
         self.map.failed.connect(self._say_problem)
         self.map.idle.connect(self.changed)

@@ -54,9 +54,7 @@ class DrawnFigure(QObject):
         self.picture: NDArray[np.uint8] | None = None  # the preview, RGBA of shape (H, W, 4)
         self.problem = ""  # why the figure cannot be drawn
         self.exporting = False  # the figure is being written
-        self._runner = LatestRunner(name, self)
-        self._runner.finished.connect(self._receive)
-        self._runner.failed.connect(self._refuse)
+        self._runner = LatestRunner(name, self, self._receive, self._refuse)
         self._runner.idle_changed.connect(lambda _: self.changed.emit())
 
     @property

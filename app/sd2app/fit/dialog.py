@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 
 from PySide6.QtCore import QSignalBlocker, Qt
 from PySide6.QtWidgets import (
     QDialog,
-    QFileDialog,
     QLabel,
     QSlider,
     QToolButton,
@@ -18,7 +16,7 @@ from PySide6.QtWidgets import (
 from sd2app.fit.person_picker import PersonPicker
 from sd2app.fit.setup import ANGLES_DEG, DEFAULT_STATURE_M, STATURES_M, FitSetupModel
 from sd2app.palette import Palette
-from sd2app.widgets.dialogs import accepting
+from sd2app.widgets.dialogs import accepting, ask_file, ask_new
 from sd2app.widgets.inputs import CheckBox, Choice, NumberBox
 from sd2app.widgets.layouts import STRETCH, column_of, form_of, row_of
 from sd2app.widgets.panel import ElidedLabel, outlined, say, sentence, side_by_side
@@ -177,16 +175,15 @@ class NewFromVideoDialog(QDialog):
 
     def _ask_video(self) -> None:
         start = str(self._setup.video.parent) if self._setup.video is not None else ""
-        name, _ = QFileDialog.getOpenFileName(self, "Video of a person", start, VIDEOS)
-        if name:
-            self._setup.choose_video(Path(name))
+        path = ask_file(self, "Video of a person", VIDEOS, start)
+        if path is not None:
+            self._setup.choose_video(path)
 
     def _ask_folder(self) -> None:
-        name, _ = QFileDialog.getSaveFileName(
-            self, "Save recording as", str(self._setup.choices.folder), "Recording (*.sd2)"
-        )
-        if name:
-            self._setup.change(folder=Path(name))
+        start = str(self._setup.choices.folder)
+        folder = ask_new(self, "Save recording as", start, "Recording (*.sd2)")
+        if folder is not None:
+            self._setup.change(folder=folder)
 
 
 def _hint(text: str) -> QLabel:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, SignalInstance
-from PySide6.QtWidgets import QDialog, QFileDialog, QMessageBox, QWidget
+from PySide6.QtWidgets import QDialog, QMessageBox, QWidget
 
 from sd2app.feature import Action, Feature, Shell
 from sd2app.fit.bar import FitBar
@@ -18,6 +18,7 @@ from sd2app.fit.on_screen import FitOnScreen
 from sd2app.fit.request import FitRequest
 from sd2app.fit.setup import FitSetupModel
 from sd2app.session.session import Session
+from sd2app.widgets.dialogs import ask_file
 from sd2core.runs.command_folder import COMMAND_IN_FOLDER
 
 
@@ -86,10 +87,9 @@ class FitFeature(Feature):
         if model.state in ("stopped", "failed") and model.request is not None:
             video = model.request.video
         if video is None:
-            name, _ = QFileDialog.getOpenFileName(window, "Video of a person", "", VIDEOS)
-            if not name:
+            video = ask_file(window, "Video of a person", VIDEOS)
+            if video is None:
                 return
-            video = Path(name)
         setup = FitSetupModel(window)
         setup.choose_video(video, self._session.document.recording)
         dialog = NewFromVideoDialog(setup, self._session.display.palette, window)

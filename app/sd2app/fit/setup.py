@@ -51,12 +51,8 @@ class FitSetupModel(QObject):
         self.frame = 0  # the one to look at
         self.picture: NDArray[np.uint8] | None = None  # RGB, (H, W, 3)
         self._reader: VideoReader | None = None
-        self._opener = LatestRunner("fit-video", self)
-        self._opener.finished.connect(self._take_video)
-        self._opener.failed.connect(self._refuse)
-        self._decoder = LatestRunner("fit-frame", self)
-        self._decoder.finished.connect(self._take_picture)
-        self._decoder.failed.connect(self._refuse)
+        self._opener = LatestRunner("fit-video", self, self._take_video, self._refuse)
+        self._decoder = LatestRunner("fit-frame", self, self._take_picture, self._refuse)
 
     # --- the video ------------------------------------------------------------------------
 

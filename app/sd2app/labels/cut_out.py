@@ -9,7 +9,6 @@ from typing import NamedTuple
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import (
     QDialog,
-    QFileDialog,
     QMessageBox,
     QWidget,
 )
@@ -19,7 +18,7 @@ from sd2app.feature import Shell
 from sd2app.labels.model import LabelsModel
 from sd2app.session.session import Session
 from sd2app.session.tasks import ListedRunner
-from sd2app.widgets.dialogs import accepting
+from sd2app.widgets.dialogs import accepting, ask_folder
 from sd2app.widgets.inputs import CheckBox, Choice
 from sd2app.widgets.layouts import STRETCH, column_of, form_of
 from sd2app.widgets.panel import sentence, side_by_side
@@ -151,9 +150,9 @@ def ask_for_cut_outs(shell: Shell, labels: LabelsModel, model: CutOutModel) -> N
     dialog.deleteLater()
     if not accepted:
         return
-    folder = QFileDialog.getExistingDirectory(shell.dialog_parent, "Folder for the cut-outs")
-    if folder:
-        model.start(spans, parts, Path(folder))
+    folder = ask_folder(shell.dialog_parent, "Folder for the cut-outs")
+    if folder is not None:
+        model.start(spans, parts, folder)
 
 
 def ask_about_others(parent: QWidget, model: CutOutModel, count: int, example: str) -> None:

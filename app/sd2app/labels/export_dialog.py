@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QDialog, QFileDialog, QWidget
+from PySide6.QtWidgets import QDialog, QWidget
 
 from sd2app.background.latest import Emit, LatestRunner
 from sd2app.feature import Shell
 from sd2app.labels.model import LabelsModel
 from sd2app.session.session import Session
-from sd2app.widgets.dialogs import ExportButtons
+from sd2app.widgets.dialogs import ExportButtons, ask_new
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.layouts import STRETCH, column_of, form_of
 from sd2app.widgets.panel import rule, say, sentence
@@ -67,9 +67,7 @@ class LabelExportDialog(QDialog):
         self.losses: tuple[Loss, ...] | None = None  # of the format; None while unknown
         self.problem = ""  # why the file cannot be written
         self.exporting = False
-        self._runner = LatestRunner("labels", self)
-        self._runner.finished.connect(self._receive)
-        self._runner.failed.connect(self._refuse)
+        self._runner = LatestRunner("labels", self, self._receive, self._refuse)
         self.setWindowTitle("Export labels")
         self._format = Choice("The program that is to read the file", self)
         self._format.addItems([one.title for one in FORMATS])
@@ -155,8 +153,7 @@ class LabelExportDialog(QDialog):
     def _ask(self) -> None:
         chosen = self.format
         kinds = " ".join(f"*{suffix}" for suffix in chosen.suffixes)
-        name, _ = QFileDialog.getSaveFileName(
-            self, "Export labels", f"{self._name}{chosen.suffixes[0]}", f"{chosen.title} ({kinds})"
-        )
-        if name:
-            self.export(Path(name))
+        start = f"{self._name}{chosen.suffixes[0]}"
+        path = ask_new(self, "Export labels", start, f"{chosen.title} ({kinds})")
+        if path is not None:
+            self.export(path)

@@ -8,7 +8,6 @@ from pathlib import Path
 
 from PySide6.QtWidgets import (
     QDialog,
-    QFileDialog,
     QLabel,
     QWidget,
 )
@@ -16,7 +15,7 @@ from PySide6.QtWidgets import (
 from sd2app.background.latest import Emit, LatestRunner
 from sd2app.feature import Shell
 from sd2app.labels.edits import LabelEdits
-from sd2app.widgets.dialogs import LABEL_FILES, LABEL_SUFFIXES, accepting
+from sd2app.widgets.dialogs import LABEL_FILES, LABEL_SUFFIXES, accepting, ask_file
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.layouts import column_of, form_of
 from sd2app.widgets.panel import FactRows, rule, say, sentence, title
@@ -47,10 +46,9 @@ def import_labels(shell: Shell, edits: LabelEdits, path: Path | None = None) -> 
         return
     parent = shell.dialog_parent
     if path is None:
-        name, _ = QFileDialog.getOpenFileName(parent, "Import labels", "", LABEL_FILES)
-        if not name:
+        path = ask_file(parent, "Import labels", LABEL_FILES)
+        if path is None:
             return
-        path = Path(name)
     dialog = LabelImportDialog(path, edits.labels.labels, edits.playback.timebase, parent)
     accepted = dialog.exec() == QDialog.DialogCode.Accepted
     incoming, way, name = dialog.incoming, dialog.way, path.stem
@@ -86,10 +84,8 @@ class LabelImportDialog(QDialog):
         self.problem = ""  # why the file cannot be read
         self.observations: tuple[str, ...] = ()  # to choose from, where there are several videos
         self._observed: str | None = None
-        self._runner = LatestRunner("labels", self)
+        self._runner = LatestRunner("labels", self, self._receive, self._refuse)
         self._runner.partial.connect(self._learn)
-        self._runner.finished.connect(self._receive)
-        self._runner.failed.connect(self._refuse)
         self.setWindowTitle("Import labels")
         self._format = Choice(
             "The program that the file is of",

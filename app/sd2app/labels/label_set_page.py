@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 from PySide6.QtCore import (
     QAbstractItemModel,
@@ -18,7 +17,6 @@ from PySide6.QtGui import QColor, QKeyEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QColorDialog,
-    QFileDialog,
     QLineEdit,
     QMenu,
     QStyleOptionViewItem,
@@ -28,6 +26,7 @@ from PySide6.QtWidgets import (
 
 from sd2app.feature import Shell
 from sd2app.labels.label_set_model import CLASS, COLOUR, KEY, NAME, NO_CLASS, LabelSetModel
+from sd2app.widgets.dialogs import ask_file, ask_new
 from sd2app.widgets.icons import swatch_icon
 from sd2app.widgets.inputs import TypedLine
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
@@ -86,16 +85,16 @@ class LabelSetPage(QWidget):
             self._model.use(replace(shown, name=name))
 
     def _import(self) -> None:
-        name, _ = QFileDialog.getOpenFileName(self, "Import label set", "", _FILES)
-        if name:
-            self._shell.attempt(lambda: self._model.use(read_label_set(Path(name))))
+        path = ask_file(self, "Import label set", _FILES)
+        if path is not None:
+            self._shell.attempt(lambda: self._model.use(read_label_set(path)))
 
     def _export(self) -> None:
         shown = self._model.label_set
         start = f"{shown.name or 'labels'}.json".replace("/", "-")
-        name, _ = QFileDialog.getSaveFileName(self, "Export label set", start, _FILES)
-        if name:
-            self._shell.attempt(lambda: write_label_set(Path(name), shown))
+        path = ask_new(self, "Export label set", start, _FILES)
+        if path is not None:
+            self._shell.attempt(lambda: write_label_set(path, shown))
 
     def _added(self) -> None:
         if self._model.add():

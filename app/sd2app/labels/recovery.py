@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import (
     QDialog,
     QDialogButtonBox,
-    QFileDialog,
     QFrame,
     QHeaderView,
     QMessageBox,
@@ -23,7 +20,7 @@ from sd2app.feature import Shell
 from sd2app.labels.autosave import LabelAutosave
 from sd2app.labels.edits import LabelEdits
 from sd2app.session.document import DocumentModel
-from sd2app.widgets.dialogs import may_delete
+from sd2app.widgets.dialogs import ask_new, may_delete
 from sd2app.widgets.layouts import column_of, row_of
 from sd2app.widgets.panel import outlined, sentence, title
 from sd2app.widgets.text import clock_text, counted
@@ -217,12 +214,11 @@ class RecoverLabelsDialog(QDialog):
     def _write_file(self) -> None:
         offer = self.offer
         assert offer is not None
-        name, _ = QFileDialog.getSaveFileName(
-            self, "Write labels", f"{offer.recording.stem}-labels.json", "Labels (*.json)"
-        )
-        if name:
+        start = f"{offer.recording.stem}-labels.json"
+        path = ask_new(self, "Write labels", start, "Labels (*.json)")
+        if path is not None:
             try:
-                write_labels(Path(name), offer.labels, recording=offer.recording)
+                write_labels(path, offer.labels, recording=offer.recording)
             except (OSError, Sd2Error) as error:
                 QMessageBox.warning(self, "Write labels", str(error))
 

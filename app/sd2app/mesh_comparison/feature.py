@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from PySide6.QtWidgets import QFileDialog, QWidget
+from PySide6.QtWidgets import QWidget
 
 from sd2app.feature import Action, Feature, Shell
 from sd2app.mesh_comparison.model import ComparisonModel
@@ -14,6 +14,7 @@ from sd2app.playback.views import TimeRuler
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
 from sd2app.video.overlay_settings import OverlayModel
+from sd2app.widgets.dialogs import ask_file
 
 _MESHES = (
     "Mesh or recording (*.npz *.zip zarr.json *.pkl *.obj *.ply *.glb recording.json);;"
@@ -80,10 +81,8 @@ class MeshComparisonFeature(Feature):
         window.show()
 
     def _ask(self) -> Path | None:
-        name, _ = QFileDialog.getOpenFileName(
-            self._shell.dialog_parent, "Compare with mesh", "", _MESHES
-        )
-        return mesh_of(Path(name)) if name else None
+        path = ask_file(self._shell.dialog_parent, "Compare with mesh", _MESHES)
+        return None if path is None else mesh_of(path)
 
     def _forget(self) -> None:
         window, self._window = self._window, None

@@ -58,9 +58,7 @@ class ComparisonModel(QObject):
         self.problem = ""  # why the meshes cannot be compared
         self._result: _Result | None = None
         self.tracks = (MapModel("", self), MapModel("", self))
-        self._runner = ListedRunner("compare", session.jobs, self)
-        self._runner.finished.connect(self._receive)
-        self._runner.failed.connect(self._refuse)
+        self._runner = ListedRunner("compare", session.jobs, self, self._receive, self._refuse)
         self._runner.cancelled.connect(self.changed)
         session.sensor.changed.connect(self._follow_sensor)
         session.sensor.dragging_changed.connect(self._follow_sensor)

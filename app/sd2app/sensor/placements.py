@@ -54,10 +54,8 @@ class PlacementsModel(QObject):
         self.shown = True  # in the scene
         self._wish: _Wish | None = None
         self._body: tuple[MeshSequence, BodyExtent] | None = None
-        self._runner = LatestRunner("placements", self)
+        self._runner = LatestRunner("placements", self, self._receive, self._fail)
         self._runner.partial.connect(self._receive)
-        self._runner.finished.connect(self._receive)
-        self._runner.failed.connect(self._fail)
         self._document.opened.connect(self._follow)
         self._document.changed.connect(self._follow)
         self._sensor.changed.connect(self.current_changed)

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QImage, QPainter
-from PySide6.QtWidgets import QFileDialog, QGridLayout, QLabel, QWidget
+from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 
 from sd2app.accuracy.model import AccuracyModel
 from sd2app.feature import Shell
@@ -24,6 +23,7 @@ from sd2app.sensor.placements import (
     limits_text,
 )
 from sd2app.widgets.canvas import Canvas
+from sd2app.widgets.dialogs import ask_file, ask_new
 from sd2app.widgets.inputs import CheckBox, Choice, TypedLine
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import FactRows, outlined, rule, sentence, title
@@ -153,24 +153,18 @@ class PlacementsPage(QWidget):
 
     def _import_plan(self) -> None:
         parent = self._shell.dialog_parent
-        name, _ = QFileDialog.getOpenFileName(parent, "Take placements", "", _READ)
-        if name:
-            self._shell.attempt(
-                lambda: self._model.edits.plan_placements(read_placements(Path(name)))
-            )
+        path = ask_file(parent, "Take placements", _READ)
+        if path is not None:
+            self._shell.attempt(lambda: self._model.edits.plan_placements(read_placements(path)))
 
     def _export_plan(self) -> None:
         plan = self._model.plan
         if plan is None:
             return
-        name, _ = QFileDialog.getSaveFileName(
-            self._shell.dialog_parent, "Export placements", "placements.json", _WRITTEN
-        )
-        if not name:
+        parent = self._shell.dialog_parent
+        path = ask_new(parent, "Export placements", "placements.json", _WRITTEN, ".json")
+        if path is None:
             return
-        path = Path(name)
-        if path.suffix.lower() != ".json":
-            path = path.with_name(path.name + ".json")
         try:
             write_placements(path, plan)
         except OSError as error:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 from PySide6.QtCore import QObject, Signal
 
@@ -70,8 +71,15 @@ class ListedRunner(LatestRunner):
 
     cancelled = Signal()  # by the user
 
-    def __init__(self, name: str, tasks: TaskList, parent: QObject | None = None) -> None:
-        super().__init__(name, parent)
+    def __init__(
+        self,
+        name: str,
+        tasks: TaskList,
+        parent: QObject | None = None,
+        take: Callable[[Any], object] | None = None,
+        refuse: Callable[[Exception], object] | None = None,
+    ) -> None:
+        super().__init__(name, parent, take, refuse)
         self._tasks = tasks
         self.job: Job | None = None
         self.partial.connect(self._report)

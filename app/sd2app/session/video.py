@@ -26,9 +26,7 @@ class VideoModel(QObject):
         self.picture: NDArray[np.uint8] | None = None  # RGB picture on screen, (H, W, 3)
         self.shown_frame = -1  # frame of the video that the picture is; -1 for none
         self._wanted = -1
-        self._runner = LatestRunner("video", self)
-        self._runner.finished.connect(self._receive)
-        self._runner.failed.connect(self._report)
+        self._runner = LatestRunner("video", self, self._receive, self._report)
         playback.frame_changed.connect(self._follow)
 
     @property

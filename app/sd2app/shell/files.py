@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QFileDialog, QMenu, QMessageBox
 
 from sd2app.feature import Action, Feature, Shell
 from sd2app.session.session import Session
+from sd2app.widgets.dialogs import ask_folder, ask_new
 from sd2core.files.resources import resource_path
 
 _FILES = (
@@ -143,12 +144,11 @@ class FilesFeature(Feature):
 
     def save_as(self) -> bool:
         """Ask for a new recording folder and save there."""
-        name, _ = QFileDialog.getSaveFileName(
-            self._shell.dialog_parent, "Save recording as", f"{self._document.title}.sd2"
-        )
-        if not name:
+        start = f"{self._document.title}.sd2"
+        path = ask_new(self._shell.dialog_parent, "Save recording as", start)
+        if path is None:
             return False
-        return self._shell.attempt(lambda: (self._document.save_as(Path(name)), True)) is not None
+        return self._shell.attempt(lambda: (self._document.save_as(path), True)) is not None
 
     def may_discard(self) -> bool:
         """True once unsaved edits are saved or given up by the user's decision."""
@@ -175,5 +175,4 @@ class FilesFeature(Feature):
         return [Path(name) for name in names]
 
     def _ask_folder(self, title: str) -> Path | None:
-        name = QFileDialog.getExistingDirectory(self._shell.dialog_parent, title)
-        return Path(name) if name else None
+        return ask_folder(self._shell.dialog_parent, title)

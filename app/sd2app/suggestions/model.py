@@ -42,9 +42,7 @@ class SuggestionsModel(QObject):
         self._declined: tuple[Span, ...] = ()
         self._home = self._labels.track
         self._made: tuple[Labels, int] | None = None
-        self._runner = LatestRunner("suggest", self)
-        self._runner.finished.connect(self._receive)
-        self._runner.failed.connect(self._fail)
+        self._runner = LatestRunner("suggest", self, self._receive, self._fail)
         self._runner.idle_changed.connect(lambda _: self.changed.emit())
         self._labels.changed.connect(self._follow)
         self._labels.selection_changed.connect(self._remember_home)

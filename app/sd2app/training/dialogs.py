@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
-from PySide6.QtWidgets import QCheckBox, QFileDialog, QMessageBox
+from PySide6.QtWidgets import QCheckBox, QMessageBox
 
 from sd2app.feature import Shell
 from sd2app.training.model import TrainingModel
+from sd2app.widgets.dialogs import ask_folder
 
 
 class TrainingDialogs:
@@ -19,21 +18,21 @@ class TrainingDialogs:
 
     def ask_store(self) -> None:
         """Let the user choose a store of pairs."""
-        name = QFileDialog.getExistingDirectory(self._parent, "Folder of pairs to learn from")
-        if name:
-            self._training.setup.add(Path(name))
+        path = ask_folder(self._parent, "Folder of pairs to learn from")
+        if path is not None:
+            self._training.setup.add(path)
 
     def ask_recordings(self) -> None:
         """Let the user choose recordings to make pairs of."""
-        name = QFileDialog.getExistingDirectory(self._parent, "A recording, or a folder of some")
-        if name:
-            self.shell.attempt(lambda: self._training.pair_maker.make(Path(name)))
+        path = ask_folder(self._parent, "A recording, or a folder of some")
+        if path is not None:
+            self.shell.attempt(lambda: self._training.pair_maker.make(path))
 
     def open_run(self) -> None:
         """Let the user choose a run in another folder, such as one started in a terminal."""
-        name = QFileDialog.getExistingDirectory(self._parent, "Folder of a run")
-        if name:
-            self.shell.attempt(lambda: self._training.open_run(Path(name)))
+        path = ask_folder(self._parent, "Folder of a run")
+        if path is not None:
+            self.shell.attempt(lambda: self._training.open_run(path))
 
     def may_leave(self) -> bool:
         """True if the window may close; decides on a run under way."""

@@ -65,7 +65,31 @@ def ask_figure(parent: QWidget, title: str, name: str) -> Path | None:
     return path if path.suffix else path.with_suffix(f".{kind[:3].lower()}")
 
 
+def ask_file(parent: QWidget, title: str, kinds: str, start: str = "") -> Path | None:
+    """Let the user choose a file that is there."""
+    chosen, _ = QFileDialog.getOpenFileName(parent, title, start, kinds)
+    return Path(chosen) if chosen else None
+
+
+def ask_folder(parent: QWidget, title: str) -> Path | None:
+    """Let the user choose a folder that is there."""
+    chosen = QFileDialog.getExistingDirectory(parent, title)
+    return Path(chosen) if chosen else None
+
+
+def ask_new(
+    parent: QWidget, title: str, start: str, kinds: str = "", suffix: str = ""
+) -> Path | None:
+    """Let the user name a file or folder to write; ``suffix`` is added where it is missing."""
+    chosen, _ = QFileDialog.getSaveFileName(parent, title, start, kinds)
+    return with_suffix(Path(chosen), suffix) if chosen else None
+
+
+def with_suffix(path: Path, suffix: str) -> Path:
+    """Path with a suffix after its name, unless it has it."""
+    return path if path.suffix.lower() == suffix else path.with_name(path.name + suffix)
+
+
 def ask_map(parent: QWidget, title: str, name: str) -> Path | None:
     """Let the user choose the file of a Doppler map."""
-    chosen, _ = QFileDialog.getSaveFileName(parent, title, name, "Doppler map (*.npz)")
-    return Path(chosen) if chosen else None
+    return ask_new(parent, title, name, "Doppler map (*.npz)")

@@ -173,7 +173,7 @@ class TestAfterACrash:
             assert not dialog._open.isEnabled()
             assert "is not there any more" in dialog._open.toolTip()
             monkeypatch.setattr(
-                "sd2app.labels.recovery.QFileDialog.getSaveFileName",
+                "PySide6.QtWidgets.QFileDialog.getSaveFileName",
                 lambda *_: (str(out), ""),
             )
             qtbot.mouseClick(dialog._write, Qt.MouseButton.LeftButton)
