@@ -61,11 +61,6 @@ class Settings:
         value = self._store.value(name)
         return default if value is None else str(value).lower() == "true"
 
-    def share(self, name: str, default: float) -> float:
-        """A number from 0 to 1."""
-        share = self.stored(name, default)
-        return share if 0 <= share <= 1 else default
-
     def stored(self, name: str, default: T) -> T:
         """A value of the default's type; the default where what is stored is none."""
         value = self._store.value(name)

@@ -25,7 +25,7 @@ from sd2core.batch.task_graph import TaskGraph
 from sd2core.batch.tasks import Task
 from sd2core.errors import Sd2Error
 from sd2core.progress import Progress, silent
-from sd2core.runs.pace import Kind, known_pace_s
+from sd2core.runs.pace import Kind, fit_kind, known_pace_s
 
 _INSPECTED = 100
 _FITTED_VERTICES = {"low": 1_229, "medium": 5_000, "high": 13_348}
@@ -118,7 +118,7 @@ def pace_kind(plan: BatchPlan, step: Step) -> Kind:
     """Kind of a step, whose items are those of :attr:`Task.work`; see :mod:`sd2core.runs.pace`."""
     if step == "fit":
         assert plan.fit is not None
-        return ("fit", plan.fit.resolution)
+        return fit_kind(plan.fit.resolution)
     section = getattr(plan, step, None)
     if section is None:
         return ("batch", step)

@@ -159,7 +159,7 @@ def _make(options: argparse.Namespace) -> None:
 
         check_output(options.landmarks, ".npz")
     from sd2core.body.fit_video import PARTIAL, check_fit_output, fit_video
-    from sd2core.runs.pace import keep_pace
+    from sd2core.runs.pace import fit_kind, keep_pace
 
     check_fit_output(options.out)
     goes_on = options.out.with_name(options.out.name + PARTIAL).exists() and not options.restart
@@ -178,7 +178,7 @@ def _make(options: argparse.Namespace) -> None:
     seconds = time.perf_counter() - begun_s
     if not goes_on:
         core_s = time.process_time() - begun_core_s
-        keep_pace(("fit", options.resolution), core_s, made.frames)
+        keep_pace(fit_kind(options.resolution), core_s, made.frames)
     if options.progress_json:
         for note in made.notes:
             print_event("note", text=note)

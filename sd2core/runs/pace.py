@@ -51,6 +51,11 @@ class Pace:
         keep_pace(kind, self._seconds, self._items)
 
 
+def fit_kind(resolution: str) -> Kind:
+    """Kind of a fit of a body, whose items are frames."""
+    return ("fit", resolution)
+
+
 def known_pace_s(kind: Kind) -> float | None:
     """Seconds per item of the last run of this kind on this machine; None if there was none."""
     return _known().get(_name(kind), (None, 0.0))[0]

@@ -14,7 +14,7 @@ from sd2app.accuracy.text import deviation
 from sd2app.session.display import DisplayModel
 from sd2app.widgets.inputs import Choice, NumberBox
 from sd2app.widgets.layouts import STRETCH, Part, column_of, row_of
-from sd2app.widgets.panel import outlined, rule, say, sentence, title
+from sd2app.widgets.panel import outlined, rule, say, sentence, show_words, title
 from sd2app.widgets.text import milliseconds, number, percent, seconds
 
 if TYPE_CHECKING:
@@ -134,8 +134,7 @@ class AccuracyPanel(QWidget):
         elif accuracy.choice is not None and not accuracy.choice.holds and not accuracy.choosing:
             held = percent(accuracy.tolerance)
             warning = f"No plan holds {held} here. This is the best that can be had."
-        self._warning.setText(warning)
-        self._warning.setVisible(bool(warning))
+        show_words(self._warning, warning)
         self._by_tolerance.setVisible(clicked)
 
     def _refresh_plot(self) -> None:

@@ -11,7 +11,7 @@ from sd2app.batch.questions import BatchQuestions
 from sd2app.batch.run_view import BatchRunView
 from sd2app.batch.setup_view import BatchSetupView
 from sd2app.widgets.layouts import column_of, row_of
-from sd2app.widgets.panel import outlined, sentence, title
+from sd2app.widgets.panel import outlined, sentence, show_words, title
 
 _ESTIMATE_MS = 600
 
@@ -43,8 +43,7 @@ class BatchWindow(QDialog):
 
     def warn(self, text: str) -> None:
         """Say what went wrong, or nothing any more."""
-        self._warning.setText(text)
-        self._warning.setVisible(bool(text))
+        show_words(self._warning, text)
 
     def showEvent(self, event: QShowEvent) -> None:
         """Follow the batch and estimate the set-up."""

@@ -22,7 +22,7 @@ from sd2app.batch.questions import BatchQuestions
 from sd2app.batch.text import failure_text, headline, step_facts, time_text
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.pages import InnerPage, InnerPages
-from sd2app.widgets.panel import ElidedLabel, outlined, sentence, side_by_side
+from sd2app.widgets.panel import ElidedLabel, outlined, sentence, show_words, side_by_side
 from sd2app.widgets.table import RecordTable
 
 _MOST_STEPS = 6
@@ -118,9 +118,8 @@ class BatchRunView(QWidget):
             return
         self._name.setText(str(run.folder.path))
         self._headline.setText(headline(run))
-        for label, text in ((self._time, time_text(run)), (self._reason, run.text)):
-            label.setText(text)
-            label.setVisible(bool(text))
+        show_words(self._time, time_text(run))
+        show_words(self._reason, run.text)
         self._show_steps()
         self._stop.setVisible(run.under_way)
         self._stop.setEnabled(run.phase != "stopping")

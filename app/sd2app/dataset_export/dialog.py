@@ -21,7 +21,7 @@ from sd2app.dataset_export.text import label_words, size_words, split_words
 from sd2app.widgets.dialogs import ask_folder, with_suffix
 from sd2app.widgets.inputs import CheckBox, Choice, NumberBox
 from sd2app.widgets.layouts import STRETCH, column_of, form_of, row_of
-from sd2app.widgets.panel import ElidedLabel, outlined, rule, sentence, side_by_side
+from sd2app.widgets.panel import ElidedLabel, outlined, rule, sentence, show_words, side_by_side
 from sd2app.widgets.text import counted
 from sd2core.recording.recording import is_recording
 
@@ -170,8 +170,7 @@ class ExportDialog(QDialog):
         if model.result is not None:
             left_out = list(model.result.left_out)
         said = [model.problem, *(f"Left out: {one}" for one in left_out)]
-        self._message.setText("\n".join(filter(None, said)))
-        self._message.setVisible(bool(self._message.text()))
+        show_words(self._message, "\n".join(filter(None, said)))
 
     def _show_writing(self) -> None:
         model = self._model

@@ -30,7 +30,7 @@ from sd2app.widgets.dialogs import ask_file, ask_new
 from sd2app.widgets.icons import swatch_icon
 from sd2app.widgets.inputs import TypedLine
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
-from sd2app.widgets.panel import ElidedLabel, outlined
+from sd2app.widgets.panel import ElidedLabel, outlined, show_words
 from sd2app.widgets.table import CellTable, Choosable, FramedCells, ListedEditor
 from sd2core.labels.files import read_label_set, write_label_set
 from sd2core.labels.label_set import GESTURES
@@ -146,8 +146,7 @@ class LabelSetPage(QWidget):
         self._less.setEnabled(row >= 0)
         self._up.setEnabled(row > 0)
         self._down.setEnabled(0 <= row < count - 1)
-        self._warning.setText(self._model.warnings)
-        self._warning.setVisible(bool(self._model.warnings))
+        show_words(self._warning, self._model.warnings)
         if not self._name.hasFocus():
             self._name.setText(self._model.label_set.name)
 

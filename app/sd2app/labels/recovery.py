@@ -22,7 +22,7 @@ from sd2app.labels.edits import LabelEdits
 from sd2app.session.document import DocumentModel
 from sd2app.widgets.dialogs import ask_new, may_delete
 from sd2app.widgets.layouts import column_of, row_of
-from sd2app.widgets.panel import outlined, sentence, title
+from sd2app.widgets.panel import outlined, sentence, show_words, title
 from sd2app.widgets.text import clock_text, counted
 from sd2core.errors import Sd2Error
 from sd2core.labels.comparison import compare
@@ -182,8 +182,7 @@ class RecoverLabelsDialog(QDialog):
             self._list.addTopLevelItem(item)
         self._said.setText(_SAID if found.offers else _NOTHING)
         self._list.setVisible(bool(found.offers))
-        self._notes.setText("\n".join(found.notes))
-        self._notes.setVisible(bool(found.notes))
+        show_words(self._notes, "\n".join(found.notes))
         if (first := self._list.topLevelItem(0)) is not None:
             self._list.setCurrentItem(first)
         self._follow()

@@ -26,7 +26,7 @@ from sd2app.widgets.canvas import Canvas
 from sd2app.widgets.dialogs import ask_file, ask_new
 from sd2app.widgets.inputs import CheckBox, Choice, TypedLine
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
-from sd2app.widgets.panel import FactRows, outlined, rule, sentence, title
+from sd2app.widgets.panel import FactRows, outlined, rule, sentence, show_words, title
 from sd2core.figures.colours import SEQUENTIAL
 from sd2core.placements.placements import read_placements, write_placements
 
@@ -62,9 +62,8 @@ class PlacementsPage(QWidget):
         accuracy: AccuracyModel,
         shell: Shell,
         batch: Callable[[], None],
-        parent: QWidget | None = None,
     ) -> None:
-        super().__init__(parent)
+        super().__init__()
         self.setObjectName("page")
         self._model, self._accuracy, self._shell = placements, accuracy, shell
         self._fields = PlacementFields(placements, self)
@@ -190,18 +189,18 @@ class PlacementsPage(QWidget):
             for widget in (label, line):
                 widget.setVisible(name in fields.texts)
             line.show_text(fields.texts.get(name, ""))
-        _say(self._how, "" if fields.problem else _HOW[fields.kind])
-        _say(self._problem, fields.problem)
+        show_words(self._how, "" if fields.problem else _HOW[fields.kind])
+        show_words(self._problem, fields.problem)
         self._count.setText(count_text(model))
         self._scale.show_ranges([place.range_m for place in model.planned.places])
         self._limits.show_facts(limit_facts(model))
-        _say(self._radar, limits_text(model))
+        show_words(self._radar, limits_text(model))
         self._show_current()
         self._shown.show_checked(model.shown)
         cost, in_use = model.cost, self._accuracy.in_use
         self._cost.setText("Their cost is being computed…" if cost is None else cost_text(cost))
         known = cost is not None and in_use is not None
-        _say(self._source, cost_source_text(cost, in_use) if known else "")  # type: ignore[arg-type]
+        show_words(self._source, cost_source_text(cost, in_use) if known else "")  # type: ignore[arg-type]
 
     def _show_current(self) -> None:
         if self._model.plan is not None:
@@ -250,9 +249,3 @@ class RangeScale(Canvas):
         )
         top = (self.height() - self._BAR) / 2
         painter.drawImage(QRectF(left, top, self.width() - left - right, self._BAR), image)
-
-
-def _say(label: QLabel, text: str) -> None:
-    """Show words, and take no room without."""
-    label.setText(text)
-    label.setVisible(bool(text))

@@ -46,6 +46,12 @@ def say(label: QLabel, text: str, role: str = "muted") -> None:
     label.setText(text)
 
 
+def show_words(label: QLabel, text: str) -> None:
+    """Show a text, and take no room without one."""
+    label.setText(text)
+    label.setVisible(bool(text))
+
+
 def rule() -> QFrame:
     """A line between two parts."""
     line = QFrame()

@@ -16,7 +16,7 @@ from sd2app.feature import Shell
 from sd2app.widgets.dialogs import may_delete
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
-from sd2app.widgets.panel import outlined, sentence, side_by_side, title
+from sd2app.widgets.panel import outlined, sentence, show_words, side_by_side, title
 
 _NEW = "New training"
 _PARTS = 1000
@@ -171,9 +171,9 @@ class RunView(QWidget, Generic[Run]):
             return
         headline, time, note = self.texts(run)
         self._headline.setText(headline)
-        for label, text in ((self._time, time), (self._reason, run.text), (self._note, note)):
-            label.setText(text)
-            label.setVisible(bool(text))
+        show_words(self._time, time)
+        show_words(self._reason, run.text)
+        show_words(self._note, note)
         self._bar.setVisible(run.phase in UNDER_WAY)
         # Without a maximum the bar says that it is busy.
         self._bar.setRange(0, 0 if run.share is None else _PARTS)

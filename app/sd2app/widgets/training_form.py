@@ -21,7 +21,7 @@ from sd2app.background.run_setup import RunSetup
 from sd2app.feature import Shell
 from sd2app.widgets.inputs import Choice, NumberBox
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
-from sd2app.widgets.panel import ElidedLabel, outlined, sentence, side_by_side, title
+from sd2app.widgets.panel import ElidedLabel, outlined, sentence, show_words, side_by_side, title
 from sd2app.widgets.text import about
 
 
@@ -117,8 +117,7 @@ class TrainingForm(QWidget):
         if self._setup.data != self._shown_data:
             self._list_data()
         self.nothing.setVisible(not self._setup.data)
-        self._division.setText(division)
-        self._division.setVisible(bool(division))
+        show_words(self._division, division)
         for name, choice in self._choices.items():
             choice.show_value(self._setup.value(name))
         for name, box in self._numbers.items():
@@ -140,8 +139,7 @@ class TrainingForm(QWidget):
         data = self._setup.data
         # What is wrong with the data, or that there is none, is said above.
         said = not data or any(one.problem for one in data)
-        self._problem.setText("" if said else why_not)
-        self._problem.setVisible(bool(self._problem.text()))
+        show_words(self._problem, "" if said else why_not)
         self._start.setEnabled(not why_not)
         self._start.setToolTip(why_not or "Train in a background process")
         self._copy.setEnabled(can_copy)
