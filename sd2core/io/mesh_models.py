@@ -40,8 +40,7 @@ def read_model_output(
     or something that is not plain data.
     """
     content = read_pickle(path)
-    if not isinstance(content, dict):
-        content = {"verts": content}
+    content = _plain_keys(content) if isinstance(content, dict) else {"verts": content}
     notes: list[str] = []
     entry = content
     if _vertices_of(content) is None:
@@ -97,6 +96,13 @@ def weak_perspective_shift(
     )
 
 
+def _plain_keys(content: dict[Any, Any]) -> dict[Any, Any]:
+    """The same with Python's numbers as keys, where a tracker left NumPy's."""
+    return {
+        key.item() if isinstance(key, np.generic) else key: value for key, value in content.items()
+    }
+
+
 def _vertices_of(entry: dict[Any, Any]) -> Any:
     return next((entry[name] for name in VERTEX_NAMES if entry.get(name) is not None), None)
 
@@ -104,7 +110,7 @@ def _vertices_of(entry: dict[Any, Any]) -> Any:
 def _choose(
     path: Path, people: dict[Any, Any], person: int | str | None, notes: list[str]
 ) -> dict[Any, Any]:
-    lengths = {key: len(_vertices_of(value)) for key, value in people.items()}
+    lengths = {key: len(_stacked(_vertices_of(value), path)) for key, value in people.items()}
     listed = ", ".join(f"{key} ({count:,} frames)" for key, count in lengths.items())
     if person is None:
         key = max(lengths, key=lambda k: lengths[k])
@@ -115,6 +121,8 @@ def _choose(
         if not matching:
             raise Sd2Error(f"{path} holds no person {person}", f"one of: {listed}")
         key = matching[0]
+        if len(people) > 1:
+            notes.append(f"Person {key} is read, as asked, of: {listed}.")
     chosen: dict[Any, Any] = people[key]
     return chosen
 
@@ -122,7 +130,8 @@ def _choose(
 def _stacked(vertices: Any, path: Path) -> NDArray[Any]:
     """One array (T, V, 3) out of an array or a list with one array per frame."""
     if isinstance(vertices, np.ndarray):
-        return vertices
+        # Some keep the axis of a batch of one clip.
+        return vertices[0] if vertices.ndim == 4 and len(vertices) == 1 else vertices
     if isinstance(vertices, list | tuple) and all(isinstance(v, np.ndarray) for v in vertices):
         shapes = [v.shape[1:] if v.ndim == 3 and len(v) == 1 else v.shape for v in vertices]
         for frame, shape in enumerate(shapes):

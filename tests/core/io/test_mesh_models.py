@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import os
 import pickle
+from collections import defaultdict
 from pathlib import Path
 from typing import Any
 
@@ -73,6 +74,42 @@ def test_a_person_can_be_chosen(tmp_path: Path) -> None:
         assert load_mesh(tmp_path / "w.pkl", person=person).frame_count == 5
     with pytest.raises(Sd2Error, match=r"w\.pkl holds no person 1.*one of: 0 \(5 frames\), 2"):
         load_mesh(tmp_path / "w.pkl", person=1)
+
+
+@pytest.mark.parametrize("key", [np.int64, np.int32, np.uint8, str])
+def test_people_are_numbered_as_a_tracker_numbers_them(tmp_path: Path, key: Any) -> None:
+    content: dict[Any, Any] = defaultdict(dict)  # as WHAM writes its output
+    content |= {key(0): wham(5), key(3): wham(9)}
+    joblib.dump(content, tmp_path / "wham_output.pkl")
+    mesh = load_mesh(tmp_path / "wham_output.pkl")
+    assert mesh.frame_count == 9
+    assert mesh.notes[0] == "Person 3 is read, seen longest of: 0 (5 frames), 3 (9 frames)."
+    chosen = load_mesh(tmp_path / "wham_output.pkl", person=0)
+    assert chosen.frame_count == 5
+    assert chosen.notes[0] == "Person 0 is read, as asked, of: 0 (5 frames), 3 (9 frames)."
+
+
+@pytest.mark.parametrize(
+    "stored",
+    [
+        lambda v: v[None],
+        list,
+        lambda v: [one[None] for one in v],
+        lambda v: v.astype(np.float64),
+        lambda v: v.astype(np.float16),
+        lambda v: np.asfortranarray(v),
+        lambda v: v.astype(">f4"),
+    ],
+    ids=["batch", "list", "list of batches", "double", "half", "fortran", "big endian"],
+)
+def test_vertices_are_read_however_they_are_nested_and_typed(tmp_path: Path, stored: Any) -> None:
+    person = wham(6)
+    vertices = person["verts"]
+    person["verts"] = stored(vertices)
+    person["frame_ids"] = list(range(6))
+    joblib.dump({np.int64(1): person}, tmp_path / "w.pkl")
+    mesh = load_mesh(tmp_path / "w.pkl", frames_per_s=30)
+    np.testing.assert_allclose(mesh.read(0, 6), vertices, atol=2e-3)
 
 
 def test_frames_keep_their_place_in_the_video(tmp_path: Path) -> None:
