@@ -6,7 +6,9 @@ import math
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from itertools import pairwise, product
+from typing import Any
 
 from sd2core.accuracy.plans import (
     FRAME_RATE_FACTORS,
@@ -19,7 +21,7 @@ from sd2core.accuracy.reasons import SceneFacts, reasons_for, scene_facts
 from sd2core.accuracy.results import Choice, Errors, relative_l1
 from sd2core.accuracy.sample import take_sample
 from sd2core.accuracy.trial import Trial
-from sd2core.doppler.options import PRESETS, SynthesisOptions
+from sd2core.doppler.options import PRESETS, DepthResolution, SynthesisOptions, Visibility
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics.compiled import worker_count
@@ -48,7 +50,7 @@ class Survey:
 
     def forecast_error(self, plan: AccuracyPlan) -> float:
         """Sum of the errors of a plan's settings: more than their error together."""
-        rate = replace(self.base, frame_rate_factor=plan.frame_rate_factor)
+        rate = _with(self.base, "frame_rate_factor", plan.frame_rate_factor)
         down = (self.change[alone] for alone in self._alone(plan) if alone != self.base)
         return self.change[rate] + sum(down)
 
@@ -56,26 +58,25 @@ class Survey:
         """Milliseconds per frame that a plan should take when all cores share the work."""
         base = self.base
         mask_ms = 0.0 if plan.mask_reuse_m else self.mask_ms[_sight_of(plan, base)]
-        count_ms = self.count_ms[replace(base, frame_rate_factor=plan.frame_rate_factor)]
+        count_ms = self.count_ms[_with(base, "frame_rate_factor", plan.frame_rate_factor)]
         if plan.range_law == "frame":
             per_vertex = self.count_ms[base]
-            saved = per_vertex - self.count_ms[replace(base, range_law="frame")]
+            saved = per_vertex - self.count_ms[_with(base, "range_law", "frame")]
             count_ms -= min(max(saved, 0.0), 0.9 * per_vertex)
         return self.cost_share[plan.vertices_kept] * (mask_ms + count_ms) / worker_count()
 
     def settings_changed(self, plan: AccuracyPlan) -> int:
         """Number of settings in which a plan differs from the base."""
-        alone = [*self._alone(plan), replace(self.base, frame_rate_factor=plan.frame_rate_factor)]
-        return sum(other != self.base for other in alone)
+        rate = _with(self.base, "frame_rate_factor", plan.frame_rate_factor)
+        return sum(other != self.base for other in (*self._alone(plan), rate))
 
     def _alone(self, plan: AccuracyPlan) -> Iterator[AccuracyPlan]:
         """Yield the base with each setting of a plan alone; frame rates are not among them."""
         yield _sight_of(plan, self.base)
-        yield replace(self.base, vertices_kept=plan.vertices_kept)
-        yield replace(self.base, range_law=plan.range_law)
-        yield replace(self.base, beyond=plan.beyond)
+        for setting in ("vertices_kept", "range_law", "beyond"):
+            yield _with(self.base, setting, getattr(plan, setting))
         if plan.mask_reuse_m:
-            yield replace(self.base, mask_reuse_m=plan.mask_reuse_m)
+            yield _with(self.base, "mask_reuse_m", plan.mask_reuse_m)
 
 
 def survey_scene(
@@ -160,12 +161,23 @@ def survey_scene(
 
 
 def _sight_of(plan: AccuracyPlan, base: AccuracyPlan) -> AccuracyPlan:
+    return _seen_by(base, plan.visibility, plan.depth_resolution, plan.mask_stride)
+
+
+# Kept, because every combination of settings asks for the few plans that it is forecast from.
+@lru_cache(maxsize=1024)
+def _seen_by(
+    base: AccuracyPlan, visibility: Visibility, depth_resolution: DepthResolution, mask_stride: int
+) -> AccuracyPlan:
     return replace(
-        base,
-        visibility=plan.visibility,
-        depth_resolution=plan.depth_resolution,
-        mask_stride=plan.mask_stride,
+        base, visibility=visibility, depth_resolution=depth_resolution, mask_stride=mask_stride
     )
+
+
+@lru_cache(maxsize=1024)
+def _with(base: AccuracyPlan, setting: str, value: object) -> AccuracyPlan:
+    changes: dict[str, Any] = {setting: value}
+    return replace(base, **changes)
 
 
 _MOST_TRIALS = 8

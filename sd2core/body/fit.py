@@ -201,13 +201,12 @@ class Fitting:
         stills = evidence[rows]
         pose = solve_stills(rig, stills, initial_pose(rig, stills.points_m, trust[rows]))
         root = rig.skeleton.heads_m[0]
+        rotations = rig.body_rotations(pose.turns)
 
         def transforms_of(other: BodyShape) -> Floats:
-            changed = people.rig(other)
+            changed = people.space.skeleton(other)
             # The pelvis stays where it is when the legs grow.
-            moved = pose.translation_m + root - changed.skeleton.heads_m[0]
-            whole = people.space.skeleton(other)
-            return whole.transforms(changed.body_rotations(pose.turns), moved)
+            return changed.transforms(rotations, pose.translation_m + root - changed.heads_m[0])
 
         outlines = [mask >= _MASK_SURE for mask in track.silhouettes[outlined]]
         return shape_of_outlines(people.space, shape, spread, transforms_of, self._camera, outlines)

@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.body.rotations import Floats, applied, product
+from sd2core.body.rotations import Floats, applied
 from sd2core.files.resources import open_bundled_arrays, resource_path
 
 FORMAT = "sd2-body"
@@ -67,22 +67,36 @@ class Skeleton:
         the axes of the rest pose; the identity is the rest pose. The translation (T, 3) is
         added to everything.
         """
-        frames = len(rotations)
-        transforms = np.empty((frames, len(self), 3, 4))
-        for bone, parent in enumerate(self.parents):
-            head = self.heads_m[bone]
-            turn = rotations[:, bone]
-            if parent < 0:
-                moved = np.broadcast_to(head, (frames, 3))
+        # Frames last: NumPy is quick along the last axis, and the others are short.
+        turns = np.ascontiguousarray(np.moveaxis(rotations, 0, -1), np.float64)  # (B, 3, 3, T)
+        transforms = np.empty((len(self), 3, 4, len(rotations)))
+        for bones, parents in self._generations:
+            heads = self.heads_m[bones, :, None]
+            turn = turns[bones]
+            if parents is None:
+                moved = np.broadcast_to(heads, (*heads.shape[:2], len(rotations)))
                 if translation_m is not None:
-                    moved = moved + translation_m
+                    moved = moved + translation_m.T
             else:
-                above = transforms[:, parent]
-                turn = product(above[..., :3], turn)
-                moved = _apply(above, head)
-            transforms[:, bone, :, :3] = turn
-            transforms[:, bone, :, 3] = moved - applied(turn, head)
-        return transforms
+                above = transforms[parents]
+                turn = _summed(above[:, :, :3, None], turn[:, None])
+                moved = _summed(above[:, :, :3], heads[:, None]) + above[:, :, 3]
+            transforms[bones, :, :3] = turn
+            transforms[:, :, 3][bones] = moved - _summed(turn, heads[:, None])
+        return np.ascontiguousarray(np.moveaxis(transforms, -1, 0))
+
+    @cached_property
+    def _generations(self) -> list[tuple[NDArray[np.intp], NDArray[np.intp] | None]]:
+        """Numbers of the bones without a parent, then of their children and so on.
+
+        Each with the numbers of their parents.
+        """
+        parents = np.array(self.parents, np.intp)
+        bones = np.flatnonzero(parents < 0)
+        generations: list[tuple[NDArray[np.intp], NDArray[np.intp] | None]] = [(bones, None)]
+        while len(bones := np.flatnonzero(np.isin(parents, bones))):
+            generations.append((bones, parents[bones]))
+        return generations
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,6 +194,12 @@ def vertex_normals(vertices_m: Floats, faces: NDArray[np.int32]) -> Floats:
     )
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     return np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
+
+
+def _summed(left: Floats, right: Floats) -> Floats:
+    """Sum of products over the third axis, in the same order on every machine."""
+    products = left * right
+    return products[:, :, 0] + products[:, :, 1] + products[:, :, 2]
 
 
 def _apply(transform: Floats, point: Floats) -> Floats:

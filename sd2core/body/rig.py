@@ -206,9 +206,10 @@ class Rig:
 
     def _rotations(self, turns: Floats) -> Floats:
         rotations = np.tile(np.eye(3), (len(turns), len(self.skeleton), 1, 1))
-        for number, bones in enumerate(self._bones):
-            for bone in bones:
-                rotations[:, bone] = product(rotations[:, bone], turns[:, number])
+        bones, numbers = self._first_turns
+        rotations[:, bones] = turns[:, numbers]
+        for bone, number in self._further_turns:
+            rotations[:, bone] = product(rotations[:, bone], turns[:, number])
         return rotations
 
     def jacobian(self, transforms: Floats, positions_m: Floats) -> Floats:
@@ -226,10 +227,7 @@ class Rig:
                 head = applied(transforms[:, bone, :, :3], self.skeleton.heads_m[bone])
                 arms = positions_m[:, rows] - (head + transforms[:, bone, :, 3])[:, None]
                 after = self._turned_after(transforms, bone, number)  # (T, 3, n)
-                turned = np.cross(
-                    after.transpose(0, 2, 1)[:, None], arms[:, :, None], axis=-1
-                )  # (T, rows, n, 3)
-                jacobian[:, rows, :, self.columns[number]] += turned.transpose(0, 1, 3, 2)
+                jacobian[:, rows, :, self.columns[number]] += _cross(after, arms)
         for axis in range(3):
             jacobian[:, :, axis, self.freedoms - 3 + axis] = 1.0
         return jacobian
@@ -244,6 +242,26 @@ class Rig:
     @cached_property
     def _bones(self) -> list[list[int]]:
         return [[self.skeleton.index[bone] for bone in joint.bones] for joint in JOINTS]
+
+    @cached_property
+    def _first_turns(self) -> tuple[list[int], list[int]]:
+        """Bones that joints turn, and the number of the first joint that turns each."""
+        first: dict[int, int] = {}
+        for number, bones in enumerate(self._bones):
+            for bone in bones:
+                first.setdefault(bone, number)
+        return list(first), list(first.values())
+
+    @cached_property
+    def _further_turns(self) -> list[tuple[int, int]]:
+        """Bones that several joints turn, and the numbers of the joints after the first."""
+        first = dict(zip(*self._first_turns, strict=True))
+        return [
+            (bone, number)
+            for number, bones in enumerate(self._bones)
+            for bone in bones
+            if first[bone] != number
+        ]
 
     @cached_property
     def _follows(self) -> dict[int, NDArray[np.intp]]:
@@ -263,6 +281,13 @@ class Rig:
             for bones in self._bones
             for by in bones
         }
+
+
+def _cross(axes: Floats, arms: Floats) -> Floats:
+    """Cross products (T, rows, 3, n) of the columns of (T, 3, n) with (T, rows, 3)."""
+    x, y, z = np.moveaxis(axes, 1, 0)[:, :, None]  # (T, 1, n) each
+    a, b, c = np.moveaxis(arms, 2, 0)[..., None]  # (T, rows, 1) each
+    return np.stack([y * c - z * b, z * a - x * c, x * b - y * a], axis=2)
 
 
 def _axes(joint: Joint, skeleton: Skeleton) -> Floats:

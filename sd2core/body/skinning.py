@@ -34,6 +34,9 @@ def pose_vertices(body: Body, transforms: Floats) -> NDArray[np.float32]:
         last = min(first + _JOB_FRAMES, len(transforms))
         pose_kernel(rest, bones, weights, influences, transforms, first, last, vertices)
 
+    if len(transforms) <= _JOB_FRAMES:
+        fill(0)
+        return vertices
     # Taken one by one, so that what one of them raises is not lost.
     for _ in workers().map(fill, range(0, len(transforms), _JOB_FRAMES)):
         pass
