@@ -18,9 +18,11 @@ side_by_side="-n logical --maxprocesses 4 --dist worksteal"
 # Only these are read for the second part.
 on_display=$(grep -rl --include='test_*.py' 'pytest\.mark\.gl' tests)
 expression=$1
+# Benchmarks are skipped here (see addopts); importing them would take longer than many tests.
+without="--ignore=tests/benchmarks"
 
 echo "== Tests without a display"
-QT_QPA_PLATFORM=offscreen $pytest $side_by_side -m "($expression) and not gl" < /dev/null
+QT_QPA_PLATFORM=offscreen $pytest $side_by_side $without -m "($expression) and not gl" < /dev/null
 offscreen=$?
 
 echo "== Tests on a display"

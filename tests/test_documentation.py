@@ -19,11 +19,14 @@ DOCUMENTS = [
 ] + sorted((REPOSITORY / "docs").rglob("*.md"))
 
 
+PARSER = full_parser()
+
+
 def command_lines() -> Iterator[str]:
     for document in DOCUMENTS:
         for block in re.findall(r"```sh\n(.*?)```", document.read_text("utf-8"), re.DOTALL):
             yield from (line for line in block.splitlines() if line.startswith("sd2 "))
-    parsers = [full_parser()]
+    parsers = [PARSER]
     while parsers:
         parser = parsers.pop()
         yield from re.findall(r"^  (sd2 .*?)(?:   .*)?$", parser.epilog or "", re.MULTILINE)
@@ -35,7 +38,7 @@ def command_lines() -> Iterator[str]:
 @pytest.mark.parametrize("line", sorted(set(command_lines())))
 def test_commands_are_understood(line: str) -> None:
     arguments = shlex.split(line, comments=True)[1:]
-    options = full_parser().parse_args(attach_negative_values(arguments))
+    options = PARSER.parse_args(attach_negative_values(arguments))
     assert callable(options.handler)
 
 

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import copy
 from pathlib import Path
 
 import numpy as np
@@ -102,6 +103,19 @@ def fitted(scene: Scene) -> BodyFit:
     return scene.fit()
 
 
+@pytest.fixture(scope="module")
+def fitted_in_windows(scene: Scene) -> BodyFit:
+    """The same, in windows of 30 frames."""
+    with pytest.MonkeyPatch.context() as patch:
+        shorten_windows(patch)
+        return scene.fit()
+
+
+def shorten_windows(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(fit_windows, "_WINDOW_FRAMES", 30)
+    patch.setattr(fit_windows, "_OVERLAP_FRAMES", 12)
+
+
 def velocity(keypoints_m: np.ndarray, times_s: np.ndarray) -> np.ndarray:
     return np.gradient(np.linalg.norm(keypoints_m, axis=-1), times_s, axis=0)
 
@@ -127,7 +141,7 @@ def test_line_of_sight_velocity_of_the_swiping_hand(scene: Scene, fitted: BodyFi
 
 def test_a_limb_that_is_hardly_seen_is_not_sure(scene: Scene, fitted: BodyFit) -> None:
     knee = LANDMARKS.index("knee.R")
-    track = Scene(60).track
+    track = copy.deepcopy(scene.track)
     track.visibility[:, knee] = 0.0
     found = fit_body(track, CAMERA, stature_m=scene.shape.stature_m, lift=scene.lift)
     known = scene.lift.lifted.velocity_sigma[:, knee] * scene.shape.stature_m
@@ -180,7 +194,7 @@ def test_outlines_tell_a_heavy_person_from_a_light_one() -> None:
 
 def test_empty_frames_hold_the_last_known_pose_and_are_marked(scene: Scene) -> None:
     gap = slice(20, 40)
-    track = Scene(60).track
+    track = copy.deepcopy(scene.track)
     track.present[gap] = False
     track.image_px[gap] = np.nan
     track.visibility[gap] = 0.0
@@ -204,10 +218,8 @@ def test_the_shortest_clips(frames: int) -> None:
     assert away.mean() < 0.04
 
 
-def test_windows_join_without_a_step(scene: Scene, fitted: BodyFit, monkeypatch) -> None:
-    monkeypatch.setattr(fit_windows, "_WINDOW_FRAMES", 30)
-    monkeypatch.setattr(fit_windows, "_OVERLAP_FRAMES", 12)
-    found = scene.fit()
+def test_windows_join_without_a_step(fitted: BodyFit, fitted_in_windows: BodyFit) -> None:
+    found = fitted_in_windows
     away = np.linalg.norm(found.keypoints_m - fitted.keypoints_m, axis=-1)
     assert away.mean() < 0.01
     rough, smooth = (np.abs(np.diff(one.keypoints_m, n=3, axis=0)).max() for one in (found, fitted))
@@ -226,10 +238,11 @@ def test_windows_cover_a_stretch(frames: int) -> None:
     assert (covered[:7] == 0).all()
 
 
-def test_a_stopped_fit_goes_on(scene: Scene, fitted: BodyFit, tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr(fit_windows, "_WINDOW_FRAMES", 30)
-    monkeypatch.setattr(fit_windows, "_OVERLAP_FRAMES", 12)
-    whole = scene.fit()
+def test_a_stopped_fit_goes_on(
+    scene: Scene, fitted_in_windows: BodyFit, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shorten_windows(monkeypatch)
+    whole = fitted_in_windows
 
     def stop_late(done: int, total: int) -> None:
         if done > total // 2:

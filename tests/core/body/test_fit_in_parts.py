@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -38,8 +39,9 @@ HIPS = [LANDMARKS.index(f"hip.{side}") for side in "LR"]
 STATURE_M = 1.7
 
 
+@lru_cache(maxsize=4)
 def swiping(frames: int, frames_per_s: float = 30.0, *, uneven: bool = False) -> LandmarkTrack:
-    """Somebody who swipes on and on, seen as the landmark model sees people."""
+    """Somebody who swipes on and on, seen as the landmark model sees people; not to be changed."""
     rng = np.random.default_rng(3)
     times_s = np.arange(frames) / frames_per_s
     if uneven:

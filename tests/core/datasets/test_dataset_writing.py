@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import tracemalloc
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -37,6 +37,20 @@ def several() -> list[Source]:
         source("r1", "carla", frames=20),  # too short for a segment
         source("r1", "dora", frames=75),
     ]
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """Data set of all sources by the ending of its name, written at once; nobody changes it."""
+    folder = tmp_path_factory.mktemp("whole")
+
+    def written(ending: str) -> Path:
+        out = folder / f"set{ending}"
+        if not out.exists():
+            write_dataset(out, several(), OPTIONS)
+        return out
+
+    return written
 
 
 def contents(path: Path) -> dict[str, np.ndarray]:
@@ -85,13 +99,10 @@ def test_what_is_written_is_read(tmp_path: Path, ending: str) -> None:
             assert rows["range_m"][row] == np.float32(one.spherical[0])
 
 
-def test_the_three_formats_hold_the_same(tmp_path: Path) -> None:
-    found = []
-    for ending in ENDINGS:
-        write_dataset(tmp_path / f"set{ending}", several(), OPTIONS)
-        found.append(contents(tmp_path / f"set{ending}"))
-    headers = [open_dataset(tmp_path / f"set{ending}").header for ending in ENDINGS]
-    lines = [list(open_dataset(tmp_path / f"set{ending}").sources()) for ending in ENDINGS]
+def test_the_three_formats_hold_the_same(whole: Callable[[str], Path]) -> None:
+    found = [contents(whole(ending)) for ending in ENDINGS]
+    headers = [open_dataset(whole(ending)).header for ending in ENDINGS]
+    lines = [list(open_dataset(whole(ending)).sources()) for ending in ENDINGS]
     assert headers[0] == headers[1] == headers[2]
     assert lines[0] == lines[1] == lines[2]
     for other in found[1:]:
@@ -102,8 +113,10 @@ def test_the_three_formats_hold_the_same(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("ending", ENDINGS)
-def test_writing_again_adds_only_what_is_new(tmp_path: Path, ending: str) -> None:
-    grown, whole = tmp_path / f"grown{ending}", tmp_path / f"whole{ending}"
+def test_writing_again_adds_only_what_is_new(
+    tmp_path: Path, whole: Callable[[str], Path], ending: str
+) -> None:
+    grown = tmp_path / f"grown{ending}"
     sources = several()
     write_dataset(grown, sources[:2], OPTIONS)
     assert write_dataset(grown, sources[:2], OPTIONS).added == 0
@@ -118,10 +131,10 @@ def test_writing_again_adds_only_what_is_new(tmp_path: Path, ending: str) -> Non
 
     assert write_dataset(grown, [lazily(one) for one in sources], OPTIONS).added == 3
     assert loaded == [one.key for one in sources[2:]]
-    write_dataset(whole, sources, OPTIONS)
-    for name, values in contents(whole).items():
-        assert np.array_equal(values, contents(grown)[name]), name
-    assert open_dataset(grown).header == open_dataset(whole).header
+    found = contents(grown)
+    for name, values in contents(whole(ending)).items():
+        assert np.array_equal(values, found[name]), name
+    assert open_dataset(grown).header == open_dataset(whole(ending)).header
 
 
 KILLED = """
@@ -152,9 +165,14 @@ writing.write_dataset(Path(sys.argv[1]), several(), OPTIONS)
     [(".zarr", 3, 0.0, 0), (".zarr", 43, 0.0, 2), (".h5", 25, 0.0, 1), (".zarr", 18, 100.0, 0)],
 )
 def test_a_killed_writer_goes_on_to_the_same_data_set(
-    tmp_path: Path, ending: str, call: int, flush_s: float, kept: int
+    tmp_path: Path,
+    whole: Callable[[str], Path],
+    ending: str,
+    call: int,
+    flush_s: float,
+    kept: int,
 ) -> None:
-    out, whole = tmp_path / f"killed{ending}", tmp_path / f"whole{ending}"
+    out = tmp_path / f"killed{ending}"
     here = Path(__file__).parent
     paths = os.pathsep.join([str(here), str(here.parents[2])])
     ended = subprocess.run(
@@ -169,25 +187,26 @@ def test_a_killed_writer_goes_on_to_the_same_data_set(
     else:
         assert not out.exists()
     assert write_dataset(out, several(), OPTIONS).added == 5 - kept
-    write_dataset(whole, several(), OPTIONS)
     if ending == ".zarr":
-        assert tree(out) == tree(whole)
+        assert tree(out) == tree(whole(ending))
     else:
-        assert open_dataset(out).header == open_dataset(whole).header
-        for name, values in contents(whole).items():
-            assert np.array_equal(values, contents(out)[name])
+        assert open_dataset(out).header == open_dataset(whole(ending)).header
+        found = contents(out)
+        for name, values in contents(whole(ending)).items():
+            assert np.array_equal(values, found[name])
         assert [path.name for path in tmp_path.glob("*.partial")] == []
 
 
-def test_a_line_that_was_not_written_to_its_end_does_not_count(tmp_path: Path) -> None:
+def test_a_line_that_was_not_written_to_its_end_does_not_count(
+    tmp_path: Path, whole: Callable[[str], Path]
+) -> None:
     out = tmp_path / "set.zarr"
     write_dataset(out, several()[:2], OPTIONS)
     index = out / "sources.jsonl"
     index.write_bytes(index.read_bytes()[:-7])
     (out / "synthetic" / "c" / "0.1f.partial").write_bytes(b"torn")
     assert write_dataset(out, several(), OPTIONS).added == 4
-    write_dataset(tmp_path / "whole.zarr", several(), OPTIONS)
-    assert tree(out) == tree(tmp_path / "whole.zarr")
+    assert tree(out) == tree(whole(".zarr"))
 
 
 def test_who_cancels_can_go_on(tmp_path: Path) -> None:

@@ -75,6 +75,7 @@ def test_a_swinging_plate(position_m: tuple[float, float, float]) -> None:
     assert min(mismatch, key=lambda lag: mismatch[lag]) == 0
 
 
+@pytest.mark.slow
 def test_the_samples_gestures_move_as_fast_either_way() -> None:
     """The rough surface's power against counting by the same law, peak within one bin.
 

@@ -19,11 +19,11 @@ PACKAGE = Path(sd2core.__file__).parent
 ONE_KERNEL = """
 import numpy as np
 from sd2core.numerics import compiled
-from sd2core.scattering.visibility import compile_kernels, vertex_normals_kernel
+from sd2core.body.skinning import compile_kernels, pose_kernel
 print(compiled.cache_directory())
 print(compiled.kernels_ready())
 compile_kernels()
-print(sum(vertex_normals_kernel.stats.cache_hits.values()))
+print(sum(pose_kernel.stats.cache_hits.values()))
 """
 
 

@@ -143,9 +143,10 @@ def test_plain_form_gives_the_same(
     walker: tuple[NDArray[np.float32], NDArray[np.int32]], sensor: tuple[float, ...]
 ) -> None:
     vertices, faces = walker[0][0], walker[1]
-    differing = np.flatnonzero(
-        look(vertices, faces, sensor) != look_plainly(vertices, faces, sensor)
-    )
+    asked = np.arange(len(vertices)) % 3 == 0  # a vertex takes the plain form long
+    points = columns(vertices)[0]
+    plain = exact_plain.exact_visibility(points, faces, np.array(sensor, float), asked)
+    differing = np.flatnonzero(asked & (look(vertices, faces, sensor) != plain))
     # Both are double precision; only a ray through an edge to the last digit may differ.
     hidden, visible = certain(
         vertices, faces, np.array(sensor), differing, barycentric=1e-8, distance_m=4e-6
@@ -154,7 +155,7 @@ def test_plain_form_gives_the_same(
     assert len(differing) <= 1
 
 
-@settings(max_examples=150)
+@settings(max_examples=60)
 @given(seed=st.integers(0, 2**32 - 1), distance=st.sampled_from([0.0, 0.1, 1.0, 10.0, 1e3, 1e6]))
 def test_any_heap_of_triangles(seed: int, distance: float) -> None:
     random = np.random.default_rng(seed)
