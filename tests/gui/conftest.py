@@ -11,8 +11,7 @@ import trimesh
 from fake_accuracy import FakeAccuracy
 from fake_classifiers import FakeClassifiers
 from fake_denoisers import FakeDenoisers
-from PySide6.QtCore import QCoreApplication, QEvent
-from window_models import models_of
+from kept_window import KeptWindow, close_window, new_window
 
 from sd2core.io.mesh import save_mesh
 from sd2core.io.radar.infineon import write_capture
@@ -85,74 +84,76 @@ def recording_copy(small_recording, tmp_path) -> Path:
     return Path(shutil.copytree(small_recording, tmp_path / small_recording.name))
 
 
+@pytest.fixture(scope="module")
+def kept():
+    """Keeps a window for the tests of a file that take ``window`` or ``labelled``."""
+    kept = KeptWindow()
+    yield kept
+    kept.close()
+
+
+def shares(request) -> bool:
+    """True for a test that takes the window that is kept."""
+    return not {"window", "labelled"}.isdisjoint(request.fixturenames)
+
+
 @pytest.fixture(autouse=True)
-def own_data(tmp_path_factory, monkeypatch) -> Path:
+def own_data(request, kept, tmp_path_factory, monkeypatch) -> Path:
     """Runs and models of whoever runs the tests are left alone."""
-    folder = tmp_path_factory.mktemp("data")
+    folder = kept.data if shares(request) else None
+    if folder is None:
+        folder = tmp_path_factory.mktemp("data")
     monkeypatch.setenv("XDG_DATA_HOME", str(folder))
     return folder
 
 
+def fresh(request, kept, name, kind):
+    """A fake as it is made, the one of the window that is kept where a test takes that."""
+    return kept.fake(name, kind) if shares(request) else kind()
+
+
 @pytest.fixture
-def fake() -> FakeAccuracy:
+def fake(request, kept) -> FakeAccuracy:
     """Chooses exact visibility unless a test tells it otherwise."""
-    return FakeAccuracy()
+    return fresh(request, kept, "fake", FakeAccuracy)
 
 
 @pytest.fixture
-def fake_models() -> FakeDenoisers:
+def fake_models(request, kept) -> FakeDenoisers:
     """No model, unless a test adds some."""
-    return FakeDenoisers()
+    return fresh(request, kept, "fake_models", FakeDenoisers)
 
 
 @pytest.fixture
-def fake_classes() -> FakeClassifiers:
+def fake_classes(request, kept) -> FakeClassifiers:
     """No classifier, unless a test adds some."""
-    return FakeClassifiers()
+    return fresh(request, kept, "fake_classes", FakeClassifiers)
 
 
 @pytest.fixture
-def empty_window(qtbot, compiled_kernels, fake, fake_models, fake_classes):
-    """The window without a recording, all views in place."""
-    from sd2app.settings import Settings
-    from sd2app.shell.parts import Parts
-    from sd2app.shell.window import MainWindow
-
-    window = MainWindow(
-        Settings.forgetful(),
-        Parts(accuracy=fake, denoisers=fake_models.library, classifiers=fake_classes.library),
-    )
-    window.resize(1280, 800)
-    window.show()
-    window.populate()
-    qtbot.waitUntil(lambda: window.settled, timeout=120_000)
+def empty_window(qtbot, kept, compiled_kernels, fake, fake_models, fake_classes):
+    """A new window without a recording, all views in place."""
+    kept.close()
+    window = new_window(qtbot, fake, fake_models, fake_classes)
     yield window
     fake.gate.set()
     fake_classes.gate.set()
-    if window.ready:
-        models_of(window).document.undo_stack.clear()
-    window.close()
-    # Styling the next window would style all that are still there.
-    window.deleteLater()
-    QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
-
-
-def opened(window, qtbot, recording):
-    """The window on a recording, everything computed."""
-    with qtbot.waitSignal(models_of(window).document.opened, timeout=120_000):
-        window.open_paths([recording])
-    qtbot.waitUntil(lambda: window.settled, timeout=120_000)
-    qtbot.waitUntil(lambda: models_of(window).synthesis.complete, timeout=120_000)
-    return window
+    close_window(window)
 
 
 @pytest.fixture
-def window(empty_window, small_recording, qtbot):
+def fakes(fake, fake_models, fake_classes):
+    """What the window is made with, by the names of the fixtures."""
+    return {"fake": fake, "fake_models": fake_models, "fake_classes": fake_classes}
+
+
+@pytest.fixture
+def window(qtbot, kept, compiled_kernels, own_data, fakes, small_recording):
     """The window on the small recording, everything computed."""
-    return opened(empty_window, qtbot, small_recording)
+    return kept.open(qtbot, small_recording, own_data, fakes)
 
 
 @pytest.fixture
-def labelled(empty_window, qtbot, recording_copy):
+def labelled(qtbot, kept, compiled_kernels, own_data, fakes, recording_copy):
     """The window on the small recording: "there" 0.2 to 0.8 s, "back" 1 to 2 s, 60 frames."""
-    return opened(empty_window, qtbot, recording_copy)
+    return kept.open(qtbot, recording_copy, own_data, fakes)

@@ -1,0 +1,256 @@
+"""One window for the tests of a file, for as long as each of them leaves it as it was found.
+
+A new window takes longer than most of what is asked of it. Here the next test gets the window of
+the last one with a recording opened in it anew, if all that the window remembers (models, views,
+settings, widgets on screen) is then what a new window remembers; else it gets a new one.
+"""
+
+from __future__ import annotations
+
+import enum
+import shutil
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PySide6.QtCore import QByteArray, QCoreApplication, QEvent
+from PySide6.QtGui import QAction, QUndoStack
+from PySide6.QtWidgets import QApplication, QSplitter, QWidget
+from window_models import models_of
+
+from sd2app.session.display import HeatmapLevels
+from sd2app.settings import DEFAULT_TOLERANCE, Settings
+from sd2app.shell.parts import Parts
+from sd2app.shell.status_bar import StatusLine
+from sd2app.shell.window import MainWindow
+from sd2core.labels.recovery import recovery_folder
+
+_PLAIN = (str, int, float, complex, bytes, type(None), enum.Enum, Path)
+_PASSING = (
+    *("revision", "renderings", "_origin_s"),  # counted up, or of the clock
+    *("_image", "_picture", "_strongest", "_dirty", "_fine"),  # painted when it is next on screen
+    *("_reader._frame", "_prefetcher"),  # looked ahead, for the next frame
+    *("_lister", "_thread", "_synthesizers._made", "_kept"),  # made in the background, or kept
+    *("edits._before", "_last_px"),  # of a drag that is over
+    "_placements._body",  # what places were last drawn about
+)
+"""Ends of names of what says nothing of what is shown or will be."""
+_HASHED_BYTES = 1 << 20
+
+
+def new_window(qtbot: Any, fake: Any, fake_models: Any, fake_classes: Any) -> MainWindow:
+    """Window without a recording, all views in place."""
+    window = MainWindow(
+        Settings.forgetful(),
+        Parts(accuracy=fake, denoisers=fake_models.library, classifiers=fake_classes.library),
+    )
+    window.resize(1280, 800)
+    window.show()
+    window.populate()
+    qtbot.waitUntil(lambda: window.settled, timeout=120_000)
+    return window
+
+
+def close_window(window: MainWindow) -> None:
+    """Give up a window, whatever was edited in it."""
+    if window.ready:
+        models_of(window).document.undo_stack.clear()
+    window.close()
+    # Styling the next window would style all that are still there, and each part of the next
+    # again whenever it is put into another.
+    window.deleteLater()
+    QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+    QApplication.instance().setStyleSheet("")
+
+
+def opened(window: MainWindow, qtbot: Any, recording: Path) -> MainWindow:
+    """The window on a recording, everything computed."""
+    with qtbot.waitSignal(models_of(window).document.opened, timeout=120_000):
+        window.open_paths([recording])
+    qtbot.waitUntil(lambda: window.settled, timeout=120_000)
+    qtbot.waitUntil(lambda: models_of(window).synthesis.complete, timeout=120_000)
+    return window
+
+
+class KeptWindow:
+    """The window that the tests of a file share, or None, and what it shares with them."""
+
+    def __init__(self) -> None:
+        self.window: MainWindow | None = None
+        self.fakes: dict[str, Any] = {}
+        self.data: Path | None = None
+        self._focus: QWidget | None = None
+        self._splitters: list[tuple[QSplitter, QByteArray]] = []
+        self._remembered: dict[str, str] = {}
+
+    def fake(self, name: str, kind: Callable[[], Any]) -> Any:
+        """A fake as it is made: that of the window that is kept, or a new one."""
+        if self.window is None:
+            return kind()
+        fake = self.fakes[name]
+        fake.gate.set()
+        fake.__init__()
+        return fake
+
+    def open(self, qtbot: Any, recording: Path, data: Path, fakes: dict[str, Any]) -> MainWindow:
+        """Window on a recording as a new one would be: the one that is kept, or a new one."""
+        if self.window is not None:
+            before = {name: _copied(fake) for name, fake in fakes.items()}
+            # Models that are there from the start have been listed by then.
+            listed = any(getattr(fake, "cards", None) for fake in fakes.values())
+            if listed or not self._as_new(qtbot, recording):
+                self.close()
+                for name, fake in fakes.items():
+                    vars(fake).update(before[name])
+        if self.window is None:
+            empty(data)
+            self.window = new_window(qtbot, **fakes)
+            self.fakes, self.data = fakes, data
+            opened(self.window, qtbot, recording)
+            self._focus = QApplication.focusWidget()
+            splitters = self.window.findChildren(QSplitter)
+            self._splitters = [(one, one.saveState()) for one in splitters]
+            self._remembered = remembered(self.window, recording)
+        return self.window
+
+    def close(self) -> None:
+        """Give up the window."""
+        if self.window is not None:
+            for fake in self.fakes.values():
+                fake.gate.set()
+            close_window(self.window)
+        self.window, self.data = None, None
+
+    def _as_new(self, qtbot: Any, recording: Path) -> bool:
+        window = self.window
+        assert window is not None
+        if not window.ready or not window.isVisible() or QApplication.activeModalWidget():
+            return False
+        models = models_of(window)
+        models.document.undo_stack.clear()
+        models.playback.set_speed(1.0)
+        models.playback.set_loop(False)
+        models.display.set_levels(**vars(HeatmapLevels()))
+        models.pointer.leave()
+        models.keys.reset_all()
+        models.trade.tolerance = DEFAULT_TOLERANCE
+        window.side.bring_up("Sensor")
+        window.messages.hide()
+        for splitter, state in self._splitters:
+            splitter.restoreState(state)
+        window.activateWindow()
+        if self._focus is not None:
+            self._focus.setFocus()
+        window.session.settings._store._values.clear()
+        opened(window, qtbot, recording)
+        models.labels.set_label(models.labels.labels.label_set.labels[0].name)
+        held = models.label_session._place._folder
+        for folder in recovery_folder().iterdir():
+            if folder != held:
+                shutil.rmtree(folder)
+        return remembered(window, recording) == self._remembered
+
+
+def _copied(fake: Any) -> dict[str, Any]:
+    """What a fake knows, its lists copied."""
+    return {
+        name: value.copy() if isinstance(value, (list, dict)) else value
+        for name, value in vars(fake).items()
+    }
+
+
+def empty(folder: Path) -> None:
+    """Delete what is in a folder."""
+    for path in folder.iterdir():
+        if path.is_dir():
+            shutil.rmtree(path)
+        else:
+            path.unlink()
+
+
+def remembered(window: MainWindow, recording: Path) -> dict[str, str]:
+    """Everything that a window remembers, by where; the recording's folder has no name in it."""
+    found: dict[str, str] = {}
+    seen: set[int] = set()
+    parts = {"session": window.session, "features": window.features, "window": vars(window)}
+    rest: list[tuple[str, Any]] = [("", parts)]
+    while rest:
+        name, value = rest.pop()
+        if name.endswith(_PASSING):
+            continue
+        if isinstance(value, (*_PLAIN, np.generic)):
+            found[name] = repr(value).replace(str(recording), "<recording>")
+        elif isinstance(value, np.ndarray):
+            content = hash(value.tobytes()) if value.nbytes <= _HASHED_BYTES else ""
+            found[name] = f"{value.dtype} {value.shape} {content}"
+        elif isinstance(value, QUndoStack):
+            found[name] = f"{value.count()} {value.index()} {value.isClean()}"
+        elif isinstance(value, (tuple, list)):
+            found[name] = f"{len(value)}"
+            rest += [(f"{name}[{place}]", item) for place, item in enumerate(value)]
+        elif isinstance(value, (set, frozenset)):
+            found[name] = f"{sorted(map(repr, value))}" if _plain(value) else f"{len(value)}"
+        elif _is_value(value):
+            found[name] = type(value).__name__
+            rest += [(f"{name}.{key}", item) for key, item in _attributes(value).items()]
+        elif id(value) in seen or not (_is_ours(value) or isinstance(value, dict)):
+            continue
+        elif isinstance(value, dict):
+            seen.add(id(value))
+            found[name] = f"{len(value)}"
+            rest += [
+                (f"{name}[{key if isinstance(key, _PLAIN) else place}]", item)
+                for place, (key, item) in enumerate(value.items())
+            ]
+        else:
+            seen.add(id(value))
+            found[name] = type(value).__name__
+            rest += [(f"{name}.{key}", item) for key, item in sorted(_attributes(value).items())]
+    on_screen = Counter(_widgets(window, ""))
+    return found | {f"on screen: {text}": f"{count}" for text, count in on_screen.items()}
+
+
+def _plain(values: Any) -> bool:
+    return all(isinstance(value, _PLAIN) for value in values)
+
+
+def _is_value(value: Any) -> bool:
+    """True for what is equal to its copies, so that it does not matter who shares it."""
+    parameters = getattr(type(value), "__dataclass_params__", None)
+    return parameters is not None and parameters.frozen and parameters.eq
+
+
+def _is_ours(value: Any) -> bool:
+    known = is_dataclass(value) and not isinstance(value, type)
+    return known or type(value).__module__.startswith(("sd2app", "fake_"))
+
+
+def _attributes(value: Any) -> dict[str, Any]:
+    slots = [name for kind in type(value).__mro__ for name in getattr(kind, "__slots__", ())]
+    return getattr(value, "__dict__", {}) | {
+        name: getattr(value, name) for name in slots if hasattr(value, name)
+    }
+
+
+def _widgets(widget: QWidget, place: str) -> list[str]:
+    """What is to be seen of a widget and those in it."""
+    place = f"{place}/{type(widget).__name__}#{widget.objectName()}"
+    states = [widget.isEnabled(), widget.hasFocus(), widget.geometry().getRect()]
+    for ask in ("text", "isChecked", "value", "currentText"):
+        if callable(method := getattr(widget, ask, None)):
+            try:
+                states.append(method())
+            except TypeError:  # it asks for a row
+                continue
+    found = [f"{place} {states}"]
+    for child in widget.children():
+        if isinstance(child, StatusLine):
+            continue  # it says what is being worked on
+        if isinstance(child, QWidget) and child.isVisible():
+            found += _widgets(child, place)
+        elif isinstance(child, QAction):
+            found.append(f"{place} {child.text()} {child.isEnabled()} {child.isChecked()}")
+    return found
