@@ -27,9 +27,10 @@ from sd2core.train.callbacks import Outcome, TrainingCallbacks
 from sd2core.train.checkpoint import Checkpoint, Position, read_checkpoint
 from sd2core.train.config import TrainConfig
 from sd2core.train.data import Order, TrainingData, prepare, read_mixed
-from sd2core.train.denoiser_module import DenoiserModule, Steps
+from sd2core.train.denoiser_module import DenoiserModule
 from sd2core.train.folder import TrainingFolder
 from sd2core.train.machine import device_of, machine_words, precision_of, settled
+from sd2core.train.steps import Steps
 from sd2core.train.validate import Exam, Validation
 
 

@@ -21,8 +21,8 @@ from sd2core.train.config import (
     TrainConfig,
     TrainingConfig,
 )
-from sd2core.train.denoiser_module import optimiser_of
 from sd2core.train.start import begin
+from sd2core.train.steps import optimiser_of
 
 BATCH, LENGTH, BINS = 64, 72, 8
 TINY: dict[str, Any] = {"channels": 4, "depth": 1}

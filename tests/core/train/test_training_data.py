@@ -27,7 +27,7 @@ from sd2core.train.data import (
     split_subjects,
     windows_of,
 )
-from sd2core.train.denoiser_module import Steps, optimiser_of, set_rate
+from sd2core.train.steps import Steps, optimiser_of, set_rate
 
 
 class TestSplit:
