@@ -6,6 +6,7 @@ import contextlib
 import logging
 import os
 import platform
+import re
 import signal
 import socket
 import ssl
@@ -71,7 +72,8 @@ def test_a_killed_worker_loses_its_current_task_only(tmp_path: Path) -> None:
     assert end.facts["done"]["synthesise"] == 18
     notes = [one["text"] for one in said if one["event"] == "note"]
     assert len(notes) == 1
-    assert notes[0].startswith("A worker died during synthesise of m")
+    # Between its look and the kill the worker may have begun its next task.
+    assert re.match("A worker died during (inspect|synthesise) of m", notes[0])
 
 
 def test_other_users_of_the_machine_cannot_connect_to_a_local_batch(tmp_path: Path) -> None:

@@ -79,11 +79,15 @@ def test_keys_while_it_plays(labelled, qtbot) -> None:
     # Another key on a track without overlaps ends the first span and begins the next.
     for frame, name in ((5, "1"), (20, "3"), (40, "3")):
         qtbot.waitUntil(lambda frame=frame: c.playback.frame >= frame, timeout=10_000)
-        pressed.append(c.playback.frame)
+        before = c.playback.frame
         key(labelled, qtbot, name)
+        # The clock runs on while the key travels.
+        pressed.append(range(before, c.playback.frame + 1))
     key(labelled, qtbot, "Space")
-    first, second, third = pressed
-    assert spans(labelled) == [("left-to-right", first, second), ("up-to-down", second, third)]
+    (label, first, second), (other, again, third) = spans(labelled)
+    assert (label, other) == ("left-to-right", "up-to-down")
+    assert again == second
+    assert all(at in when for at, when in zip((first, second, third), pressed, strict=True))
 
 
 def test_a_hand_draws_moves_and_shortens(labelled, qtbot) -> None:
