@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.camera import PinholeCamera
-from sd2core.body.evidence import EvidenceInParts, resolve_arm_depths
+from sd2core.body.evidence import EvidenceInParts, trust_of
 from sd2core.body.fit_windows import Windows
 from sd2core.body.fitted import PER_FRAME, BodyFit, FittedMotion, mean_over_limbs
 from sd2core.body.initial import initial_pose
@@ -22,7 +22,7 @@ from sd2core.body.rotations import Floats
 from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.body.shaping import shape_of_lengths, shape_of_outlines
 from sd2core.body.solve import ROUNDS, solve, solve_stills
-from sd2core.body.track import PART_FRAMES, Landmarks, parts
+from sd2core.body.track import LANDMARKS, PART_FRAMES, Landmarks, parts
 from sd2core.errors import Sd2Error
 from sd2core.progress import Progress, silent
 
@@ -33,13 +33,16 @@ DEFAULT_STATURE_M = 1.72
 
 STATURES_M = (0.5, 2.6)
 
+SEEN = 0.5
+"""Trust from which on a landmark counts as seen."""
+
 _FINISHED_FRAMES = 600
 _MASK_SURE = 128
 _OUTLINES = 16
 
 # Measured on simulated people (docs/decisions/0022): what the lifter says of its
 # velocities, and the fit's error across the view per error of a landmark there.
-_ALONG = 0.22
+_ALONG = 0.9
 _ACROSS_PER_S = 3.0
 
 _UNSEEN_MPS = 0.3
@@ -101,13 +104,13 @@ def fit_motion(
     """
     fitting = Fitting(track, camera, stature_m, None, workspace)
     along_mps, across_mps = np.zeros((2, len(track), len(LIMBS)), np.float32)
-    done = residuals = 0
+    done, seen = 0, np.zeros(len(LANDMARKS))
     residual_m = quality = 0.0
     for part in fitting.finished(progress):
         frames = slice(done, done + len(part))
         along_mps[frames] = mean_over_limbs(part.along_sd_mps)
         across_mps[frames] = mean_over_limbs(part.across_sd_mps)
-        residuals += int(part.present.sum()) * part.residual_m.shape[1]
+        seen += np.isfinite(part.residual_m).sum(axis=0)
         residual_m += float(np.nansum(part.residual_m))
         quality += float(part.quality[part.present].sum())
         done = frames.stop
@@ -118,7 +121,8 @@ def fit_motion(
         present=track.present,
         along_sd_mps=along_mps,
         across_sd_mps=across_mps,
-        residual_m=residual_m / residuals,
+        seen=seen / int(track.present.sum()),
+        residual_m=residual_m / max(seen.sum(), 1.0),
         quality=quality / int(track.present.sum()),
     )
 
@@ -176,9 +180,8 @@ class Fitting:
         part, track, _ = self._evidence.part(start, stop)
         if self.windows.is_kept(number, part):
             return
-        leaning = resolve_arm_depths(part, rig)
-        first = initial_pose(rig, leaning.points_m, track.visibility.astype(np.float64))
-        self.windows.keep(number, part, solve(rig, leaning, first, tick))
+        first = initial_pose(rig, part.points_m, trust_of(track))
+        self.windows.keep(number, part, solve(rig, part, first, tick))
 
     def _shape(self, people: _People, looked: Callable[[int], None]) -> BodyShape:
         """Bone lengths from evenly chosen frames, then girth from those with outlines."""
@@ -219,8 +222,8 @@ class Fitting:
         trunk_m = keypoints_m[:, evidence.trunk, 2].mean(axis=1)
         seen_m = replace(evidence, trunk_m=trunk_m).points_m
         residual_m = np.linalg.norm(keypoints_m - seen_m, axis=-1)
-        residual_m[~track.present] = np.nan
-        unseen = 1.0 - np.clip(track.visibility.astype(np.float64), 0.0, 1.0)
+        trust = trust_of(track)
+        residual_m[~track.present[:, None] | (trust < SEEN)] = np.nan
         return BodyFit(
             timebase=track.timebase,
             shape=shape,
@@ -230,7 +233,10 @@ class Fitting:
             keypoints_m=keypoints_m,
             residual_m=residual_m,
             along_sd_mps=_there(
-                np.hypot(_ALONG * shape.stature_m * lifted.velocity_sigma, _UNSEEN_MPS * unseen**4),
+                np.hypot(
+                    _ALONG * shape.stature_m * lifted.velocity_sigma,
+                    _UNSEEN_MPS * (1.0 - trust) ** 4,
+                ),
                 track.present,
             ),
             across_sd_mps=_there(

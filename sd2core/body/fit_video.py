@@ -23,9 +23,10 @@ from sd2core.body.fitted import FittedMotion
 from sd2core.body.landmark_files import save_track
 from sd2core.body.landmark_models import landmark_models
 from sd2core.body.landmarks import DEFAULT_MAX_GAP_S, SIGHTINGS, OnFrame, find_landmarks
+from sd2core.body.limbs import LIMB_LANDMARKS, LIMBS
 from sd2core.body.model import Resolution
 from sd2core.body.person_selection import Rectangle
-from sd2core.body.track import Landmarks, parts
+from sd2core.body.track import LANDMARK, Landmarks, parts
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text, replace_folder
 from sd2core.files.lock import FileLock
@@ -45,6 +46,10 @@ LANDMARKS = "landmarks"
 """Sub-folder in which the search for landmarks keeps its results."""
 
 _LOCK = "lock"
+
+_NEVER_SEEN = 0.02
+"""Share of the frames below which a limb counts as never seen."""
+_DOUBTFUL_M = 0.07
 
 Stage = Literal["models", "find", "refine", "fit", "write"]
 
@@ -161,7 +166,7 @@ def fit_video(
                 int(track.bridged.sum()),
                 motion.residual_m,
                 motion.quality,
-                (*video.notes, *track.notes),
+                (*video.notes, *track.notes, *fit_notes(motion)),
             )
             _write(motion, out, partial, choices.resolution, report.progress_of("write"))
             _describe(partial / _new(out), provenance(made, path, choices))
@@ -170,6 +175,26 @@ def fit_video(
             _take_place(partial, out)
     shutil.rmtree(partial, ignore_errors=True)
     return made
+
+
+def fit_notes(motion: FittedMotion) -> tuple[str, ...]:
+    """Sentences on what a fit is not to be believed in."""
+    notes = []
+    unseen = [
+        limb for limb in LIMBS if motion.seen[LANDMARK[LIMB_LANDMARKS[limb][-1]]] < _NEVER_SEEN
+    ]
+    if unseen:
+        sides = {"L": "left", "R": "right", "": ""}
+        names = [limb.replace("_", " ").partition(".") for limb in unseen]
+        listed = ", ".join(f"{sides[side]} {name}".strip() for name, _, side in names)
+        notes.append(f"Never seen: {listed}. They are held at rest and move with the body only.")
+    if motion.residual_m > _DOUBTFUL_M:
+        notes.append(
+            f"This fit is not to be believed: the body is {100.0 * motion.residual_m:.1f} cm from"
+            f" the landmarks on average, and good ones stay below {100.0 * _DOUBTFUL_M:.0f} cm."
+            " Give the camera's focal length and the person's height where they are guessed."
+        )
+    return tuple(notes)
 
 
 def provenance(made: FittedVideo, path: Path, choices: FitChoices) -> dict[str, Any]:

@@ -46,7 +46,7 @@ class BodyFit:
     translation_m: Floats  # (T, 3)
     present: NDArray[np.bool_]  # (T,) False in empty frames
     keypoints_m: Floats  # (T, 33, 3) the fitted body's landmarks in the camera frame
-    residual_m: Floats  # (T, 33) distance of the lifted landmarks from them; NaN in empty frames
+    residual_m: Floats  # (T, 33) distance of the lifted landmarks from them; NaN where not seen
     along_sd_mps: Floats  # (T, 33) deviation of velocity along the line of sight; 0 in empty ones
     across_sd_mps: Floats  # (T, 33) deviation in any direction at right angles to it
 
@@ -68,8 +68,11 @@ class BodyFit:
     @property
     def quality(self) -> Floats:
         """Quality of the fit per frame, (T,): from 0 (no person) to 1 (landmarks on the body)."""
-        residual = np.nan_to_num(self.residual_m, nan=np.inf)
-        return np.asarray(np.exp(-np.median(residual, axis=1) / 0.05))
+        seen = np.isfinite(self.residual_m)
+        ordered = np.sort(self.residual_m, axis=1)  # what was not seen comes last
+        middle = np.maximum(seen.sum(axis=1) - 1, 0) // 2
+        median_m = np.take_along_axis(ordered, middle[:, None], axis=1)[:, 0]
+        return np.asarray(np.exp(-np.nan_to_num(median_m, nan=np.inf) / 0.05))
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +85,7 @@ class FittedMotion:
     present: NDArray[np.bool_]
     along_sd_mps: NDArray[np.float32]  # (T, L) of BodyFit, mean over each limb's landmarks
     across_sd_mps: NDArray[np.float32]  # (T, L)
+    seen: Floats  # (33,) share of the frames with the person in which each landmark was seen
     residual_m: float  # mean of BodyFit.residual_m
     quality: float  # mean of BodyFit.quality over frames with the person
 

@@ -2,7 +2,7 @@
 
 Seven kinds of residuals, each divided by its standard deviation: landmarks in the
 picture, their depth behind the middle of the trunk, the trunk's own depth, their
-velocity along the optical axis relative to it, habits and limits of joints, arms behind
+velocity along the optical axis, habits and limits of joints, arms behind
 the chest, and smoothness (the acceleration of every degree of freedom). Landmarks,
 depths and velocities far off count less (iteratively reweighted least squares). Unknowns
 of a frame meet only those of the next two, so the equations are banded.
@@ -80,14 +80,15 @@ class Normal:
         from scipy.linalg import solveh_banded
 
         frames, unknowns = self.gradient.shape
-        width = min(REACH, frames - 1) * unknowns + unknowns - 1
-        banded = np.zeros((width + 1, frames * unknowns), order="F")  # as LAPACK takes it
-        row, column = np.mgrid[:unknowns, :unknowns]
-        for apart, blocks in enumerate(self.blocks[: min(REACH, frames - 1) + 1]):
-            below = row - column - apart * unknowns
-            kept = below <= 0
-            places = np.arange(len(blocks))[:, None] * unknowns + apart * unknowns
-            banded[width + below[kept], places + column[kept]] = blocks[:, kept]
+        reach = min(REACH, frames - 1)
+        # As LAPACK takes it: a column of the matrix, down to its diagonal, after the other.
+        columns = np.zeros((frames, unknowns, (reach + 1) * unknowns))
+        for apart, blocks in enumerate(self.blocks[: reach + 1]):
+            for column in range(unknowns):
+                first = (reach - apart + 1) * unknowns - 1 - column
+                rows = unknowns if apart else column + 1
+                columns[apart:, column, first : first + rows] = blocks[:, :rows, column]
+        banded = columns.reshape(frames * unknowns, -1).T
         banded[-1] *= 1.0 + damping
         solved = solveh_banded(
             banded,
@@ -156,6 +157,7 @@ class Objective:
         self.rig, self.evidence, self.acceleration_sd = rig, evidence, acceleration_sd
         self._relaxed, self._habit_sd, self._limits = _habits(rig)
         self._step_s = np.diff(evidence.times_s)
+        self._size, self._size_share = _size_error(evidence)
         heads, index = rig.skeleton.heads_m, rig.skeleton.index
         self._arm_m = float(
             np.linalg.norm(heads[index["lowerarm01.L"]] - heads[index["upperarm01.L"]])
@@ -174,12 +176,12 @@ class Objective:
         angles = self._angles(pose)
         low, high = self._limits
         beyond = np.minimum(angles - low, 0.0) + np.maximum(angles - high, 0.0)
+        off = (positions[..., :2] / depth[..., None] - seen.slopes) / seen.slopes_sd[..., None]
         return Residuals(
-            (positions[..., :2] / depth[..., None] - seen.slopes) / seen.slopes_sd[..., None],
+            self._but_for_size(off.reshape(len(off), -1, 1)).reshape(off.shape),
             (depth - trunk[:, None] - seen.depth_m) / seen.depth_sd_m,
             ((trunk - seen.trunk_m) / seen.trunk_sd_m)[:, None],
-            (np.diff(depth - trunk[:, None], axis=0) / self._step_s[:, None] - velocity)
-            / velocity_sd,
+            (np.diff(depth, axis=0) / self._step_s[:, None] - velocity) / velocity_sd,
             angles / self._habit_sd,
             beyond / _LIMIT_SD_RAD,
             self._behind(marks)[0],
@@ -223,9 +225,11 @@ class Objective:
         shift = (jacobian[:, :, :2] - slopes[..., None] * along[:, :, None]) / depth[
             ..., None, None
         ]
-        shift *= (trust.picture / seen.slopes_sd[..., None])[..., None]
+        shift /= seen.slopes_sd[..., None, None]
+        known = self._but_for_size(shift.reshape(frames, -1, unknowns))
+        known = known.reshape(shift.shape) * trust.picture[..., None]
         normal.add(
-            residuals.picture.reshape(frames, -1), [(0, shift.reshape(frames, -1, unknowns))]
+            residuals.picture.reshape(frames, -1), [(0, known.reshape(frames, -1, unknowns))]
         )
 
         trunk = along[:, seen.trunk].mean(axis=1, keepdims=True)  # (T, 1, n)
@@ -239,7 +243,7 @@ class Objective:
             per_m = trust.velocity / (self._velocity()[1] * self._step_s[:, None])
             normal.add(
                 residuals.velocity,
-                [(0, -apart[:-1] * per_m[..., None]), (1, apart[1:] * per_m[..., None])],
+                [(0, -along[:-1] * per_m[..., None]), (1, along[1:] * per_m[..., None])],
             )
         normal.add_diagonal(
             residuals.habit, [(0, np.broadcast_to(1.0 / self._habit_sd, (frames, unknowns)))]
@@ -266,6 +270,14 @@ class Objective:
             axis=1,
         )
         return Pose(turns, pose.translation_m + change[:, -3:])
+
+    def _but_for_size(self, shifts: Floats) -> Floats:
+        """Shifts (T, 66, n) in the picture, in standard deviations of independent errors.
+
+        A change of the person's size counts less, as all landmarks share its error.
+        """
+        along = self._size.transpose(0, 2, 1) @ shifts
+        return np.asarray(shifts - (self._size_share * self._size) @ along)
 
     def _velocity(self) -> tuple[Floats, Floats]:
         """Mean velocity between frames, and its standard deviation, (T - 1, 33)."""
@@ -310,6 +322,22 @@ def cost(residuals: Residuals) -> float:
     return 0.5 * float(sum((one**2).sum() for one in residuals))
 
 
+def _size_error(evidence: Evidence) -> tuple[Floats, Floats]:
+    """Change of the picture with the person's size, (T, 66, 1) of length 1, and its share.
+
+    Independent errors and one of the size, which all landmarks share, have the covariance
+    1 + s² u uᵀ; the root of its inverse is 1 - share · u uᵀ / |u|².
+    """
+    there = np.isfinite(evidence.slopes_sd)[..., None]
+    slopes = np.where(there, evidence.slopes, 0.0)
+    middle = slopes.sum(axis=1, keepdims=True) / np.maximum(there.sum(axis=1, keepdims=True), 1)
+    change = np.where(there, slopes - middle, 0.0) / evidence.slopes_sd[..., None]
+    change = change.reshape(len(change), -1, 1)
+    length = np.linalg.norm(change, axis=1, keepdims=True)
+    share = 1.0 - 1.0 / np.sqrt(1.0 + (evidence.size_sd * length) ** 2)
+    return change / np.maximum(length, 1e-12), share
+
+
 def _habits(rig: Rig) -> tuple[Floats, Floats, tuple[Floats, Floats]]:
     """Relaxed rotations (J, 3, 3), spread (n,) and limits (n,) of every joint."""
     relaxed = np.tile(np.eye(3), (len(JOINTS), 1, 1))
@@ -347,9 +375,9 @@ _FIRST_ROTATION_RADPS2 = 60.0
 _FIRST_TRANSLATION_MPS2 = 6.0
 _LEAST_ROTATION_RADPS2 = 0.3
 _LEAST_TRANSLATION_MPS2 = 0.05
-_LIVELINESS = 1.0
+_LIVELINESS = 0.7
 """Standard deviation of an acceleration over what was found around it."""
-_AROUND_S = 0.15
+_AROUND_S = 0.3
 ROUNDS = 4
 _STEPS = 8
 _CONVERGED = 1e-3

@@ -133,6 +133,7 @@ def evidence_of_points(times_s: Floats, points_m: Floats, sd_m: Floats) -> Evide
         times_s=times_s,
         slopes=points_m[..., :2] / depth[..., None],
         slopes_sd=sd_m / depth,
+        size_sd=0.0,
         trunk=TORSO_CORNERS,
         depth_m=depth - trunk_m[:, None],
         depth_sd_m=sd_m,
@@ -201,10 +202,11 @@ def puppet_of(clips: Sequence[SkeletonClip], markers: tuple[Marker, ...]) -> Pup
     points = KeypointSpace(space)
     shape = _shape(space, points, *stills)
     own = points.of(shape)
-    rest_m = own.rest_m.copy()
-    ears = [LANDMARK["ear.L"], LANDMARK["ear.R"]]
-    rest_m[ears] = rest_m[ears].mean(axis=0)
-    own = replace(own, rest_m=rest_m)
+    if len({marker.joint for marker in markers if marker.landmark[:4] == "ear."}) == 1:
+        rest_m = own.rest_m.copy()
+        ears = [LANDMARK["ear.L"], LANDMARK["ear.R"]]
+        rest_m[ears] = rest_m[ears].mean(axis=0)
+        own = replace(own, rest_m=rest_m)
     return Puppet(shape, _placed(space.skeleton(shape), own, markers, *stills), markers)
 
 

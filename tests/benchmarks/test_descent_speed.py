@@ -49,6 +49,7 @@ def problem() -> tuple[Objective, Pose]:
         times_s=times_s,
         slopes=points_m[..., :2] / depth_m[..., None] + 0.005 * rng.normal(size=(FRAMES, 33, 2)),
         slopes_sd=0.005 * full,
+        size_sd=0.0,
         trunk=tuple(TORSO_CORNERS),
         depth_m=depth_m - centre_m[:, None] + 0.05 * rng.normal(size=full.shape),
         depth_sd_m=0.1 * full,

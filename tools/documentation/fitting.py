@@ -24,6 +24,7 @@ from sd2core.numerics.compiled import warm_up
 from tools.documentation.places import BUILD, DOCS, IMAGES, SHARED
 from tools.fitting.__main__ import main as run_fitting
 from tools.fitting.truth import read_truth
+from tools.motion_capture.__main__ import main as run_motion_capture
 
 REAL = ("walk.mkv", "help.mkv", "again.mkv")
 
@@ -80,7 +81,11 @@ def main() -> None:
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else BUILD / "fitting"
     folder.mkdir(parents=True, exist_ok=True)
     clips, fits, tables = folder / "clips", folder / "fits", folder / "tables.md"
-    _run("clips", clips)
+    motions = []
+    if (SHARED / "motion").is_dir():
+        _run_motions("drive", SHARED / "motion", folder / "motions")
+        motions = ["--motions", folder / "motions"]
+    _run("clips", clips, *motions)
     _frames(clips)
     videos = [SHARED / "video" / name for name in REAL]
     real = [video for video in videos if video.exists()]
@@ -95,6 +100,12 @@ def main() -> None:
 
 def _run(*arguments: object) -> None:
     code = run_fitting([str(argument) for argument in arguments])
+    if code:
+        sys.exit(code)
+
+
+def _run_motions(*arguments: object) -> None:
+    code = run_motion_capture([str(argument) for argument in arguments])
     if code:
         sys.exit(code)
 

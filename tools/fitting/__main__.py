@@ -15,7 +15,7 @@ from sd2core.cli.reading import check_output
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from tools.command_line import run_tool
-from tools.fitting.clips import CLIPS, TUNING, clip_named, make_fit_truth
+from tools.fitting.clips import CLIPS, REAL_MOTION, TUNING, clip_named, make_fit_truth
 from tools.fitting.error_check import compare_errors
 from tools.fitting.error_measurement import measure_errors
 from tools.fitting.report import as_dict
@@ -60,6 +60,15 @@ def _add_clips(commands: argparse._SubParsersAction) -> None:
         help=(
             "only these, separated by commas, or `tuning`: ten other clips by which the weights"
             " of the fit were chosen (default: all but those)"
+        ),
+    )
+    parser.add_argument(
+        "--motions",
+        type=Path,
+        metavar="FOLDER",
+        help=(
+            "also clips with the motion of real people, from the folder that"
+            " `python -m tools.motion_capture drive` made"
         ),
     )
     parser.add_argument("--list", action="store_true", help="name the clips and make nothing")
@@ -159,8 +168,8 @@ def _add_errors(commands: argparse._SubParsersAction) -> None:
 
 def _clips(options: argparse.Namespace) -> None:
     if options.list:
-        width = max(len(clip.name) for clip in (*CLIPS, *TUNING))
-        for clip in (*CLIPS, *TUNING):
+        width = max(len(clip.name) for clip in (*CLIPS, *REAL_MOTION, *TUNING))
+        for clip in (*CLIPS, *REAL_MOTION, *TUNING):
             print(
                 f"{clip.name:<{width}}  {clip.person}, {clip.room}, at {clip.distance_m:g} m,"
                 f" camera {clip.camera_m:g} m high"
@@ -169,9 +178,10 @@ def _clips(options: argparse.Namespace) -> None:
     if options.out is None:
         raise Sd2Error("No folder is given", "python -m tools.fitting clips OUT")
     names = [name for name in (options.clips or "").split(",") if name]
-    clips = TUNING if names == ["tuning"] else [clip_named(name) for name in names] or CLIPS
+    standard = CLIPS if options.motions is None else (*CLIPS, *REAL_MOTION)
+    clips = TUNING if names == ["tuning"] else [clip_named(name) for name in names] or standard
     with progress_bar("Simulating", unit="frame") as progress:
-        made = make_fit_truth(options.out, clips, progress)
+        made = make_fit_truth(options.out, clips, progress, options.motions)
     print(f"{len(made)} clips in {options.out}")
 
 

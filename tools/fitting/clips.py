@@ -36,6 +36,7 @@ from tools.build_sample.clothing import Clothes
 from tools.build_sample.render import Camera, Renderer
 from tools.build_sample.sample import write_compact_mesh
 from tools.build_sample.swipes import GestureSpan
+from tools.fitting.captured import captured_transforms
 from tools.fitting.cast import PEOPLE, ROOMS
 from tools.fitting.motions import Action, duration_s, perform
 from tools.fitting.truth import FORMAT, VERSION, read_truth
@@ -106,6 +107,54 @@ CLIPS = (
 )
 """Clips that fits are scored on; the weights of the fit were chosen by others."""
 
+
+def _captured(
+    trial: str, start_s: float, length_s: float, heading_deg: float, **more: Any
+) -> Action:
+    return Action(
+        "captured",
+        trial=trial,
+        start_s=start_s,
+        length_s=length_s,
+        heading_deg=heading_deg,
+        **more,
+    )
+
+
+REAL_MOTION = (
+    Clip("walk-towards", _captured("08_01", 0.0, 2.2, 0.0), "bo", "studio", 4.6, 1.2, 31),
+    Clip("walk-away", _captured("08_10", 0.0, 2.2, 180.0), "dora", "office", 3.4, 1.5, 32),
+    Clip("walk-across", _captured("02_01", 0.0, 2.6, 90.0), "chen", "window", 4.2, 1.0, 33),
+    Clip("walk-oblique", _captured("12_02", 0.0, 5.0, -40.0), "femi", "evening", 4.4, 1.6, 34),
+    Clip("walk-about", _captured("09_12", 1.0, 7.0, 20.0), "ada", "studio", 4.6, 1.1, 35),
+    Clip("walk-turning", _captured("09_12", 8.0, 7.0, -120.0), "emil", "window", 4.6, 2.0, 36),
+    Clip(
+        "sit-and-stand", _captured("ui_m05_s09_e02", 0.0, 2.4, 15.0), "ada", "office", 3.2, 1.2, 37
+    ),
+    Clip(
+        "sit-oblique", _captured("ui_m05_s10_e05", 0.0, 2.0, -55.0), "bo", "evening", 3.4, 0.9, 38
+    ),
+    Clip("squat", _captured("ui_m01_s09_e05", 0.0, 2.8, 60.0), "dora", "studio", 3.6, 1.3, 39),
+    Clip("bend-and-lift", _captured("02_06", 1.0, 6.0, 30.0), "emil", "office", 3.4, 1.4, 40),
+    Clip("reach-and-wash", _captured("02_10", 4.0, 6.0, -20.0), "femi", "window", 3.2, 1.2, 41),
+    Clip("punch", _captured("02_05", 3.0, 5.0, -60.0), "chen", "studio", 3.4, 1.1, 42),
+    Clip("exercise", _captured("ui_m02_s09_e02", 0.0, 2.0, 10.0), "bo", "window", 3.8, 1.2, 43),
+    Clip(
+        "exercise-side", _captured("ui_m03_s10_e05", 0.0, 2.0, 75.0), "ada", "evening", 3.8, 1.0, 44
+    ),
+    Clip("jump", _captured("02_04", 0.0, 4.0, -30.0), "dora", "window", 3.8, 1.2, 45),
+    Clip("hop", _captured("49_02", 4.0, 5.0, 140.0), "emil", "studio", 4.0, 1.3, 46),
+    Clip("dance", _captured("49_11", 1.0, 6.0, 45.0), "femi", "office", 4.0, 1.2, 47),
+    Clip("cropped-bend", _captured("02_06", 8.0, 5.0, 0.0), "ada", "window", 1.9, 1.45, 48),
+    Clip("cropped-hop", _captured("49_03", 2.0, 5.0, -25.0), "chen", "office", 2.0, 1.5, 49),
+    Clip(
+        "cropped-lunge", _captured("ui_m04_s10_e02", 0.0, 2.0, 20.0), "bo", "studio", 2.2, 1.6, 50
+    ),
+    Clip("cropped-walk", _captured("12_01", 1.0, 2.0, 90.0), "dora", "evening", 2.3, 1.4, 51),
+)
+"""Clips with the motion of real people whom nothing was learnt from or tuned on; the cropped ones
+are cut off at the knees."""
+
 TUNING = (
     Clip("tune-1", _swipes(_ALL, "fast"), "ada", "window", 2.4, 1.2, 101, 0.1),
     Clip("tune-2", _swipes(_ALL, "normal"), "bo", "studio", 2.0, 1.1, 102),
@@ -129,16 +178,21 @@ def clip_named(name: str) -> Clip:
     Sd2Error
         When there is none of this name.
     """
-    for clip in (*CLIPS, *TUNING):
+    for clip in (*CLIPS, *REAL_MOTION, *TUNING):
         if clip.name == name:
             return clip
     raise Sd2Error(
-        f"There is no clip {name!r}", ", ".join(clip.name for clip in CLIPS), "See --list"
+        f"There is no clip {name!r}",
+        ", ".join(clip.name for clip in (*CLIPS, *REAL_MOTION)),
+        "See --list",
     )
 
 
 def make_fit_truth(
-    out: Path, clips: Sequence[Clip] = CLIPS, progress: Progress = silent
+    out: Path,
+    clips: Sequence[Clip] = CLIPS,
+    progress: Progress = silent,
+    motions: Path | None = None,
 ) -> list[Path]:
     """Make clips that are not there yet.
 
@@ -149,6 +203,8 @@ def make_fit_truth(
         there when it is complete.
     progress : Progress
         Counts frames of the clips to be made.
+    motions : Path, optional
+        Folder made by ``python -m tools.motion_capture``, for clips of :data:`REAL_MOTION`.
 
     Returns
     -------
@@ -168,7 +224,7 @@ def make_fit_truth(
     total, done = sum(_frame_count(clip) for clip in missing), 0
     for clip in missing:
         before = done
-        _make(out, clip, lambda frames, _: progress(before + frames, total))  # noqa: B023
+        _make(out, clip, motions, lambda frames, _: progress(before + frames, total))  # noqa: B023
         done += _frame_count(clip)
     progress(total, total)
     return [out / clip.name for clip in clips]
@@ -210,28 +266,35 @@ class Scene:
         return turned + self.transforms[..., 3]
 
 
-def scene(clip: Clip, space: ShapeSpace) -> Scene:
-    """Everything about a clip but its picture."""
+def scene(clip: Clip, space: ShapeSpace, motions: Path | None = None) -> Scene:
+    """Everything about a clip but its picture; ``motions`` as :func:`make_fit_truth` takes it."""
     shape = PEOPLE[clip.person].shape(space)
     skeleton = space.skeleton(shape)
     times_s = np.arange(_frame_count(clip)) / FRAMES_PER_S
+    camera = Camera(above_floor_m=clip.camera_m)
+    if clip.action.kind == "captured":
+        place = np.array([clip.across_m, clip.camera_m, clip.distance_m])
+        transforms = captured_transforms(space, shape, clip.action, place, motions)
+        return Scene(shape, times_s, transforms, skeleton, (), camera)
     scale = arm_length_m(skeleton) / arm_length_m(space.base_skeleton)
     motion, spans = perform(skeleton, clip.action, times_s, clip.seed, scale)
     place = np.array([clip.across_m, clip.camera_m, clip.distance_m])
     transforms = skeleton.transforms(motion.rotations, motion.translation_m + place)
-    camera = Camera(above_floor_m=clip.camera_m)
     return Scene(shape, times_s, transforms, skeleton, spans, camera)
 
 
-def renderer(clip: Clip, space: ShapeSpace, shape: BodyShape) -> Renderer:
+def renderer(clip: Clip, space: ShapeSpace, known: Scene) -> Renderer:
     """Draws this clip's person in this clip's room."""
-    body = space.load("high", shape)
+    body = space.load("high", known.shape)
     nearest_m = clip.distance_m - (clip.action.walk_m if clip.action.kind == "walk" else 0.0)
+    farthest_m = clip.distance_m
+    if clip.action.kind == "captured":
+        nearest_m, farthest_m = np.percentile(known.transforms[:, 0, 2, 3], [0.0, 100.0])
     studio = replace(
         ROOMS[clip.room],
-        wall_m=max(clip.distance_m + 1.1, 3.5),
-        shadow_m=3.2 + clip.distance_m - nearest_m,
-        shadow_depth_m=0.5 * (clip.distance_m + nearest_m),
+        wall_m=max(farthest_m + 1.1, 3.5),
+        shadow_m=3.2 + farthest_m - nearest_m,
+        shadow_depth_m=0.5 * (farthest_m + nearest_m),
         noise=NOISE,
     )
     clothes = Clothes.of(Body.load("high"), PEOPLE[clip.person].outfit)
@@ -254,24 +317,24 @@ def _is_made(folder: Path, clip: Clip) -> bool:
     return True
 
 
-def _make(out: Path, clip: Clip, progress: Progress) -> None:
+def _make(out: Path, clip: Clip, motions: Path | None, progress: Progress) -> None:
     workspace = Path(tempfile.mkdtemp(prefix=f".{clip.name}.", suffix=".tmp", dir=out))
     try:
         folder = workspace / clip.name
         folder.mkdir()
-        _fill(folder, clip, progress)
+        _fill(folder, clip, motions, progress)
         folder.rename(out / clip.name)
     finally:
         shutil.rmtree(workspace, ignore_errors=True)
 
 
-def _fill(folder: Path, clip: Clip, progress: Progress) -> None:
+def _fill(folder: Path, clip: Clip, motions: Path | None, progress: Progress) -> None:
     space = ShapeSpace()
-    known = scene(clip, space)
+    known = scene(clip, space, motions)
     camera = known.camera
     write_video(
         folder / "video.mp4",
-        _pictures(known.mesh(space, "high"), renderer(clip, space, known.shape), clip, progress),
+        _pictures(known.mesh(space, "high"), renderer(clip, space, known), clip, progress),
         FRAMES_PER_S,
         (camera.width, camera.height),
     )
@@ -335,6 +398,8 @@ def _truth(clip: Clip, known: Scene, keypoints: NDArray[np.float64]) -> dict[str
 
 
 def _notes(clip: Clip) -> list[str]:
+    if clip.action.kind == "captured":
+        return ["A real person's recorded motion on another body; fingers and face do not move."]
     notes = ["Hand and arm follow minimum-jerk moves; a person's are less even."]
     if clip.action.kind == "still":
         notes = ["The body does not move at all: it does not breathe. The camera has noise."]

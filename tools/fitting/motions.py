@@ -27,7 +27,7 @@ from sd2core.simulate.limbs import (
 )
 from tools.build_sample.swipes import GestureSpan, Move, arm_poses
 
-Kind = Literal["swipes", "still", "walk", "turn"]
+Kind = Literal["swipes", "still", "walk", "turn", "captured"]
 Speed = Literal["slow", "normal", "fast"]
 Swipe = Literal["left-to-right", "right-to-left", "up-to-down", "down-to-up"]
 
@@ -54,7 +54,7 @@ class Action:
 
     Parameters
     ----------
-    kind : {"swipes", "still", "walk", "turn"}
+    kind : {"swipes", "still", "walk", "turn", "captured"}
     swipes : tuple of {"left-to-right", "right-to-left", "up-to-down", "down-to-up"}
         One after another, as the camera sees them.
     speed : {"slow", "normal", "fast"}
@@ -66,6 +66,13 @@ class Action:
         For ``walk``: how far towards the camera, and how fast in between.
     turn_deg : tuple of float
         For ``turn``: where to, one after another; 0 faces the camera.
+    trial : str
+        For ``captured``: the recording of a real person's motion.
+    start_s, length_s : float
+        For ``captured``: the part of it that is shown.
+    heading_deg : float
+        For ``captured``: 0 shows the person's front at the start, 180 the back; positive turns
+        the person's left side to the camera.
     """
 
     kind: Kind
@@ -76,6 +83,10 @@ class Action:
     walk_m: float = 2.5
     walk_mps: float = 1.05
     turn_deg: tuple[float, ...] = (75.0, -65.0)
+    trial: str = ""
+    start_s: float = 0.0
+    length_s: float = 4.0
+    heading_deg: float = 0.0
 
 
 class Performance(NamedTuple):
@@ -93,13 +104,15 @@ def duration_s(action: Action, seed: int) -> float:
         return _START_S + action.walk_m / action.walk_mps + 0.7 + 0.45
     if action.kind == "turn":
         return _turns(action)[-1][1] + 0.6
+    if action.kind == "captured":
+        return action.length_s
     return 4.0
 
 
 def perform(
     skeleton: Skeleton, action: Action, times_s: Floats, seed: int, arm_scale: float = 1.0
 ) -> Performance:
-    """Carry an action out.
+    """Carry an action out; those of real people are in :mod:`tools.fitting.captured`.
 
     Parameters
     ----------

@@ -14,6 +14,7 @@ from sd2core.cli.output import print_json, progress_bar
 from sd2core.cli.reading import check_output
 from sd2core.errors import Sd2Error
 from tools.command_line import run_tool
+from tools.motion_capture.bodies import load_motions
 from tools.train_lifter.data import load_takes, make_lifter_data
 from tools.train_lifter.emulate import landmark_offsets
 from tools.train_lifter.score import score
@@ -37,7 +38,8 @@ def _add_commands(kinds: argparse._SubParsersAction) -> None:
         ),
         examples=(
             "  python -m tools.train_lifter data people --takes 400 --seed 1\n"
-            "  python -m tools.train_lifter data unseen --takes 40 --held-out"
+            "  python -m tools.train_lifter data unseen --takes 40 --held-out\n"
+            "  python -m tools.train_lifter data walkers --motions motions --takes 400"
         ),
     )
     data.add_argument("out", type=Path, metavar="OUT", help="folder of the takes")
@@ -57,6 +59,12 @@ def _add_commands(kinds: argparse._SubParsersAction) -> None:
             " or gesturing before the camera"
         ),
     )
+    data.add_argument(
+        "--motions",
+        type=Path,
+        metavar="FOLDER",
+        help="people move as those recorded there do (made by python -m tools.motion_capture)",
+    )
     data.add_argument("--processes", type=positive_int, default=2, metavar="P", help="(default: 2)")
     data.add_argument("--models", type=Path, metavar="FOLDER", help="the landmark models")
     train = add_command(
@@ -65,18 +73,29 @@ def _add_commands(kinds: argparse._SubParsersAction) -> None:
         "train the lifter of `sd2 fit` on such takes",
         handler=_train,
         examples=(
-            "  python -m tools.train_lifter train people --out lifter.npz\n"
-            "  python -m tools.train_lifter train people more --start lifter.npz --out better.npz"
+            "  python -m tools.train_lifter train people walkers --kept unseen --motions motions"
+            " --out lifter.npz"
         ),
     )
     train.add_argument("data", type=Path, nargs="+", metavar="DATA", help="folders of the takes")
+    train.add_argument(
+        "--kept",
+        type=Path,
+        nargs="+",
+        required=True,
+        metavar="DATA",
+        help="folders of takes that only calibrate: of people and motion not learnt from",
+    )
+    train.add_argument(
+        "--motions", type=Path, metavar="FOLDER", help="real motion to emulate (see data --motions)"
+    )
     train.add_argument("--start", type=Path, metavar="FILE", help="a lifter to go on from")
     train.add_argument(
         "--steps",
         type=positive_int,
         metavar="N",
         help="of optimisation (default: %(default)s)",
-        default=5000,
+        default=4500,
     )
     train.add_argument("--out", type=Path, required=True, metavar="FILE", help="to write (.npz)")
     train.add_argument(
@@ -112,6 +131,7 @@ def _data(options: argparse.Namespace) -> None:
             options.seed,
             held_out=options.held_out,
             manner=options.manner,
+            motions=options.motions,
             processes=options.processes,
             models=options.models,
             progress=progress,
@@ -123,11 +143,13 @@ def _train(options: argparse.Namespace) -> None:
     check_output(options.out, ".npz")
     takes = [take for folder in options.data for take in _takes(folder)]
     start = Lifter.load(options.start) if options.start else None
-    from tools.train_lifter.training import Recipe, save_lifter, train_on  # needs torch
+    kept = [take for folder in options.kept for take in _takes(folder)]
+    motions = load_motions(options.motions, "learn") if options.motions else []
+    from tools.train_lifter.training import Recipe, material, save_lifter, train  # needs torch
 
     with progress_bar("Training", unit="step") as progress:
         recipe = Recipe(steps=options.steps, seed=options.seed)
-        lifter = train_on(takes, recipe, progress, start=start)
+        lifter = train(material(takes, kept, motions, recipe), recipe, progress, start=start)
     save_lifter(lifter, options.out)
     print(f"Wrote {options.out}")
 

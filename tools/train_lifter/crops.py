@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,6 +85,38 @@ def random_background(rng: np.random.Generator, width: int, height: int) -> Pixe
     return np.clip(picture, 0, 255).astype(np.uint8)
 
 
+class Furniture(NamedTuple):
+    """Things that stand before the person: their picture (H, W, 3), and where they are (H, W)."""
+
+    picture: Pixels
+    mask: Pixels
+
+
+def random_furniture(
+    rng: np.random.Generator, places_px: NDArray[np.float64], width: int, height: int
+) -> Furniture:
+    """A box that hides legs or a side of the person, as a table or a chair does.
+
+    Parameters
+    ----------
+    places_px : array, shape (T, 33, 2)
+        Of the landmarks.
+    """
+    mask = np.zeros((height, width), np.uint8)
+    low, high = np.percentile(places_px.reshape(-1, 2), [5.0, 95.0], axis=0)
+    across, up = high - low
+    if rng.random() < 0.7:  # on the floor
+        top = low[1] + rng.uniform(0.45, 0.9) * up
+        left = low[0] + rng.uniform(-0.5, 0.6) * across
+        box = left, top, left + rng.uniform(0.3, 1.2) * across, float(height)
+    else:
+        left = low[0] + rng.uniform(-0.1, 0.9) * across
+        box = left, 0.0, left + rng.uniform(0.05, 0.2) * across, float(height)
+    x0, y0, x1, y1 = (int(value) for value in np.clip(box, 0, [width, height, width, height]))
+    mask[y0:y1, x0:x1] = 255
+    return Furniture(random_background(rng, width, height), mask)
+
+
 class CropPainter:
     """Draws one dressed body into squares of one camera's picture.
 
@@ -93,6 +126,8 @@ class CropPainter:
     background : uint8 array, shape (height, width, 3)
     rng : numpy.random.Generator
         For the noise.
+    furniture : Furniture, optional
+        Before the body.
     """
 
     def __init__(
@@ -103,7 +138,9 @@ class CropPainter:
         look: Look,
         background: Pixels,
         rng: np.random.Generator,
+        furniture: Furniture | None = None,
     ) -> None:
+        self._furniture = furniture
         self._faces = np.ascontiguousarray(faces, np.int32)
         self._wardrobe = wardrobe
         self._camera = camera
@@ -151,6 +188,12 @@ class CropPainter:
             self._srgb,
             fine,
         )
+        if self._furniture is not None:
+            picture, mask = (
+                cv2.resize(roi.cut(layer), (side, side), interpolation=cv2.INTER_LINEAR)
+                for layer in self._furniture
+            )
+            np.copyto(fine, picture, where=(mask > 127)[..., None])
         crop = cv2.resize(fine, (CROP_PX, CROP_PX), interpolation=cv2.INTER_AREA)
         crop = self._filmed(crop, roi.size_px / CROP_PX)
         self._blacken(crop, roi)

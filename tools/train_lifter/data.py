@@ -9,10 +9,12 @@ from pathlib import Path
 
 from sd2core.processes import end_with_parent
 from sd2core.progress import Progress, silent
+from tools.motion_capture.bodies import BodyMotion, load_motions
 from tools.train_lifter.deeds import Manner
 from tools.train_lifter.takes import Take, TakeMaker
 
 _maker: TakeMaker | None = None
+_motions: list[BodyMotion] = []
 
 
 def make_lifter_data(
@@ -22,6 +24,7 @@ def make_lifter_data(
     *,
     held_out: bool = False,
     manner: Manner = "any",
+    motions: Path | None = None,
     processes: int = 2,
     models: Path | None = None,
     progress: Progress = silent,
@@ -37,7 +40,10 @@ def make_lifter_data(
     held_out : bool
         With the motion that is kept for testing.
     manner : {"any", "natural", "gestures"}
-        How people move.
+        How simulated people move.
+    motions : Path, optional
+        Folder made by ``python -m tools.motion_capture``: people move as those in it do. With
+        ``held_out``, as the people who are kept for calibration.
     models : Path, optional
         Folder of the landmark models.
 
@@ -52,11 +58,13 @@ def make_lifter_data(
     folder.mkdir(parents=True, exist_ok=True)
     missing = [n for n in range(takes) if not take_path(folder, n).exists()]
     job = partial(_make, folder, seed, held_out, manner)
+    if motions is not None:
+        job = partial(_make_captured, folder, seed, held_out)
     done = takes - len(missing)
     progress(done, takes)
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(
-        processes, mp_context=context, initializer=_start, initargs=(models,)
+        processes, mp_context=context, initializer=_start, initargs=(models, motions, held_out)
     ) as pool:
         futures = [pool.submit(job, number) for number in missing]
         try:
@@ -80,16 +88,23 @@ def load_takes(folder: Path) -> list[Take]:
     return [Take.load(path) for path in sorted(folder.glob("take-*.npz"))]
 
 
-def _start(models: Path | None) -> None:
+def _start(models: Path | None, motions: Path | None, held_out: bool) -> None:
     end_with_parent()
     from sd2core.body.blazepose import PoseLandmarker
     from sd2core.body.landmark_models import landmark_models
 
-    global _maker
+    global _maker, _motions
     _maker = TakeMaker(PoseLandmarker(landmark_models(models).landmarker))
+    if motions is not None:
+        _motions = load_motions(motions, "calibrate" if held_out else "learn")
 
 
 def _make(folder: Path, seed: int, held_out: bool, manner: Manner, number: int) -> None:
     assert _maker is not None
     take = _maker.make((seed, int(held_out), number), held_out=held_out, manner=manner)
     take.save(take_path(folder, number))
+
+
+def _make_captured(folder: Path, seed: int, held_out: bool, number: int) -> None:
+    assert _maker is not None
+    _maker.captured((seed, int(held_out), number), _motions).save(take_path(folder, number))

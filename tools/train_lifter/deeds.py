@@ -11,8 +11,8 @@ from sd2core.simulate.people.motion import Deed
 from sd2core.simulate.people.walking import Mode
 
 Manner = Literal["any", "natural", "gestures"]
-"""Manner of motion: elbows any way they can be, elbows as people have them, or standing or
-sitting before the camera and making strokes with one hand or both."""
+"""Manner of simulated motion: elbows any way they can be, elbows as people have them, or standing
+or sitting before the camera and making strokes with one hand or both."""
 
 LEGS: dict[Mode, float] = {"stand": 0.56, "shift": 0.18, "walk": 0.14, "turn": 0.05, "sit": 0.07}
 """Actions of the legs, each with its probability."""

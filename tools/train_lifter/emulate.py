@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from sd2core.body.lifter_features import Seen
 from sd2core.body.rotations import applied
 from sd2core.body.track import LANDMARKS
+from tools.motion_capture.bodies import BodyMotion
 from tools.train_lifter.deeds import Manner
 from tools.train_lifter.takes import Stage, Take
 
@@ -27,7 +28,9 @@ Singles = NDArray[np.float32]
 _HIPS = [LANDMARKS.index("hip.L"), LANDMARKS.index("hip.R")]
 _SHOULDERS = [LANDMARKS.index("shoulder.L"), LANDMARKS.index("shoulder.R")]
 _WRISTS = [LANDMARKS.index("wrist.L"), LANDMARKS.index("wrist.R")]
+_ANKLES = [LANDMARKS.index("ankle.L"), LANDMARKS.index("ankle.R")]
 _WALK = 2  # takes have 0 and 1 in this place
+_CAPTURED = 3
 _MANNERS: tuple[Manner, ...] = ("any", "natural", "gestures", "gestures")
 """Manners of the motions, in turn."""
 _CANDIDATES = 24
@@ -153,6 +156,17 @@ def random_walks(emulator: Emulator, count: int, seed: int) -> list[Walk]:
     return walks
 
 
+def captured_walks(
+    emulator: Emulator, motions: Sequence[BodyMotion], count: int, seed: int
+) -> list[Walk]:
+    """Motions of random bodies that move as real people did, not drawn."""
+    stage, walks = Stage(), []
+    for number in range(count):
+        scene = stage.captured(np.random.default_rng((seed, _CAPTURED, number)), motions)
+        walks.append(emulator.walk(scene.keypoints_m, scene.bone_turns, scene.shape.stature_m))
+    return walks
+
+
 def _regressors(places: Singles) -> Singles:
     """Predictors of the network's metres: place from the hips, direction of the trunk."""
     hips = places[:, _HIPS].mean(axis=1, keepdims=True)
@@ -164,11 +178,12 @@ def _regressors(places: Singles) -> Singles:
 
 
 def _marks(places: Singles) -> Floats:
-    """By what motions are alike: facing, distance, speed and place of the hands."""
+    """By what motions are alike: facing, distance, speed of hands and feet, place of the hands."""
     shoulders, wrists = places[:, _SHOULDERS], places[:, _WRISTS]
     across = shoulders[:, 0] - shoulders[:, 1]
     facing = np.arctan2(across[:, 2].mean(), across[:, 0].mean())
-    speed = np.log(0.03 + 30.0 * np.abs(np.diff(wrists, axis=0)).mean(axis=(0, 2)))
+    ends = places[:, _WRISTS + _ANKLES]
+    speed = np.log(0.03 + 30.0 * np.abs(np.diff(ends, axis=0)).mean(axis=(0, 2)))
     ahead = (wrists - shoulders)[..., 1:].mean(axis=0).ravel()
     distance = np.log(places[:, :, 2].mean())
     wide = [2.0 * np.cos(facing), 2.0 * np.sin(facing), 2.0 * distance]

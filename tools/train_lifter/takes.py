@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -11,23 +13,35 @@ from numpy.typing import NDArray
 
 from sd2core.body.blazepose import CLOSE_UP, PoseLandmarker, Roi
 from sd2core.body.camera import PinholeCamera
-from sd2core.body.rig import KeypointSpace
+from sd2core.body.rig import Keypoints, KeypointSpace, Rig
 from sd2core.body.rotations import Floats
 from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.body.skinning import pose_vertices
 from sd2core.body.track import LANDMARKS
 from sd2core.files.atomic import atomic_write
+from sd2core.mocap.driving import resample_pose
 from sd2core.simulate.people.motion import random_motion
-from tools.train_lifter.crops import CropPainter, random_background, random_look
+from tools.motion_capture.bodies import BodyMotion
+from tools.motion_capture.catalogue import RATE_HZ
+from tools.train_lifter.crops import (
+    CropPainter,
+    Furniture,
+    random_background,
+    random_furniture,
+    random_look,
+)
 from tools.train_lifter.deeds import Manner, random_deed
-from tools.train_lifter.view import random_view
+from tools.train_lifter.view import View, random_view, random_view_around
 from tools.train_lifter.wardrobe import random_wardrobe
 
 FRAMES = 96
-RATE_HZ = 30.0
 
 _HIPS = [LANDMARKS.index("hip.L"), LANDMARKS.index("hip.R")]
 _ROI_FOLLOWS = 0.25
+_WALKS_MPS = 0.4
+_SLOWEST = 0.4
+"""Pace below which a motion is too short for a take."""
+_FURNISHED = 0.25
 _LOST = 0.5
 
 
@@ -128,14 +142,58 @@ class Stage:
             view = random_view(rng, keypoints.positions(transforms))
             if view is None:
                 continue
-            transforms = view.transforms(transforms)
-            return Scene(
-                shape,
-                view.camera,
-                transforms,
-                keypoints.positions(transforms),
-                transforms[:, keypoints.bones, :, :3],
-            )
+            return _scene(shape, keypoints, view, transforms)
+
+    def captured(
+        self, rng: np.random.Generator, motions: Sequence[BodyMotion], frames: int = FRAMES
+    ) -> Scene:
+        """A random body in a part of a real person's motion, seen from anywhere around.
+
+        The motion may be mirrored, reversed, and up to a fifth faster or slower than it was.
+        """
+        share = np.array([_weight(motion) for motion in motions])
+        share /= share.sum()
+        while True:
+            motion = motions[int(rng.choice(len(motions), p=share))]
+            pace = float(np.exp(rng.uniform(-0.18, 0.18)))
+            needed = math.ceil((frames - 1) * pace) + 1
+            if len(motion) < needed:
+                pace, needed = (len(motion) - 1) / (frames - 1), len(motion)
+            if pace < _SLOWEST:
+                continue
+            start = int(rng.integers(0, len(motion) - needed + 1))
+            shape = self.space.random(rng)
+            keypoints = self._keypoints.of(shape)
+            rig = Rig(self.space.skeleton(shape), keypoints)
+            own = self.space.skeleton(motion.shape)
+            pose = motion.pose_on(rig.skeleton, own, slice(start, start + needed))
+            ticks = np.arange(frames, dtype=np.float64) * pace
+            pose = resample_pose(pose, np.arange(needed, dtype=float), ticks)
+            if rng.random() < 0.5:
+                pose = pose.at(slice(None, None, -1))
+            whole = self.space.skeleton(shape)
+            transforms = whole.transforms(rig.body_rotations(pose.turns), pose.translation_m)
+            view = random_view_around(rng, keypoints.positions(transforms))
+            if view is not None:
+                return _scene(shape, keypoints, view, transforms)
+
+
+def _scene(shape: BodyShape, keypoints: Keypoints, view: View, transforms: Floats) -> Scene:
+    transforms = view.transforms(transforms)
+    return Scene(
+        shape,
+        view.camera,
+        transforms,
+        keypoints.positions(transforms),
+        transforms[:, keypoints.bones, :, :3],
+    )
+
+
+def _weight(motion: BodyMotion) -> float:
+    """How often a motion is drawn: by its length, up to half a minute, and its way."""
+    speed_mps = np.linalg.norm(np.diff(motion.translation_m[:, [0, 2]], axis=0), axis=1) * RATE_HZ
+    walks = 2.0 if np.median(speed_mps) > _WALKS_MPS else 1.0
+    return walks * (min(len(motion), 900) + 100)
 
 
 class TakeMaker:
@@ -164,6 +222,23 @@ class TakeMaker:
         """
         rng = np.random.default_rng(seed)
         scene = self._stage.scene(rng, held_out=held_out, manner=manner, frames=frames)
+        return self._filmed(rng, scene, None)
+
+    def captured(
+        self, seed: tuple[int, ...], motions: Sequence[BodyMotion], frames: int = FRAMES
+    ) -> Take:
+        """One take of a random body in the motion of a real person, perhaps behind furniture."""
+        rng = np.random.default_rng(seed)
+        scene = self._stage.captured(rng, motions, frames)
+        furniture = None
+        if rng.random() < _FURNISHED:
+            places_px = scene.camera.project(scene.keypoints_m)
+            size = scene.camera.width, scene.camera.height
+            furniture = random_furniture(rng, places_px, *size)
+        return self._filmed(rng, scene, furniture)
+
+    def _filmed(self, rng: np.random.Generator, scene: Scene, furniture: Furniture | None) -> Take:
+        """A scene in random clothes, light and surroundings, and what is seen of it."""
         camera = scene.camera
         body = self._stage.space.load("medium", scene.shape)
         painter = CropPainter(
@@ -173,6 +248,7 @@ class TakeMaker:
             random_look(rng),
             random_background(rng, camera.width, camera.height),
             rng,
+            furniture,
         )
         vertices = pose_vertices(body, scene.transforms)
         return Take(

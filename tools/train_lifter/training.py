@@ -27,25 +27,19 @@ from sd2core.body.lifter_features import RATE_HZ
 from sd2core.body.track import LANDMARKS
 from sd2core.files.atomic import atomic_write
 from sd2core.progress import Progress, silent
-from tools.train_lifter.emulate import Emulator, Walk, random_walks
+from tools.motion_capture.bodies import BodyMotion
+from tools.train_lifter.emulate import Emulator, Walk, captured_walks, random_walks
 from tools.train_lifter.examples import Batch, Example, batch, emulated, example, varied
 from tools.train_lifter.network import LifterNetwork
 from tools.train_lifter.takes import Take
 
 Singles = NDArray[np.float32]
 
-_CALIBRATION_EVERY = 10
-"""Every tenth take calibrates the spreads and is not trained on."""
-
-_WEIGHTS = {"wrist": 3.0, "pinky": 3.0, "index": 3.0, "thumb": 3.0, "elbow": 2.5} | {
-    "shoulder": 1.5,
-    "hip": 1.5,
-    "knee": 0.6,
-    "ankle": 0.4,
-    "heel": 0.3,
-    "foot_index": 0.3,
-}
+_WEIGHTS = dict.fromkeys(("shoulder", "hip", "elbow", "knee", "wrist", "ankle"), 2.0) | (
+    dict.fromkeys(("pinky", "index", "thumb", "heel", "foot_index"), 1.5)
+)
 _FACE_WEIGHT = 0.5
+_SPREADS_WEIGHT = 0.05
 
 
 @dataclass(frozen=True)
@@ -56,8 +50,8 @@ class Recipe:
     ----------
     steps : int
         Of optimisation.
-    emulated_share : float
-        Of every batch; the rest is from drawn takes.
+    emulated_share, captured_share : float
+        Of every batch: simulated and real motion without pictures; the rest is drawn takes.
     frames : int
         Of each example.
     rate : float
@@ -66,14 +60,15 @@ class Recipe:
         Weights of the losses; ``change`` is that of the depths' differences over
         1, 2 and 4 frames.
     walks : int
-        Motions to emulate.
+        Motions to emulate, of either kind.
     """
 
     width: int = 128
     dilations: tuple[int, ...] = (1, 2, 4, 8, 2, 1)
     dropout: float = 0.1
-    steps: int = 5000
-    emulated_share: float = 0.6
+    steps: int = 4500
+    emulated_share: float = 0.25
+    captured_share: float = 0.4
     batch: int = 24
     frames: int = 64
     rate: float = 1.5e-3
@@ -81,42 +76,50 @@ class Recipe:
     depth: float = 4.0
     root: float = 2.0
     change: float = 0.3
-    walks: int = 1000
+    walks: int = 500
     seed: int = 0
 
 
-def train_on(
-    takes: Sequence[Take],
-    recipe: Recipe,
-    progress: Progress = silent,
-    start: Lifter | None = None,
-) -> Lifter:
-    """Train on drawn takes and on emulated motion that follows them.
+@dataclass(frozen=True, eq=False)
+class Material:
+    """What a lifter is trained and calibrated on."""
 
-    Deterministic for the same takes, recipe, machine and number of threads.
-    """
-    emulator = Emulator([take for n, take in enumerate(takes) if n % _CALIBRATION_EVERY])
-    walks = random_walks(emulator, recipe.walks, recipe.seed)
-    return train(takes, walks, emulator, recipe, progress, start=start)
+    takes: Sequence[Take]
+    kept: Sequence[Take]
+    """Of other people, or other motion; they calibrate the spreads."""
+    emulator: Emulator | None = None
+    walks: Sequence[Walk] = ()
+    captured: Sequence[Walk] = ()
+
+
+def material(
+    takes: Sequence[Take],
+    kept: Sequence[Take],
+    motions: Sequence[BodyMotion],
+    recipe: Recipe,
+) -> Material:
+    """Drawn takes, and emulated motion whose errors follow them."""
+    emulator = Emulator(takes)
+    return Material(
+        takes,
+        kept,
+        emulator,
+        random_walks(emulator, recipe.walks, recipe.seed),
+        captured_walks(emulator, motions, recipe.walks, recipe.seed) if motions else (),
+    )
 
 
 def train(
-    takes: Sequence[Take],
-    walks: Sequence[Walk] | None,
-    emulator: Emulator | None,
+    known: Material,
     recipe: Recipe,
     progress: Progress = silent,
     log: Callable[[str], None] | None = None,
     start: Lifter | None = None,
 ) -> Lifter:
-    """Train a lifter.
+    """Train a lifter; deterministic for the same material, recipe, machine and threads.
 
     Parameters
     ----------
-    takes : sequence of Take
-        Drawn ones; every tenth is kept for calibration.
-    walks : sequence of Walk, optional
-        Motions to emulate.
     log : callable, optional
         Told the losses now and then.
     start : Lifter, optional
@@ -124,9 +127,7 @@ def train(
     """
     torch.manual_seed(recipe.seed)
     rng = np.random.default_rng(recipe.seed)
-    examples = [example(take) for take in takes]
-    kept = [one for n, one in enumerate(examples) if n % _CALIBRATION_EVERY == 0]
-    learnt = [one for n, one in enumerate(examples) if n % _CALIBRATION_EVERY]
+    learnt = [example(take) for take in known.takes]
     told = np.concatenate([batch([one]).told[0] for one in learnt[:200]])
     if start is not None:
         network = LifterNetwork.continued(start.network, recipe.dropout)
@@ -135,7 +136,6 @@ def train(
         network = LifterNetwork(
             told.mean(axis=0), spread, recipe.width, recipe.dilations, recipe.dropout
         )
-    share = recipe.emulated_share if walks else 0.0
     mean = copy.deepcopy(network)
     optimiser = torch.optim.AdamW(network.parameters(), lr=recipe.rate, weight_decay=0.02)
     schedule = torch.optim.lr_scheduler.OneCycleLR(
@@ -143,7 +143,7 @@ def train(
     )
     network.train()
     for step in range(recipe.steps):
-        drawn = _drawn(rng, learnt, walks, emulator, share, recipe)
+        drawn = _drawn(rng, learnt, known, recipe)
         loss, parts = losses(network(torch.from_numpy(drawn.told)), drawn, recipe)
         optimiser.zero_grad()
         loss.backward()
@@ -158,29 +158,28 @@ def train(
     exported = mean.exported()
     return Lifter(
         exported,
-        calibration(exported, kept),
+        calibration(exported, [example(take) for take in known.kept]),
         {
             "recipe": asdict(recipe),
-            "takes": len(takes),
-            "walks": len(walks or ()),
+            "takes": len(known.takes),
+            "kept": len(known.kept),
+            "walks": len(known.walks),
+            "captured": len(known.captured),
             "start": dict(start.provenance) if start is not None else None,
         },
     )
 
 
 def _drawn(
-    rng: np.random.Generator,
-    learnt: Sequence[Example],
-    walks: Sequence[Walk] | None,
-    emulator: Emulator | None,
-    share: float,
-    recipe: Recipe,
+    rng: np.random.Generator, learnt: Sequence[Example], known: Material, recipe: Recipe
 ) -> Batch:
     chosen = []
     frames = int(rng.integers(recipe.frames // 2, recipe.frames + 1))
     for _ in range(recipe.batch):
-        if walks and emulator is not None and rng.random() < share:
-            one = emulated(rng, emulator, walks[int(rng.integers(len(walks)))])
+        kind = rng.random() - recipe.captured_share
+        walks = known.captured if kind < 0.0 else known.walks
+        if walks and known.emulator is not None and kind < recipe.emulated_share:
+            one = emulated(rng, known.emulator, walks[int(rng.integers(len(walks)))])
         else:
             one = learnt[int(rng.integers(len(learnt)))]
         chosen.append(varied(rng, one, frames))
@@ -207,7 +206,7 @@ def losses(
         "depth": recipe.depth * (_huber(depth_error, 0.15) * weights).mean(),
         "root": recipe.root * _huber(root_error, 0.2).mean(),
         "change": recipe.change * change,
-        "spreads": 0.02
+        "spreads": _SPREADS_WEIGHT
         * (
             _likelihood(root_error, out[..., 1]).mean()
             + _likelihood(depth_error, rest[..., 1, :]).mean()
@@ -238,9 +237,12 @@ def _huber(error: torch.Tensor, knee: float) -> torch.Tensor:
 
 
 def _likelihood(error: torch.Tensor, log_sigma: torch.Tensor) -> torch.Tensor:
-    """Negative logarithm of a normal density, of errors taken as given."""
-    log_sigma = log_sigma.clamp(*LOG_SIGMA)
-    return log_sigma + 0.5 * (error.detach() * torch.exp(-log_sigma)) ** 2
+    """Negative logarithm of a normal density, of errors taken as given.
+
+    Beyond its limits a spread keeps its gradient: where it had none, it never came back.
+    """
+    limited = log_sigma + (log_sigma.clamp(*LOG_SIGMA) - log_sigma).detach()
+    return limited + 0.5 * (error.detach() * torch.exp(-limited)) ** 2
 
 
 def _follow(mean: LifterNetwork, network: LifterNetwork, inertia: float) -> None:

@@ -13,6 +13,8 @@ from sd2core.body.track import LANDMARKS
 from sd2core.simulate.limbs import turn_about
 
 _SIZES = ((640, 480), (640, 480), (640, 360), (480, 640))
+_PHONES = ((640, 480), (640, 360), (480, 640), (360, 640))
+_TRUNK = tuple(LANDMARKS.index(f"{name}.{side}") for name in ("shoulder", "hip") for side in "LR")
 _UPPER_BODY = tuple(
     LANDMARKS.index(name) for name in ("nose", "shoulder.L", "shoulder.R", "elbow.L", "elbow.R")
 )
@@ -81,6 +83,50 @@ def random_view(rng: np.random.Generator, keypoints_m: Floats) -> View | None:
         turn = turn_about(2, np.array([rng.normal(0.0, 1.5)]))[0] @ turn
         view = View(camera, turn, -turn @ at)
         if _sees(view, upper, hips):
+            return view
+    return None
+
+
+def random_view_around(rng: np.random.Generator, keypoints_m: Floats) -> View | None:
+    """A camera anywhere around a person, of a phone or a webcam, that sees the trunk.
+
+    Headings are uniform over the circle, heights 0.4 to 2.5 m above the floor, distances 1 to 6 m.
+    Three of five see the whole body most of the time; the others may cut off arms and legs.
+
+    Parameters
+    ----------
+    keypoints_m : array, shape (T, 33, 3)
+        In the world, y down, the floor at 0.
+
+    Returns
+    -------
+    View or None
+        None where no camera of a hundred sees it.
+    """
+    middle = keypoints_m[:, _TRUNK].mean(axis=(0, 1))
+    whole = rng.random() < 0.6
+    for _ in range(100):
+        width, height = _PHONES[rng.integers(len(_PHONES))]
+        field = math.radians(rng.uniform(45.0, 80.0))
+        camera = PinholeCamera(width, height, max(width, height) / 2.0 / math.tan(field / 2.0))
+        distance = rng.uniform(1.0, 6.0)
+        aside = rng.uniform(-0.25, 0.25) * distance * width / camera.focal_px
+        around = turn_about(1, np.array([rng.uniform(-180.0, 180.0)]))[0]
+        at = middle + around @ np.array([-aside, 0.0, -distance])
+        at[1] = -rng.uniform(0.4, 2.5)
+        slope = rng.uniform(-0.25, 0.25) * height / camera.focal_px
+        pitch = math.degrees(math.atan2(middle[1] - at[1], distance) - math.atan(slope))
+        if abs(pitch) > 30.0:
+            continue
+        turn = turn_about(0, np.array([pitch]))[0] @ around.T
+        turn = turn_about(2, np.array([rng.normal(0.0, 2.0)]))[0] @ turn
+        view = View(camera, turn, -turn @ at)
+        seen_m = view.points(keypoints_m)
+        if seen_m[..., 2].min() < 0.7:
+            continue
+        places_px = camera.project(seen_m)
+        inside = np.all((places_px >= 0.0) & (places_px <= [width, height]), axis=2)
+        if inside[:, _TRUNK].mean() > 0.97 and (not whole or inside.mean() > 0.95):
             return view
     return None
 

@@ -133,8 +133,8 @@ def test_a_cancelled_clip_leaves_nothing(tmp_path: Path, short: None) -> None:
 def test_what_is_no_clip_is_explained(tmp_path: Path) -> None:
     with pytest.raises(Sd2Error, match="no clip of known motion"):
         truth_folders(tmp_path)
-    with pytest.raises(Sd2Error, match="no clip 'dance'"):
-        clip_named("dance")
+    with pytest.raises(Sd2Error, match="no clip 'ballet'"):
+        clip_named("ballet")
     (tmp_path / "truth.json").write_text(json.dumps({"format": "sd2-fit-truth", "version": 99}))
     with pytest.raises(Sd2Error, match="version 99"):
         read_truth(tmp_path)
@@ -144,7 +144,7 @@ def test_a_shaped_body_wears_the_same_clothes(space: ShapeSpace) -> None:
     """Sleeves end at the same vertices, so the forearm is bare however long it is."""
     clip = clip_named("left-hand-fast")
     known = scene(clip, space)
-    drawer = clip_module.renderer(clip, space, known.shape)
+    drawer = clip_module.renderer(clip, space, known)
     np.testing.assert_array_equal(
         drawer._clothes.fields, Clothes.of(Body.load("high"), drawer._clothes.outfit).fields
     )

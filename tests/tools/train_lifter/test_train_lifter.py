@@ -11,8 +11,11 @@ from sd2core.body.blazepose import CROP_PX, Pose, Roi
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.lifter import POINTS, Lifter
 from sd2core.body.lifter_features import rate
+from sd2core.body.rig import JOINTS
+from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.simulate.people.arms import STYLES
-from tools.train_lifter.crops import CropPainter, Look
+from tools.motion_capture.bodies import BodyMotion
+from tools.train_lifter.crops import CropPainter, Look, random_furniture
 from tools.train_lifter.deeds import GESTURE_STYLES, HELD_OUT_STYLES, random_deed
 from tools.train_lifter.emulate import Emulator, Walk, random_walks
 from tools.train_lifter.examples import batch, emulated, example, varied
@@ -142,12 +145,12 @@ def test_emulated_people_look_like_the_takes(takes: list[Take]) -> None:
 
 def test_training_learns_and_repeats(takes: list[Take], tmp_path: Path) -> None:
     pytest.importorskip("torch")
-    from tools.train_lifter.training import Recipe, save_lifter, train
+    from tools.train_lifter.training import Material, Recipe, save_lifter, train
 
-    recipe = Recipe(width=8, dilations=(1, 2), steps=30, batch=4, frames=20, dropout=0.0)
+    recipe = Recipe(width=8, dilations=(1, 2), steps=30, batch=4, frames=24, dropout=0.0)
     logged: list[str] = []
-    one = train(takes, None, None, recipe, log=logged.append)
-    two = train(takes, None, None, recipe)
+    one = train(Material(takes[1:], takes[:1]), recipe, log=logged.append)
+    two = train(Material(takes[1:], takes[:1]), recipe)
     for name, array in one.network.arrays.items():
         np.testing.assert_array_equal(array, two.network.arrays[name])
     first, last = (float(text.split("root ")[1].split(",")[0]) for text in (logged[0], logged[-1]))
@@ -162,14 +165,66 @@ def test_training_learns_and_repeats(takes: list[Take], tmp_path: Path) -> None:
 
 def test_training_goes_on_from_a_lifter(takes: list[Take]) -> None:
     pytest.importorskip("torch")
-    from tools.train_lifter.training import Recipe, train
+    from tools.train_lifter.training import Material, Recipe, train
 
     recipe = Recipe(width=8, dilations=(1, 2), steps=3, batch=2, frames=20, rate=1e-9)
-    one = train(takes, None, None, recipe)
-    two = train(takes, None, None, recipe, start=one)
+    one = train(Material(takes[1:], takes[:1]), recipe)
+    two = train(Material(takes[1:], takes[:1]), recipe, start=one)
     for name, array in one.network.arrays.items():
         np.testing.assert_allclose(two.network.arrays[name], array, atol=1e-6)
     assert two.provenance["start"] == one.provenance
+
+
+def test_a_spread_beyond_its_limits_still_learns() -> None:
+    torch = pytest.importorskip("torch")
+    from tools.train_lifter.training import _likelihood
+
+    log_sigma = torch.tensor([-9.0, 0.0, 4.0], requires_grad=True)
+    _likelihood(torch.tensor([0.1, 0.1, 0.1]), log_sigma).sum().backward()
+    gradient = log_sigma.grad.numpy()
+    # Too sure: larger; too unsure: smaller, however far outside.
+    assert gradient[0] < -1.0
+    assert gradient[1] > 0.5
+    assert gradient[2] > 0.5
+
+
+def test_real_motion_is_seen_from_everywhere(stage: Stage) -> None:
+    motion = _swaying()
+    facing, distances_m = [], []
+    for n in range(40):
+        scene = stage.captured(np.random.default_rng(n), [motion], frames=24)
+        assert scene.keypoints_m.shape == (24, 33, 3)
+        trunk_m = scene.keypoints_m[:, [11, 12, 23, 24]]
+        assert (scene.keypoints_m[..., 2] > 0.7).all()
+        size = np.array([scene.camera.width, scene.camera.height])
+        shown = scene.camera.project(trunk_m)
+        assert ((shown >= 0.0) & (shown <= size)).all(axis=2).mean() > 0.97
+        across = trunk_m[0, 0] - trunk_m[0, 1]
+        facing.append(np.arctan2(across[2], across[0]))
+        distances_m.append(trunk_m[..., 2].mean())
+    quarters = np.histogram(facing, 4, (-np.pi, np.pi))[0]
+    assert (quarters >= 3).all()
+    assert min(distances_m) < 2.5
+    assert max(distances_m) > 4.5
+
+
+def test_furniture_stands_before_the_person() -> None:
+    rng = np.random.default_rng(3)
+    places_px = rng.uniform([200, 100], [300, 400], (5, 33, 2))
+    furniture = random_furniture(rng, places_px, 640, 480)
+    assert furniture.picture.shape == (480, 640, 3)
+    covered = furniture.mask[places_px[..., 1].astype(int), places_px[..., 0].astype(int)] > 0
+    assert 0.02 < covered.mean() < 0.9
+
+
+def _swaying() -> BodyMotion:
+    """A body that sways and turns round."""
+    space = ShapeSpace()
+    vectors = np.zeros((60, len(JOINTS), 3))
+    vectors[:, 0, 1] = np.linspace(0.0, 1.0, 60)
+    vectors[:, 1, 0] = 0.2 * np.sin(np.arange(60) / 5.0)
+    shape = BodyShape(np.zeros(len(space)), 1.7)
+    return BodyMotion("t", "p", "sway", "learn", shape, vectors, np.zeros((60, 3)), 0.01)
 
 
 def test_numpy_and_torch_agree() -> None:

@@ -1,0 +1,1 @@
+"""Real motion capture as bodies of ours in motion, to learn and to measure depth from."""

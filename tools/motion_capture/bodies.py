@@ -1,0 +1,188 @@
+"""Bodies in the motion of real people: driven once, kept in a folder, posed on any shape."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.body.initial import Pose
+from sd2core.body.model import Skeleton
+from sd2core.body.rig import KeypointSpace, Rig
+from sd2core.body.rotations import from_vector, to_vector
+from sd2core.body.shape import BodyShape, ShapeSpace
+from sd2core.errors import Sd2Error
+from sd2core.files.atomic import atomic_write
+from sd2core.mocap.driving import SkeletonClip, puppet_of, resample_pose
+from sd2core.processes import end_with_parent
+from sd2core.progress import Progress, silent
+from tools.motion_capture.catalogue import RATE_HZ, Role, Trial, trials
+from tools.motion_capture.points import MARKERS
+
+Floats = NDArray[np.float64]
+
+_GLITCH_MPS = 18.0
+_LEAST_S = 1.0
+_MOST_S = 20.0
+"""Of one recording; what follows is much alike."""
+_NEAR_M = 4.0
+_LEG = ("upperleg01.L", "lowerleg01.L", "foot.L")
+
+
+@dataclass(frozen=True, eq=False)
+class BodyMotion:
+    """One trial as rotations of our joints; the world has y down, the floor at 0, and 30 Hz."""
+
+    trial: str
+    person: str
+    what: str
+    role: Role
+    shape: BodyShape  # of the person
+    vectors: Floats  # (T, J, 3) rotation vectors of the joints of sd2core.body.rig.JOINTS
+    translation_m: Floats  # (T, 3)
+    residual_m: float  # mean distance of the body's points from the recorded ones
+
+    def __len__(self) -> int:
+        return len(self.vectors)
+
+    def pose_on(self, skeleton: Skeleton, own: Skeleton, frames: slice) -> Pose:
+        """Pose of some frames on another skeleton, with steps as long as its legs.
+
+        ``own`` is the skeleton of the person's shape.
+        """
+        scale = _leg_m(skeleton) / _leg_m(own)
+        place_m = scale * (own.heads_m[0] + self.translation_m[frames]) - skeleton.heads_m[0]
+        return Pose(from_vector(self.vectors[frames]), place_m)
+
+    def save(self, path: Path) -> None:
+        """Write one ``.npz``, whole or not at all."""
+        arrays: dict[str, Any] = vars(self) | {
+            "shape": np.append(self.shape.coefficients, self.shape.stature_m),
+            "vectors": self.vectors.astype(np.float32),
+            "translation_m": self.translation_m.astype(np.float32),
+        }
+        with atomic_write(path) as stream:
+            np.savez_compressed(stream, **arrays)
+
+    @classmethod
+    def load(cls, path: Path) -> BodyMotion:
+        """Read what :meth:`save` wrote."""
+        with np.load(path, allow_pickle=False) as data:
+            known: dict[str, Any] = {
+                name: data[name].item() if not data[name].ndim else data[name].astype(np.float64)
+                for name in data.files
+            }
+        shape = known.pop("shape")
+        return cls(shape=BodyShape(shape[:-1], float(shape[-1])), **known)
+
+
+def _leg_m(skeleton: Skeleton) -> float:
+    heads_m = skeleton.heads_m[[skeleton.index[bone] for bone in _LEG]]
+    return float(np.linalg.norm(np.diff(heads_m, axis=0), axis=1).sum())
+
+
+def load_motions(folder: Path, role: Role) -> list[BodyMotion]:
+    """All motions of a folder that are for one use, by name."""
+    motions = [BodyMotion.load(path) for path in sorted(folder.glob("*.npz"))]
+    return [motion for motion in motions if motion.role == role]
+
+
+def drive_bodies(
+    source: Path, out: Path, processes: int = 2, progress: Progress = silent
+) -> list[str]:
+    """Drive a body by every trial of a folder that is not in ``out`` yet.
+
+    All trials of one person drive one body. Returns what was left out, and why.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    people: dict[str, list[Trial]] = defaultdict(list)
+    for trial in trials(source):
+        people[trial.person].append(trial)
+    jobs = [one for one in people.values() if any(not path_of(out, t).exists() for t in one)]
+    jobs.sort(key=len)
+    total, done, notes = sum(len(one) for one in jobs), 0, []
+    progress(0, total)
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(processes, mp_context=context, initializer=end_with_parent) as pool:
+        futures = {pool.submit(partial(_drive, out), one): len(one) for one in jobs}
+        for future in as_completed(futures):
+            notes += future.result()
+            done += futures[future]
+            progress(done, total)
+    return sorted(notes)
+
+
+def path_of(out: Path, trial: Trial) -> Path:
+    """Path of one trial's body."""
+    return out / f"{trial.name}.npz"
+
+
+def _drive(out: Path, own: Sequence[Trial]) -> list[str]:
+    """Bodies of one person's trials."""
+    notes: list[str] = []
+    clips: dict[Trial, tuple[SkeletonClip, Floats]] = {}
+    for trial in own:
+        try:
+            points_m, rate_hz = trial.points()
+        except Sd2Error as error:
+            notes.append(f"{trial.name}: {error}")
+            continue
+        found = _clip(points_m, rate_hz)
+        if found is None:
+            notes.append(f"{trial.name}: shorter than {_LEAST_S} s without a jump")
+        else:
+            clips[trial] = found
+    if all(path_of(out, trial).exists() for trial in clips):
+        return notes
+    puppet = puppet_of([clip for clip, _ in clips.values()], MARKERS)
+    for trial, (clip, shift_m) in clips.items():
+        driven = puppet.pose(clip)
+        times_s = np.arange(clip.times_s[0], clip.times_s[-1], 1.0 / RATE_HZ)
+        pose = resample_pose(driven.pose, clip.times_s, times_s)
+        motion = BodyMotion(
+            trial.name,
+            trial.person,
+            trial.what,
+            trial.role,
+            puppet.shape,
+            to_vector(pose.turns),
+            pose.translation_m - shift_m,
+            float(np.nanmean(driven.residual_m)),
+        )
+        motion.save(path_of(out, trial))
+    return notes
+
+
+def _clip(points_m: Floats, rate_hz: float) -> tuple[SkeletonClip, Floats] | None:
+    """The longest stretch without a jump, before a camera, and how far it was moved there.
+
+    None if that is too short.
+    """
+    turned = points_m * np.array([1.0, -1.0, -1.0])
+    fast = np.linalg.norm(np.diff(turned, axis=0), axis=-1).max(axis=1) * rate_hz > _GLITCH_MPS
+    edges = np.concatenate([[0], np.flatnonzero(fast) + 1, [len(turned)]])
+    longest = int(np.argmax(np.diff(edges)))
+    start, stop = edges[longest : longest + 2]
+    if stop - start < _LEAST_S * rate_hz:
+        return None
+    kept = turned[start : min(stop, start + round(_MOST_S * rate_hz))]
+    shift_m = np.array([0.0, 0.0, _NEAR_M - kept[..., 2].min()])
+    return SkeletonClip(np.arange(len(kept)) / rate_hz, kept + shift_m), shift_m
+
+
+def rig_of(space: ShapeSpace, keypoints: KeypointSpace, shape: BodyShape) -> Rig:
+    """Joints and landmarks of one body."""
+    return Rig(space.skeleton(shape), keypoints.of(shape))
+
+
+def minutes(motions: Iterable[BodyMotion]) -> float:
+    """Length of all motions together."""
+    return sum(len(motion) for motion in motions) / RATE_HZ / 60.0
