@@ -40,8 +40,8 @@ _FINISHED_FRAMES = 600
 _MASK_SURE = 128
 _OUTLINES = 16
 
-# Measured on simulated people (docs/decisions/0022): what the lifter says of its
-# velocities, and the fit's error across the view per error of a landmark there.
+# The fit's error along the view per error that the lifter states (docs/decisions/0046), and
+# across the view per error of a landmark there (docs/decisions/0022).
 _ALONG = 0.9
 _ACROSS_PER_S = 3.0
 

@@ -49,10 +49,12 @@ What `sd2 fit` makes of videos whose motion is known, measured. Made by
 make fitting
 ```
 
-on {machine}: sixteen videos of simulated people (`python -m tools.fitting clips`), whose motions
-nothing in the program was trained with, fitted by `sd2 fit` with the camera's focal
+on {machine}: sixteen videos of simulated people (`python -m tools.fitting clips`) and, where the
+motion capture is there, twenty-one whose motion is that of recorded people, all of motions and
+persons that nothing in the program was trained with; fitted by `sd2 fit` with the camera's focal
 length and the person's height given, and measured by `python -m tools.fitting score`. What the
-clips can and cannot say is [decision 19](decisions/0019-known-truth-for-the-fit.md).
+clips can and cannot say is [decision 19](decisions/0019-known-truth-for-the-fit.md); how the
+lifter came about is [decision 46](decisions/0046-depth-from-real-motion.md).
 
 ![Frames of eight of the clips](images/fit-truth.png)
 
