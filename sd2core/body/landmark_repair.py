@@ -72,37 +72,25 @@ def undo_side_swaps(found: RawTrack) -> tuple[RawTrack, dict[str, NDArray[np.boo
 
     A swap is undone where that makes the motion smoother (the sum of accelerations over the whole
     clip is the least, by dynamic programming over both sides of each frame); the side that most
-    frames say is right. The whole body is decided first, then what is left of its parts: of one
-    part that lies in the picture's plane the motion tells too little. Returns the track, and per
-    part the frames that were changed, (T,).
+    frames say is right. Returns the track, and per part the frames that were changed, (T,).
     """
-    everything = tuple(range(len(LANDMARKS)))
-    whole = _swapped(found, everything)
-    swaps = dict.fromkeys(SIDED_PARTS, whole)
-    found = found.picked(_PARTNERS, whole)
-    for part, members in SIDED_PARTS.items():
-        alone = _swapped(found, members)
-        found = swap_sides(found, part, alone)
-        swaps[part] = whole ^ alone
-    return found, swaps
-
-
-def _swapped(found: RawTrack, members: tuple[int, ...]) -> NDArray[np.bool_]:
-    """Frames (T,) in which these landmarks move more smoothly with their sides swapped."""
+    swaps: dict[str, NDArray[np.bool_]] = {}
     rows = np.flatnonzero(found.present)
-    swapped = np.zeros(len(found.times_s), bool)
-    if len(rows) < 3:
-        return swapped
     times = found.times_s[rows]
-    scale = pixels_per_metre(found)[rows, None]
-    cost = np.zeros((2, 2, 2, len(rows) - 2))
-    for landmark in members:
-        sides = [_place_m(found, rows, scale, each) for each in _pair(landmark)]
-        cost += _bends(times, np.stack(sides))
-    switch = np.abs(np.diff(np.indices((2, 2, 2)), axis=0)).sum(axis=0)  # (a, b, c)
-    cost += 0.5 * len(members) * _SWITCH_M**2 * switch[..., None]
-    swapped[rows] = _smoothest(cost)
-    return swapped
+    for part, members in SIDED_PARTS.items():
+        swapped = np.zeros(len(found.times_s), bool)
+        if len(rows) >= 3:
+            scale = pixels_per_metre(found)[rows, None]
+            cost = np.zeros((2, 2, 2, len(rows) - 2))
+            for landmark in members:
+                sides = [_place_m(found, rows, scale, each) for each in _pair(landmark)]
+                cost += _bends(times, np.stack(sides))
+            switch = np.abs(np.diff(np.indices((2, 2, 2)), axis=0)).sum(axis=0)  # (a, b, c)
+            cost += 0.5 * len(members) * _SWITCH_M**2 * switch[..., None]
+            swapped[rows] = _smoothest(cost)
+        found = swap_sides(found, part, swapped)
+        swaps[part] = swapped
+    return found, swaps
 
 
 def swap_sides(found: RawTrack, part: str, frames: NDArray[np.bool_]) -> RawTrack:
@@ -345,9 +333,7 @@ def repair_landmarks(
     repaired parts, in order.
     """
     swapped = find_side_swaps(read, seen)
-    whole = np.logical_and.reduce(list(swapped.values()))
-    counts = {part: int((frames & ~whole).sum()) for part, frames in swapped.items()}
-    tally = _Tally(swapped={"the whole body": int(whole.sum())} | counts)
+    tally = _Tally(swapped={part: int(frames.sum()) for part, frames in swapped.items()})
     for start, stop in parts(len(times_s)):
         first, last = _around(start, stop, times_s, seen, max_gap_s)
         found = read(first, last)
