@@ -19,7 +19,7 @@ _PICTURE_SD = 0.006
 _LEAST_TRUST = 0.05
 _OUTSIDE = 0.05
 """Share of the picture's height beyond whose edges a landmark is surely a guess."""
-SIZE_SD = 0.05
+_SIZE_SD = 0.05
 """Who stoops looks smaller, and who stretches larger."""
 
 
@@ -66,7 +66,7 @@ def evidence_of(
         times_s=np.array(track.timebase.times_s),
         slopes=camera.slopes(track.image_px.astype(np.float64)),
         slopes_sd=_PICTURE_SD * (stature_m / depth_m)[:, None] / trust,
-        size_sd=SIZE_SD,
+        size_sd=_SIZE_SD,
         trunk=TORSO_CORNERS,
         depth_m=stature_m * lifted.depth,
         depth_sd_m=stature_m * lifted.depth_sigma / trust,

@@ -33,7 +33,7 @@ DEFAULT_STATURE_M = 1.72
 
 STATURES_M = (0.5, 2.6)
 
-SEEN = 0.5
+_SEEN = 0.5
 """Trust from which on a landmark counts as seen."""
 
 _FINISHED_FRAMES = 600
@@ -223,7 +223,7 @@ class Fitting:
         seen_m = replace(evidence, trunk_m=trunk_m).points_m
         residual_m = np.linalg.norm(keypoints_m - seen_m, axis=-1)
         trust = trust_of(track)
-        residual_m[~track.present[:, None] | (trust < SEEN)] = np.nan
+        residual_m[~track.present[:, None] | (trust < _SEEN)] = np.nan
         return BodyFit(
             timebase=track.timebase,
             shape=shape,

@@ -226,10 +226,10 @@ class Objective:
             ..., None, None
         ]
         shift /= seen.slopes_sd[..., None, None]
-        known = self._but_for_size(shift.reshape(frames, -1, unknowns))
-        known = known.reshape(shift.shape) * trust.picture[..., None]
+        shift = self._but_for_size(shift.reshape(frames, -1, unknowns)).reshape(shift.shape)
+        shift *= trust.picture[..., None]
         normal.add(
-            residuals.picture.reshape(frames, -1), [(0, known.reshape(frames, -1, unknowns))]
+            residuals.picture.reshape(frames, -1), [(0, shift.reshape(frames, -1, unknowns))]
         )
 
         trunk = along[:, seen.trunk].mean(axis=1, keepdims=True)  # (T, 1, n)

@@ -8,6 +8,7 @@ real videos are left out where the recordings are not there (``SD2_SHARED_DATA``
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -85,13 +86,14 @@ def main() -> None:
     clips, fits, tables = folder / "clips", folder / "fits", folder / "tables.md"
     motions = []
     if (SHARED / "motion").is_dir():
-        _run_motions("drive", SHARED / "motion", folder / "motions")
+        _run(run_motion_capture, "drive", SHARED / "motion", folder / "motions")
         motions = ["--motions", folder / "motions"]
-    _run("clips", clips, *motions)
+    _run(run_fitting, "clips", clips, *motions)
     _frames(clips)
     videos = [SHARED / "video" / name for name in REAL]
     real = [video for video in videos if video.exists()]
-    _run("score", clips, "--keep", fits, "--markdown", tables, *(["--real", *real] * bool(real)))
+    score = ["score", clips, "--keep", fits, "--markdown", tables]
+    _run(run_fitting, *score, *(["--real", *real] * bool(real)))
     truth = read_truth(clips / COMPARED)
     pair = [truth.mesh(), load_mesh(fits / f"{COMPARED}.zarr")]
     compared = compare_meshes(pair, ["true", "fitted"])
@@ -100,14 +102,8 @@ def main() -> None:
     atomic_write_text(DOCS / "fitting.md", page)
 
 
-def _run(*arguments: object) -> None:
-    code = run_fitting([str(argument) for argument in arguments])
-    if code:
-        sys.exit(code)
-
-
-def _run_motions(*arguments: object) -> None:
-    code = run_motion_capture([str(argument) for argument in arguments])
+def _run(program: Callable[[Sequence[str]], int], *arguments: object) -> None:
+    code = program([str(argument) for argument in arguments])
     if code:
         sys.exit(code)
 

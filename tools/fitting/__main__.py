@@ -15,7 +15,7 @@ from sd2core.cli.reading import check_output
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from tools.command_line import run_tool
-from tools.fitting.clips import CLIPS, REAL_MOTION, TUNING, clip_named, make_fit_truth
+from tools.fitting.clips import ALL_CLIPS, CLIPS, REAL_MOTION, TUNING, clip_named, make_fit_truth
 from tools.fitting.error_check import compare_errors
 from tools.fitting.error_measurement import measure_errors
 from tools.fitting.report import as_dict
@@ -168,8 +168,8 @@ def _add_errors(commands: argparse._SubParsersAction) -> None:
 
 def _clips(options: argparse.Namespace) -> None:
     if options.list:
-        width = max(len(clip.name) for clip in (*CLIPS, *REAL_MOTION, *TUNING))
-        for clip in (*CLIPS, *REAL_MOTION, *TUNING):
+        width = max(len(clip.name) for clip in ALL_CLIPS)
+        for clip in ALL_CLIPS:
             print(
                 f"{clip.name:<{width}}  {clip.person}, {clip.room}, at {clip.distance_m:g} m,"
                 f" camera {clip.camera_m:g} m high"

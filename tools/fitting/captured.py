@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from sd2core.body.model import Skeleton
-from sd2core.body.rig import KeypointSpace
-from sd2core.body.rotations import Floats, applied, product
+from sd2core.body.rig import KeypointSpace, Rig
+from sd2core.body.rotations import Floats, applied
 from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.errors import Sd2Error
 from sd2core.simulate.limbs import turn_about
 from tools.fitting.motions import Action
-from tools.motion_capture.bodies import BodyMotion, rig_of
+from tools.motion_capture.bodies import BodyMotion, moved_transforms
 from tools.motion_capture.catalogue import RATE_HZ
 
 _REMEDY = "Make it: python -m tools.motion_capture drive DATA/motion MOTIONS"
@@ -43,9 +43,9 @@ def captured_transforms(
     frames = slice(start, start + round(action.length_s * RATE_HZ))
     if len(motion) < frames.stop:
         raise Sd2Error(f"{path} has {len(motion)} frames", f"{frames.stop} or more")
-    rig = rig_of(space, KeypointSpace(space), shape)
     whole = space.skeleton(shape)
-    pose = motion.pose_on(rig.skeleton, space.skeleton(motion.shape), frames)
+    rig = Rig(whole, KeypointSpace(space).of(shape))
+    pose = motion.pose_on(whole, space.skeleton(motion.shape), frames)
     transforms = whole.transforms(rig.body_rotations(pose.turns), pose.translation_m)
     return _before_camera(whole, transforms, action.heading_deg, place_m)
 
@@ -60,8 +60,4 @@ def _before_camera(
     turn = turn_about(1, np.array([heading_deg - facing_deg]))[0]
     way_m = applied(turn, applied(transforms[:, 0, :, :3], root) + transforms[:, 0, :, 3])
     middle_m = 0.5 * (way_m.min(axis=0) + way_m.max(axis=0))
-    seen = np.empty_like(transforms)
-    seen[..., :3] = product(turn, transforms[..., :3])
-    seen[..., 3] = applied(turn, transforms[..., 3])
-    seen[..., 3] += place_m - middle_m * [1.0, 0.0, 1.0]
-    return seen
+    return moved_transforms(transforms, turn, place_m - middle_m * [1.0, 0.0, 1.0])

@@ -170,6 +170,9 @@ TUNING = (
 """Other clips, by which the weights of the fit were chosen (``--clips tuning``)."""
 
 
+ALL_CLIPS = (*CLIPS, *REAL_MOTION, *TUNING)
+
+
 def clip_named(name: str) -> Clip:
     """One of :data:`CLIPS` or :data:`TUNING`.
 
@@ -178,7 +181,7 @@ def clip_named(name: str) -> Clip:
     Sd2Error
         When there is none of this name.
     """
-    for clip in (*CLIPS, *REAL_MOTION, *TUNING):
+    for clip in ALL_CLIPS:
         if clip.name == name:
             return clip
     raise Sd2Error(

@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 
 from sd2core.body.initial import Pose
 from sd2core.body.model import Skeleton
-from sd2core.body.rig import KeypointSpace, Rig
-from sd2core.body.rotations import from_vector, to_vector
-from sd2core.body.shape import BodyShape, ShapeSpace
+from sd2core.body.rotations import applied, from_vector, product, to_vector
+from sd2core.body.shape import BodyShape
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
 from sd2core.mocap.driving import SkeletonClip, puppet_of, resample_pose
@@ -178,9 +177,12 @@ def _clip(points_m: Floats, rate_hz: float) -> tuple[SkeletonClip, Floats] | Non
     return SkeletonClip(np.arange(len(kept)) / rate_hz, kept + shift_m), shift_m
 
 
-def rig_of(space: ShapeSpace, keypoints: KeypointSpace, shape: BodyShape) -> Rig:
-    """Joints and landmarks of one body."""
-    return Rig(space.skeleton(shape), keypoints.of(shape))
+def moved_transforms(transforms: Floats, turn: Floats, shift_m: Floats) -> Floats:
+    """Transforms of bones (T, B, 3, 4) that are then turned (3, 3) and shifted (3,) as a whole."""
+    moved = np.empty_like(transforms)
+    moved[..., :3] = product(turn, transforms[..., :3])
+    moved[..., 3] = applied(turn, transforms[..., 3]) + shift_m
+    return moved
 
 
 def minutes(motions: Iterable[BodyMotion]) -> float:

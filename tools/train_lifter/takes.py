@@ -149,7 +149,8 @@ class Stage:
     ) -> Scene:
         """A random body in a part of a real person's motion, seen from anywhere around.
 
-        The motion may be mirrored, reversed, and up to a fifth faster or slower than it was.
+        The motion may be reversed, and up to a fifth faster or slower than it was; a short one is
+        drawn out.
         """
         share = np.array([_weight(motion) for motion in motions])
         share /= share.sum()
@@ -164,14 +165,14 @@ class Stage:
             start = int(rng.integers(0, len(motion) - needed + 1))
             shape = self.space.random(rng)
             keypoints = self._keypoints.of(shape)
-            rig = Rig(self.space.skeleton(shape), keypoints)
+            whole = self.space.skeleton(shape)
+            rig = Rig(whole, keypoints)
             own = self.space.skeleton(motion.shape)
-            pose = motion.pose_on(rig.skeleton, own, slice(start, start + needed))
+            pose = motion.pose_on(whole, own, slice(start, start + needed))
             ticks = np.arange(frames, dtype=np.float64) * pace
             pose = resample_pose(pose, np.arange(needed, dtype=float), ticks)
             if rng.random() < 0.5:
                 pose = pose.at(slice(None, None, -1))
-            whole = self.space.skeleton(shape)
             transforms = whole.transforms(rig.body_rotations(pose.turns), pose.translation_m)
             view = random_view_around(rng, keypoints.positions(transforms))
             if view is not None:

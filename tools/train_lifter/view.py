@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from sd2core.body.camera import PinholeCamera
-from sd2core.body.rotations import Floats, applied, product
-from sd2core.body.track import LANDMARKS
+from sd2core.body.rotations import Floats, applied
+from sd2core.body.track import LANDMARKS, TORSO_CORNERS
 from sd2core.simulate.limbs import turn_about
+from tools.motion_capture.bodies import moved_transforms
 
 _SIZES = ((640, 480), (640, 480), (640, 360), (480, 640))
 _PHONES = ((640, 480), (640, 360), (480, 640), (360, 640))
-_TRUNK = tuple(LANDMARKS.index(f"{name}.{side}") for name in ("shoulder", "hip") for side in "LR")
 _UPPER_BODY = tuple(
     LANDMARKS.index(name) for name in ("nose", "shoulder.L", "shoulder.R", "elbow.L", "elbow.R")
 )
@@ -41,10 +41,7 @@ class View:
 
     def transforms(self, transforms: Floats) -> Floats:
         """Transforms of bones (T, B, 3, 4) that end in the camera frame."""
-        seen = np.empty_like(transforms)
-        seen[..., :3] = product(self.turn, transforms[..., :3])
-        seen[..., 3] = self.points(transforms[..., 3])
-        return seen
+        return moved_transforms(transforms, self.turn, self.shift_m)
 
 
 def random_view(rng: np.random.Generator, keypoints_m: Floats) -> View | None:
@@ -64,24 +61,20 @@ def random_view(rng: np.random.Generator, keypoints_m: Floats) -> View | None:
     hips = keypoints_m[:, [LANDMARKS.index("hip.L"), LANDMARKS.index("hip.R")]].mean(axis=1)
     middle = upper.mean(axis=(0, 1))
     for _ in range(100):
-        width, height = _SIZES[rng.integers(len(_SIZES))]
-        field = math.radians(rng.uniform(45.0, 75.0))
-        camera = PinholeCamera(width, height, max(width, height) / 2.0 / math.tan(field / 2.0))
+        camera = _camera(rng, _SIZES, 75.0)
         # Half of the people near, as before a webcam, the rest anywhere.
         distance = rng.uniform(1.2, 2.2) if rng.random() < 0.5 else rng.uniform(1.5, 5.0)
-        aside = rng.uniform(-0.3, 0.3) * distance * width / camera.focal_px
+        aside = rng.uniform(-0.3, 0.3) * distance * camera.width / camera.focal_px
         above = rng.uniform(0.5, 1.9)
         # Seen from the front mostly, from anywhere sometimes.
         azimuth = rng.normal(0.0, 25.0) if rng.random() < 0.95 else rng.uniform(-180.0, 180.0)
         around = turn_about(1, np.array([azimuth]))[0]
         at = middle + around @ np.array([-aside, -above - middle[1], -distance])
-        slope = rng.uniform(-0.3, 0.3) * height / camera.focal_px
+        slope = rng.uniform(-0.3, 0.3) * camera.height / camera.focal_px
         pitch = math.degrees(math.atan2(middle[1] - at[1], distance) - math.atan(slope))
         if abs(pitch) > 17.0:
             continue
-        turn = turn_about(0, np.array([pitch]))[0] @ around.T
-        turn = turn_about(2, np.array([rng.normal(0.0, 1.5)]))[0] @ turn
-        view = View(camera, turn, -turn @ at)
+        view = _tilted(camera, at, around, pitch, rng.normal(0.0, 1.5))
         if _sees(view, upper, hips):
             return view
     return None
@@ -103,32 +96,46 @@ def random_view_around(rng: np.random.Generator, keypoints_m: Floats) -> View | 
     View or None
         None where no camera of a hundred sees it.
     """
-    middle = keypoints_m[:, _TRUNK].mean(axis=(0, 1))
+    middle = keypoints_m[:, TORSO_CORNERS].mean(axis=(0, 1))
     whole = rng.random() < 0.6
     for _ in range(100):
-        width, height = _PHONES[rng.integers(len(_PHONES))]
-        field = math.radians(rng.uniform(45.0, 80.0))
-        camera = PinholeCamera(width, height, max(width, height) / 2.0 / math.tan(field / 2.0))
+        camera = _camera(rng, _PHONES, 80.0)
         distance = rng.uniform(1.0, 6.0)
-        aside = rng.uniform(-0.25, 0.25) * distance * width / camera.focal_px
+        aside = rng.uniform(-0.25, 0.25) * distance * camera.width / camera.focal_px
         around = turn_about(1, np.array([rng.uniform(-180.0, 180.0)]))[0]
         at = middle + around @ np.array([-aside, 0.0, -distance])
         at[1] = -rng.uniform(0.4, 2.5)
-        slope = rng.uniform(-0.25, 0.25) * height / camera.focal_px
+        slope = rng.uniform(-0.25, 0.25) * camera.height / camera.focal_px
         pitch = math.degrees(math.atan2(middle[1] - at[1], distance) - math.atan(slope))
         if abs(pitch) > 30.0:
             continue
-        turn = turn_about(0, np.array([pitch]))[0] @ around.T
-        turn = turn_about(2, np.array([rng.normal(0.0, 2.0)]))[0] @ turn
-        view = View(camera, turn, -turn @ at)
+        view = _tilted(camera, at, around, pitch, rng.normal(0.0, 2.0))
         seen_m = view.points(keypoints_m)
         if seen_m[..., 2].min() < 0.7:
             continue
         places_px = camera.project(seen_m)
-        inside = np.all((places_px >= 0.0) & (places_px <= [width, height]), axis=2)
-        if inside[:, _TRUNK].mean() > 0.97 and (not whole or inside.mean() > 0.95):
+        inside = np.all((places_px >= 0.0) & (places_px <= [camera.width, camera.height]), axis=2)
+        if inside[:, TORSO_CORNERS].mean() > 0.97 and (not whole or inside.mean() > 0.95):
             return view
     return None
+
+
+def _camera(
+    rng: np.random.Generator, sizes: tuple[tuple[int, int], ...], widest_deg: float
+) -> PinholeCamera:
+    """A camera with a picture of one of some sizes, that sees 45 degrees or more."""
+    width, height = sizes[rng.integers(len(sizes))]
+    field = math.radians(rng.uniform(45.0, widest_deg))
+    return PinholeCamera(width, height, max(width, height) / 2.0 / math.tan(field / 2.0))
+
+
+def _tilted(
+    camera: PinholeCamera, at: Floats, around: Floats, pitch_deg: float, roll_deg: float
+) -> View:
+    """View from a place (3,), turned about the vertical, then up or down, then aside."""
+    turn = turn_about(0, np.array([pitch_deg]))[0] @ around.T
+    turn = turn_about(2, np.array([roll_deg]))[0] @ turn
+    return View(camera, turn, -turn @ at)
 
 
 def _sees(view: View, upper: Floats, hips: Floats) -> bool:

@@ -5,14 +5,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sd2core.body.rig import JOINTS, KeypointSpace
+from sd2core.body.rig import JOINTS, KeypointSpace, Rig
 from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.body.track import LANDMARK
-from tools.motion_capture.bodies import BodyMotion, drive_bodies, load_motions, rig_of
+from tools.motion_capture.bodies import BodyMotion, drive_bodies, load_motions
 from tools.motion_capture.catalogue import trials
 
 SPACE = ShapeSpace()
 KEYPOINTS = KeypointSpace(SPACE)
+
+
+def rig_of(shape: BodyShape) -> Rig:
+    return Rig(SPACE.skeleton(shape), KEYPOINTS.of(shape))
 
 
 def motion(stature_m: float = 1.7, **more: str) -> BodyMotion:
@@ -43,9 +47,7 @@ def test_a_motion_comes_back_from_its_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize("stature_m", [1.5, 1.7, 1.95])
 def test_another_body_makes_the_same_turns_with_steps_as_long_as_its_legs(stature_m: float) -> None:
     own = motion()
-    rigs = [
-        rig_of(SPACE, KEYPOINTS, BodyShape(own.shape.coefficients, s)) for s in (1.7, stature_m)
-    ]
+    rigs = [rig_of(BodyShape(own.shape.coefficients, s)) for s in (1.7, stature_m)]
     skeletons = [SPACE.skeleton(BodyShape(own.shape.coefficients, s)) for s in (1.7, stature_m)]
     poses = [own.pose_on(skeleton, skeletons[0], slice(2, 9)) for skeleton in skeletons]
     np.testing.assert_array_equal(poses[0].turns, poses[1].turns)
@@ -66,7 +68,7 @@ def test_a_real_walk_keeps_its_places(shared_data: Path, tmp_path: Path) -> None
     assert drive_bodies(tmp_path / "source", tmp_path / "out", 1) == []
     (walk,) = load_motions(tmp_path / "out", "learn")
     assert walk.residual_m < 0.02
-    rig = rig_of(SPACE, KEYPOINTS, walk.shape)
+    rig = rig_of(walk.shape)
     own = SPACE.skeleton(walk.shape)
     pose = walk.pose_on(own, own, slice(None))
     found_m = rig.keypoints.positions(rig.transforms(*pose))
