@@ -12,7 +12,7 @@ from sd2core.mesh.sequence import MeshSequence
 from sd2core.timebase import Timebase
 
 FPS = 30.0
-FRAMES = 120
+FRAMES = 60
 
 Path = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 """Positions (T, 3) in metres at times (T,)."""

@@ -22,7 +22,7 @@ CAMERA = VirtualSensor()
 
 @pytest.fixture(scope="module")
 def scene() -> MeshSequence:
-    return together(ball(swinging((0, 0, 3), 1.5, 0.8), fineness=3), plate((0.25, 0, 1), 0.5, 0.5))
+    return together(ball(swinging((0, 0, 3), 1.5, 0.8), fineness=2), plate((0.25, 0, 1), 0.5, 0.5))
 
 
 @pytest.fixture(scope="module")

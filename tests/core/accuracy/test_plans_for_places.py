@@ -44,7 +44,7 @@ def test_places_to_check_on_are_the_ends_and_the_middle(count: int) -> None:
 
 @pytest.mark.usefixtures("free")
 def test_the_plan_holds_at_every_place() -> None:
-    mesh = swinging_sphere(90)
+    mesh = swinging_sphere(45)
     found = choose_for_places(mesh, AROUND, 10**6, 0.1, PAPER)
     assert found.plan != TOP
     assert 0 < found.error_l1 <= 0.1
@@ -59,7 +59,7 @@ def test_the_plan_holds_at_every_place() -> None:
 
 @pytest.mark.usefixtures("free")
 def test_where_nothing_else_holds_the_most_accurate_is_taken() -> None:
-    found = choose_for_places(swinging_sphere(90), AROUND, 10**6, 1e-9, PAPER)
+    found = choose_for_places(swinging_sphere(45), AROUND, 10**6, 1e-9, PAPER)
     assert (found.plan, found.error_l1) == (TOP, 0.0)
     assert "holds 0.0% from every place" in found.reasons[0]
 
@@ -74,7 +74,7 @@ def test_a_plan_that_fails_elsewhere_is_chosen_anew_there(monkeypatch: pytest.Mo
         return replace(really(mesh, place, **told), plan=bad if len(asked) == 1 else good)
 
     monkeypatch.setattr(places, "choose", chosen)
-    found = choose_for_places(swinging_sphere(90), AROUND, 10**6, 0.3, PAPER)
+    found = choose_for_places(swinging_sphere(45), AROUND, 10**6, 0.3, PAPER)
     assert asked == AROUND[:2]
     assert found.plan == good
 
@@ -83,7 +83,7 @@ def test_a_plan_that_fails_elsewhere_is_chosen_anew_there(monkeypatch: pytest.Mo
 def test_what_is_chosen_and_is_not_cheaper_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     costs = {TOP: 1.0, AccuracyPlan(): 0.1}
     monkeypatch.setattr(places._Search, "frame_s", lambda _, plan: costs.get(plan, 0.2))
-    found = choose_for_places(swinging_sphere(90), AROUND, 10**6, 0.3, PAPER)
+    found = choose_for_places(swinging_sphere(45), AROUND, 10**6, 0.3, PAPER)
     assert found.plan == AccuracyPlan()
     assert 0 < found.error_l1 <= 0.3
 

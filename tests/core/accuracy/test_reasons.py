@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
-from accuracy_scenes import ball, moving, plate, steady, swinging, together
+from accuracy_scenes import FPS, FRAMES, ball, moving, plate, steady, swinging, together
 
 from sd2core.accuracy.choosing import choose, survey_scene
 from sd2core.accuracy.results import Choice, Reason
@@ -77,13 +77,13 @@ def long_rod(middle_m: float, length_m: float) -> MeshSequence:
     rod = trimesh.creation.box((0.05, 0.05, length_m)).subdivide().subdivide().subdivide()
     rod.apply_transform(trimesh.transformations.rotation_matrix(0.4, (0, 1, 0)))
     # It turns about its middle, so that near and far parts have other velocities.
-    times_s = np.arange(120) / 30
+    times_s = np.arange(FRAMES) / FPS
     angle = 0.5 * np.sin(2 * np.pi * 0.5 * times_s)
     x, y, z = np.asarray(rod.vertices).T
     turned = np.stack(
         [
             np.cos(angle)[:, None] * x + np.sin(angle)[:, None] * z,
-            np.broadcast_to(y, (120, len(y))),
+            np.broadcast_to(y, (FRAMES, len(y))),
             -np.sin(angle)[:, None] * x + np.cos(angle)[:, None] * z,
         ],
         axis=2,
@@ -141,7 +141,7 @@ def test_passing_behind_a_picket_fence_requires_a_mask_for_each_frame() -> None:
 
 
 def test_a_still_plate_over_a_calm_body_lets_masks_grow_old() -> None:
-    scene = together(ball(APPROACHING), plate((0.25, 0, 1), 0.5, 0.5))
+    scene = together(ball(APPROACHING, frames=120), plate((0.25, 0, 1), 0.5, 0.5, frames=120))
     choice = chosen(scene, 0.05)
     found = reason(choice, "mask_age")
     assert not found.modelled
