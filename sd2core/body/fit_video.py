@@ -95,6 +95,7 @@ class FittedVideo:
     residual_m: float  # mean distance of the lifted landmarks from the body
     quality: float  # from 0 to 1, mean over frames with the person
     notes: tuple[str, ...]  # sentences on the video and on repairs
+    doubts: tuple[str, ...]  # sentences on what of the body is not to be believed
 
 
 def fit_video(
@@ -166,7 +167,8 @@ def fit_video(
                 int(track.bridged.sum()),
                 motion.residual_m,
                 motion.quality,
-                (*video.notes, *track.notes, *fit_notes(motion)),
+                (*video.notes, *track.notes),
+                fit_doubts(motion),
             )
             _write(motion, out, partial, choices.resolution, report.progress_of("write"))
             _describe(partial / _new(out), provenance(made, path, choices))
@@ -177,9 +179,9 @@ def fit_video(
     return made
 
 
-def fit_notes(motion: FittedMotion) -> tuple[str, ...]:
-    """Sentences on what a fit is not to be believed in."""
-    notes = []
+def fit_doubts(motion: FittedMotion) -> tuple[str, ...]:
+    """Sentences on what of a fit is not to be believed."""
+    doubts = []
     unseen = [
         limb for limb in LIMBS if motion.seen[LANDMARK[LIMB_LANDMARKS[limb][-1]]] < _NEVER_SEEN
     ]
@@ -187,14 +189,14 @@ def fit_notes(motion: FittedMotion) -> tuple[str, ...]:
         sides = {"L": "left", "R": "right", "": ""}
         names = [limb.replace("_", " ").partition(".") for limb in unseen]
         listed = ", ".join(f"{sides[side]} {name}".strip() for name, _, side in names)
-        notes.append(f"Never seen: {listed}. They are held at rest and move with the body only.")
+        doubts.append(f"Never seen: {listed}. They are held at rest and move with the body only.")
     if motion.residual_m > _DOUBTFUL_M:
-        notes.append(
+        doubts.append(
             f"This fit is not to be believed: the body is {100.0 * motion.residual_m:.1f} cm from"
             f" the landmarks on average, and good ones stay below {100.0 * _DOUBTFUL_M:.0f} cm."
             " Give the camera's focal length and the person's height where they are guessed."
         )
-    return tuple(notes)
+    return tuple(doubts)
 
 
 def provenance(made: FittedVideo, path: Path, choices: FitChoices) -> dict[str, Any]:
@@ -213,6 +215,7 @@ def provenance(made: FittedVideo, path: Path, choices: FitChoices) -> dict[str, 
         "stature_source": "default" if stature_m is None else "user",
         "max_gap_s": choices.max_gap_s,
         "notes": list(made.notes),
+        "doubts": list(made.doubts),
     }
 
 

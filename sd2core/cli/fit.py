@@ -180,7 +180,7 @@ def _make(options: argparse.Namespace) -> None:
         core_s = time.process_time() - begun_core_s
         keep_pace(fit_kind(options.resolution), core_s, made.frames)
     if options.progress_json:
-        for note in made.notes:
+        for note in (*made.notes, *made.doubts):
             print_event("note", text=note)
         out, seconds = str(options.out), round(seconds, 2)
         print_event("done", out=out, frames=made.frames, present=made.present, seconds=seconds)
@@ -303,5 +303,5 @@ def _print(options: argparse.Namespace, made: FittedVideo, seconds: float) -> No
             "took": f"{seconds:.0f} s, {seconds / frames:.2f} s per frame",
         },
     )  # fmt: skip
-    for note in made.notes:
+    for note in (*made.notes, *made.doubts):
         print(f"  {note}")

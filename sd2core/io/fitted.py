@@ -12,13 +12,23 @@ from pydantic import ValidationError
 
 from sd2core.files.recording_json import CameraEntry
 
+_NOT_OURS = (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile)
+
 
 def fitted_camera(mesh: Path) -> CameraEntry | None:
     """Camera that a body was fitted with; None for a mesh that is not from ``sd2 fit``."""
     try:
         return CameraEntry.model_validate(_said(mesh)["camera"])
-    except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile, ValidationError):
+    except (*_NOT_OURS, ValidationError):
         return None
+
+
+def fitted_doubts(mesh: Path) -> tuple[str, ...]:
+    """Sentences on what of a fitted body is not to be believed; none for other meshes."""
+    try:
+        return tuple(str(doubt) for doubt in _said(mesh)["doubts"])
+    except _NOT_OURS:
+        return ()
 
 
 def _said(mesh: Path) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import is_pattern
+from sd2core.io.fitted import fitted_doubts
 from sd2core.io.mesh_arrays import (
     RawMesh,
     StoredVertices,
@@ -78,7 +79,8 @@ def load_mesh(
     Returns
     -------
     MeshSequence
-        With notes about everything that was assumed or repaired. Vertices in
+        With notes about everything that was assumed or repaired, and on what of a body by
+        `sd2 fit` is not to be believed. Vertices in
         memory are all checked; those on disk in a sample of frames here, and
         for finite values whenever they are read.
 
@@ -114,7 +116,7 @@ def load_mesh(
     known = uncertainty_of(raw, source)
     if known is not None:
         known = known.times(_velocity_factor(raw.times_s, times_s, scale))
-    notes = tuple(raw.notes)
+    notes = (*raw.notes, *fitted_doubts(path))
     return MeshSequence(
         raw.vertices,
         raw.faces,

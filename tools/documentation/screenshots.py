@@ -1,7 +1,7 @@
 """Take the screenshots of the documentation: `make screenshots`.
 
 Draws the real window, on whatever display Qt finds, into docs/images. The real
-video and its mesh are read from the folder of real recordings
+video is read from the folder of real recordings
 (``SD2_SHARED_DATA``, by default ``../shared/data``); without it those pictures
 are left as they are.
 """
@@ -70,9 +70,25 @@ def placements(window: MainWindow) -> None:
     )
 
 
-def real(window: MainWindow) -> None:
-    """A real person with the mesh fitted to the video."""
+def real(application: QApplication) -> None:
+    """A real person with the body that `sd2 fit` makes of the video."""
+    with tempfile.TemporaryDirectory() as folder:
+        video, mesh = SHARED / "video" / "walk.mkv", Path(folder) / "walk.zarr"
+        if fitted(video, mesh):
+            take(application, "real-video.png", [video, mesh], walking)
+        else:
+            print("real-video.png is left as it is: the fit failed", file=sys.stderr)
+
+
+def walking(window: MainWindow) -> None:
+    """A moment in which both arms are seen."""
     window.session.playback.seek(1.9)
+
+
+def fitted(video: Path, mesh: Path) -> bool:
+    """Run `sd2 fit`; True if there is a mesh."""
+    command = ["sd2app.command_line", "fit", str(video), "--out", str(mesh)]
+    return subprocess.run([sys.executable, "-m", *command], check=False).returncode == 0
 
 
 def strip() -> None:
@@ -116,15 +132,13 @@ def comparison(application: QApplication) -> None:
     """The sample's mesh, which is the truth, beside the body that is fitted to its video."""
     sample_folder = resource_path("swipes.sd2")
     with tempfile.TemporaryDirectory() as folder:
-        fitted = Path(folder) / "sd2 fit.zarr"
-        video = str(sample_folder / "video.mp4")
-        command = [sys.executable, "-m", "sd2app.command_line", "fit", video, "--out", str(fitted)]
-        if subprocess.run(command, check=False).returncode != 0:
+        mesh = Path(folder) / "sd2 fit.zarr"
+        if not fitted(sample_folder / "video.mp4", mesh):
             print("comparison.png is left as it is: the fit failed", file=sys.stderr)
             return
         window = opened(application, [sample_folder])
         window.session.playback.seek(2.1)
-        window.features.mesh_comparison.compare(fitted)
+        window.features.mesh_comparison.compare(mesh)
         compared = window.findChild(ComparisonWindow)
         wait_for(application, lambda: compared._model.comparison is not None)
         wait_until_settled(application, window, LIMIT_S)
@@ -163,12 +177,12 @@ def main() -> None:
     take(application, "placements.png", swipes, placements)
     comparison(application)
     learning(application)
-    walk = [SHARED / "video" / "walk.mkv", SHARED / "mesh" / "walk.npz"]
-    if all(path.exists() for path in walk):
-        take(application, "real-video.png", walk, real)
+    walk = SHARED / "video" / "walk.mkv"
+    if walk.exists():
+        real(application)
         fitting(application)
     else:
-        print(f"real-video.png is left as it is: there is no {walk[0]}", file=sys.stderr)
+        print(f"real-video.png is left as it is: there is no {walk}", file=sys.stderr)
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sd2core.body.evidence import Evidence, trust_of
-from sd2core.body.fit_video import fit_notes
+from sd2core.body.fit_video import fit_doubts
 from sd2core.body.fitted import FittedMotion
 from sd2core.body.limbs import LIMBS
 from sd2core.body.shape import BodyShape
@@ -29,6 +29,7 @@ def seen(size_sd: float, seed: int) -> Evidence:
         trunk_sd_m=ones[:, 0],
         velocity_mps=0.0 * ones,
         velocity_sd_mps=ones,
+        standing_sd_mps=ones[:, :4],
     )
 
 
@@ -93,10 +94,10 @@ def fitted(residual_m: float, **share: float) -> FittedMotion:
 
 
 def test_a_good_fit_says_nothing() -> None:
-    assert fit_notes(fitted(0.05)) == ()
+    assert fit_doubts(fitted(0.05)) == ()
 
 
 def test_limbs_that_were_never_seen_and_a_fit_not_to_be_believed_are_said() -> None:
-    never, doubtful = fit_notes(fitted(0.093, ankle=0.01, foot_index=0.0))
+    never, doubtful = fit_doubts(fitted(0.093, ankle=0.01, foot_index=0.0))
     assert never.startswith("Never seen: left shank, right shank, left foot, right foot.")
     assert "not to be believed: the body is 9.3 cm" in doubtful

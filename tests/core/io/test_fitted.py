@@ -1,4 +1,4 @@
-"""The camera that a fitted mesh was made with."""
+"""What a fitted mesh says about its fit."""
 
 from __future__ import annotations
 
@@ -11,10 +11,17 @@ import pytest
 import zarr
 
 from sd2core.files.recording_json import CameraEntry
-from sd2core.io.fitted import fitted_camera
+from sd2core.io.fitted import fitted_camera, fitted_doubts
+from sd2core.io.mesh import load_mesh, save_mesh
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.recording.recording import MeshReading, Recording
+from sd2core.timebase import Timebase
 
-SAID = {"camera": {"focal_px": 612.5, "width": 640, "height": 480, "source": "metadata"}}
+DOUBT = "Never seen: left foot."
+SAID = {
+    "camera": {"focal_px": 612.5, "width": 640, "height": 480, "source": "metadata"},
+    "doubts": [DOUBT],
+}
 CAMERA = CameraEntry(focal_px=612.5, width=640, height=480, source="metadata")
 
 
@@ -35,6 +42,16 @@ def fitted(request, tmp_path: Path) -> Path:
 
 def test_it_is_read_from_every_form(fitted: Path) -> None:
     assert fitted_camera(fitted) == CAMERA
+    assert fitted_doubts(fitted) == (DOUBT,)
+
+
+def test_a_mesh_that_is_opened_says_what_is_not_to_be_believed(tmp_path: Path) -> None:
+    path = tmp_path / "body.zarr"
+    vertices = np.random.default_rng(0).uniform(0.0, 1.5, (4, 9, 3)).astype(np.float32)
+    save_mesh(MeshSequence(vertices, None, Timebase.regular(4, 30.0), "test"), path)
+    assert DOUBT not in load_mesh(path).notes
+    zarr.open_group(str(path), mode="r+").attrs["fit"] = SAID
+    assert load_mesh(path).notes[-1] == DOUBT
 
 
 def test_other_meshes_say_nothing(tmp_path: Path) -> None:
@@ -47,6 +64,7 @@ def test_other_meshes_say_nothing(tmp_path: Path) -> None:
     np.savez(tmp_path / "bad.npz", fit=np.array(json.dumps(bad)))
     for name in ("plain.npz", "plain.zarr", "text.obj", "odd.npz", "bad.npz", "none.npz"):
         assert fitted_camera(tmp_path / name) is None
+        assert fitted_doubts(tmp_path / name) == ()
 
 
 def test_a_recording_learns_what_nobody_said(fitted: Path, tmp_path: Path) -> None:
