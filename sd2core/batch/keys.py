@@ -56,7 +56,7 @@ _CODE: dict[Step, tuple[str, ...]] = {
 }
 """Modules that a step's results depend on, within sd2core."""
 
-_RESOURCES: dict[Step, tuple[str, ...]] = {"fit": ("body.npz", "lifter.npz")}
+_RESOURCES: dict[Step, tuple[str, ...]] = {"fit": ("body.npz", "lifter.npz", "sides.npz")}
 
 
 def key_of(step: Step, content: dict[str, Any]) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.camera import PinholeCamera
-from sd2core.body.lifter import Lifted, LiftedTrack
+from sd2core.body.lifter import FEET, Lifted, LiftedTrack
 from sd2core.body.rotations import Floats
 from sd2core.body.track import TORSO_CORNERS, Landmarks, LandmarkTrack, parts
 
@@ -19,6 +19,9 @@ _PICTURE_SD = 0.006
 _LEAST_TRUST = 0.05
 _OUTSIDE = 0.05
 """Share of the picture's height beyond whose edges a landmark is surely a guess."""
+_STANDING_MPS = 0.05
+_STEPPING_MPS = 1.0
+"""Standard deviations of a foot's velocity, on the ground and in a step."""
 _SIZE_SD = 0.05
 """Who stoops looks smaller, and who stretches larger."""
 
@@ -40,6 +43,7 @@ class Evidence:
     trunk_sd_m: Floats  # (T,)
     velocity_mps: Floats  # (T, 33) along the optical axis, positive away
     velocity_sd_mps: Floats  # (T, 33)
+    standing_sd_mps: Floats  # (T, 4) velocity of each of lifter.FEET, about none
 
     @property
     def points_m(self) -> Floats:
@@ -74,6 +78,8 @@ def evidence_of(
         trunk_sd_m=stature_m * lifted.centre_sigma,
         velocity_mps=stature_m * lifted.velocity,
         velocity_sd_mps=stature_m * lifted.velocity_sigma / trust,
+        standing_sd_mps=np.hypot(_STANDING_MPS, _STEPPING_MPS * np.sqrt(1.0 - lifted.standing))
+        / trust[:, FEET],
     )
 
 

@@ -14,8 +14,9 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.body.landmark_repair import RawTrack, repair_landmarks
+from sd2core.body.landmark_repair import repair_landmarks
 from sd2core.body.person_selection import Rectangle
+from sd2core.body.raw_track import RawTrack
 from sd2core.body.refining import Stretch
 from sd2core.body.track import PER_FRAME, Landmarks, LandmarkTrack, parts
 from sd2core.errors import Sd2Error

@@ -8,167 +8,28 @@ is repaired in parts, each with a margin on both sides.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.body.track import LANDMARKS, MIRRORED, parts
+from sd2core.body.raw_track import SCALE_S, RawTrack, pixels_per_metre, place_m
+from sd2core.body.sides import Read, find_side_swaps, swap_sides
+from sd2core.body.track import LANDMARKS, parts, with_margin
+from sd2core.mesh.presence import runs
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 
-ARMS = tuple(range(13, 23))
-LEGS = tuple(range(25, 33))
-TRUNK = tuple(number for number in range(33) if number not in ARMS + LEGS)
-SIDED_PARTS = {"head and trunk": TRUNK, "the arms": ARMS, "the legs": LEGS}
-"""Parts of the body that are swapped as one, and their landmarks."""
-
-_PARTNERS = np.array(MIRRORED)
-
 MAX_ACCELERATION_MPS2 = 250.0
 """Limit for any landmark; a swipe of 0.8 m in 0.25 s reaches 74 m/s²."""
 _SPIKE_S = 0.1
-_SCALE_S = 0.5
 _NOISE_M = 0.06
 _SIGMAS = 6.0
 _ROUNDS = 5
-_SWITCH_M = 0.10
 _BRIDGED_VISIBILITY = 0.25
-_MARGIN_FRAMES = 300
-
-
-@dataclass(frozen=True, eq=False)
-class RawTrack:
-    """Landmarks as detected in each of T frames; NaN, or visibility 0, where nothing was found."""
-
-    times_s: Floats  # (T,)
-    present: NDArray[np.bool_]  # (T,)
-    bridged: NDArray[np.bool_]  # (T,)
-    image_px: Singles  # (T, 33, 2)
-    depth_px: Singles  # (T, 33)
-    world_m: Singles  # (T, 33, 3)
-    visibility: Singles  # (T, 33)
-
-    def picked(self, order: NDArray[np.intp], frames: NDArray[np.bool_]) -> RawTrack:
-        """Landmarks of some frames in another order (33,)."""
-        changed = {}
-        for name in ("image_px", "depth_px", "world_m", "visibility"):
-            values = getattr(self, name).copy()
-            values[frames] = values[frames][:, order]
-            changed[name] = values
-        return replace(self, **changed)
-
-    def part(self, start: int, stop: int) -> RawTrack:
-        """Frames ``start`` to ``stop``."""
-        return RawTrack(**{name: values[start:stop] for name, values in vars(self).items()})
-
-
-# -- Left and right ------------------------------------------------------------------------------
-
-
-def undo_side_swaps(found: RawTrack) -> tuple[RawTrack, dict[str, NDArray[np.bool_]]]:
-    """Undo swaps of left and right: of head and trunk, of the arms, of the legs, or of all.
-
-    A swap is undone where that makes the motion smoother (the sum of accelerations over the whole
-    clip is the least, by dynamic programming over both sides of each frame); the side that most
-    frames say is right. Returns the track, and per part the frames that were changed, (T,).
-    """
-    swaps: dict[str, NDArray[np.bool_]] = {}
-    rows = np.flatnonzero(found.present)
-    times = found.times_s[rows]
-    for part, members in SIDED_PARTS.items():
-        swapped = np.zeros(len(found.times_s), bool)
-        if len(rows) >= 3:
-            scale = pixels_per_metre(found)[rows, None]
-            cost = np.zeros((2, 2, 2, len(rows) - 2))
-            for landmark in members:
-                sides = [_place_m(found, rows, scale, each) for each in _pair(landmark)]
-                cost += _bends(times, np.stack(sides))
-            switch = np.abs(np.diff(np.indices((2, 2, 2)), axis=0)).sum(axis=0)  # (a, b, c)
-            cost += 0.5 * len(members) * _SWITCH_M**2 * switch[..., None]
-            swapped[rows] = _smoothest(cost)
-        found = swap_sides(found, part, swapped)
-        swaps[part] = swapped
-    return found, swaps
-
-
-def swap_sides(found: RawTrack, part: str, frames: NDArray[np.bool_]) -> RawTrack:
-    """Swap left and right of one of :data:`SIDED_PARTS` in some frames (T,)."""
-    members = list(SIDED_PARTS[part])
-    order = np.arange(len(LANDMARKS))
-    order[members] = _PARTNERS[members]
-    return found.picked(order, frames)
-
-
-def _pair(landmark: int) -> tuple[int, int]:
-    return landmark, MIRRORED[landmark]
-
-
-def _place_m(found: RawTrack, rows: NDArray[np.intp], scale: Floats, landmark: int) -> Floats:
-    """One landmark in the picture and in the model's own coordinates, in metres, (N, 5)."""
-    picture = found.image_px[rows, landmark] / scale
-    return np.concatenate([picture, found.world_m[rows, landmark]], axis=1, dtype=np.float64)
-
-
-def _bends(times_s: Floats, sides: Floats) -> Floats:
-    """Squared distance (m²) of the middle of three frames from the line between the others.
-
-    ``sides`` (2, N, d) holds the landmark and the one on the other side. The result,
-    (2, 2, 2, N - 2), is for each choice of side in the three frames.
-    """
-    before, middle, after = times_s[:-2], times_s[1:-1], times_s[2:]
-    share = ((middle - before) / (after - before))[:, None]
-    bends = np.empty((2, 2, 2, len(middle)))
-    for a, b, c in np.ndindex(2, 2, 2):
-        line = (1.0 - share) * sides[a, :-2] + share * sides[c, 2:]
-        # Limited: a jump that no choice of side avoids must not count for more.
-        bends[a, b, c] = np.minimum(np.square(sides[b, 1:-1] - line).sum(axis=1), 0.25)
-    return bends
-
-
-def _smoothest(cost: Floats) -> NDArray[np.bool_]:
-    """Cheapest choices (N,) for costs (2, 2, 2, N - 2) of three in succession."""
-    steps = cost.shape[3]
-    # What most frames say, where motion says nothing.
-    tie = 1e-9
-    total = np.array([[0.0, tie], [tie, 2 * tie]])  # (earlier, later)
-    choice = np.empty((steps, 2, 2), np.int8)
-    for step in range(steps):
-        options = total[:, :, None] + cost[:, :, :, step]  # (a, b, c)
-        choice[step] = options.argmin(axis=0)
-        total = options.min(axis=0)
-        total[:, 1] += tie
-    best = int(total.argmin())
-    states = np.empty(steps + 2, bool)
-    b, c = divmod(best, 2)
-    states[-2:] = b, c
-    for step in range(steps - 1, -1, -1):
-        a = int(choice[step, b, c])
-        states[step] = a
-        b, c = a, b
-    if states.mean() > 0.5:
-        states = ~states
-    return states
-
-
-def pixels_per_metre(found: RawTrack) -> Floats:
-    """Scale of the person in the picture, (T,), in pixels per metre: median over 0.5 s."""
-    from scipy.ndimage import median_filter
-
-    image, world = (
-        np.sqrt(places.var(axis=1, dtype=np.float64).sum(axis=1))
-        for places in (found.image_px, found.world_m[..., :2])
-    )
-    with np.errstate(invalid="ignore", divide="ignore"):
-        scale = image / world
-    good = np.isfinite(scale) & (scale > 0)
-    middle = float(np.median(scale[good])) if good.any() else 1.0
-    scale[~good] = middle
-    step_s = float(np.median(np.diff(found.times_s))) if len(scale) > 1 else _SCALE_S
-    # One landmark that jumps away makes that frame's picture look larger.
-    window = max(round(_SCALE_S / step_s), 5)
-    return np.asarray(median_filter(scale, size=window, mode="nearest"))
+_NAMED = 4
+"""Stretches that a note names at most."""
 
 
 # -- Outliers ------------------------------------------------------------------------------------
@@ -189,7 +50,7 @@ def replace_outliers(found: RawTrack) -> tuple[RawTrack, NDArray[np.bool_]]:
         return found, replaced
     times, scale = found.times_s[rows], pixels_per_metre(found)[rows, None]
     for landmark in range(len(LANDMARKS)):
-        place = _place_m(found, rows, scale, landmark)
+        place = place_m(found, rows, scale, landmark)
         seen = find_spikes(times, place[:, :2])
         deep = find_spikes(times, place[:, 2:])
         replaced[rows, landmark] = seen | deep
@@ -215,7 +76,7 @@ def find_spikes(times_s: Floats, places_m: Floats) -> NDArray[np.bool_]:
     step_s = float(np.median(np.diff(times_s)))
     longest = max(int(_SPIKE_S / step_s + 0.01), 1)
     current = places_m
-    window = (2 * max(round(0.5 * _SCALE_S / step_s), 2) + 1, 1)
+    window = (2 * max(round(0.5 * SCALE_S / step_s), 2) + 1, 1)
     away = np.linalg.norm(places_m - median_filter(places_m, window, mode="nearest"), axis=1)
     for length in range(min(longest, frames - 4), 0, -1):
         for _ in range(_ROUNDS):
@@ -315,9 +176,6 @@ def bridge_gaps(found: RawTrack, max_gap_s: float) -> RawTrack:
 
 # -- The whole clip ------------------------------------------------------------------------------
 
-Read = Callable[[int, int], RawTrack]
-"""Function that gives what was found in frames ``start`` to ``stop``."""
-
 
 def repair_landmarks(
     read: Read,
@@ -332,8 +190,8 @@ def repair_landmarks(
     from the last frame before to the first after, are bridged. ``write`` is called with the
     repaired parts, in order.
     """
-    swapped = find_side_swaps(read, seen)
-    tally = _Tally(swapped={part: int(frames.sum()) for part, frames in swapped.items()})
+    swapped = find_side_swaps(read, len(seen))
+    tally = _Tally(swapped)
     for start, stop in parts(len(times_s)):
         first, last = _around(start, stop, times_s, seen, max_gap_s)
         found = read(first, last)
@@ -344,33 +202,6 @@ def repair_landmarks(
         tally.add(found, replaced[start - first : stop - first])
         write(found)
     return tally.sentences(max_gap_s)
-
-
-def find_side_swaps(read: Read, seen: NDArray[np.bool_]) -> dict[str, NDArray[np.bool_]]:
-    """Frames (T,) in which left and right are to be swapped back, for each part of the body.
-
-    The side that most frames say is right: not only those of one part of the clip, but of all
-    parts that are linked by frames that they share.
-    """
-    frames = len(seen)
-    swapped = {part: np.zeros(frames, bool) for part in SIDED_PARTS}
-    linked, decided = 0, 0  # where what is linked began, and up to where all is decided
-    for start, stop in parts(frames):
-        first, last = max(start - _MARGIN_FRAMES, 0), min(stop + _MARGIN_FRAMES, frames)
-        shared = seen[first:decided]
-        if not shared.any():
-            linked = start
-        for part, here in undo_side_swaps(read(first, last))[1].items():
-            whole = swapped[part]
-            both = slice(first, decided)
-            if shared.any() and (whole[both] != here[: decided - first])[shared].mean() > 0.5:
-                here = ~here & seen[first:last]
-            whole[start:last] = here[start - first :]
-            counted = whole[linked:last][seen[linked:last]]
-            if counted.any() and counted.mean() > 0.5:
-                whole[linked:last] = ~whole[linked:last] & seen[linked:last]
-        decided = last
-    return swapped
 
 
 def _around(
@@ -395,30 +226,30 @@ def _around(
     after = int(np.searchsorted(rows, stop))
     if bridged_after(after - 1):
         stop = max(stop, int(rows[min(after + 2, len(rows) - 1)]) + 1)
-    return max(start - _MARGIN_FRAMES, 0), min(stop + _MARGIN_FRAMES, len(times_s))
+    return with_margin(start, stop, len(times_s))
 
 
 @dataclass
 class _Tally:
-    """Counts of repairs."""
+    """What was repaired."""
 
-    swapped: dict[str, int]
+    swapped: dict[str, NDArray[np.bool_]]  # frames of each part of the body
+    missing: list[NDArray[np.bool_]] = field(default_factory=list)
     landmarks: int = 0
     outlying: int = 0
     bridged: int = 0
-    missing: int = 0
 
     def add(self, found: RawTrack, replaced: NDArray[np.bool_]) -> None:
         self.landmarks += int(replaced.sum())
         self.outlying += int(replaced.any(axis=1).sum())
         self.bridged += int(found.bridged.sum())
-        self.missing += int((~found.present).sum())
+        self.missing.append(~found.present)
 
     def sentences(self, max_gap_s: float) -> tuple[str, ...]:
         notes = [
-            f"Left and right of {part} swapped back in {_count(frames)}."
+            f"Left and right of {part} swapped back in {_which(frames)}."
             for part, frames in self.swapped.items()
-            if frames
+            if frames.any()
         ]
         if self.landmarks:
             notes.append(
@@ -430,9 +261,17 @@ class _Tally:
                 f"Interpolated, in gaps of up to {max_gap_s:g} s without the person:"
                 f" {_count(self.bridged)}."
             )
-        if self.missing:
-            notes.append(f"Left empty, without the person: {_count(self.missing)}.")
+        missing = np.concatenate(self.missing)
+        if missing.any():
+            notes.append(f"Left empty, without the person: {_which(missing)}.")
         return tuple(notes)
+
+
+def _which(frames: NDArray[np.bool_]) -> str:
+    """Number of the frames, and which they are."""
+    spans = [f"{a} to {b - 1}" if b > a + 1 else f"{a}" for a, b in runs(frames)]
+    more = [f"{len(spans) - _NAMED} more"] if len(spans) > _NAMED else []
+    return f"{_count(int(frames.sum()))} ({', '.join(spans[:_NAMED] + more)})"
 
 
 def _count(number: int, what: str = "frame") -> str:

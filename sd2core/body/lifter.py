@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
@@ -20,12 +20,24 @@ from sd2core.body.lifter_features import (
     RATE_HZ,
     Seen,
     features,
+    interpolated,
     mirrored,
+    nearly_at_rate,
     rate,
+    resampled,
     scale_of,
     typical_size,
 )
-from sd2core.body.track import LANDMARKS, MIRRORED, PART_FRAMES, Landmarks, LandmarkTrack, parts
+from sd2core.body.network import Network, network_of
+from sd2core.body.track import (
+    LANDMARK,
+    LANDMARKS,
+    MIRRORED,
+    PART_FRAMES,
+    Landmarks,
+    LandmarkTrack,
+    parts,
+)
 from sd2core.errors import Sd2Error
 from sd2core.files.resources import open_bundled_arrays, resource_path
 from sd2core.mesh.presence import runs
@@ -36,23 +48,30 @@ Floats = NDArray[np.float64]
 
 
 FORMAT = "sd2-lifter"
-VERSION = 1
+VERSION = 2
 POINTS = len(LANDMARKS)
-OUTPUTS = 2 + 4 * POINTS
-"""Root and its spread, depths and theirs, velocities and theirs; spreads as logarithms.
+FEET = tuple(LANDMARK[f"{place}.{side}"] for place in ("heel", "foot_index") for side in "LR")
+"""Landmarks that stand still where they touch the ground."""
+OUTPUTS = 2 + 4 * POINTS + len(FEET)
+"""Root and its spread, depths and theirs, velocities and theirs; spreads as logarithms. Then the
+log odds that each of the feet stands still.
 
-Velocities are whole, or what is to be added to the rate of the depths: see
-:attr:`Network.beyond_rates`.
+Velocities are what is to be added to the rate of the depths, see :func:`with_rates`.
 """
 
 _VELOCITIES = slice(2 + 2 * POINTS, 2 + 3 * POINTS)
+STANDING = slice(OUTPUTS - len(FEET), OUTPUTS)
 
 LOG_SIGMA = (-6.0, 1.5)
 """Between these the network's logarithms of spreads are held."""
 
-_WINDOW = 600
-_FAR = 8.0
-_SAME_RATE = 0.1
+_OTHER_SIDE = [
+    *(0, 1),
+    *(2 + POINTS * kind + other for kind in range(4) for other in MIRRORED),
+    *(STANDING.start + FEET.index(MIRRORED[row]) for row in FEET),
+]
+"""Outputs of the mirror image, in the order of those of the person."""
+
 _BESIDE = 4
 """Frames more than a tick away that still matter where a track is resampled."""
 
@@ -68,6 +87,7 @@ class LiftedTrack:
     depth_sigma: Floats  # (T, 33)
     velocity: Floats  # (T, 33) of the landmark's z per second, positive away
     velocity_sigma: Floats  # (T, 33)
+    standing: Floats  # (T, 4) probability that each of FEET stands still
 
     def part(self, start: int, stop: int) -> LiftedTrack:
         """Frames ``start`` to ``stop``."""
@@ -85,48 +105,6 @@ class Lifted(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Network:
-    """A stack of dilated convolutions over time, as arrays.
-
-    Every block adds to its input: norm, SiLU, convolution of three frames, SiLU, matrix. Beyond the
-    ends of a stretch everything is zero. ``arrays`` holds ``mean``, ``spread`` (C,) of the
-    features; ``enter`` (C, H), ``enter_bias``; ``gain`` (n, H), ``wide`` (n, 3, H, H),
-    ``wide_bias`` (n, H), ``flat`` (n, H, H), ``flat_bias`` (n, H); ``last_gain`` (H,), ``leave``
-    (H, OUTPUTS) and ``leave_bias``. With ``beyond_rates``, velocities are to be added to the rate
-    of the depths.
-    """
-
-    dilations: tuple[int, ...]
-    arrays: Mapping[str, Singles]
-    beyond_rates: bool = False
-
-    @cached_property
-    def reach(self) -> int:
-        """Receptive field: frames to either side that can matter."""
-        return sum(self.dilations)
-
-    def __call__(self, told: Singles) -> Singles:
-        """Outputs (T, OUTPUTS) of features (T, C), computed in windows."""
-        parts = []
-        for start in range(0, len(told), _WINDOW):
-            stop = min(start + _WINDOW, len(told))
-            first, last = max(start - self.reach, 0), min(stop + self.reach, len(told))
-            parts.append(self.whole(told[first:last])[start - first : stop - first])
-        return np.concatenate(parts)
-
-    def whole(self, told: Singles) -> Singles:
-        """Outputs of features, computed in one piece."""
-        a = self.arrays
-        x = np.clip((told - a["mean"]) / a["spread"], -_FAR, _FAR)
-        state = x @ a["enter"] + a["enter_bias"]
-        for n, dilation in enumerate(self.dilations):
-            inner = _convolved(_bent(_normed(state, a["gain"][n])), a["wide"][n], dilation)
-            state = state + _bent(inner + a["wide_bias"][n]) @ a["flat"][n] + a["flat_bias"][n]
-        result: Singles = _bent(_normed(state, a["last_gain"])) @ a["leave"] + a["leave_bias"]
-        return result
-
-
-@dataclass(frozen=True, eq=False)
 class Lifter:
     """A trained network and the calibration (OUTPUTS,) of its standard deviations."""
 
@@ -140,9 +118,14 @@ class Lifter:
         path = resource_path("lifter.npz") if path is None else Path(path)
         command = "python -m tools.train_lifter train"
         with open_bundled_arrays(path, FORMAT, VERSION, "a lifter", command) as (meta, data):
-            arrays = {name: data[name].astype(np.float32) for name in meta["arrays"]}
+            if meta["version"] < VERSION:
+                raise Sd2Error(
+                    f"{path} is a lifter of version {meta['version']}",
+                    f"version {VERSION}",
+                    f"Train it anew with `{command}`",
+                )
+            network = network_of(meta, data)
             calibration = data["calibration"].astype(np.float32)
-        network = Network(tuple(meta["dilations"]), arrays, meta.get("beyond_rates", False))
         return cls(network, calibration, meta["provenance"])
 
     def outputs(self, seen: Seen, sample: Seen | None = None) -> Singles:
@@ -162,18 +145,14 @@ def symmetric(network: Network, seen: Seen, sample: Seen | None = None) -> Singl
     total = np.zeros((len(seen.sure), OUTPUTS), np.float32)
     for view, known in ((seen, sample), (mirrored(seen), mirrored(sample))):
         scale = scale_of(known)
-        told = features(view, scale)
-        backwards = features(Seen(*(np.asarray(part)[::-1] for part in view)), scale)
-        ahead, back = network(told), network(backwards)
-        if network.beyond_rates:
-            ahead, back = with_rates(ahead, size), with_rates(back, size)
+        backwards = Seen(*(np.asarray(part)[::-1] for part in view))
+        ahead, back = (
+            with_rates(network(features(each, scale)), size) for each in (view, backwards)
+        )
         back = back[::-1].copy()
         back[:, _VELOCITIES] *= -1.0
         both = ahead + back
-        if view is not seen:
-            rest = both[:, 2:].reshape(-1, 4, POINTS)[..., list(MIRRORED)]
-            both = np.concatenate([both[:, :2], rest.reshape(len(both), -1)], axis=1)
-        total += both
+        total += both if view is seen else both[:, _OTHER_SIDE]
     return np.asarray(total / 4.0, np.float32)
 
 
@@ -191,26 +170,6 @@ def with_rates(out: Singles, size: float) -> Singles:
 def spread(logarithm: NDArray[np.floating]) -> Floats:
     """Standard deviation of its clipped logarithm."""
     return np.asarray(np.exp(np.clip(logarithm, *LOG_SIGMA)))
-
-
-def _convolved(x: Singles, kernel: Singles, dilation: int) -> Singles:
-    """Convolution over three frames ``dilation`` apart; zero beyond the ends."""
-    result: Singles = x @ kernel[1]
-    if len(x) > dilation:
-        result[dilation:] += x[:-dilation] @ kernel[0]
-        result[:-dilation] += x[dilation:] @ kernel[2]
-    return result
-
-
-def _normed(x: Singles, gain: Singles) -> Singles:
-    """Root-mean-square norm of every frame, times a gain per channel."""
-    power = np.mean(x * x, axis=1, keepdims=True)
-    return np.asarray(x * (gain / np.sqrt(power + np.float32(1e-5))))
-
-
-def _bent(x: Singles) -> Singles:
-    """SiLU: every value times its logistic function."""
-    return np.asarray(x * (np.float32(0.5) + np.float32(0.5) * np.tanh(np.float32(0.5) * x)))
 
 
 class _Block(NamedTuple):
@@ -271,7 +230,7 @@ class LiftedInParts:
         sample = view.seen if whole else self._sample(block.first, block.last)
         outputs = self._lifter.outputs(view.seen, sample)
         size = float(typical_size(sample.slopes))
-        return _interpolated(outputs, view.place - view.ticks[0]), size
+        return interpolated(outputs, view.place - view.ticks[0]), size
 
     def _sampled(self, first: int, last: int) -> Seen:
         """Ticks of a long stretch, evenly spread."""
@@ -288,9 +247,7 @@ class LiftedInParts:
     def _view(self, block: _Block) -> _View:
         """A block at the network's rate, with as much around it as matters."""
         times_s = self._track.timebase.times_s[block.first : block.last]
-        steps = np.diff(times_s) * RATE_HZ
-        frames = len(times_s)
-        same = not len(steps) or bool((np.abs(steps - 1.0) < _SAME_RATE).all())
+        frames, same = len(times_s), nearly_at_rate(times_s)
         place = np.arange(frames, dtype=np.float64) if same else (times_s - times_s[0]) * RATE_HZ
         inner = place[block.start - block.first : block.stop - block.first]
         end = np.inf if block.stop == block.last else place[block.stop - block.first]
@@ -307,7 +264,7 @@ class LiftedInParts:
         seen = _seen(self._track.part(block.first + first, block.first + last), self._camera)
         if not same:
             near = place[first:last]
-            seen = Seen(*(_resampled(np.asarray(part), near, ticks) for part in seen))
+            seen = Seen(*(resampled(np.asarray(part), near, ticks) for part in seen))
         return _View(seen, ticks, inner, end)
 
 
@@ -321,39 +278,9 @@ def _seen(track: LandmarkTrack, camera: PinholeCamera) -> Seen:
     )
 
 
-def _resampled(values: Floats, place: Floats, ticks: NDArray[np.intp]) -> Floats:
-    """Values (T, ...) at increasing places, at consecutive whole numbers.
-
-    Where frames are closer than a tick each tick is their mean, weighted by a
-    triangle of one tick to each side; elsewhere a monotone cubic goes through them.
-    """
-    from scipy.interpolate import PchipInterpolator
-
-    flat = values.reshape(len(values), -1)
-    result = PchipInterpolator(place, flat, axis=0)(np.minimum(ticks, place[-1]))
-    low = np.minimum(place.astype(np.intp), ticks[-1])
-    total, weight = np.zeros((len(ticks) + 1, flat.shape[1])), np.zeros(len(ticks) + 1)
-    for tick, share in ((low, 1.0 - (place - low)), (low + 1, place - low)):
-        share = np.clip(share, 0.0, 1.0)
-        near = tick >= ticks[0]
-        row = tick[near] - ticks[0]
-        np.add.at(total, row, share[near, None] * flat[near])
-        np.add.at(weight, row, share[near])
-    crowded = weight[:-1] > 1.3
-    result[crowded] = total[:-1][crowded] / weight[:-1][crowded, None]
-    return np.asarray(result.reshape(len(ticks), *values.shape[1:]))
-
-
-def _interpolated(outputs: Singles, place: Floats) -> Floats:
-    """Rows of outputs at fractional places."""
-    low = np.clip(place.astype(np.intp), 0, max(len(outputs) - 2, 0))
-    share = np.clip(place - low, 0.0, 1.0)[:, None]
-    high = np.minimum(low + 1, len(outputs) - 1)
-    return np.asarray((1.0 - share) * outputs[low] + share * outputs[high])
-
-
 def _lifted(timebase: Timebase, raw: Floats, size: Floats) -> LiftedTrack:
-    root, root_spread, rest = raw[:, 0], raw[:, 1], raw[:, 2:].reshape(len(raw), 4, POINTS)
+    root, root_spread = raw[:, 0], raw[:, 1]
+    rest = raw[:, 2 : STANDING.start].reshape(len(raw), 4, POINTS)
     centre = np.exp(root) / size
     return LiftedTrack(
         timebase,
@@ -363,4 +290,5 @@ def _lifted(timebase: Timebase, raw: Floats, size: Floats) -> LiftedTrack:
         spread(rest[:, 1]),
         rest[:, 2],
         spread(rest[:, 3]),
+        1.0 / (1.0 + np.exp(-raw[:, STANDING])),
     )

@@ -15,6 +15,8 @@ Singles = NDArray[np.float32]
 RATE_HZ = 30.0
 """Frames per second that the network is trained on; other tracks are resampled."""
 
+_SAME_RATE = 0.1
+
 _SHOULDERS, _HIPS = list(TORSO_CORNERS[:2]), list(TORSO_CORNERS[2:])
 _TORSO_M = 0.5
 """A torso's length, which the landmark model's own metres are brought to."""
@@ -172,3 +174,39 @@ def rate(values: Floats, axis: int) -> Floats:
     if values.shape[axis] < 2:
         return np.zeros_like(values)
     return np.asarray(RATE_HZ * np.gradient(values, axis=axis))
+
+
+def nearly_at_rate(times_s: Floats) -> bool:
+    """True if frames follow each other at :data:`RATE_HZ`, within a tenth of a frame."""
+    return bool((np.abs(np.diff(times_s) * RATE_HZ - 1.0) < _SAME_RATE).all())
+
+
+def resampled(values: Floats, place: Floats, ticks: NDArray[np.intp]) -> Floats:
+    """Values (T, ...) at increasing places, at consecutive whole numbers.
+
+    Where frames are closer than a tick each tick is their mean, weighted by a
+    triangle of one tick to each side; elsewhere a monotone cubic goes through them.
+    """
+    from scipy.interpolate import PchipInterpolator
+
+    flat = values.reshape(len(values), -1)
+    result = PchipInterpolator(place, flat, axis=0)(np.minimum(ticks, place[-1]))
+    low = np.minimum(place.astype(np.intp), ticks[-1])
+    total, weight = np.zeros((len(ticks) + 1, flat.shape[1])), np.zeros(len(ticks) + 1)
+    for tick, share in ((low, 1.0 - (place - low)), (low + 1, place - low)):
+        share = np.clip(share, 0.0, 1.0)
+        near = tick >= ticks[0]
+        row = tick[near] - ticks[0]
+        np.add.at(total, row, share[near, None] * flat[near])
+        np.add.at(weight, row, share[near])
+    crowded = weight[:-1] > 1.3
+    result[crowded] = total[:-1][crowded] / weight[:-1][crowded, None]
+    return np.asarray(result.reshape(len(ticks), *values.shape[1:]))
+
+
+def interpolated(outputs: NDArray[np.floating], place: Floats) -> NDArray[np.float64]:
+    """Rows of outputs at fractional places."""
+    low = np.clip(place.astype(np.intp), 0, max(len(outputs) - 2, 0))
+    share = np.clip(place - low, 0.0, 1.0)[:, None]
+    high = np.minimum(low + 1, len(outputs) - 1)
+    return np.asarray((1.0 - share) * outputs[low] + share * outputs[high])

@@ -1,9 +1,9 @@
 """Pose through time by Gauss–Newton: its cost, the equations of a step, and the stages.
 
-Seven kinds of residuals, each divided by its standard deviation: landmarks in the
+Eight kinds of residuals, each divided by its standard deviation: landmarks in the
 picture, their depth behind the middle of the trunk, the trunk's own depth, their
-velocity along the optical axis, habits and limits of joints, arms behind
-the chest, and smoothness (the acceleration of every degree of freedom). Landmarks,
+velocity along the optical axis, movement of feet that stand, habits and limits of joints, arms
+behind the chest, and smoothness (the acceleration of every degree of freedom). Landmarks,
 depths and velocities far off count less (iteratively reweighted least squares). Unknowns
 of a frame meet only those of the next two, so the equations are banded.
 """
@@ -20,6 +20,7 @@ import numpy as np
 
 from sd2core.body.evidence import Evidence
 from sd2core.body.initial import Pose
+from sd2core.body.lifter import FEET
 from sd2core.body.rig import BEHIND, CHEST, JOINT, JOINTS, Rig
 from sd2core.body.rotations import Floats, from_vector, to_vector, transposed
 from sd2core.body.track import LANDMARKS
@@ -144,6 +145,7 @@ class Residuals(NamedTuple):
     depth: Floats  # (T, 33)
     trunk: Floats  # (T, 1)
     velocity: Floats  # (T - 1, 33)
+    standing: Floats  # (T - 1, 12) movement of feet that stand
     habit: Floats  # (T, n), and (T, n) of the limits
     limit: Floats
     behind: Floats  # (T, 4)
@@ -182,6 +184,7 @@ class Objective:
             (depth - trunk[:, None] - seen.depth_m) / seen.depth_sd_m,
             ((trunk - seen.trunk_m) / seen.trunk_sd_m)[:, None],
             (np.diff(depth, axis=0) / self._step_s[:, None] - velocity) / velocity_sd,
+            self._held() * np.diff(positions[:, FEET].reshape(len(depth), -1), axis=0),
             angles / self._habit_sd,
             beyond / _LIMIT_SD_RAD,
             self._behind(marks)[0],
@@ -206,6 +209,7 @@ class Objective:
             1.0 / np.sqrt(1.0 + (residuals.depth / _FAR_DEPTH) ** 2),
             1.0 / np.sqrt(1.0 + (residuals.trunk / _FAR_DEPTH) ** 2),
             1.0 / np.sqrt(1.0 + (residuals.velocity / _FAR_DEPTH) ** 2),
+            1.0 / np.sqrt(1.0 + (residuals.standing / _FAR_DEPTH) ** 2),
             *ones,
         )
 
@@ -245,6 +249,9 @@ class Objective:
                 residuals.velocity,
                 [(0, -along[:-1] * per_m[..., None]), (1, along[1:] * per_m[..., None])],
             )
+            feet = jacobian[:, FEET].reshape(frames, -1, unknowns)  # (T, 12, n)
+            held = (self._held() * trust.standing)[..., None]
+            normal.add(residuals.standing, [(0, -held * feet[:-1]), (1, held * feet[1:])])
         normal.add_diagonal(
             residuals.habit, [(0, np.broadcast_to(1.0 / self._habit_sd, (frames, unknowns)))]
         )
@@ -286,6 +293,12 @@ class Objective:
             0.5 * (seen.velocity_mps[1:] + seen.velocity_mps[:-1]),
             0.5 * (seen.velocity_sd_mps[1:] + seen.velocity_sd_mps[:-1]),
         )
+
+    def _held(self) -> Floats:
+        """What a movement of feet costs, in standard deviations per metre, (T - 1, 12)."""
+        sd = self.evidence.standing_sd_mps
+        sd_mps = np.repeat(np.maximum(sd[1:], sd[:-1]), 3, axis=1)
+        return 1.0 / (sd_mps * self._step_s[:, None])
 
     def _behind(self, marks: Floats, moves: Floats | None = None) -> tuple[Floats, Floats]:
         """Distance of arms behind the chest beyond what is common (T, 4), derivatives (T, 4, n).

@@ -82,12 +82,19 @@ PART_FRAMES = 3600
 What has to be known of the whole clip is then taken from so many frames of it.
 """
 
+_MARGIN_FRAMES = 300
+
 
 def parts(frames: int) -> Iterator[tuple[int, int]]:
     """Start and stop of the parts of a clip, of nearly equal length."""
     count = max(-(-frames // PART_FRAMES), 1)
     edges = [frames * number // count for number in range(count + 1)]
     yield from pairwise(edges)
+
+
+def with_margin(start: int, stop: int, frames: int) -> tuple[int, int]:
+    """Start and stop of a part of a clip with the frames around it that it is repaired with."""
+    return max(start - _MARGIN_FRAMES, 0), min(stop + _MARGIN_FRAMES, frames)
 
 
 class Landmarks(Protocol):

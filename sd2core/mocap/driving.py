@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from sd2core.body.evidence import Evidence
 from sd2core.body.fitted import FittedVertices
 from sd2core.body.initial import Pose, initial_pose
+from sd2core.body.lifter import FEET
 from sd2core.body.model import Resolution, Skeleton
 from sd2core.body.rig import Keypoints, KeypointSpace, Rig
 from sd2core.body.rotations import Floats, applied, transposed
@@ -143,6 +144,7 @@ def evidence_of_points(times_s: Floats, points_m: Floats, sd_m: Floats) -> Evide
         trunk_sd_m=1.0 / np.sqrt(np.maximum((1.0 / sd_m**2).sum(axis=1), 1e-12)),
         velocity_mps=np.zeros_like(sd_m),
         velocity_sd_mps=np.full_like(sd_m, np.inf),
+        standing_sd_mps=np.full((len(depth), len(FEET)), np.inf),
     )
 
 

@@ -58,6 +58,7 @@ def problem() -> tuple[Objective, Pose]:
         velocity_mps=np.gradient(depth_m - centre_m[:, None], times_s, axis=0)
         + 0.2 * rng.normal(size=full.shape),
         velocity_sd_mps=0.8 * full,
+        standing_sd_mps=np.ones((FRAMES, 4)),
     )
     acceleration_sd = np.full((FRAMES - 2, rig.freedoms), 60.0)
     acceleration_sd[:, -3:] = 6.0

@@ -1,1 +1,1 @@
-"""Training data, training and scores of the bundled lifter: ``resources/lifter.npz``."""
+"""Training data, training and scores of the bundled ``lifter.npz`` and ``sides.npz``."""

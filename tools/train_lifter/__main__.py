@@ -18,6 +18,7 @@ from tools.motion_capture.bodies import load_motions
 from tools.train_lifter.data import load_takes, make_lifter_data
 from tools.train_lifter.emulate import landmark_offsets
 from tools.train_lifter.score import score
+from tools.train_lifter.swaps import score_sides
 from tools.train_lifter.takes import Take
 
 
@@ -77,7 +78,7 @@ def _add_commands(kinds: argparse._SubParsersAction) -> None:
             " --out lifter.npz"
         ),
     )
-    train.add_argument("data", type=Path, nargs="+", metavar="DATA", help="folders of the takes")
+    _add_learning(train, steps=11000)
     train.add_argument(
         "--kept",
         type=Path,
@@ -86,27 +87,21 @@ def _add_commands(kinds: argparse._SubParsersAction) -> None:
         metavar="DATA",
         help="folders of takes that only calibrate: of people and motion not learnt from",
     )
-    train.add_argument(
-        "--motions", type=Path, metavar="FOLDER", help="real motion to emulate (see data --motions)"
+    sides = add_command(
+        kinds,
+        "sides",
+        "train what tells left from right, on such takes",
+        handler=_sides,
+        examples="  python -m tools.train_lifter sides people --motions motions --out sides.npz",
     )
-    train.add_argument("--start", type=Path, metavar="FILE", help="a lifter to go on from")
-    train.add_argument(
-        "--steps",
-        type=positive_int,
-        metavar="N",
-        help="of optimisation (default: %(default)s)",
-        default=4500,
-    )
-    train.add_argument("--out", type=Path, required=True, metavar="FILE", help="to write (.npz)")
-    train.add_argument(
-        "--seed", type=int, default=0, metavar="S", help="seed of all random numbers"
-    )
+    _add_learning(sides, steps=4000)
     scoring = add_command(
         kinds,
         "score",
-        "measure a lifter on such takes",
+        "measure the lifter, and what tells left from right, on such takes",
         handler=_score,
-        description="Errors of the velocity along the line of sight, joint by joint.",
+        description="Errors of the velocity along the line of sight, joint by joint, and frames in"
+        " which left is taken for right.",
         examples="  python -m tools.train_lifter score unseen",
     )
     scoring.add_argument("data", type=Path, metavar="DATA", help="folder of the takes")
@@ -121,6 +116,24 @@ def _add_commands(kinds: argparse._SubParsersAction) -> None:
         examples="  python -m tools.train_lifter offsets people",
     )
     offsets.add_argument("data", type=Path, metavar="DATA", help="folder of the takes")
+
+
+def _add_learning(parser: argparse.ArgumentParser, steps: int) -> None:
+    parser.add_argument("data", type=Path, nargs="+", metavar="DATA", help="folders of the takes")
+    parser.add_argument(
+        "--motions", type=Path, metavar="FOLDER", help="real motion to emulate (see data --motions)"
+    )
+    parser.add_argument(
+        "--steps",
+        type=positive_int,
+        metavar="N",
+        help="of optimisation (default: %(default)s)",
+        default=steps,
+    )
+    parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="to write (.npz)")
+    parser.add_argument(
+        "--seed", type=int, default=0, metavar="S", help="seed of all random numbers"
+    )
 
 
 def _data(options: argparse.Namespace) -> None:
@@ -142,23 +155,43 @@ def _data(options: argparse.Namespace) -> None:
 def _train(options: argparse.Namespace) -> None:
     check_output(options.out, ".npz")
     takes = [take for folder in options.data for take in _takes(folder)]
-    start = Lifter.load(options.start) if options.start else None
     kept = [take for folder in options.kept for take in _takes(folder)]
     motions = load_motions(options.motions, "learn") if options.motions else []
     from tools.train_lifter.training import Recipe, material, save_lifter, train  # needs torch
 
     with progress_bar("Training", unit="step") as progress:
         recipe = Recipe(steps=options.steps, seed=options.seed)
-        lifter = train(material(takes, kept, motions, recipe), recipe, progress, start=start)
+        lifter = train(material(takes, kept, motions, recipe), recipe, progress)
     save_lifter(lifter, options.out)
     print(f"Wrote {options.out}")
 
 
+def _sides(options: argparse.Namespace) -> None:
+    check_output(options.out, ".npz")
+    takes = [take for folder in options.data for take in _takes(folder)]
+    motions = load_motions(options.motions, "learn") if options.motions else []
+    from tools.train_lifter.network import save_network  # needs torch
+    from tools.train_lifter.sides import SidesRecipe, train_sides
+    from tools.train_lifter.training import Recipe, material
+
+    recipe = SidesRecipe(steps=options.steps, seed=options.seed)
+    with progress_bar("Training", unit="step") as progress:
+        known = material(takes, (), motions, Recipe(seed=options.seed))
+        network, meta = train_sides(known, recipe, progress)
+    save_network(network, options.out, meta)
+    print(f"Wrote {options.out}")
+
+
 def _score(options: argparse.Namespace) -> None:
-    found = score(Lifter.load(options.lifter), _takes(options.data))
+    takes = _takes(options.data)
+    found, sides = score(Lifter.load(options.lifter), takes), score_sides(takes)
     if options.json:
         joints = {joint: values._asdict() for joint, values in found.joints.items()}
-        print_json({"joints": joints, "still_mps": found.still_mps})
+        likeness = [row._asdict() for row in found.likeness]
+        print_json(
+            {"joints": joints, "likeness": likeness, "still_mps": found.still_mps}
+            | {"sides": {part: values._asdict() for part, values in sides.items()}}
+        )
         return
     print("joint       error  of true  corr.  kept  within 1σ  edge  depth")
     for joint, one in found.joints.items():
@@ -166,6 +199,15 @@ def _score(options: argparse.Namespace) -> None:
             f"{joint:10s}{one.rms_mps:7.3f}{one.truth_mps:9.3f}{one.correlation:7.2f}"
             f"{one.kept:6.2f}{one.covered:10.2f}{one.edge:7.2f}{one.depth_cm:6.1f} cm"
         )
+    print("frames up to    depth  landmark model's  velocity  landmark model's")
+    for row in found.likeness:
+        print(
+            f"{row.distance:12.2f}{row.depth_cm:6.1f} cm{row.own_depth_cm:15.1f} cm"
+            f"{row.velocity_mps:6.2f} m/s{row.own_velocity_mps:14.2f} m/s"
+        )
+    print("mirrored         found  undone   put in  undone")
+    for part, shares in sides.items():
+        print(f"{part:15s}" + "".join(f"{100.0 * share:6.1f} %" for share in shares))
     print(f"Nothing moves: {found.still_mps:.3f} m/s over all landmarks")
 
 

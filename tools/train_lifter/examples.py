@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.body.lifter import FEET
 from sd2core.body.lifter_features import Seen, features, mirrored, rate, typical_size
 from sd2core.body.track import MIRRORED, TORSO_CORNERS
 from tools.train_lifter.emulate import Emulator, Walk
@@ -18,6 +19,9 @@ Singles = NDArray[np.float32]
 _TURN_DEG = 8.0
 _GAP_SHARE = 0.15
 _LONGEST_GAP = 8
+_STANDING = 0.12
+"""Statures per second below which a foot stands still."""
+_OTHER_FEET = [FEET.index(MIRRORED[row]) for row in FEET]
 
 
 class Example(NamedTuple):
@@ -29,10 +33,13 @@ class Example(NamedTuple):
         (T, ...).
     depth : float32 array, shape (T, 33)
         Z of the keypoints in statures.
+    standing : float32 array, shape (T, 4)
+        1 where a foot stands still, otherwise 0.
     """
 
     seen: Seen
     depth: Singles
+    standing: Singles
 
 
 class Batch(NamedTuple):
@@ -46,6 +53,8 @@ class Batch(NamedTuple):
     depth, velocity : float32 array, shape (N, T, 33)
     size : float32 array, shape (N,)
         The typical apparent size.
+    standing : float32 array, shape (N, T, 4)
+        See :class:`Example`.
     """
 
     told: Singles
@@ -53,6 +62,7 @@ class Batch(NamedTuple):
     depth: Singles
     velocity: Singles
     size: Singles
+    standing: Singles
 
 
 def example(take: Take) -> Example:
@@ -65,13 +75,21 @@ def example(take: Take) -> Example:
         take.visibility,
         take.confidence,
     )
-    return Example(seen, take.keypoints_m[..., 2] / np.float32(take.stature_m))
+    places = take.keypoints_m / np.float32(take.stature_m)
+    return Example(seen, places[..., 2], _standing(places))
 
 
 def emulated(rng: np.random.Generator, emulator: Emulator, walk: Walk) -> Example:
     """Example from a motion without pictures."""
     seen = emulator.seen(rng, walk)
-    return Example(Seen(*(np.asarray(part, np.float32) for part in seen)), walk.places[..., 2])
+    seen = Seen(*(np.asarray(part, np.float32) for part in seen))
+    return Example(seen, walk.places[..., 2], _standing(walk.places))
+
+
+def _standing(places: Singles) -> Singles:
+    """Where feet stand still, of places (T, 33, 3) in statures."""
+    speed = np.linalg.norm(rate(places[:, list(FEET)], 0), axis=-1)
+    return (speed < _STANDING).astype(np.float32)
 
 
 def batch(examples: Sequence[Example]) -> Batch:
@@ -87,6 +105,7 @@ def batch(examples: Sequence[Example]) -> Batch:
         truth - centre[..., None],
         np.asarray(rate(truth, 1), np.float32),
         size.astype(np.float32),
+        np.stack([e.standing for e in examples]),
     )
 
 
@@ -95,14 +114,14 @@ def varied(rng: np.random.Generator, one: Example, length: int) -> Example:
     start = int(rng.integers(0, len(one.depth) - length + 1))
     step = slice(start, start + length)
     slopes, depth, world, visibility, sure = (np.array(part[step]) for part in one.seen)
-    truth = one.depth[step]
+    truth, standing = one.depth[step], one.standing[step]
     if rng.random() < 0.5:
         other = mirrored(Seen(slopes, depth, world, visibility, sure))
         slopes, depth, world, visibility, sure = (np.asarray(part) for part in other)
-        truth = truth[:, list(MIRRORED)]
+        truth, standing = truth[:, list(MIRRORED)], standing[:, _OTHER_FEET]
     if rng.random() < 0.5:
-        slopes, depth, world, visibility, sure, truth = (
-            part[::-1] for part in (slopes, depth, world, visibility, sure, truth)
+        slopes, depth, world, visibility, sure, truth, standing = (
+            part[::-1] for part in (slopes, depth, world, visibility, sure, truth, standing)
         )
     angle = np.radians(_TURN_DEG * rng.uniform(-1.0, 1.0))
     turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]], np.float32)
@@ -111,7 +130,7 @@ def varied(rng: np.random.Generator, one: Example, length: int) -> Example:
     seen = Seen(slopes, depth, world, visibility, sure)
     if rng.random() < _GAP_SHARE:
         seen = _bridged(rng, seen)
-    return Example(seen, truth)
+    return Example(seen, truth, standing)
 
 
 def _bridged(rng: np.random.Generator, seen: Seen) -> Seen:

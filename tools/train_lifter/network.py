@@ -1,22 +1,28 @@
-"""The lifter's network in torch, for training; its arrays are those of the NumPy form."""
+"""The network over time in torch, for training; its arrays are those of the NumPy form."""
 
 from __future__ import annotations
 
-from typing import cast
+import copy
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import nn
 
-from sd2core.body.lifter import OUTPUTS, Network
+from sd2core.body.network import Network
+from sd2core.files.atomic import atomic_write
+from sd2core.progress import Progress, silent
 
 _FAR = 8.0
 _EPSILON = 1e-5
 
 
 class LifterNetwork(nn.Module):
-    """See :class:`sd2core.body.lifter.Network`.
+    """See :class:`sd2core.body.network.Network`.
 
     Parameters
     ----------
@@ -31,6 +37,7 @@ class LifterNetwork(nn.Module):
         width: int,
         dilations: tuple[int, ...],
         dropout: float,
+        outputs: int,
     ) -> None:
         super().__init__()
         self.dilations = dilations
@@ -43,40 +50,15 @@ class LifterNetwork(nn.Module):
         )
         self.flat = nn.ModuleList(nn.Linear(width, width) for _ in dilations)
         self.last_gain = nn.Parameter(torch.ones(width))
-        self.leave = nn.Linear(width, OUTPUTS)
+        self.leave = nn.Linear(width, outputs)
         self.dropout = nn.Dropout(dropout)
         with torch.no_grad():
             for layer in self.flat:
                 cast(nn.Linear, layer).weight.mul_(0.3)
             self.leave.weight.mul_(0.1)
 
-    @classmethod
-    def continued(cls, network: Network, dropout: float) -> LifterNetwork:
-        """A network with the weights of one in NumPy."""
-        a = {name: torch.from_numpy(array.copy()) for name, array in network.arrays.items()}
-        made = cls(
-            network.arrays["mean"],
-            network.arrays["spread"],
-            a["enter"].shape[1],
-            network.dilations,
-            dropout,
-        )
-        with torch.no_grad():
-            made.enter.weight.copy_(a["enter"].T)
-            made.enter.bias.copy_(a["enter_bias"])
-            made.gain.copy_(a["gain"])
-            made.last_gain.copy_(a["last_gain"])
-            made.leave.weight.copy_(a["leave"].T)
-            made.leave.bias.copy_(a["leave_bias"])
-            for n, (wide, flat) in enumerate(zip(made.wide, made.flat, strict=True)):
-                wide.weight.copy_(a["wide"][n].permute(2, 1, 0))
-                wide.bias.copy_(a["wide_bias"][n])
-                flat.weight.copy_(a["flat"][n].T)
-                flat.bias.copy_(a["flat_bias"][n])
-        return made
-
     def forward(self, told: torch.Tensor) -> torch.Tensor:
-        """Outputs (N, T, OUTPUTS) of features (N, T, C)."""
+        """Outputs (N, T, M) of features (N, T, C)."""
         x = ((told - self.mean) / self.spread).clamp(-_FAR, _FAR)
         state = self.enter(x)
         for n, (wide, flat) in enumerate(zip(self.wide, self.flat, strict=True)):
@@ -109,7 +91,7 @@ class LifterNetwork(nn.Module):
             name: np.ascontiguousarray(cast(torch.Tensor, tensor).detach().numpy(), np.float32)
             for name, tensor in tensors.items()
         }
-        return Network(self.dilations, arrays, beyond_rates=True)
+        return Network(self.dilations, arrays)
 
 
 def _convolved(x: torch.Tensor, layer: nn.Conv1d, dilation: int) -> torch.Tensor:
@@ -126,3 +108,53 @@ def _convolved(x: torch.Tensor, layer: nn.Conv1d, dilation: int) -> torch.Tensor
 
 def _normed(x: torch.Tensor, gain: torch.Tensor) -> torch.Tensor:
     return x * (gain * torch.rsqrt((x * x).mean(dim=-1, keepdim=True) + _EPSILON))
+
+
+def trained(
+    network: LifterNetwork,
+    steps: int,
+    rate: float,
+    lost: Callable[[], tuple[torch.Tensor, Mapping[str, float]]],
+    progress: Progress = silent,
+    log: Callable[[str], None] | None = None,
+) -> Network:
+    """The running mean of a network's weights after steps of AdamW.
+
+    ``lost`` draws a batch and gives its loss, and the parts of it that are told to ``log`` now and
+    then. The rate rises to ``rate`` and falls again, once.
+    """
+    mean = copy.deepcopy(network)
+    optimiser = torch.optim.AdamW(network.parameters(), lr=rate, weight_decay=0.02)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(
+        optimiser, rate, total_steps=steps + 1, pct_start=0.1
+    )
+    network.train()
+    for step in range(steps):
+        loss, parts = lost()
+        optimiser.zero_grad()
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
+        optimiser.step()
+        schedule.step()
+        with torch.no_grad():
+            for slow, fast in zip(mean.parameters(), network.parameters(), strict=True):
+                slow.lerp_(fast, 1.0 - min(0.995, step / (step + 20.0)))
+        progress(step + 1, steps)
+        if log is not None and (step % 250 == 0 or step == steps - 1):
+            log(f"{step + 1}: " + ", ".join(f"{name} {value:.4f}" for name, value in parts.items()))
+    mean.eval()
+    return mean.exported()
+
+
+def save_network(
+    network: Network, path: Path, meta: Mapping[str, Any], more: Mapping[str, Any] | None = None
+) -> None:
+    """Write a network, its weights in half precision, and other arrays of its file."""
+    arrays: dict[str, Any] = {
+        name: array if name in ("mean", "spread") else array.astype(np.float16)
+        for name, array in network.arrays.items()
+    }
+    told = {**meta, "dilations": list(network.dilations), "arrays": sorted(arrays)}
+    everything = arrays | dict(more or {})
+    with atomic_write(path) as stream:
+        np.savez_compressed(stream, **everything, meta=json.dumps(told))

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.body.lifter import POINTS, Lifter, spread
-from sd2core.body.track import LANDMARKS
+from sd2core.body.lifter import POINTS, STANDING, Lifter, spread
+from sd2core.body.lifter_features import rate
+from sd2core.body.track import LANDMARKS, TORSO_CORNERS
 from tools.train_lifter.examples import batch, example
 from tools.train_lifter.takes import Take
 
@@ -17,6 +19,7 @@ _EDGE = 5
 _MIDDLE = 10
 _FAST_MPS = 0.5
 _STILL_MPS = 0.1
+_LIKE = (0.5, 0.9)
 
 _JOINTS = ("wrist", "index", "elbow", "shoulder", "hip", "knee", "ankle", "nose")
 GROUPS = {
@@ -54,17 +57,41 @@ class JointScore(NamedTuple):
     depth_cm: float
 
 
+class LikenessScore(NamedTuple):
+    """Errors of all landmarks in frames that are about as like those learnt from.
+
+    Parameters
+    ----------
+    distance : float
+        Largest mean square of the features, in their standard deviations.
+    depth_cm, own_depth_cm : float
+        Error of the depth behind the body's centre: of the lifter, and of the landmark model.
+    velocity_mps, own_velocity_mps : float
+        Error of its rate; the lifter's with its error of the centre's.
+    """
+
+    distance: float
+    depth_cm: float
+    own_depth_cm: float
+    velocity_mps: float
+    own_velocity_mps: float
+
+
 class Score(NamedTuple):
     """Errors of a lifter.
 
     Parameters
     ----------
+    likeness : list of LikenessScore
+        Of the half of the frames that is most like those learnt from, the 40 % after it, and the
+        tenth that is least like them.
     still_mps : float
         Root mean square of all velocities found in takes in which nothing moves;
         NaN where there is no such take.
     """
 
     joints: dict[str, JointScore]
+    likeness: list[LikenessScore]
     still_mps: float
 
 
@@ -75,12 +102,13 @@ def score(lifter: Lifter, takes: Sequence[Take]) -> Score:
     for take in takes:
         one = example(take)
         right = batch([one])
-        rest = lifter.outputs(one.seen)[:, 2:].reshape(-1, 4, POINTS) * take.stature_m
+        said = lifter.outputs(one.seen)[:, 2 : STANDING.start].reshape(-1, 4, POINTS)
+        rest = said * take.stature_m
         truth = right.velocity[0] * take.stature_m
         errors.append(rest[:, 2] - truth)
         truths.append(truth)
         depths.append(rest[:, 0] - right.depth[0] * take.stature_m)
-        sigmas.append(spread(lifter.outputs(one.seen)[:, 2 + 3 * POINTS :]) * take.stature_m)
+        sigmas.append(spread(said[:, 3]) * take.stature_m)
         inside.append(_inside(take))
         frames.append(np.minimum(np.arange(len(truth)), np.arange(len(truth))[::-1]))
         if np.abs(truth).max() < _STILL_MPS:
@@ -105,7 +133,34 @@ def score(lifter: Lifter, takes: Sequence[Take]) -> Score:
             _rms(e[from_edge < _EDGE]) / max(_rms(e[from_edge >= _MIDDLE]), 1e-12),
             100.0 * _rms(depth[:, rows][chosen]),
         )
-    return Score(joints, _rms(np.concatenate(still)) if still else float("nan"))
+    still_mps = _rms(np.concatenate(still)) if still else float("nan")
+    return Score(joints, _by_likeness(lifter, takes), still_mps)
+
+
+def _by_likeness(lifter: Lifter, takes: Sequence[Take]) -> list[LikenessScore]:
+    """Whether the landmark model's own depth is better where the features are unusual."""
+    distances, errors = [], []
+    for take in takes:
+        one = example(take)
+        right, network = batch([one]), lifter.network
+        features = (right.told[0] - network.arrays["mean"]) / network.arrays["spread"]
+        distances.append((features**2).mean(axis=1))
+        said = lifter.outputs(one.seen)[:, 2 : STANDING.start].reshape(-1, 4, POINTS)
+        world = np.asarray(one.seen.world_m)[..., 2]
+        own = (world - world[:, TORSO_CORNERS].mean(axis=1, keepdims=True)) / take.stature_m
+        centre = right.velocity[0] - rate(right.depth[0], 0)
+        truth = right.depth[0], right.depth[0], right.velocity[0], right.velocity[0]
+        found = said[:, 0], own, said[:, 2], rate(own, 0) + centre
+        off = [np.square(f - t).mean(axis=1) for f, t in zip(found, truth, strict=True)]
+        errors.append(np.stack(off, axis=1) * take.stature_m**2)
+    distance, squares = np.concatenate(distances), np.concatenate(errors)
+    edges = np.quantile(distance, [0.0, *_LIKE, 1.0])
+    rows = []
+    for low, high in pairwise(edges):
+        chosen = (distance >= low) & (distance <= high)
+        depth_m, own_m, mps, own_mps = np.sqrt(squares[chosen].mean(axis=0)).tolist()
+        rows.append(LikenessScore(float(high), 100 * depth_m, 100 * own_m, mps, own_mps))
+    return rows
 
 
 def _inside(take: Take) -> NDArray[np.bool_]:

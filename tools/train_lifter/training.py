@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import copy
-import json
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
@@ -18,19 +15,19 @@ from sd2core.body.lifter import (
     LOG_SIGMA,
     OUTPUTS,
     POINTS,
+    STANDING,
     VERSION,
     Lifter,
-    Network,
     symmetric,
 )
 from sd2core.body.lifter_features import RATE_HZ
+from sd2core.body.network import Network
 from sd2core.body.track import LANDMARKS
-from sd2core.files.atomic import atomic_write
 from sd2core.progress import Progress, silent
 from tools.motion_capture.bodies import BodyMotion
 from tools.train_lifter.emulate import Emulator, Walk, captured_walks, random_walks
 from tools.train_lifter.examples import Batch, Example, batch, emulated, example, varied
-from tools.train_lifter.network import LifterNetwork
+from tools.train_lifter.network import LifterNetwork, save_network, trained
 from tools.train_lifter.takes import Take
 
 Singles = NDArray[np.float32]
@@ -40,6 +37,7 @@ _WEIGHTS = dict.fromkeys(("shoulder", "hip", "elbow", "knee", "wrist", "ankle"),
 )
 _FACE_WEIGHT = 0.5
 _SPREADS_WEIGHT = 0.05
+_STANDING_WEIGHT = 0.05
 
 
 @dataclass(frozen=True)
@@ -64,19 +62,19 @@ class Recipe:
     """
 
     width: int = 128
-    dilations: tuple[int, ...] = (1, 2, 4, 8, 2, 1)
+    dilations: tuple[int, ...] = (1, 2, 4, 8, 16, 4, 1)
     dropout: float = 0.1
-    steps: int = 4500
+    steps: int = 11000
     emulated_share: float = 0.25
     captured_share: float = 0.4
     batch: int = 24
-    frames: int = 64
+    frames: int = 80
     rate: float = 1.5e-3
     velocity: float = 1.0
     depth: float = 4.0
     root: float = 2.0
     change: float = 0.3
-    walks: int = 500
+    walks: int = 1000
     seed: int = 0
 
 
@@ -114,7 +112,6 @@ def train(
     recipe: Recipe,
     progress: Progress = silent,
     log: Callable[[str], None] | None = None,
-    start: Lifter | None = None,
 ) -> Lifter:
     """Train a lifter; deterministic for the same material, recipe, machine and threads.
 
@@ -122,40 +119,21 @@ def train(
     ----------
     log : callable, optional
         Told the losses now and then.
-    start : Lifter, optional
-        To go on from; its width and dilations stay.
     """
     torch.manual_seed(recipe.seed)
     rng = np.random.default_rng(recipe.seed)
     learnt = [example(take) for take in known.takes]
     told = np.concatenate([batch([one]).told[0] for one in learnt[:200]])
-    if start is not None:
-        network = LifterNetwork.continued(start.network, recipe.dropout)
-    else:
-        spread = np.maximum(told.std(axis=0), 1e-3)
-        network = LifterNetwork(
-            told.mean(axis=0), spread, recipe.width, recipe.dilations, recipe.dropout
-        )
-    mean = copy.deepcopy(network)
-    optimiser = torch.optim.AdamW(network.parameters(), lr=recipe.rate, weight_decay=0.02)
-    schedule = torch.optim.lr_scheduler.OneCycleLR(
-        optimiser, recipe.rate, total_steps=recipe.steps + 1, pct_start=0.1
+    spread = np.maximum(told.std(axis=0), 1e-3)
+    network = LifterNetwork(
+        told.mean(axis=0), spread, recipe.width, recipe.dilations, recipe.dropout, OUTPUTS
     )
-    network.train()
-    for step in range(recipe.steps):
+
+    def lost() -> tuple[torch.Tensor, dict[str, float]]:
         drawn = _drawn(rng, learnt, known, recipe)
-        loss, parts = losses(network(torch.from_numpy(drawn.told)), drawn, recipe)
-        optimiser.zero_grad()
-        loss.backward()
-        torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
-        optimiser.step()
-        schedule.step()
-        _follow(mean, network, min(0.995, step / (step + 20.0)))
-        progress(step + 1, recipe.steps)
-        if log is not None and (step % 250 == 0 or step == recipe.steps - 1):
-            log(f"{step + 1}: " + ", ".join(f"{name} {value:.4f}" for name, value in parts.items()))
-    mean.eval()
-    exported = mean.exported()
+        return losses(network(torch.from_numpy(drawn.told)), drawn, recipe)
+
+    exported = trained(network, recipe.steps, recipe.rate, lost, progress, log)
     return Lifter(
         exported,
         calibration(exported, [example(take) for take in known.kept]),
@@ -165,7 +143,6 @@ def train(
             "kept": len(known.kept),
             "walks": len(known.walks),
             "captured": len(known.captured),
-            "start": dict(start.provenance) if start is not None else None,
         },
     )
 
@@ -191,8 +168,8 @@ def losses(
 ) -> tuple[torch.Tensor, dict[str, float]]:
     """The loss and its parts; spreads learn from errors, but errors not from spreads."""
     weights = torch.from_numpy(landmark_weights())
-    rest = out[..., 2:].unflatten(-1, (4, POINTS))
-    root, depth, velocity, size = (torch.from_numpy(part) for part in truth[1:])
+    rest = out[..., 2 : STANDING.start].unflatten(-1, (4, POINTS))
+    root, depth, velocity, size, standing = (torch.from_numpy(part) for part in truth[1:])
     root_error = out[..., 0] - root
     depth_error = rest[..., 0, :] - depth
     centre = torch.exp(out[..., :1].detach()) / size[:, None, None] * _rate(out[..., :1])
@@ -206,6 +183,8 @@ def losses(
         "depth": recipe.depth * (_huber(depth_error, 0.15) * weights).mean(),
         "root": recipe.root * _huber(root_error, 0.2).mean(),
         "change": recipe.change * change,
+        "standing": _STANDING_WEIGHT
+        * torch.nn.functional.binary_cross_entropy_with_logits(out[..., STANDING], standing),
         "spreads": _SPREADS_WEIGHT
         * (
             _likelihood(root_error, out[..., 1]).mean()
@@ -245,12 +224,6 @@ def _likelihood(error: torch.Tensor, log_sigma: torch.Tensor) -> torch.Tensor:
     return limited + 0.5 * (error.detach() * torch.exp(-limited)) ** 2
 
 
-def _follow(mean: LifterNetwork, network: LifterNetwork, inertia: float) -> None:
-    with torch.no_grad():
-        for slow, fast in zip(mean.parameters(), network.parameters(), strict=True):
-            slow.lerp_(fast, 1.0 - inertia)
-
-
 def calibration(network: Network, kept: Sequence[Example]) -> Singles:
     """Offsets of the logarithms of spreads with which 68 % of errors lie within."""
     ratios = []
@@ -264,13 +237,13 @@ def calibration(network: Network, kept: Sequence[Example]) -> Singles:
     logs = np.log(np.maximum(share, 1e-3))
     added[1] = logs[0]
     added[2 + POINTS : 2 + 2 * POINTS] = logs[1 : 1 + POINTS]
-    added[2 + 3 * POINTS :] = logs[1 + POINTS :]
+    added[2 + 3 * POINTS : STANDING.start] = logs[1 + POINTS :]
     return added
 
 
 def errors(out: Singles, truth: Batch) -> tuple[Singles, Singles]:
     """Errors of root, depths and velocities of one example, and their log spreads, (T, 67)."""
-    rest = out[:, 2:].reshape(len(out), 4, POINTS)
+    rest = out[:, 2 : STANDING.start].reshape(len(out), 4, POINTS)
     error = [out[:, :1] - truth.root[0][:, None], rest[:, 0] - truth.depth[0]]
     error.append(rest[:, 2] - truth.velocity[0])
     return (
@@ -281,17 +254,5 @@ def errors(out: Singles, truth: Batch) -> tuple[Singles, Singles]:
 
 def save_lifter(lifter: Lifter, path: Path) -> None:
     """Write a lifter, its weights in half precision."""
-    arrays: dict[str, Any] = {
-        name: array if name in ("mean", "spread") else array.astype(np.float16)
-        for name, array in lifter.network.arrays.items()
-    }
-    meta = {
-        "format": FORMAT,
-        "version": VERSION,
-        "dilations": list(lifter.network.dilations),
-        "beyond_rates": lifter.network.beyond_rates,
-        "arrays": sorted(arrays),
-        "provenance": dict(lifter.provenance),
-    }
-    with atomic_write(path) as stream:
-        np.savez_compressed(stream, **arrays, calibration=lifter.calibration, meta=json.dumps(meta))
+    meta = {"format": FORMAT, "version": VERSION, "provenance": dict(lifter.provenance)}
+    save_network(lifter.network, path, meta, {"calibration": lifter.calibration})

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import copy
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from sd2core.body import fit_windows
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.fit import fit_body
 from sd2core.body.fitted import BodyFit
-from sd2core.body.lifter import LiftedTrack
+from sd2core.body.lifter import FEET, LiftedTrack
 from sd2core.body.rig import KeypointSpace
 from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.body.shaping import overlap, silhouette
@@ -43,6 +44,7 @@ class Known:
             depth_sigma=np.full(depth.shape, 0.03) / stature_m,
             velocity=(velocity + 0.1 * rng.standard_normal(depth.shape)) / stature_m,
             velocity_sigma=np.full(depth.shape, 0.1) / stature_m,
+            standing=np.zeros((len(depth), len(FEET))),
         )
 
     def __call__(self, track: Landmarks, camera: PinholeCamera) -> LiftedTrack:
@@ -52,11 +54,17 @@ class Known:
 class Scene:
     """A person of random shape who swipes, and the landmarks of a perfect model."""
 
-    def __init__(self, frames: int, start_s: float = 1.2, frames_per_s: float = 30.0) -> None:
+    def __init__(
+        self,
+        frames: int,
+        start_s: float = 1.2,
+        frames_per_s: float = 30.0,
+        distance_m: float = 2.4,
+    ) -> None:
         self.shape = SPACE.random(np.random.default_rng(7))
         times_s = start_s + np.arange(frames) / frames_per_s
         motion = swipes(SPACE.base_skeleton, times_s)
-        place = np.array([0.05, 1.1, 2.4])
+        place = np.array([0.05, 1.1, distance_m])
         transforms = SPACE.skeleton(self.shape).transforms(
             motion.rotations, motion.translation_m + place
         )
@@ -137,6 +145,22 @@ def test_line_of_sight_velocity_of_the_swiping_hand(scene: Scene, fitted: BodyFi
     assert np.sqrt(((true - found)[:, hand] ** 2).mean()) < 0.08
     for ends in (slice(0, 5), slice(-5, None)):
         assert np.sqrt(((true - found)[ends] ** 2).mean()) < 0.05
+
+
+def test_feet_that_stand_do_not_slide() -> None:
+    scene = Scene(30, distance_m=4.5)
+    lifted, times_s = scene.lift.lifted, scene.track.timebase.times_s
+    track, feet = copy.deepcopy(scene.track), list(FEET)
+    track.image_px[:, feet] += 6.0 * np.sin(6.0 * times_s)[:, None, None].astype(np.float32)
+    found_mps = []
+    for sure in (0.0, 1.0):
+        told = replace(lifted, standing=np.full_like(lifted.standing, sure))
+        fit = fit_body(track, CAMERA, stature_m=scene.shape.stature_m, lift=lambda *_, to=told: to)
+        found_mps.append(
+            np.sqrt(np.mean(np.gradient(fit.keypoints_m[:, feet], times_s, axis=0) ** 2))
+        )
+    free_mps, held_mps = found_mps
+    assert held_mps < 0.7 * free_mps
 
 
 def test_a_limb_that_is_hardly_seen_is_not_sure(scene: Scene, fitted: BodyFit) -> None:

@@ -7,19 +7,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from seen_people import somebody
 
 from sd2core.body.landmark_repair import (
-    ARMS,
-    LEGS,
-    RawTrack,
     bridge_gaps,
     find_spikes,
-    pixels_per_metre,
     repair_landmarks,
     replace_outliers,
-    undo_side_swaps,
 )
-from sd2core.body.track import LANDMARKS, MIRRORED
+from sd2core.body.raw_track import RawTrack, pixels_per_metre
+from sd2core.body.sides import swap_sides
+from sd2core.body.track import LANDMARKS
 
 PX_PER_M = 150.0
 CENTRE_PX = np.array([320.0, 240.0])
@@ -91,67 +89,6 @@ def at(frames: int, *numbers: int) -> NDArray[np.bool_]:
     return chosen
 
 
-def swapped(found: RawTrack, frames: NDArray[np.bool_], members: tuple[int, ...]) -> RawTrack:
-    order = np.arange(33)
-    order[list(members)] = np.array(MIRRORED)[list(members)]
-    return found.picked(order, frames)
-
-
-class TestSides:
-    @settings(max_examples=25)
-    @given(
-        st.sampled_from([tuple(range(33)), ARMS, LEGS]),
-        st.lists(st.tuples(st.integers(0, 58), st.integers(1, 8)), min_size=1, max_size=3),
-        st.sampled_from([10.0, 30.0, 120.0]),
-    )
-    def test_a_swap_is_undone_exactly(
-        self, members: tuple[int, ...], runs: list[tuple[int, int]], frames_per_s: float
-    ) -> None:
-        true = waving(np.arange(60) / frames_per_s)
-        wrong = np.zeros(60, bool)
-        for start, length in runs:
-            wrong[start : start + length] = True
-        mended, _ = undo_side_swaps(swapped(true, wrong, members))
-        assert same(mended, true)
-
-    def test_nothing_is_changed_where_nothing_is_wrong(self) -> None:
-        true = waving(np.arange(90) / 30.0)
-        mended, swaps = undo_side_swaps(true)
-        assert same(mended, true)
-        assert not any(frames.any() for frames in swaps.values())
-
-    def test_hands_that_really_cross_stay_crossed(self) -> None:
-        """Each hand goes steadily to the other side and back; at one moment they meet."""
-        times = np.arange(60) / 30.0
-        points = np.repeat(standing()[None], 60, axis=0)
-        way = minimum_jerk((times - 0.3) / 0.5) - minimum_jerk((times - 1.2) / 0.5)
-        for number in ARMS[2:]:
-            points[:, number, 0] *= 1.0 - 2.0 * way
-        true = found_from(points, times)
-        assert same(undo_side_swaps(true)[0], true)
-
-    def test_a_person_who_turns_round_keeps_their_sides(self) -> None:
-        times = np.arange(90) / 30.0
-        angle = np.pi * minimum_jerk(times / 2.5)
-        rest = standing()
-        points = np.stack(
-            [
-                np.cos(angle)[:, None] * rest[:, 0],
-                np.repeat(rest[None, :, 1], 90, axis=0),
-                np.sin(angle)[:, None] * rest[:, 0],
-            ],
-            axis=2,
-        )
-        true = found_from(points, times)
-        assert same(undo_side_swaps(true)[0], true)
-
-    def test_most_frames_say_which_side_is_right(self) -> None:
-        true = waving(np.arange(60) / 30.0)
-        mostly = ~at(60, *range(20))
-        mended, _ = undo_side_swaps(swapped(true, mostly, tuple(range(33))))
-        assert same(mended, swapped(true, np.ones(60, bool), tuple(range(33))))
-
-
 class TestOutliers:
     @pytest.mark.parametrize("frames_per_s", [30.0, 60.0, 120.0])
     def test_a_fast_swipe_is_untouched(self, frames_per_s: float) -> None:
@@ -217,7 +154,7 @@ class TestOutliers:
 
     @pytest.mark.parametrize("frames", [1, 2, 3, 4])
     def test_few_frames(self, frames: int) -> None:
-        true = waving(np.arange(frames) / 30.0)
+        true = somebody(1).part(0, frames)
         assert same(repaired(true, 0.5)[0], true)
 
 
@@ -272,17 +209,17 @@ class TestGaps:
         empty = self.lost(waving(np.arange(20) / 30.0), np.ones(20, bool))
         mended, notes = repaired(empty, 0.5)
         assert same(mended, empty)
-        assert notes == ("Left empty, without the person: 20 frames.",)
+        assert notes == ("Left empty, without the person: 20 frames (0 to 19).",)
 
 
 def test_what_was_done_is_said() -> None:
-    true = waving(np.arange(90) / 30.0)
-    spoilt = swapped(true, at(90, 40, 41), ARMS)
+    true = somebody(1)
+    spoilt = swap_sides(true, "the arms", at(90, 40, 41))
     spoilt.image_px[60, WRIST] += 100.0
     spoilt = TestGaps().lost(spoilt, at(90, 70, 71, 72))
     mended, notes = repaired(spoilt, 0.5)
     assert notes == (
-        "Left and right of the arms swapped back in 2 frames.",
+        "Left and right of the arms swapped back in 2 frames (40 to 41).",
         "Replaced from the frames around them: 1 outlying landmark in 1 frame.",
         "Interpolated, in gaps of up to 0.5 s without the person: 3 frames.",
     )

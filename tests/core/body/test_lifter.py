@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from sd2core.body.camera import PinholeCamera
-from sd2core.body.lifter import OUTPUTS, LiftedInParts, LiftedTrack, Lifter, Network
+from sd2core.body.lifter import OUTPUTS, LiftedInParts, LiftedTrack, Lifter
 from sd2core.body.lifter_features import Seen, features
+from sd2core.body.network import Network
 from sd2core.body.rig import KeypointSpace
 from sd2core.body.shape import ShapeSpace
 from sd2core.body.track import LANDMARKS, MIRRORED, TORSO_CORNERS, LandmarkTrack

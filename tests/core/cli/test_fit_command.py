@@ -216,7 +216,7 @@ class TestOutput:
         mesh = load_mesh(tmp_path / "mesh.zarr")
         assert mesh.present is not None
         np.testing.assert_array_equal(np.flatnonzero(mesh.present), [0, 1, 14])
-        assert "Left empty, without the person: 12 frames." in outcome.out
+        assert "Left empty, without the person: 12 frames (" in outcome.out
         assert np.isfinite(vertices(tmp_path / "mesh.zarr")).all()
 
     @pytest.mark.parametrize(
