@@ -93,18 +93,14 @@ def swap_sides(found: RawTrack, part: str, frames: NDArray[np.bool_]) -> RawTrac
 # -- What the network says -------------------------------------------------------------------------
 
 
-def swap_odds(found: RawTrack, network: Network | None = None) -> Floats:
-    """Log odds that each of :data:`SIDED_PARTS` is mirrored, (T, 3); 0 without a person.
-
-    By the bundled network unless another is given.
-    """
-    network = _bundled() if network is None else network
+def swap_odds(found: RawTrack) -> Floats:
+    """Log odds that each of :data:`SIDED_PARTS` is mirrored, (T, 3); 0 without a person."""
     odds = np.zeros((len(found.times_s), len(SIDED_PARTS)))
     rows = np.flatnonzero(found.present)
     breaks = np.flatnonzero(np.diff(found.times_s[rows]) > _LONGEST_GAP_S) + 1
     for stretch in np.split(rows, breaks):
         if len(stretch) > 1:
-            odds[stretch] = _odds(network, found, stretch)
+            odds[stretch] = _odds(_bundled(), found, stretch)
     return odds
 
 
