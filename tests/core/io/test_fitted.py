@@ -54,6 +54,24 @@ def test_a_mesh_that_is_opened_says_what_is_not_to_be_believed(tmp_path: Path) -
     assert load_mesh(path).notes[-1] == DOUBT
 
 
+def test_a_damaged_word_of_the_fit_keeps_no_mesh_from_being_read(tmp_path: Path) -> None:
+    """Every byte of it in turn."""
+    path, spoilt = tmp_path / "body.npz", tmp_path / "spoilt.npz"
+    vertices = np.random.default_rng(0).uniform(0.0, 1.5, (4, 9, 3)).astype(np.float32)
+    save_mesh(MeshSequence(vertices, None, Timebase.regular(4, 30.0), "test"), path)
+    with zipfile.ZipFile(path, "a", zipfile.ZIP_DEFLATED) as archive:
+        with archive.open("fit.npy", "w") as member:
+            np.lib.format.write_array(member, np.array(json.dumps(SAID)))
+        word = archive.getinfo("fit.npy")
+    sound = path.read_bytes()
+    assert load_mesh(path).notes[-1] == DOUBT
+    start = sound.index(b"fit.npy", word.header_offset) + len("fit.npy")
+    for place in range(start, start + word.compress_size):
+        spoilt.write_bytes(sound[:place] + bytes([sound[place] ^ 0xFF]) + sound[place + 1 :])
+        np.testing.assert_array_equal(load_mesh(spoilt).read(0, 4), vertices)
+        assert fitted_camera(spoilt) in (None, CAMERA)
+
+
 def test_other_meshes_say_nothing(tmp_path: Path) -> None:
     np.savez(tmp_path / "plain.npz", vertices=np.zeros((1, 3, 3)))
     zarr.open_group(str(tmp_path / "plain.zarr"), mode="w")
