@@ -19,6 +19,7 @@ from sd2core.body.camera import PinholeCamera
 from sd2core.body.lifter_features import (
     RATE_HZ,
     Seen,
+    backwards,
     features,
     interpolated,
     mirrored,
@@ -117,13 +118,10 @@ class Lifter:
         """Read the bundled lifter, or another one; Sd2Error if it is missing, damaged or newer."""
         path = resource_path("lifter.npz") if path is None else Path(path)
         command = "python -m tools.train_lifter train"
-        with open_bundled_arrays(path, FORMAT, VERSION, "a lifter", command) as (meta, data):
-            if meta["version"] < VERSION:
-                raise Sd2Error(
-                    f"{path} is a lifter of version {meta['version']}",
-                    f"version {VERSION}",
-                    f"Train it anew with `{command}`",
-                )
+        with open_bundled_arrays(path, FORMAT, VERSION, "a lifter", command, oldest=VERSION) as (
+            meta,
+            data,
+        ):
             network = network_of(meta, data)
             calibration = data["calibration"].astype(np.float32)
         return cls(network, calibration, meta["provenance"])
@@ -145,9 +143,8 @@ def symmetric(network: Network, seen: Seen, sample: Seen | None = None) -> Singl
     total = np.zeros((len(seen.sure), OUTPUTS), np.float32)
     for view, known in ((seen, sample), (mirrored(seen), mirrored(sample))):
         scale = scale_of(known)
-        backwards = Seen(*(np.asarray(part)[::-1] for part in view))
         ahead, back = (
-            with_rates(network(features(each, scale)), size) for each in (view, backwards)
+            with_rates(network(features(each, scale)), size) for each in (view, backwards(view))
         )
         back = back[::-1].copy()
         back[:, _VELOCITIES] *= -1.0
@@ -165,6 +162,11 @@ def with_rates(out: Singles, size: float) -> Singles:
     centre = np.exp(out[:, :1]) / np.float32(size) * rate(out[:, :1], 0)
     full[:, _VELOCITIES] += rate(out[:, 2 : 2 + POINTS], 0) + centre
     return full
+
+
+def by_landmark(out: NDArray[Any]) -> NDArray[Any]:
+    """Depths, their spreads, velocities and theirs of outputs (T, OUTPUTS), as (T, 4, 33)."""
+    return out[:, 2 : STANDING.start].reshape(len(out), 4, POINTS)
 
 
 def spread(logarithm: NDArray[np.floating]) -> Floats:
@@ -279,8 +281,7 @@ def _seen(track: LandmarkTrack, camera: PinholeCamera) -> Seen:
 
 
 def _lifted(timebase: Timebase, raw: Floats, size: Floats) -> LiftedTrack:
-    root, root_spread = raw[:, 0], raw[:, 1]
-    rest = raw[:, 2 : STANDING.start].reshape(len(raw), 4, POINTS)
+    root, root_spread, rest = raw[:, 0], raw[:, 1], by_landmark(raw)
     centre = np.exp(root) / size
     return LiftedTrack(
         timebase,

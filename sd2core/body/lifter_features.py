@@ -74,6 +74,11 @@ def mirrored(seen: Seen) -> Seen:
     )
 
 
+def backwards(seen: Seen) -> Seen:
+    """A stretch played backwards."""
+    return Seen(*(np.asarray(part)[::-1] for part in seen))
+
+
 def apparent_size(slopes: Floats) -> Floats:
     """Apparent length of the torso: slope between middle of shoulders and of hips, (..., T)."""
     torso = slopes[..., _SHOULDERS, :].mean(axis=-2) - slopes[..., _HIPS, :].mean(axis=-2)

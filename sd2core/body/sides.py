@@ -17,11 +17,13 @@ from sd2core.body.lifter_features import (
     RATE_HZ,
     Seen,
     apparent_size,
+    backwards,
     features,
     interpolated,
     mirrored,
     nearly_at_rate,
     resampled,
+    scale_of,
 )
 from sd2core.body.network import Network, network_of
 from sd2core.body.raw_track import RawTrack, pixels_per_metre, place_m
@@ -74,10 +76,11 @@ def undo_side_swaps(found: RawTrack) -> tuple[RawTrack, dict[str, NDArray[np.boo
     rows = np.flatnonzero(found.present)
     if len(rows) < 3:
         return found, swaps
+    scale = pixels_per_metre(found)[rows, None]
     odds = np.clip(swap_odds(found)[rows] - _RARER, -_SURE, _SURE)
     for number, (part, members) in enumerate(SIDED_PARTS.items()):
         alone = -_ODDS_M2 * len(members) * odds[:, number]
-        swaps[part][rows] = _cheapest(_motion_cost(found, rows, members), alone)
+        swaps[part][rows] = _cheapest(_motion_cost(found, rows, scale, members), alone)
         found = swap_sides(found, part, swaps[part])
     return found, swaps
 
@@ -142,8 +145,9 @@ def likely_swaps(network: Network, seen: Seen) -> NDArray[np.float32]:
     """
     told = []
     for view in (seen, mirrored(seen)):
-        backwards = Seen(*(np.asarray(part)[::-1] for part in view))
-        told += [network(features(view)), network(features(backwards))[::-1]]
+        scale = scale_of(view)
+        told.append(network(features(view, scale)))
+        told.append(network(features(backwards(view), scale))[::-1])
     return np.mean(told, axis=0, dtype=np.float32)
 
 
@@ -163,12 +167,13 @@ def load_sides(path: Path | None = None) -> Network:
 # -- What motion says ------------------------------------------------------------------------------
 
 
-def _motion_cost(found: RawTrack, rows: NDArray[np.intp], members: tuple[int, ...]) -> Floats:
+def _motion_cost(
+    found: RawTrack, rows: NDArray[np.intp], scale: Floats, members: tuple[int, ...]
+) -> Floats:
     """Squared distances (m²) of landmarks from smooth paths, for each choice of sides.
 
     (2, 2, 2, N - 2) for three frames in succession; a change of sides has a price.
     """
-    scale = pixels_per_metre(found)[rows, None]
     cost = np.zeros((2, 2, 2, len(rows) - 2))
     for landmark in members:
         pair = (landmark, MIRRORED[landmark])

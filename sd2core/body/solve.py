@@ -160,6 +160,13 @@ class Objective:
         self._relaxed, self._habit_sd, self._limits = _habits(rig)
         self._step_s = np.diff(evidence.times_s)
         self._size, self._size_share = _size_error(evidence)
+        self._velocity_mps, self._velocity_sd_mps = (
+            0.5 * (values[1:] + values[:-1])
+            for values in (evidence.velocity_mps, evidence.velocity_sd_mps)
+        )
+        standing = evidence.standing_sd_mps
+        standing_sd_mps = np.repeat(np.maximum(standing[1:], standing[:-1]), 3, axis=1)
+        self._held_per_m = 1.0 / (standing_sd_mps * self._step_s[:, None])  # (T - 1, 12)
         heads, index = rig.skeleton.heads_m, rig.skeleton.index
         self._arm_m = float(
             np.linalg.norm(heads[index["lowerarm01.L"]] - heads[index["upperarm01.L"]])
@@ -174,7 +181,6 @@ class Objective:
         positions = marks[:, : len(LANDMARKS)]
         depth = positions[..., 2]  # (T, 33)
         trunk = depth[:, seen.trunk].mean(axis=1)
-        velocity, velocity_sd = self._velocity()
         angles = self._angles(pose)
         low, high = self._limits
         beyond = np.minimum(angles - low, 0.0) + np.maximum(angles - high, 0.0)
@@ -183,8 +189,9 @@ class Objective:
             self._but_for_size(off.reshape(len(off), -1, 1)).reshape(off.shape),
             (depth - trunk[:, None] - seen.depth_m) / seen.depth_sd_m,
             ((trunk - seen.trunk_m) / seen.trunk_sd_m)[:, None],
-            (np.diff(depth, axis=0) / self._step_s[:, None] - velocity) / velocity_sd,
-            self._held() * np.diff(positions[:, FEET].reshape(len(depth), -1), axis=0),
+            (np.diff(depth, axis=0) / self._step_s[:, None] - self._velocity_mps)
+            / self._velocity_sd_mps,
+            self._held_per_m * np.diff(positions[:, FEET].reshape(len(depth), -1), axis=0),
             angles / self._habit_sd,
             beyond / _LIMIT_SD_RAD,
             self._behind(marks)[0],
@@ -244,13 +251,13 @@ class Objective:
             [(0, trunk * (trust.trunk / seen.trunk_sd_m[:, None])[..., None])],
         )
         if frames > 1:
-            per_m = trust.velocity / (self._velocity()[1] * self._step_s[:, None])
+            per_m = trust.velocity / (self._velocity_sd_mps * self._step_s[:, None])
             normal.add(
                 residuals.velocity,
                 [(0, -along[:-1] * per_m[..., None]), (1, along[1:] * per_m[..., None])],
             )
             feet = jacobian[:, FEET].reshape(frames, -1, unknowns)  # (T, 12, n)
-            held = (self._held() * trust.standing)[..., None]
+            held = (self._held_per_m * trust.standing)[..., None]
             normal.add(residuals.standing, [(0, -held * feet[:-1]), (1, held * feet[1:])])
         normal.add_diagonal(
             residuals.habit, [(0, np.broadcast_to(1.0 / self._habit_sd, (frames, unknowns)))]
@@ -285,20 +292,6 @@ class Objective:
         """
         along = self._size.transpose(0, 2, 1) @ shifts
         return np.asarray(shifts - (self._size_share * self._size) @ along)
-
-    def _velocity(self) -> tuple[Floats, Floats]:
-        """Mean velocity between frames, and its standard deviation, (T - 1, 33)."""
-        seen = self.evidence
-        return (
-            0.5 * (seen.velocity_mps[1:] + seen.velocity_mps[:-1]),
-            0.5 * (seen.velocity_sd_mps[1:] + seen.velocity_sd_mps[:-1]),
-        )
-
-    def _held(self) -> Floats:
-        """What a movement of feet costs, in standard deviations per metre, (T - 1, 12)."""
-        sd = self.evidence.standing_sd_mps
-        sd_mps = np.repeat(np.maximum(sd[1:], sd[:-1]), 3, axis=1)
-        return 1.0 / (sd_mps * self._step_s[:, None])
 
     def _behind(self, marks: Floats, moves: Floats | None = None) -> tuple[Floats, Floats]:
         """Distance of arms behind the chest beyond what is common (T, 4), derivatives (T, 4, n).

@@ -49,13 +49,14 @@ def bundled_files(pattern: str) -> list[Path]:
 
 @contextmanager
 def open_bundled_arrays(
-    path: Path, kind: str, version: int, what: str, command: str
+    path: Path, kind: str, version: int, what: str, command: str, *, oldest: int = 0
 ) -> Iterator[tuple[dict[str, Any], Mapping[str, NDArray[Any]]]]:
     """Open an ``.npz`` whose ``meta`` tells its format; arrays are read where asked for.
 
-    ``kind`` and ``version`` are the format that is wanted, up to this version; ``what`` it holds
-    and the ``command`` that writes it are for the error. Raises Sd2Error if the file is missing,
-    damaged, of a later version, or lacks an array that is asked for while it is open.
+    ``kind`` and ``version`` are the format that is wanted, from version ``oldest`` up to this one;
+    ``what`` it holds and the ``command`` that writes it are for the error. Raises Sd2Error if the
+    file is missing, damaged, of another version, or lacks an array that is asked for while it is
+    open.
     """
     import numpy as np
 
@@ -67,6 +68,12 @@ def open_bundled_arrays(
                     f"{path} is of format {meta.get('format')!r} version {meta.get('version')}",
                     f"{kind!r} up to version {version}",
                     "Open it with the version of SD² Studio that wrote it",
+                )
+            if meta.get("version", 0) < oldest:
+                raise Sd2Error(
+                    f"{path} is of format {kind!r} version {meta.get('version')}",
+                    f"version {oldest} or later",
+                    f"Make it anew with `{command}`",
                 )
             yield meta, data
     except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:

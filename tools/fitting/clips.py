@@ -292,7 +292,8 @@ def renderer(clip: Clip, space: ShapeSpace, known: Scene) -> Renderer:
     nearest_m = clip.distance_m - (clip.action.walk_m if clip.action.kind == "walk" else 0.0)
     farthest_m = clip.distance_m
     if clip.action.kind == "captured":
-        nearest_m, farthest_m = np.percentile(known.transforms[:, 0, 2, 3], [0.0, 100.0])
+        away_m = known.transforms[:, 0, 2, 3]
+        nearest_m, farthest_m = away_m.min(), away_m.max()
     studio = replace(
         ROOMS[clip.room],
         wall_m=max(farthest_m + 1.1, 3.5),

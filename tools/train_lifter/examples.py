@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.lifter import FEET
-from sd2core.body.lifter_features import Seen, features, mirrored, rate, typical_size
+from sd2core.body.lifter_features import Seen, backwards, features, mirrored, rate, typical_size
 from sd2core.body.track import MIRRORED, TORSO_CORNERS
 from tools.train_lifter.emulate import Emulator, Walk
 from tools.train_lifter.takes import Take
@@ -111,26 +111,36 @@ def batch(examples: Sequence[Example]) -> Batch:
 
 def varied(rng: np.random.Generator, one: Example, length: int) -> Example:
     """A part of an example, perhaps mirrored, reversed, turned, with a gap."""
-    start = int(rng.integers(0, len(one.depth) - length + 1))
-    step = slice(start, start + length)
-    slopes, depth, world, visibility, sure = (np.array(part[step]) for part in one.seen)
-    truth, standing = one.depth[step], one.standing[step]
-    if rng.random() < 0.5:
-        other = mirrored(Seen(slopes, depth, world, visibility, sure))
-        slopes, depth, world, visibility, sure = (np.asarray(part) for part in other)
+    cut, seen, is_mirrored, is_reversed = another_view(rng, one.seen, length)
+    truth, standing = one.depth[cut], one.standing[cut]
+    if is_mirrored:
         truth, standing = truth[:, list(MIRRORED)], standing[:, _OTHER_FEET]
-    if rng.random() < 0.5:
-        slopes, depth, world, visibility, sure, truth, standing = (
-            part[::-1] for part in (slopes, depth, world, visibility, sure, truth, standing)
-        )
-    angle = np.radians(_TURN_DEG * rng.uniform(-1.0, 1.0))
-    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]], np.float32)
-    slopes = slopes @ turn
-    world = np.concatenate([world[..., :2] @ turn, world[..., 2:]], axis=-1)
-    seen = Seen(slopes, depth, world, visibility, sure)
+    if is_reversed:
+        truth, standing = truth[::-1], standing[::-1]
     if rng.random() < _GAP_SHARE:
         seen = _bridged(rng, seen)
     return Example(seen, truth, standing)
+
+
+def another_view(
+    rng: np.random.Generator, seen: Seen, length: int
+) -> tuple[slice, Seen, bool, bool]:
+    """A part of a stretch, perhaps its mirror image, perhaps played backwards, a little turned.
+
+    Returns which part, what is seen of it, and whether it is mirrored and reversed.
+    """
+    start = int(rng.integers(0, len(seen.sure) - length + 1))
+    cut = slice(start, start + length)
+    view = Seen(*(np.array(part[cut]) for part in seen))
+    is_mirrored, is_reversed = rng.random() < 0.5, rng.random() < 0.5
+    view = mirrored(view) if is_mirrored else view
+    view = backwards(view) if is_reversed else view
+    angle = np.radians(_TURN_DEG * rng.uniform(-1.0, 1.0))
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]], np.float32)
+    world = np.asarray(view.world_m)
+    turned = np.concatenate([world[..., :2] @ turn, world[..., 2:]], axis=-1)
+    view = view._replace(slopes=np.asarray(view.slopes) @ turn, world_m=turned)
+    return cut, view, is_mirrored, is_reversed
 
 
 def _bridged(rng: np.random.Generator, seen: Seen) -> Seen:

@@ -9,11 +9,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.body.lifter import POINTS, STANDING, Lifter, spread
+from sd2core.body.lifter import Lifter, by_landmark, spread
 from sd2core.body.lifter_features import rate
 from sd2core.body.track import LANDMARKS, TORSO_CORNERS
-from tools.train_lifter.examples import batch, example
+from tools.train_lifter.examples import Batch, Example, batch, example
 from tools.train_lifter.takes import Take
+
+Floats = NDArray[np.floating]
 
 _EDGE = 5
 _MIDDLE = 10
@@ -98,11 +100,12 @@ class Score(NamedTuple):
 def score(lifter: Lifter, takes: Sequence[Take]) -> Score:
     """Compare what a lifter says of takes with their truth."""
     errors, truths, depths, sigmas, inside, frames = [], [], [], [], [], []
-    still = []
+    still, distances, squares = [], [], []
     for take in takes:
         one = example(take)
-        right = batch([one])
-        said = lifter.outputs(one.seen)[:, 2 : STANDING.start].reshape(-1, 4, POINTS)
+        right, said = batch([one]), by_landmark(lifter.outputs(one.seen))
+        distances.append(_distance(lifter, right))
+        squares.append(take.stature_m**2 * _squares(one, right, said, take.stature_m))
         rest = said * take.stature_m
         truth = right.velocity[0] * take.stature_m
         errors.append(rest[:, 2] - truth)
@@ -134,26 +137,32 @@ def score(lifter: Lifter, takes: Sequence[Take]) -> Score:
             100.0 * _rms(depth[:, rows][chosen]),
         )
     still_mps = _rms(np.concatenate(still)) if still else float("nan")
-    return Score(joints, _by_likeness(lifter, takes), still_mps)
+    likeness = _by_likeness(np.concatenate(distances), np.concatenate(squares))
+    return Score(joints, likeness, still_mps)
 
 
-def _by_likeness(lifter: Lifter, takes: Sequence[Take]) -> list[LikenessScore]:
+def _distance(lifter: Lifter, right: Batch) -> Floats:
+    """How unlike what was learnt from each frame is, (T,): the features' mean square."""
+    arrays = lifter.network.arrays
+    features = (right.told[0] - arrays["mean"]) / arrays["spread"]
+    return np.asarray((features**2).mean(axis=1))
+
+
+def _squares(one: Example, right: Batch, said: Floats, stature_m: float) -> Floats:
+    """Mean squares of errors over the landmarks, (T, 4), in the order of LikenessScore.
+
+    Of the lifter's depth and of the landmark model's own, and of their rates, in statures.
+    """
+    world = np.asarray(one.seen.world_m)[..., 2]
+    own = (world - world[:, TORSO_CORNERS].mean(axis=1, keepdims=True)) / stature_m
+    depth, velocity = right.depth[0], right.velocity[0]
+    centre = velocity - rate(depth, 0)
+    off = said[:, 0] - depth, own - depth, said[:, 2] - velocity, rate(own, 0) + centre - velocity
+    return np.stack([np.square(each).mean(axis=1) for each in off], axis=1)
+
+
+def _by_likeness(distance: Floats, squares: Floats) -> list[LikenessScore]:
     """Whether the landmark model's own depth is better where the features are unusual."""
-    distances, errors = [], []
-    for take in takes:
-        one = example(take)
-        right, network = batch([one]), lifter.network
-        features = (right.told[0] - network.arrays["mean"]) / network.arrays["spread"]
-        distances.append((features**2).mean(axis=1))
-        said = lifter.outputs(one.seen)[:, 2 : STANDING.start].reshape(-1, 4, POINTS)
-        world = np.asarray(one.seen.world_m)[..., 2]
-        own = (world - world[:, TORSO_CORNERS].mean(axis=1, keepdims=True)) / take.stature_m
-        centre = right.velocity[0] - rate(right.depth[0], 0)
-        truth = right.depth[0], right.depth[0], right.velocity[0], right.velocity[0]
-        found = said[:, 0], own, said[:, 2], rate(own, 0) + centre
-        off = [np.square(f - t).mean(axis=1) for f, t in zip(found, truth, strict=True)]
-        errors.append(np.stack(off, axis=1) * take.stature_m**2)
-    distance, squares = np.concatenate(distances), np.concatenate(errors)
     edges = np.quantile(distance, [0.0, *_LIKE, 1.0])
     rows = []
     for low, high in pairwise(edges):

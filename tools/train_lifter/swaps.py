@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.body.lifter_features import RATE_HZ, Seen, apparent_size, mirrored, resampled
+from sd2core.body.lifter_features import RATE_HZ, Seen, apparent_size, resampled
 from sd2core.body.raw_track import RawTrack
 from sd2core.body.sides import SIDED_PARTS, undo_side_swaps
 from sd2core.body.track import LANDMARK, MIRRORED
-from tools.train_lifter.examples import example
+from tools.train_lifter.examples import another_view, example
 from tools.train_lifter.takes import Take
 
 Singles = NDArray[np.float32]
@@ -30,7 +30,6 @@ _CLEAR = 0.05
 _UNTOUCHED = 0.3
 _MOST_STRETCHES = 3
 _THINNED = 0.3
-_TURN_DEG = 8.0
 _SAME_VISIBILITY = 0.15
 _JITTER = 0.02
 """Of a landmark, at most, in lengths of the torso."""
@@ -75,20 +74,11 @@ def known_of(take: Take) -> Known:
 
 def varied(rng: np.random.Generator, one: Known, frames: int) -> Known:
     """A part of a stretch, perhaps its mirror image, reversed and turned."""
-    start = int(rng.integers(0, len(one.mirrored) - frames + 1))
-    cut = slice(start, start + frames)
-    seen = Seen(*(np.array(part[cut]) for part in one.seen))
+    cut, seen, _, is_reversed = another_view(rng, one.seen, frames)
     wrong, weight = one.mirrored[cut], one.weight[cut]
-    if rng.random() < 0.5:
-        seen = mirrored(seen)
-    if rng.random() < 0.5:
-        seen = Seen(*(np.asarray(part)[::-1] for part in seen))
+    if is_reversed:
         wrong, weight = wrong[::-1], weight[::-1]
-    angle = np.radians(_TURN_DEG * rng.uniform(-1.0, 1.0))
-    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]], np.float32)
-    world = np.asarray(seen.world_m)
-    turned = np.concatenate([world[..., :2] @ turn, world[..., 2:]], axis=-1)
-    return Known(seen._replace(slopes=seen.slopes @ turn, world_m=turned), wrong, weight)
+    return Known(seen, wrong, weight)
 
 
 def spoilt(rng: np.random.Generator, one: Known) -> Known:

@@ -18,6 +18,7 @@ from sd2core.body.lifter import (
     STANDING,
     VERSION,
     Lifter,
+    by_landmark,
     symmetric,
 )
 from sd2core.body.lifter_features import RATE_HZ
@@ -243,7 +244,7 @@ def calibration(network: Network, kept: Sequence[Example]) -> Singles:
 
 def errors(out: Singles, truth: Batch) -> tuple[Singles, Singles]:
     """Errors of root, depths and velocities of one example, and their log spreads, (T, 67)."""
-    rest = out[:, 2 : STANDING.start].reshape(len(out), 4, POINTS)
+    rest = by_landmark(out)
     error = [out[:, :1] - truth.root[0][:, None], rest[:, 0] - truth.depth[0]]
     error.append(rest[:, 2] - truth.velocity[0])
     return (

@@ -197,7 +197,7 @@ def test_the_picture_must_be_the_camera_s(lifter: Lifter) -> None:
         lifted_by(lifter, _track(places), PinholeCamera(320, 240, 300.0))
 
 
-def test_a_damaged_or_later_file_is_refused(tmp_path: Path) -> None:
+def test_a_damaged_later_or_older_file_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "lifter.npz"
     path.write_bytes(b"nothing")
     with pytest.raises(Sd2Error, match="lifter"):
@@ -205,3 +205,7 @@ def test_a_damaged_or_later_file_is_refused(tmp_path: Path) -> None:
     np.savez(path, meta=json.dumps({"format": "sd2-lifter", "version": 99}))
     with pytest.raises(Sd2Error, match="version"):
         Lifter.load(path)
+    np.savez(path, meta=json.dumps({"format": "sd2-lifter", "version": 1}))
+    with pytest.raises(Sd2Error, match="version 1") as refused:
+        Lifter.load(path)
+    assert "tools.train_lifter train" in str(refused.value)
