@@ -20,7 +20,7 @@ help:
 	@echo "make setup        virtual environment in .venv, with pinned dependencies"
 	@echo "make lint         ruff, mypy and the rules between modules"
 	@echo "make format       let ruff format the code"
-	@echo "make test-slow    the tests that take minutes"
+	@echo "make test-slow    the slow tests"
 	@echo "make bench        the benchmarks"
 	@echo "make wheel        dist/*.whl"
 	@echo "make screenshots  the pictures in docs/"

@@ -272,6 +272,7 @@ def test_whole_maps_against_the_reference(
 PLACES_M = st.sampled_from([0.0, -0.0, 1e-12, -1e-3, 0.1, 1.0, -1.0, 1e3, 1e6, -1e6])
 
 
+@pytest.mark.slow
 @given(
     points=st.lists(st.tuples(PLACES_M, PLACES_M, PLACES_M), min_size=6, max_size=12),
     corners=st.lists(st.integers(0, 2), min_size=12, max_size=12),

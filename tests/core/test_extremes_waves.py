@@ -271,6 +271,7 @@ def test_velocity_comes_back_wrapped_by_modular_arithmetic(
     assert abs(apart) <= 0.5001 * config.velocity_resolution_mps
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("chirps", "samples"), [(2, 1024), (16, 8), (1024, 8), (1024, 1024)])
 def test_few_and_many_chirps_and_samples(chirps: int, samples: int) -> None:
     # The range is the middle gate's, the speed a quarter of what wraps.

@@ -117,6 +117,7 @@ time.sleep(600)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="there threads end with their process")
 def test_a_process_that_is_gone_holds_no_lock(tmp_path) -> None:
     """Its first thread is gone before the others, which still hold what it had open."""

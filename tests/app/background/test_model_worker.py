@@ -107,6 +107,7 @@ def test_what_is_wrong_is_said_and_the_process_goes_on(process, folder):
     assert model.denoise(a_map()).values.any()
 
 
+@pytest.mark.slow
 def test_one_that_died_is_started_again(process, folder):
     model = process.load(folder / "gru.safetensors")
     before = model.denoise(a_map()).values
@@ -168,6 +169,7 @@ def test_a_classifier_beside_the_denoisers_answers_as_the_library(
         process.load_classifier(folder / "gru.safetensors")
 
 
+@pytest.mark.slow
 def test_the_window_itself_never_loads_torch():
     code = (
         "import sys\n"

@@ -284,6 +284,7 @@ def test_a_batch_runs_to_its_end_and_its_results_are_listed(qtbot, made, meshes)
     assert "1 task could not be done" in said[0]
 
 
+@pytest.mark.slow
 def test_a_batch_outlives_the_model_and_is_found_again(qtbot, made, meshes):
     settings = Settings.forgetful()
     first = made("--step-s", 1.0, settings=settings)

@@ -226,6 +226,7 @@ def test_a_training_is_followed_to_its_end_and_its_model_is_used(set_up, qtbot):
     assert kept.exists()
 
 
+@pytest.mark.slow
 def test_time_left_is_told_from_what_it_took(set_up, qtbot):
     model = set_up.training("--step-s", "0.5")
     set_up.ready(model)
@@ -296,6 +297,7 @@ def test_another_window_finds_what_is_under_way(set_up, qtbot):
     assert first.run.phase == "stopped"
 
 
+@pytest.mark.slow
 def test_a_comparison_that_was_stopped_goes_on_in_its_folder(set_up, qtbot):
     model = set_up.training("--step-s", "0.5")
     set_up.ready(model)
@@ -315,6 +317,7 @@ def test_a_comparison_that_was_stopped_goes_on_in_its_folder(set_up, qtbot):
     assert (model.run.result / "table.json").is_file()
 
 
+@pytest.mark.slow
 def test_a_real_command_is_stopped_as_by_ctrl_c(set_up, tmp_path, qtbot):
     folder = CommandFolder(tmp_path / "run")
     out = tmp_path / "c.safetensors"

@@ -105,6 +105,7 @@ def test_it_looks_at_a_map_of_a_kind_that_it_has_learned_from(set_up):
     assert model.track.source is denoised
 
 
+@pytest.mark.slow
 def test_the_choice_is_remembered_and_loaded_again(set_up, qtbot):
     first = set_up.model()
     first.use(set_up.path)

@@ -410,6 +410,7 @@ def test_closing_lets_go_of_the_models(context, models, qtbot, ball):
 # --- the library's own --------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_real_model_gives_the_map_that_the_library_gives(
     qapp, compiled_kernels, qtbot, ball, tmp_path
 ):

@@ -34,6 +34,7 @@ def labels_of(places: list[tuple[str, int, int, str]]) -> Labels:
     return Labels(TRACKS, tuple(spans))
 
 
+@pytest.mark.slow
 @given(st.lists(placed, max_size=40))
 def test_spans_of_a_lane_do_not_overlap(places) -> None:
     labels = labels_of(places)

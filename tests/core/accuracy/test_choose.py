@@ -101,6 +101,7 @@ def test_short_clips(frames: int) -> None:
     assert choice.errors.frames >= 1
 
 
+@pytest.mark.slow
 def test_a_choice_can_be_written_down(scene: MeshSequence) -> None:
     choice = choose(scene, CAMERA, tolerance=0.1)
     content = json.loads(json.dumps(choice.to_json()))
@@ -148,6 +149,7 @@ def test_a_missing_number_is_named_by_its_frame_in_the_clip() -> None:
         choose(broken, CAMERA, tolerance=0.1)
 
 
+@pytest.mark.slow
 def test_a_survey_that_builds_on_another_finds_the_same(
     scene: MeshSequence, survey: Survey
 ) -> None:
@@ -192,6 +194,7 @@ def test_inside_a_body_nothing_needs_to_stand_in_between() -> None:
     assert not any(reason.setting in ("mask_reuse", "mask_age") for reason in choice.reasons)
 
 
+@pytest.mark.slow
 def test_a_single_map_keeps_no_mask(scene: MeshSequence) -> None:
     """Such a plan is for a sensor that moves: alone it would be worked out whole."""
     survey = survey_scene(scene, CAMERA, PAPER)
@@ -206,6 +209,7 @@ def test_a_single_map_keeps_no_mask(scene: MeshSequence) -> None:
     assert not at_rest.holds
 
 
+@pytest.mark.slow
 def test_a_clip_too_short_to_check_apart_says_so(scene: MeshSequence) -> None:
     few = replace(
         scene, vertices=scene.read(0, 6), timebase=Timebase(scene.times_s[:6]), source="few"

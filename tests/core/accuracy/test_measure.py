@@ -108,12 +108,14 @@ def test_measuring_can_be_stopped(scene: MeshSequence) -> None:
     assert len(calls) == 3
 
 
+@pytest.mark.slow
 def test_the_weight_is_measured_against_its_own_reference(scene: MeshSequence) -> None:
     options = replace(PRESETS["paper"], weight="projected")
     table = measure(scene, CAMERA, options=options, repeats=1)
     assert error(table, AccuracyPlan(weight="projected", frame_rate_factor=8)) < 1e-3
 
 
+@pytest.mark.slow
 def test_waves_converge_and_blocks_and_motion_bring_them_nearer() -> None:
     body = ball(steady((0, 0, 2), (0.1, 0, -0.8)), fineness=3, radius_m=0.1)
     table = measure(body, CAMERA, family="fmcw", repeats=1)

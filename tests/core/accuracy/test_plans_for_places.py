@@ -79,6 +79,7 @@ def test_a_plan_that_fails_elsewhere_is_chosen_anew_there(monkeypatch: pytest.Mo
     assert found.plan == good
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("free")
 def test_what_is_chosen_and_is_not_cheaper_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     costs = {TOP: 1.0, AccuracyPlan(): 0.1}

@@ -116,6 +116,7 @@ def test_a_small_body_far_away_does_not_require_the_range_law() -> None:
     assert choice.plan.range_law == "frame"
 
 
+@pytest.mark.slow
 def test_a_quick_to_and_fro_requires_a_higher_frame_rate() -> None:
     choice = chosen(ball(swinging((0, 0, 2), 1.5, 3.0)), 0.1)
     found = reason(choice, "motion")
@@ -123,6 +124,7 @@ def test_a_quick_to_and_fro_requires_a_higher_frame_rate() -> None:
     assert choice.plan.frame_rate_factor > 1
 
 
+@pytest.mark.slow
 def test_uniform_motion_does_not_require_a_higher_frame_rate() -> None:
     choice = chosen(ball(APPROACHING))
     found = reason(choice, "motion")
@@ -131,6 +133,7 @@ def test_uniform_motion_does_not_require_a_higher_frame_rate() -> None:
     assert choice.plan.frame_rate_factor == 1
 
 
+@pytest.mark.slow
 def test_passing_behind_a_picket_fence_requires_a_mask_for_each_frame() -> None:
     pickets = [plate((x, 0, 1.0), 0.02, 1.0) for x in np.arange(-1.0, 1.0, 0.04)]
     scene = together(ball(steady((-1.5, 0, 3), (0.8, 0, -0.5))), *pickets)
@@ -140,6 +143,7 @@ def test_passing_behind_a_picket_fence_requires_a_mask_for_each_frame() -> None:
     assert choice.plan.mask_stride == 1
 
 
+@pytest.mark.slow
 def test_a_still_plate_over_a_calm_body_lets_masks_grow_old() -> None:
     scene = together(ball(APPROACHING, frames=120), plate((0.25, 0, 1), 0.5, 0.5, frames=120))
     choice = chosen(scene, 0.05)
@@ -156,12 +160,14 @@ def test_still_surroundings_are_not_modelled() -> None:
     assert found.value == pytest.approx(still, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_where_all_moves_all_is_modelled() -> None:
     found = reason(chosen(ball(APPROACHING)), "static")
     assert found.modelled
     assert found.value == 0
 
 
+@pytest.mark.slow
 def test_a_fine_plain_surface_does_not_require_all_vertices() -> None:
     choice = chosen(ball(APPROACHING, fineness=5), 0.05)
     found = reason(choice, "geometry")

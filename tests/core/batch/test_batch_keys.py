@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -42,6 +43,7 @@ def test_the_order_of_keys_does_not_matter_and_json_changes_nothing(content: Any
     assert key_of("synthesise", json.loads(json.dumps(content))) == key
 
 
+@pytest.mark.slow
 @given(contents, contents)
 def test_different_contents_have_different_keys(one: Any, other: Any) -> None:
     same = json.dumps(one, sort_keys=True) == json.dumps(other, sort_keys=True)

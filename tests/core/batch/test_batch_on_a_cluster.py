@@ -45,6 +45,7 @@ def _plan(folder: Path, out: str) -> BatchPlan:
     return plan_from_text(_PLAN.format(out=out), folder)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="stops and kills processes by signals")
 def test_a_killed_worker_loses_its_current_task_only(tmp_path: Path) -> None:
     save_spheres(tmp_path / "meshes", 6, frames=200)
@@ -76,6 +77,7 @@ def test_a_killed_worker_loses_its_current_task_only(tmp_path: Path) -> None:
     assert re.match("A worker died during (inspect|synthesise) of m", notes[0])
 
 
+@pytest.mark.slow
 def test_other_users_of_the_machine_cannot_connect_to_a_local_batch(tmp_path: Path) -> None:
     pytest.importorskip("cryptography")
     with local_client(tmp_path, 1) as client:

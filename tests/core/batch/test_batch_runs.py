@@ -93,6 +93,7 @@ def test_maps_are_those_of_synth_and_denoise(run: Runs) -> None:
         )
 
 
+@pytest.mark.slow
 def test_a_tolerance_is_one_plan_per_mesh_for_all_its_places(
     run: Runs, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -284,6 +285,7 @@ def test_stopped_it_goes_on(run: Runs) -> None:
     assert len(maps_in(run.out)) == 4
 
 
+@pytest.mark.slow
 def test_two_batches_in_one_folder_are_refused(run: Runs) -> None:
     save_spheres(run.folder / "meshes", 1)
     run(MAPS)

@@ -82,6 +82,7 @@ def test_only_what_depends_on_a_change_is_simulated_again(tmp_path: Path) -> Non
     assert run(tmp_path, SIMULATED + "seed = 3\n")[1].submitted == {"simulate": 2}
 
 
+@pytest.mark.slow
 def test_the_data_set_holds_simulated_maps_of_every_place_and_the_real_radar(
     tmp_path: Path,
 ) -> None:

@@ -97,6 +97,7 @@ def test_a_map_names_sensor_and_options(tmp_path: Path) -> None:
     assert made.meta["options"]["axis"] == asdict(VelocityAxis(64))
 
 
+@pytest.mark.slow
 def test_denoised_stretches_are_those_of_the_whole_map(tmp_path: Path) -> None:
     """To single precision's digits: what a model remembers fades within the margin."""
     frames = 3 * 2400

@@ -163,6 +163,7 @@ def test_feet_that_stand_do_not_slide() -> None:
     assert held_mps < 0.7 * free_mps
 
 
+@pytest.mark.slow
 def test_a_limb_that_is_hardly_seen_is_not_sure(scene: Scene, fitted: BodyFit) -> None:
     knee = LANDMARKS.index("knee.R")
     track = copy.deepcopy(scene.track)
@@ -188,6 +189,7 @@ def test_surface_has_the_outline(scene: Scene, fitted: BodyFit) -> None:
     assert min(shares) > 0.9
 
 
+@pytest.mark.slow
 def test_outlines_tell_a_heavy_person_from_a_light_one() -> None:
     heavy = Scene(8)
     girths = {}
@@ -216,6 +218,7 @@ def test_outlines_tell_a_heavy_person_from_a_light_one() -> None:
     assert girths[0.95] > 1.05 * girths[0.05]
 
 
+@pytest.mark.slow
 def test_empty_frames_hold_the_last_known_pose_and_are_marked(scene: Scene) -> None:
     gap = slice(20, 40)
     track = copy.deepcopy(scene.track)
@@ -262,6 +265,7 @@ def test_windows_cover_a_stretch(frames: int) -> None:
     assert (covered[:7] == 0).all()
 
 
+@pytest.mark.slow
 def test_a_stopped_fit_goes_on(
     scene: Scene, fitted_in_windows: BodyFit, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -197,6 +197,7 @@ class TestMending:
                 getattr(parts, name).astype(float), values.astype(float), atol=1e-4, err_msg=name
             )
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(("first", "last"), [(0, 60), (0, 90), (95, 150)])
     def test_the_right_side_does_not_depend_on_most_of_the_clip(
         self, first: int, last: int
@@ -251,6 +252,7 @@ class TestTrack:
             kept.part(0, 10)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("short_parts")
 @pytest.mark.parametrize(
     ("frames_per_s", "uneven"), [(30.0, False), (12.5, False), (60.0, False), (50.0, True)]
@@ -278,6 +280,7 @@ def velocity_mps(points_m: np.ndarray, times_s: np.ndarray) -> np.ndarray:
 class TestFit:
     FRAMES = 150
 
+    @pytest.mark.slow
     def test_short_parts_change_nothing(self) -> None:
         """Windows are the same: only rounding differs."""
         few = swiping(60)
@@ -289,6 +292,7 @@ class TestFit:
         np.testing.assert_allclose(parts.keypoints_m, whole.keypoints_m, atol=2e-4)
         np.testing.assert_allclose(parts.along_sd_mps, whole.along_sd_mps, atol=1e-4)
 
+    @pytest.mark.slow
     def test_velocities_go_on_across_seams(self) -> None:
         """Fitted in windows, they differ little from those of one window, seams or not."""
         known = swiping(self.FRAMES)
@@ -316,6 +320,7 @@ class TestFit:
 
 
 class TestMotion:
+    @pytest.mark.slow
     def test_the_mesh_is_that_of_a_fit_in_memory(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
@@ -345,6 +350,7 @@ class TestMotion:
         assert reports == sorted(reports)
         assert reports[-1][0] == reports[-1][1]
 
+    @pytest.mark.slow
     @pytest.mark.usefixtures("short_parts")
     def test_no_more_than_a_part_is_in_memory(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

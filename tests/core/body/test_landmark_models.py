@@ -72,6 +72,7 @@ class TestFetching:
             places.landmark_models()
         assert not any((tmp_path / "cache").iterdir())
 
+    @pytest.mark.slow
     def test_out_of_reach_of_the_index(self, wheel: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         """With the real pip, which finds nobody at the other end."""
         for name in list(os.environ):

@@ -106,6 +106,7 @@ class TestOutliers:
         path = np.stack([0.2 * np.sin(2 * np.pi * 4 * times), 0 * times], axis=1)
         assert not find_spikes(times, path).any()
 
+    @pytest.mark.slow
     @settings(max_examples=8)
     @given(
         st.integers(2, 50),

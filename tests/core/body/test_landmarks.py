@@ -84,6 +84,7 @@ class TestOnePerson:
             area = (mask > 127).mean() * CAMERA.width * CAMERA.height
             assert 0.1 < area / PERSON_PX**2 < 0.35
 
+    @pytest.mark.slow
     def test_both_passes_are_shown(self, swipe: Path, models: LandmarkModels) -> None:
         stages: list[str] = []
         seen: dict[str, list[int]] = {"find": [], "refine": []}
@@ -100,6 +101,7 @@ class TestOnePerson:
         assert sorted(seen["find"]) == seen["refine"] == list(range(FRAMES))
         assert reports["find"][-1] == reports["refine"][-1] == (FRAMES, FRAMES)
 
+    @pytest.mark.slow
     def test_one_thread_finds_the_same_as_two(
         self, swipe: Path, models: LandmarkModels, track: LandmarkTrack
     ) -> None:
@@ -120,6 +122,7 @@ class TestWhichPerson:
             pictures.append(room)
         return film(path, pictures)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(("red", "red_in_front"), [(False, True), (True, True)])
     def test_people_who_cross_are_not_confused(
         self, models: LandmarkModels, tmp_path: Path, red: bool, red_in_front: bool
@@ -134,6 +137,7 @@ class TestWhichPerson:
         apart = np.abs(way) > 45
         np.testing.assert_allclose(middle[apart], expected[apart], atol=8)
 
+    @pytest.mark.slow
     def test_a_rectangle_in_a_later_frame(self, models: LandmarkModels, tmp_path: Path) -> None:
         path = self.crossing(tmp_path / "crossing.mp4", red_in_front=True)
         track = found(path, models, person=Rectangle(205, 20, 90, 215, frame=20))
@@ -166,6 +170,7 @@ class TestWhichPerson:
 
 
 class TestPictures:
+    @pytest.mark.slow
     def test_a_person_half_out_of_the_picture(self, models: LandmarkModels, tmp_path: Path) -> None:
         """The picture ends at the middle of the body, on the person's left."""
         pictures, truth = swiping()
@@ -179,6 +184,7 @@ class TestPictures:
         assert track.visibility[:, hidden].max() < 0.5
         assert np.median(track.visibility[:, shown]) > 0.7
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("share", [0.15])
     def test_a_small_person(self, models: LandmarkModels, tmp_path: Path, share: float) -> None:
         """Far away, to the left; the model sees people from two fifths of the picture on."""
@@ -196,6 +202,7 @@ class TestPictures:
         off = np.hypot(*np.moveaxis(track.image_px - truth, -1, 0))
         assert np.median(off) < 0.03 * 3 * share * PERSON_PX
 
+    @pytest.mark.slow
     def test_portrait(self, models: LandmarkModels, tmp_path: Path) -> None:
         path = film(tmp_path / "portrait.mp4", [each[:, 60:220] for each in swiping()[0]])
         track = found(path, models)
@@ -254,6 +261,7 @@ class TestTimes:
         gone = (times > 0.25) & (times < 0.25 + empty_s)
         return [room if each else person for each in gone]
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("frames_per_s", [10, 30])
     @pytest.mark.parametrize("bridged", [True, False])
     def test_a_gap(
@@ -279,10 +287,12 @@ class TestTimes:
             assert (track.visibility[gone] == 0).all()
             assert not track.bridged.any()
 
+    @pytest.mark.slow
     def test_another_limit(self, models: LandmarkModels, tmp_path: Path) -> None:
         path = film(tmp_path / "gap.mp4", self.gap(10, 0.65), frames_per_s=10)
         assert found(path, models, max_gap_s=1.0).present.all()
 
+    @pytest.mark.slow
     def test_variable_frame_rate(self, models: LandmarkModels, tmp_path: Path) -> None:
         """Every frame is shown at its own time, and the swipe is found there."""
         pictures, _ = swiping()
@@ -291,6 +301,7 @@ class TestTimes:
         np.testing.assert_allclose(track.timebase.times_s, np.array(times_ms) / 1e3, atol=2e-3)
         assert np.median(off_px(track)) < 0.02 * PERSON_PX
 
+    @pytest.mark.slow
     def test_a_fast_camera(self, models: LandmarkModels, tmp_path: Path) -> None:
         """At 120 frames/s, the first pass looks at one in eight."""
         pictures = [each for each in swiping()[0][4:6] for _ in range(8)]
@@ -311,6 +322,7 @@ class TestTimes:
 
 
 class TestStopped:
+    @pytest.mark.slow
     @pytest.mark.parametrize("stop_after", [9, 20])
     def test_going_on_gives_the_same(
         self,
@@ -344,6 +356,7 @@ class TestStopped:
         assert len(again) <= 2 * FRAMES - stop_after + 4 + 4
         assert found(swipe, models, workspace=tmp_path, on_frame=cancel).present.all()
 
+    @pytest.mark.slow
     def test_the_work_on_another_video_is_not_used(
         self, swipe: Path, models: LandmarkModels, tmp_path: Path
     ) -> None:

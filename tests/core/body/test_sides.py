@@ -54,6 +54,7 @@ def real(shared_data: Path, models: LandmarkModels) -> RawTrack:
     return RawTrack(track.timebase.times_s, **{name: getattr(track, name) for name in names})
 
 
+@pytest.mark.slow
 @settings(max_examples=40)
 @given(
     st.sampled_from([ALL, ("head and trunk",), ("the arms",), ("the legs",), ALL[:2]]),
@@ -73,6 +74,7 @@ def test_mirrored_stretches_of_a_real_person_are_undone(
     assert left <= 0.02 * 3 * len(wrong)
 
 
+@pytest.mark.slow
 @settings(max_examples=8)
 @given(st.integers(0, 40), st.floats(0.3, 3.0), st.floats(-200.0, 200.0))
 def test_odds_do_not_depend_on_place_and_size(seed: int, zoom: float, shift_px: float) -> None:
@@ -117,6 +119,7 @@ def test_few_frames(frames: int) -> None:
     np.testing.assert_array_equal(undo_side_swaps(true)[0].image_px, true.image_px)
 
 
+@pytest.mark.slow
 @settings(max_examples=60)
 @given(st.integers(3, 8), st.integers(0, 2**31))
 def test_the_cheapest_choice_is_that_of_all_choices(frames: int, seed: int) -> None:

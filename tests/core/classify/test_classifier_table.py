@@ -128,6 +128,7 @@ def test_every_condition_is_there_once() -> None:
     assert Condition(network=PAPER) in found
 
 
+@pytest.mark.slow
 def test_a_table_that_was_stopped_goes_on(tmp_path: Path) -> None:
     whole = make_table(tmp_path / "whole", KNOWN, ONCE)
     calls: list[int] = []
@@ -164,6 +165,7 @@ def test_runs_of_other_data_or_settings_are_not_taken(tmp_path: Path) -> None:
     assert digest(other) != digest(known)
 
 
+@pytest.mark.slow
 def test_words_and_pictures_of_a_table(tmp_path: Path) -> None:
     table = make_table(tmp_path, KNOWN, OPTIONS)
     text, markdown = as_text(table), as_markdown(table)

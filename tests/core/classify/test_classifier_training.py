@@ -39,6 +39,7 @@ def test_classes_that_can_be_told_are_learnt(known: ClipSet, model: str, kind: s
     assert made.classifier.card.trained_on == ("simulated",)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", MODELS)
 def test_what_only_the_future_tells_is_learnt_with_a_delay(known: ClipSet, model: str) -> None:
     """Every frame has the class that is shown a third of a second later."""

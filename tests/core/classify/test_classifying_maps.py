@@ -18,6 +18,7 @@ from sd2core.timebase import Timebase
 SAME = 2e-5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("model", "delay"), [("lstm", 0), ("lstm", 11), ("s4", 0), ("s4", 11)])
 @pytest.mark.parametrize("kind", ["peak", "columns"])
 def test_frame_by_frame_equals_the_whole_map(model: str, kind: str, delay: int) -> None:
@@ -94,6 +95,7 @@ def test_the_answer_is_that_of_the_network_so_many_frames_on(delay: int) -> None
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", MODELS)
 @pytest.mark.parametrize("delay", [0, 15])
 def test_without_a_person_it_is_background_and_begins_anew(model: str, delay: int) -> None:

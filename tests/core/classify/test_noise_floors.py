@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from classifiers import CLASSES, NULLED
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -41,6 +42,7 @@ def test_a_share_of_the_clips_gets_it_and_a_silent_one_stays_silent() -> None:
     assert not some_noisy([silent], NULLED, 1.0, 1)[0].energies.any()
 
 
+@pytest.mark.slow
 def test_who_learnt_from_maps_without_noise_knows_those_with_it() -> None:
     short = TrainOptions(steps=40, batch=8, check_steps=10, learning_rate=0.02, delay_s=0.0)
     noisy = some_noisy(KNOWN.clips[12:], NULLED, 1.0, 5)

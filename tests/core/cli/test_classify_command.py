@@ -125,6 +125,7 @@ def test_progress_is_told_to_other_programs(sd2: Sd2, store: Path, tmp_path: Pat
     assert lines[0]["steps"] == 3
 
 
+@pytest.mark.slow
 def test_who_stops_keeps_the_best(
     sd2: Sd2, store: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -187,6 +188,7 @@ def test_a_capture_of_a_recording_is_seen_as_the_classifier_learnt(sd2: Sd2, mod
     assert json.loads(found.out)["map_kind"] == "simulated"
 
 
+@pytest.mark.slow
 def test_a_table_is_made_once(sd2: Sd2, store: Path, tmp_path: Path) -> None:
     arguments = ("classify", "table", store, "--out", tmp_path, "--seeds", 1, "--steps", 2)
     first = sd2(*arguments, "--shares", "50%,100%")
@@ -202,6 +204,7 @@ def test_a_table_is_made_once(sd2: Sd2, store: Path, tmp_path: Path) -> None:
         assert (tmp_path / name).stat().st_size
 
 
+@pytest.mark.slow
 def test_networks_are_compared_on_the_radar_alone(sd2: Sd2, store: Path, tmp_path: Path) -> None:
     how = ("--radar-only", "--seeds", 1, "--steps", 2, "--shares", "100%", "--width", 4)
     told = json.loads(sd2("classify", "table", store, "--out", tmp_path, *how, "--json").out)

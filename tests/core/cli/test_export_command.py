@@ -60,6 +60,7 @@ def test_a_folder_of_recordings_becomes_a_data_set_with_card_and_sheet(
     assert json.loads(sd2("info", out, "--json").out)["segments"] == 15
 
 
+@pytest.mark.slow
 def test_a_dry_run_says_what_would_be_written_and_writes_nothing(
     sd2: Sd2, people: Path, tmp_path: Path
 ) -> None:
@@ -77,6 +78,7 @@ def test_a_dry_run_says_what_would_be_written_and_writes_nothing(
     assert "of which 3 were there already" in again.out
 
 
+@pytest.mark.slow
 def test_a_radar_is_simulated_at_every_place_and_its_cost_said_before(
     sd2: Sd2, people: Path, tmp_path: Path
 ) -> None:
@@ -101,6 +103,7 @@ def test_a_radar_is_simulated_at_every_place_and_its_cost_said_before(
         assert dataset["available"][:, 2].all()
 
 
+@pytest.mark.slow
 def test_programs_are_told_line_by_line(sd2: Sd2, people: Path, tmp_path: Path) -> None:
     told = sd2("export", people, "--out", tmp_path / "s.npz", *SMALL, "--progress-json")
     lines = [json.loads(line) for line in told.out.splitlines()]

@@ -120,6 +120,7 @@ class TestLines:
         assert (about["stature_m"], about["stature_source"]) == (1.7, "user")
         assert about["video"] == "swipe.mp4"
 
+    @pytest.mark.slow
     def test_an_error_is_a_line_too(self, sd2: Sd2, models: LandmarkModels, tmp_path: Path) -> None:
         path = film(tmp_path / "empty.mp4", [empty_room()] * 3)
         outcome = sd2(*arguments(path, tmp_path / "mesh.zarr", "--progress-json"))
@@ -148,6 +149,7 @@ class TestKilled:
                 assert start[0]["resumed"] is True
         return Process(clip, out).run()
 
+    @pytest.mark.slow
     @pytest.mark.skipif(os.name == "nt", reason="SIGKILL")
     def test_a_killed_process_goes_on(
         self, clip: Path, models: LandmarkModels, tmp_path: Path
@@ -205,6 +207,7 @@ class TestOutput:
         with np.load(out) as arrays:
             assert json.loads(str(arrays["fit"]))["camera"] == about["camera"]
 
+    @pytest.mark.slow
     def test_two_frames_and_one_without_anybody(
         self, sd2: Sd2, models: LandmarkModels, tmp_path: Path
     ) -> None:

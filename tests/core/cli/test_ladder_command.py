@@ -41,6 +41,7 @@ def test_the_table_is_kept_and_reused(sd2: Sd2, plate: Path, own_cache: Path) ->
     assert [r["cost"]["all_cores_ms"] for r in fresh["measurement"]["results"]] != times
 
 
+@pytest.mark.slow
 def test_the_table_names_what_it_was_measured_against(sd2: Sd2, plate: Path) -> None:
     outcome = sd2("ladder", plate, "--repeats", 1)
     assert "plate.npz on " in outcome.out
@@ -48,6 +49,7 @@ def test_the_table_names_what_it_was_measured_against(sd2: Sd2, plate: Path) -> 
     assert "* counted" in outcome.out
 
 
+@pytest.mark.slow
 def test_the_picture(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
     picture = tmp_path / "trade.png"
     assert sd2("ladder", plate, "--repeats", 1, "--plot", picture).code == 0

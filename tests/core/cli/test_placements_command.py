@@ -45,6 +45,7 @@ def test_words_say_what_is_beyond_the_radar(sd2: Sd2, plate: Path) -> None:
     assert ["beyond" in row for row in rows] == [False, True]
 
 
+@pytest.mark.slow
 def test_what_is_written_is_read_and_what_a_recording_plans_is_listed(
     sd2: Sd2, plate: Path, tmp_path: Path
 ) -> None:

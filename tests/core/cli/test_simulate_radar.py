@@ -144,6 +144,7 @@ def test_what_does_not_fit_together_is_said(
     assert sentence in outcome.err
 
 
+@pytest.mark.slow
 def test_the_samples_gestures_have_the_velocity_that_counting_gives(
     sd2: Sd2, tmp_path: Path
 ) -> None:

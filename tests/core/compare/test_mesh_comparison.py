@@ -158,6 +158,7 @@ def test_the_sensor_may_be_elsewhere(mesh: MeshSequence) -> None:
     assert behind.velocity_mps[1][:, JOINTS.index("pelvis")] == pytest.approx(-0.2, abs=0.005)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".png", ".svg"])
 def test_the_figure_shows_every_mesh(mesh: MeshSequence, tmp_path: Path, suffix: str) -> None:
     found = compare_meshes([mesh, mesh, mesh], ["truth", "ours", "theirs"], reference=1)

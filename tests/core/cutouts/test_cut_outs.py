@@ -179,6 +179,7 @@ def test_pictures_of_odd_size_are_cut_out_too(source, tmp_path) -> None:
         assert (clip.width, clip.height, len(clip)) == (64, 48, 6)
 
 
+@pytest.mark.slow
 def test_killed_midway_there_are_whole_folders_only_and_it_goes_on(source, tmp_path) -> None:
     import subprocess
     import sys

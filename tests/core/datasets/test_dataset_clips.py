@@ -22,6 +22,7 @@ ENDINGS = (".zarr", ".h5", ".npz")
 CLASSES = ("background", "horizontal", "vertical")
 
 
+@pytest.mark.slow
 @settings(max_examples=8, deadline=None)
 @given(st.sampled_from(ENDINGS), st.integers(24, 150), st.integers(0, 23))
 def test_segments_are_put_together_again(

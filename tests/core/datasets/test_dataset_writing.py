@@ -159,6 +159,7 @@ writing.write_dataset(Path(sys.argv[1]), several(), OPTIONS)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
 @pytest.mark.parametrize(
     ("ending", "call", "flush_s", "kept"),
@@ -298,6 +299,7 @@ def test_null_bins_are_empty_in_all_kinds(tmp_path: Path) -> None:
             assert values[..., [0, 1, 4, 5, 6, 7]].all()
 
 
+@pytest.mark.slow
 def test_what_cannot_be_is_refused_in_words(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -340,6 +342,7 @@ def test_what_cannot_be_is_refused_in_words(
         write_dataset(tmp_path / "large.npz", several(), OPTIONS)
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_the_number_of_sources(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

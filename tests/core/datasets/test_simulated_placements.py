@@ -63,6 +63,7 @@ def with_own_radar(folder: Path, mesh: Path, sensor: VirtualSensor) -> Recording
     return one
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate_hz", [30.0, 25.0], ids=["radar's rate", "another rate"])
 def test_every_place_shows_what_a_radar_there_would_have_recorded(
     tmp_path: Path, rate_hz: float
@@ -87,6 +88,7 @@ def test_every_place_shows_what_a_radar_there_would_have_recorded(
     assert power[0] > 10 * power[1]
 
 
+@pytest.mark.slow
 def test_frames_of_a_long_clip_are_columns_of_the_whole_map() -> None:
     mesh = _swaying_plate(620)
     simulation = Simulation(FEW_CHIRPS, seed=5)
@@ -114,6 +116,7 @@ def test_mesh_place_and_seed_each_have_noise_of_their_own() -> None:
     assert seed_of(_swaying_plate(4), sensor, Simulation()) in seeds
 
 
+@pytest.mark.slow
 def test_a_real_radar_stays_and_a_simulated_one_is_made_anew(tmp_path: Path) -> None:
     real = recording(tmp_path / "anna.sd2", simulated=False)
     own, *others = made(real, SIMULATED)

@@ -84,6 +84,7 @@ def test_live_equals_batch(name: str, short_chunks: None) -> None:
     np.testing.assert_allclose(frames, batch, rtol=2e-4, atol=1e-5 * batch.max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*CAUSAL, *WINDOWED])
 def test_several_frames_at_once_are_those_one_by_one(name: str, short_chunks: None) -> None:
     denoiser, values = trained(name), energies(100)

@@ -177,6 +177,7 @@ def test_no_logarithm_is_too_large(kernel: str, log_dt: float, log_decay: float)
         assert state.isfinite().all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kernel", KERNELS)
 @pytest.mark.parametrize("bidirectional", [False, True])
 def test_derivatives_of_the_layer(kernel: str, bidirectional: bool) -> None:

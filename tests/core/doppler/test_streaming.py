@@ -72,6 +72,7 @@ def test_a_long_recording_equals_the_one_in_memory(
     np.testing.assert_array_equal(part.values, whole.values[:, 58:131])
 
 
+@pytest.mark.slow
 def test_memory_stays_within_the_budget(tmp_path: Path) -> None:
     mesh = wobbling(200)
     stored = zarr.create_array(

@@ -61,6 +61,7 @@ def test_every_label_in_view_has_a_name_and_a_hatch_of_its_own(row) -> None:
     assert [line[0][0] for line in ends.get_segments()] == [4.0, 3.0, 6.0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
 def test_every_kind_of_file_is_written_and_the_svg_holds_words(row, tmp_path, suffix) -> None:
     path = tmp_path / f"figure{suffix}"
@@ -90,6 +91,7 @@ def test_only_what_is_in_view_is_drawn(row) -> None:
         draw_maps([row], Levels(), start_s=3.0, end_s=3.0)
 
 
+@pytest.mark.slow
 def test_spans_too_narrow_to_tell_apart_are_plain_and_leave_the_maps_alone(row) -> None:
     crowd = tuple(
         Span(k + 1, "Hands", k * 0.01, k * 0.01 + 0.005, "up-to-down") for k in range(900)

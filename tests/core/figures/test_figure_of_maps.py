@@ -60,6 +60,7 @@ def test_where_one_says_nothing_there_is_no_difference():
         difference_of(one, row_of(np.ones((5, 3))), Levels())
 
 
+@pytest.mark.slow
 def test_the_figure_shows_the_sign_and_carries_provenance(tmp_path):
     loud, quiet = np.full((8, 10), 1.0), np.full((8, 10), 0.01)
     rows = [

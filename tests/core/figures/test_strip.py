@@ -141,6 +141,7 @@ def text_of(path: Path) -> list[str]:
     return re.findall(r"<text[^>]*>([^<]*)</text>", path.read_text())
 
 
+@pytest.mark.slow
 def test_svg_holds_its_words_as_text_and_stays_small(source, tmp_path) -> None:
     frames, options = [0, 3, 6, 9], StripOptions()
     path = tmp_path / "strip.svg"
@@ -174,6 +175,7 @@ def test_png_says_where_it_comes_from(source, tmp_path) -> None:
     assert said["options"]["as_dots"] is True
 
 
+@pytest.mark.slow
 def test_more_frames_than_columns_go_below(source) -> None:
     one = drawn(source, [0, 1, 2, 3], rows=("mesh",), colour="plain")
     two = drawn(source, [0, 1, 2, 3], rows=("mesh",), colour="plain", columns=2)

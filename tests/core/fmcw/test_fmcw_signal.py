@@ -55,6 +55,7 @@ def by_quadrature(phase: np.ndarray, order: int = 40) -> np.ndarray:
     return np.einsum("nij,ij->n", values, 2.0 * u * np.outer(weight, weight))
 
 
+@pytest.mark.slow
 @settings(max_examples=200)
 @given(
     start=st.floats(-100.0, 100.0),

@@ -508,6 +508,7 @@ def test_same_seed_same_bits_whatever_the_threads() -> None:
     assert (first != other).any()
 
 
+@pytest.mark.slow
 def test_a_small_budget_of_memory_changes_nothing_but_the_memory() -> None:
     # 300 frames of 16 kB in single precision and 8 kB of counts.
     config = replace(PAPER_RADAR, receivers=2)

@@ -117,6 +117,7 @@ def test_who_agrees_with_himself_agrees_wholly(a: Labels) -> None:
     assert found.spans.f1 == (1.0 if a.spans else None)
 
 
+@pytest.mark.slow
 @given(any_labels(), any_labels(), st.sampled_from([0.1, 0.3, 0.5, 0.9]))
 @settings(max_examples=80)
 def test_it_does_not_matter_who_is_first(a: Labels, b: Labels, min_iou: float) -> None:

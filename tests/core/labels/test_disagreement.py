@@ -44,6 +44,7 @@ def test_their_frames_are_those_that_differ(mine, theirs) -> None:
     assert all(one.end_s <= after.start_s for one, after in pairwise(found))
 
 
+@pytest.mark.slow
 @settings(max_examples=60, suppress_health_check=[HealthCheck.too_slow])
 @given(any_labels(edges_s), any_labels(edges_s), st.sampled_from((0.1, 0.5, 1.0)))
 def test_matching_in_groups_is_matching_at_once(mine, theirs, min_iou) -> None:
@@ -61,6 +62,7 @@ def test_matching_in_groups_is_matching_at_once(mine, theirs, min_iou) -> None:
     assert reached == pytest.approx(worth[rows, columns].sum())
 
 
+@pytest.mark.slow
 def test_ten_thousand_spans_of_each_are_matched() -> None:
     mine = spans(*((k, k + 0.5, "wave") for k in range(10_000)))
     theirs = spans(*((k + 0.1, k + 0.6, "wave") for k in range(10_000)))

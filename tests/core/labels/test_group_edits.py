@@ -78,6 +78,7 @@ def test_copies_keep_their_distances_and_shorten_where_there_is_no_room() -> Non
         duplicate_together(LABELS, FRAMES, (2, 3), 4.2)
 
 
+@pytest.mark.slow
 @given(
     times_s=st.lists(st.floats(0.01, 0.5), min_size=20, max_size=40),
     edges=st.lists(st.integers(0, 19), min_size=4, max_size=12, unique=True),

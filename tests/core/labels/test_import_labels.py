@@ -49,6 +49,7 @@ def test_a_cut_that_leaves_no_frame_leaves_the_span_out() -> None:
     assert len(found.outside) == 2
 
 
+@pytest.mark.slow
 @moderate
 @given(any_labels())
 def test_every_span_is_taken_or_named(labels: Labels) -> None:
@@ -63,6 +64,7 @@ def test_every_span_is_taken_or_named(labels: Labels) -> None:
     assert all(span == kept[span.id] for span in found.labels.spans if span.id not in cut)
 
 
+@pytest.mark.slow
 @moderate
 @given(any_labels(), any_labels())
 def test_adding_changes_nothing_that_is_there(here: Labels, brought: Labels) -> None:

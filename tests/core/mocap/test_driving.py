@@ -66,6 +66,7 @@ def test_the_surface_lies_on_the_person(
     assert np.percentile(apart, 95) < 0.08
 
 
+@pytest.mark.slow
 def test_joints_that_lie_beside_ours_are_placed_on_the_body() -> None:
     joints = joints_of(_swiping()[0])
     # Hips that are nearer to each other than ours.
@@ -76,6 +77,7 @@ def test_joints_that_lie_beside_ours_are_placed_on_the_body() -> None:
     assert np.nanmean(driven.residual_m[:, [23, 24]]) < 0.015
 
 
+@pytest.mark.slow
 def test_bridged_frames_are_not_evidence() -> None:
     joints = approaching(30, 0.5)
     frames = np.delete(np.arange(30), [12, 13])

@@ -125,6 +125,7 @@ def test_nulled_bins_are_empty_in_both(folders: list[Path], tmp_path: Path) -> N
     assert pairs.takes[0].radar.any()
 
 
+@pytest.mark.slow
 def test_a_stopped_run_goes_on(folders: list[Path], pairs: PairSet, tmp_path: Path) -> None:
     out = tmp_path / "stopped.zarr"
     seen = []
@@ -153,6 +154,7 @@ def test_the_same_part_twice_is_refused(folders: list[Path], tmp_path: Path) -> 
     assert not (tmp_path / "twice.zarr").exists()
 
 
+@pytest.mark.slow
 def test_a_real_lunge_drives_a_body(shared_data: Path) -> None:
     part = read_mars(shared_data / "paired" / "mars_subject4", "validate")
     whole, rows = part.stretches[3], 80

@@ -54,6 +54,7 @@ def sealed(tmp_path: Path) -> Path:
     return copy.parent
 
 
+@pytest.mark.slow
 def test_the_installation_keeps_its_machine_code(tmp_path: Path) -> None:
     copy = tmp_path / "sd2core"
     shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__", "resources"))
@@ -71,6 +72,7 @@ def test_a_read_only_installation_uses_the_users_cache(sealed: Path, tmp_path: P
     assert cache in Path(folder).parents
 
 
+@pytest.mark.slow
 def test_nothing_writable_but_the_temporary_folder(sealed: Path, tmp_path: Path) -> None:
     blocked, temporary = str(tmp_path / "file"), tmp_path / "temporary"
     temporary.mkdir()
@@ -125,6 +127,7 @@ def test_warm_up_makes_ready_and_reports(monkeypatch: pytest.MonkeyPatch) -> Non
     assert compiled.compile_in_background() is None
 
 
+@pytest.mark.slow
 def test_warm_up_leaves_nothing_to_compile() -> None:
     """A process that finds the kernels ready compiles nothing when it uses them."""
     compiled.warm_up()

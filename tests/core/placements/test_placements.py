@@ -49,6 +49,7 @@ clouds = st.builds(
 specs = grids | clouds
 
 
+@pytest.mark.slow
 @given(specs, targets)
 def test_every_sensor_looks_at_the_target_from_where_it_says(spec, target):
     places, sensors = spec.places(), spec.sensors(target)

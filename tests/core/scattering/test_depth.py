@@ -148,6 +148,7 @@ def test_walker_finer_is_better(
         assert coarse < 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("resolution", [128, 256])
 @pytest.mark.parametrize("sensor", [*BODY_PLACES, (0.3, 0.4, 1.4)])
 def test_plain_form_gives_the_same(
@@ -162,6 +163,7 @@ def test_plain_form_gives_the_same(
     assert (ours != plain).sum() <= 1
 
 
+@pytest.mark.slow
 @FORMS
 @pytest.mark.parametrize("sensor", [(0.1, 0.2, -0.1), (0.0, 0.0, 0.0), (0.75, 0.1, 0.1)])
 def test_around_the_sensor_it_is_exact(form: Look, sensor: tuple[float, ...]) -> None:

@@ -155,6 +155,7 @@ def test_plain_form_gives_the_same(
     assert len(differing) <= 1
 
 
+@pytest.mark.slow
 @settings(max_examples=60)
 @given(seed=st.integers(0, 2**32 - 1), distance=st.sampled_from([0.0, 0.1, 1.0, 10.0, 1e3, 1e6]))
 def test_any_heap_of_triangles(seed: int, distance: float) -> None:

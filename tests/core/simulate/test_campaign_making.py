@@ -68,6 +68,7 @@ def test_another_look_and_a_perfect_fit_are_of_the_same_motion(whole: Path) -> N
     assert 0.5 < one.radar.sum() / other.radar.sum() < 2.0
 
 
+@pytest.mark.slow
 def test_stopped_and_continued_is_as_if_it_had_not_been(
     whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -96,6 +97,7 @@ def test_stopped_and_continued_is_as_if_it_had_not_been(
     assert same(read_pairs(out), read_pairs(whole))
 
 
+@pytest.mark.slow
 def test_several_processes_make_the_same_and_a_longer_one_begins_alike(
     whole: Path, tmp_path: Path
 ) -> None:

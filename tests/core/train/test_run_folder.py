@@ -112,6 +112,7 @@ class TestFolder:
         with pytest.raises(Sd2Error, match=r"lost its process.*sd2 train --resume"):
             run.tell("pause")
 
+    @pytest.mark.slow
     def test_one_process_per_run(self, tmp_path: Path) -> None:
         run = TrainingFolder(tmp_path / "run")
         run.create("gru")

@@ -245,6 +245,7 @@ class TestOrder:
 
 
 class TestOptimiser:
+    @pytest.mark.slow
     @pytest.mark.parametrize("name", [name for name in MODELS if name != "s4-serial"])
     def test_every_parameter_once_and_state_spaces_apart(self, name: str) -> None:
         model = build(name, 32)

@@ -196,6 +196,7 @@ class TestSteering:
         assert same(tmp_path / "whole", run.path)
         assert curve(tmp_path / "whole") == curve(run.path)
 
+    @pytest.mark.slow
     def test_paused(self, pairs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         config = settings(pairs)
         begin(config, tmp_path / "whole")
@@ -263,6 +264,7 @@ def wait_for(tail: ProgressTail, step: int, training: subprocess.Popen[bytes]) -
         time.sleep(0.02)
 
 
+@pytest.mark.slow
 def test_terminated_and_killed(pairs: Path, tmp_path: Path) -> None:
     """As a user's machine may do it: first a polite end, then a power cut."""
     config = settings(pairs, epochs=24, checkpoint_s=0.2)

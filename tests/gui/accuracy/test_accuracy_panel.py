@@ -230,6 +230,7 @@ def test_what_was_measured_elsewhere_is_said_to_be(panel, window, fake, qtbot):
     qtbot.waitUntil(lambda: "Measured for another placement" in texts(panel), timeout=10_000)
 
 
+@pytest.mark.slow
 def test_many_points_are_painted_in_both_themes(panel, window, fake, qtbot):
     """Every state of the plot is painted without a word from Qt."""
     here = models_of(window).sensor.sensor

@@ -159,6 +159,7 @@ def test_delete_takes_a_recording_from_the_list_and_says_what_is_missing(opened,
     assert not button(dialog, "Start").isEnabled()
 
 
+@pytest.mark.slow
 def test_failures_and_their_reasons_are_shown_and_a_batch_is_stopped(opened, qtbot, recording_copy):
     window = opened("--fail", 1, "--step-s", 30)
     batch = models_of(window).batch
@@ -220,6 +221,7 @@ def test_placements_of_the_recording_or_of_a_file_are_taken(opened, qtbot, tmp_p
     assert read_plan(tmp_path / "plan.toml") == setup.plan()
 
 
+@pytest.mark.slow
 def test_the_window_closes_and_the_batch_goes_on(opened, qtbot):
     window = opened("--step-s", 20)
     batch = models_of(window).batch

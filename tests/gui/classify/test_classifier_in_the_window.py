@@ -347,6 +347,7 @@ def test_a_person_is_typed_and_who_does_what_is_said(trainable, tmp_path, qtbot)
     assert "300 steps of about 500 ms, as measured here before." in said()
 
 
+@pytest.mark.slow
 def test_stopped_by_a_click(trainable, qtbot):
     training, panel = models_of(trainable).class_training, trainable.findChild(ClassPanel)
     training._command = (*training._command, "--step-s", "0.5")

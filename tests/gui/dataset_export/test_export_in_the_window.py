@@ -104,6 +104,7 @@ def test_counts_follow_and_the_data_set_is_written(
     qtbot.waitUntil(lambda: QApplication.activeModalWidget() is None)
 
 
+@pytest.mark.slow
 def test_it_goes_on_when_the_dialog_is_closed_and_can_be_stopped(
     window, dialog, qtbot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

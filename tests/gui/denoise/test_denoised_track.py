@@ -149,6 +149,7 @@ def test_without_a_model_the_difference_says_why_it_cannot_be(window, qtbot):
     assert not window.maps.difference.isVisible()
 
 
+@pytest.mark.slow
 def test_playing_live_shows_frames_as_the_clock_reaches_them(denoised, fake_models, qtbot):
     c = models_of(denoised)
     whole = c.denoised.map.values.copy()
@@ -182,6 +183,7 @@ def test_playing_live_shows_frames_as_the_clock_reaches_them(denoised, fake_mode
     assert c.settings.flag("denoise_live", False)
 
 
+@pytest.mark.slow
 def test_the_model_before_stands_below_this_one(denoised, qtbot):
     c, tracks = models_of(denoised), denoised.maps
     assert not denoised.action("compare_models").isEnabled()

@@ -42,6 +42,7 @@ def test_frames_as_they_are_chosen(model):
     assert model.choice.count == 1
 
 
+@pytest.mark.slow
 def test_the_preview_follows_what_is_chosen(model, qtbot):
     model.choose(count=2)
     settle(model, qtbot)
@@ -69,6 +70,7 @@ def test_what_is_not_there_is_not_offered(empty_window, small_recording, qtbot):
     model.close()
 
 
+@pytest.mark.slow
 def test_exported_by_hand(window, qtbot, tmp_path, monkeypatch):
     path = tmp_path / "strip.png"
     monkeypatch.setattr(

@@ -129,6 +129,7 @@ def test_from_the_offer_to_the_recording(made, qtbot, video) -> None:
     assert not bar.isVisible()
 
 
+@pytest.mark.slow
 def test_landmarks_are_drawn_and_the_clock_goes_along_until_it_is_moved(made, qtbot, video) -> None:
     window = made("--pause-s", 0.01, "--stop-at", 30)
     show(window, qtbot, video)
@@ -187,6 +188,7 @@ def test_a_failure_is_shown_and_put_away(made, qtbot, video) -> None:
     assert models_of(window).fit.state == "idle"
 
 
+@pytest.mark.slow
 def test_closing_asks_and_the_next_start_continues(made, qtbot, video) -> None:
     settings = Settings.forgetful()
     window = made("--stop-at", 10, settings=settings)
@@ -220,6 +222,7 @@ def test_a_folder_in_which_a_fit_was_stopped_can_be_opened(made, qtbot, video) -
     assert models_of(window).fit.state == "stopped"
 
 
+@pytest.mark.slow
 def test_what_is_open_meanwhile_stays_open(made, qtbot, video, small_recording) -> None:
     window = made("--body", "--pause-s", 0.02)
     show(window, qtbot, small_recording)
@@ -232,6 +235,7 @@ def test_what_is_open_meanwhile_stays_open(made, qtbot, video, small_recording) 
     assert c.document.recording.folder == video.with_name("walk.sd2")
 
 
+@pytest.mark.slow
 def test_a_recording_that_is_open_keeps_its_edits_and_gets_the_mesh(made, qtbot, video) -> None:
     saved = Recording.create(video.with_name("mine.sd2"), video=video, title="Mine")
     window = made("--body", "--pause-s", 0.02)

@@ -45,6 +45,7 @@ def listed(folder: Path) -> list[tuple[str, list[int], list[str]]]:
     return [(one["span"]["label"], one["frames"], one["files"]) for one in spans]
 
 
+@pytest.mark.slow
 def test_all_spans_with_all_that_there_is(window, qtbot, cuts) -> None:
     cut(window, qtbot, "all (2)")
     files = ["video.mp4", "mesh.zarr", "synthetic.npz", "radar.npz"]
@@ -82,6 +83,7 @@ def test_cancelled_it_leaves_whole_folders_only(window, qtbot, cuts) -> None:
     assert not list(cuts.glob(".sd2-cut-*"))
 
 
+@pytest.mark.slow
 def test_a_folder_that_cannot_be_is_said(window, qtbot, cuts) -> None:
     cuts.write_text("a file")
     cut(window, qtbot, "all (2)")

@@ -91,6 +91,7 @@ def test_a_mark_has_the_time_of_the_frame_that_is_shown(
         key(empty_window, "Escape")
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("by_hand")
 @RATES
 def test_a_key_while_it_plays_marks_the_frame_on_screen(
@@ -172,6 +173,7 @@ def check_formats(labels: Labels, window, folder: Path) -> None:
         assert len(back.spans) == len(labels.spans)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("by_hand")
 def test_the_eight_gestures_of_the_sample(unlabelled_sample, qtbot, tmp_path) -> None:
     c, script = models_of(unlabelled_sample), presses()

@@ -32,6 +32,7 @@ def killed(small_recording: Path, tmp_path: Path, kills: int) -> int:
 
 @pytest.mark.skipif(sys.platform != "linux", reason="forks processes that open a window")
 class TestKilled:
+    @pytest.mark.slow
     def test_a_few_times(self, compiled_kernels, small_recording, tmp_path: Path) -> None:
         assert killed(small_recording, tmp_path, 4) > 4
 

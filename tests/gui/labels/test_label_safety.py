@@ -271,6 +271,7 @@ class TestReadOnly:
         assert all(one.isEnabled() and one.toolTip() != refusal for one in labels)
         assert not window.action("edit_labels_here").isEnabled()
 
+    @pytest.mark.slow
     def test_the_sensor_is_saved_and_their_labels_stay(
         self, on, qtbot, elsewhere, recording_copy
     ) -> None:
@@ -289,6 +290,7 @@ class TestReadOnly:
         assert bar(window).text == ""
         assert spans(window) == [BACK]
 
+    @pytest.mark.slow
     @pytest.mark.skipif(sys.platform == "win32", reason="kills a process by signal")
     def test_a_process_that_dies_lets_go_and_leaves_its_edits(
         self, on, qtbot, recording_copy

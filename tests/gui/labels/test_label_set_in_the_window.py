@@ -75,6 +75,7 @@ def test_a_label_is_added_named_and_used_at_once(window, page, qtbot) -> None:
     assert c.labels.labels.label_set == GESTURES
 
 
+@pytest.mark.slow
 def test_a_label_is_removed_by_key_and_no_span_is(window, page) -> None:
     c = models_of(window)
     c.labels.select([span.id for span in c.labels.labels.spans])
@@ -84,6 +85,7 @@ def test_a_label_is_removed_by_key_and_no_span_is(window, page) -> None:
     assert len(c.labels.labels.spans) == 2
 
 
+@pytest.mark.slow
 def test_spans_of_a_removed_label_keep_it_or_get_another(window, page) -> None:
     c = models_of(window)
     ids = [span.id for span in c.labels.labels.spans]

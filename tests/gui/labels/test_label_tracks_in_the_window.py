@@ -94,6 +94,7 @@ def test_tracks_are_added_renamed_freed_moved_and_removed_step_by_step(labelled,
     assert spans(labelled) == [THERE, BACK]
 
 
+@pytest.mark.slow
 def test_what_a_track_may_not_be_is_said(two_tracks) -> None:
     c = models_of(two_tracks)
     assert not c.label_tracks.add("Hands", "free")
@@ -187,6 +188,7 @@ def test_many_tracks_are_scrolled_and_the_chosen_one_is_in_view(labelled, qtbot)
         qtbot.waitUntil(in_view, timeout=5000)
 
 
+@pytest.mark.slow
 def test_the_menu_shows_the_tracks_and_the_one_that_is_chosen(two_tracks) -> None:
     c = models_of(two_tracks)
     entries = [one for one in menu_of(two_tracks, "Tracks").actions() if one.actionGroup()]

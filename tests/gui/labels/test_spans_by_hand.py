@@ -45,6 +45,7 @@ def steps(window) -> list[str]:
 # --- a loop -----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_double_click_plays_the_span_again_and_again(labelled, qtbot) -> None:
     playback = models_of(labelled).playback
     playback.set_speed(4.0)

@@ -115,6 +115,7 @@ def test_the_other_one_can_be_the_reference(compared, qtbot):
     assert row_of(compared, "head").distance_m == pytest.approx(ASIDE_M, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_it_follows_the_sensor(compared, empty_window, qtbot):
     sensor = VirtualSensor(position_m=(1.5, 0.0, 1.0))
     models_of(empty_window).edits.place_sensor(sensor)

@@ -30,6 +30,7 @@ def gl_stage(make_stage: Any, qtbot: Any) -> Stage:
     return made
 
 
+@pytest.mark.slow
 def test_the_window_shows_the_colours(gl_stage: Stage) -> None:
     left, right = gl_stage.colour_at(LEFT), gl_stage.colour_at(RIGHT)
     assert left.red() > left.blue() + 60

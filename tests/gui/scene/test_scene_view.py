@@ -434,6 +434,7 @@ print("drawn")
 """
 
 
+@pytest.mark.slow
 def test_a_view_that_nobody_closed_does_not_crash_at_exit() -> None:
     run = subprocess.run(
         [sys.executable, "-c", _LEFT_OPEN], capture_output=True, text=True, timeout=120, check=False

@@ -97,6 +97,7 @@ def test_escape_takes_back_what_was_typed(window, page, qtbot):
     assert stack.count() == count
 
 
+@pytest.mark.slow
 def test_typing_that_ends_in_another_recording_is_no_step_there(
     window, page, qtbot, recording_copy
 ):

@@ -21,6 +21,7 @@ def walk(empty_window, shared_data, qtbot):
     return empty_window
 
 
+@pytest.mark.slow
 def test_the_mesh_lies_on_the_person(walk, qtbot):
     c = models_of(walk)
     for frame in (20, 44, 70):

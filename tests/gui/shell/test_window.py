@@ -294,6 +294,7 @@ def test_clutter_removal_can_be_undone(window, qtbot):
     qtbot.waitUntil(lambda: np.array_equal(c.real.map.values, before), timeout=10_000)
 
 
+@pytest.mark.slow
 def test_the_bundled_sample_is_never_written_to(empty_window, qtbot, monkeypatch):
     from PySide6.QtWidgets import QFileDialog
 
@@ -539,6 +540,7 @@ def test_the_question_mark_shows_all_keys(window, qtbot):
     assert isinstance(shown[0], KeysDialog)
 
 
+@pytest.mark.slow
 def test_both_themes_repaint_everything(window, qtbot):
     light = window.grab().toImage()
     window.features.program.set_dark(True)

@@ -84,6 +84,7 @@ def test_suggestions_are_saved_with_the_labels(moving, qtbot, tmp_path) -> None:
     ] * 2
 
 
+@pytest.mark.slow
 def test_while_it_plays_a_label_key_marks_also_with_a_suggestion_selected(moving, qtbot) -> None:
     asked(moving, qtbot)
     c = models_of(moving)

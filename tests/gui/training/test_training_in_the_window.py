@@ -65,6 +65,7 @@ def click(window: MainWindow, qtbot, text: str) -> None:
     qtbot.mouseClick(found[0], Qt.MouseButton.LeftButton)
 
 
+@pytest.mark.slow
 def test_a_run_outlives_its_window_and_is_found_by_the_next(made, qtbot, tmp_path) -> None:
     settings = Settings.forgetful()
     window = made("--rest-at", 1, settings=settings)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QSlider, QToolButton
 from window_models import models_of
@@ -34,6 +35,7 @@ def test_mesh_dots_and_opacity(window, qtbot):
     assert overlay.style.opacity > before
 
 
+@pytest.mark.slow
 def test_the_video_shows_the_mesh_as_strongly_as_asked(window, qtbot):
     from sd2app.video.view import VideoView
 

@@ -56,6 +56,7 @@ def bundled() -> Recording:
     return open_recording(resource_path("swipes.sd2"))
 
 
+@pytest.mark.slow
 def test_everything_but_the_video_is_the_same_every_time(short: Path, tmp_path: Path) -> None:
     again = files(make_sample(tmp_path / "short.sd2", duration_s=SHORT_S))
     first = files(short)
@@ -74,6 +75,7 @@ def test_the_suffix_is_appended(short: Path) -> None:
     assert short.name == "short.sd2"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.3, 0.9])
 def test_a_cancelled_sample_leaves_nothing(tmp_path: Path, share: float) -> None:
     def stop(done: int, total: int) -> None:

@@ -109,6 +109,7 @@ def test_another_clip_of_the_same_name_is_not_touched(made: Path) -> None:
         make_fit_truth(made.parent, [other])
 
 
+@pytest.mark.slow
 def test_a_clip_is_the_same_every_time(made: Path, tmp_path: Path, short: None) -> None:
     (again,) = make_fit_truth(tmp_path / "again", [clip_named("still-hand-up")])
     for name in ("truth.json", "keypoints.npz"):

@@ -144,6 +144,7 @@ def test_the_seed_alone_decides(space: ShapeSpace) -> None:
     assert scene(other, space).spans != scene(clip, space).spans
 
 
+@pytest.mark.slow
 def test_no_motion_is_cut_off(space: ShapeSpace, keypoint_space: KeypointSpace) -> None:
     for clip in CLIPS:
         hand = landmark(scene(clip, space), keypoint_space, f"index.{clip.action.hand}")

@@ -154,6 +154,7 @@ def test_a_spread_beyond_its_limits_still_learns() -> None:
     assert gradient[2] > 0.5
 
 
+@pytest.mark.slow
 def test_real_motion_is_seen_from_everywhere(stage: Stage) -> None:
     motion = _swaying()
     facing, distances_m = [], []
