@@ -6,15 +6,16 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QGridLayout, QLabel, QProgressBar, QSizePolicy, QToolButton, QWidget
+from PySide6.QtWidgets import QGridLayout, QLabel, QSizePolicy, QToolButton, QWidget
 
 from sd2app.accuracy.model import PRESETS, AccuracyModel
 from sd2app.accuracy.plot import AccuracyPlot
 from sd2app.accuracy.text import deviation
 from sd2app.session.display import DisplayModel
 from sd2app.widgets.inputs import Choice, NumberBox
-from sd2app.widgets.layouts import STRETCH, Part, column_of, row_of
+from sd2app.widgets.layouts import STRETCH, column_of, pane, row_of
 from sd2app.widgets.panel import outlined, rule, say, sentence, show_words, title
+from sd2app.widgets.progress_bar import ProgressBar
 from sd2app.widgets.text import milliseconds, number, percent, seconds
 
 if TYPE_CHECKING:
@@ -53,11 +54,6 @@ class AccuracyPanel(QWidget):
 
     # --- building -------------------------------------------------------------------------
 
-    def _part(self, *contents: Part) -> QWidget:
-        part = QWidget(self)
-        part.setLayout(column_of(*contents, spacing_px=4, margins_px=(0, 0, 0, 0)))
-        return part
-
     def _use_part(self) -> QWidget:
         self._figures, self._plan = sentence("", "title"), sentence("", "plan")
         self._figures.setAccessibleName("Its error and cost")
@@ -69,9 +65,8 @@ class AccuracyPanel(QWidget):
             self._accuracy.choose_by_tolerance,
             self,
         )
-        return self._part(
-            self._figures, self._plan, self._warning, row_of(self._by_tolerance, STRETCH)
-        )
+        below = row_of(self._by_tolerance, STRETCH)
+        return pane(self._figures, self._plan, self._warning, below, spacing_px=4)
 
     def _plot_part(self, display: DisplayModel, measure: QAction) -> QWidget:
         measured = self._accuracy.measured
@@ -81,21 +76,14 @@ class AccuracyPanel(QWidget):
             "Plans of which signal model", self, _FAMILY_TEXT, measured.set_family
         )
         self._measure = outlined("", measure.toolTip(), measure.trigger, self)
-        self._bar = QProgressBar(self)
-        self._bar.setMaximumHeight(14)
-        self._bar.setTextVisible(False)
-        self._bar.setAccessibleName("Progress of the measurement")
+        self._bar = ProgressBar("Progress of the measurement")
         self._cancel = outlined("Cancel", "Stop measuring", measured.cancel, self)
-        return self._part(
-            self._empty,
-            self._plot,
-            row_of(self._family, self._measure, self._bar, self._cancel, STRETCH),
-            self._source,
-        )
+        controls = row_of(self._family, self._measure, self._bar, self._cancel, STRETCH)
+        return pane(self._empty, self._plot, controls, self._source, spacing_px=4)
 
     def _reason_part(self) -> QWidget:
         self._reasons = ReasonList(self)
-        return self._part(rule(), title("Why this plan"), self._reasons)
+        return pane(rule(), title("Why this plan"), self._reasons, spacing_px=4)
 
     # --- showing --------------------------------------------------------------------------
 
@@ -161,8 +149,7 @@ class AccuracyPanel(QWidget):
         self._bar.setVisible(job is not None)
         self._cancel.setVisible(job is not None)
         if job is not None:
-            self._bar.setRange(0, job.total)
-            self._bar.setValue(job.done)
+            self._bar.show_count(job.done, job.total)
 
 
 def _unbroken(plan: str) -> str:
@@ -229,15 +216,9 @@ class ToleranceRow(QWidget):
             button.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
             button.clicked.connect(lambda _=False, value=tolerance: accuracy.set_tolerance(value))
         self._meaning = sentence("")
-        self.setLayout(
-            column_of(
-                row_of(title("Tolerance"), STRETCH, self._box),
-                row_of(*((button, 1) for button in self._presets.values()), spacing_px=4),
-                self._meaning,
-                spacing_px=4,
-                margins_px=(0, 0, 0, 0),
-            )
-        )
+        top = row_of(title("Tolerance"), STRETCH, self._box)
+        presets = row_of(*((button, 1) for button in self._presets.values()), spacing_px=4)
+        self.setLayout(column_of(top, presets, self._meaning, spacing_px=4, margins_px=0))
         accuracy.changed.connect(self._refresh)
         self._refresh()
 

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QHBoxLayout, QWidget
 from sd2app.agreement.model import AgreementModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.widgets.inputs import action_button
-from sd2app.widgets.layouts import STRETCH, column_of, row_of
+from sd2app.widgets.layouts import STRETCH, column_of, pane, row_of
 from sd2app.widgets.panel import ElidedLabel, FactRows, rule, sentence, title
 from sd2app.widgets.text import counted
 from sd2core.labels.agreement import kappa_words
@@ -33,8 +33,7 @@ class AgreementPanel(QWidget):
         super().__init__()
         self.setObjectName("page")
         self._model = model
-        self._name = ElidedLabel(self)
-        self._name.setObjectName("title")
+        self._name = ElidedLabel(self, "title")
         self._verdict, self._where = sentence("", "plain"), sentence("", "plain")
         self._facts = FactRows(_MOST_FACTS, at_the_edge=True, parent=self)
         self._labels = FactRows(_MOST_LABELS, at_the_edge=True, parent=self)
@@ -49,15 +48,13 @@ class AgreementPanel(QWidget):
         self._refresh()
 
     def _lay_out_result(self, action: Callable[[str], QAction]) -> QWidget:
-        result = QWidget(self)
         buttons = (("previous_disagreement", "Previous"), ("next_disagreement", "Next"))
         parts = (
             *(self._verdict, sentence(_MEANING), rule()),
             *(_row(title("Disagreements"), action, *buttons), self._where, rule()),
             *(self._facts, rule(), title("Kappa of each label"), self._labels),
         )
-        result.setLayout(column_of(*parts, spacing_px=8, margins_px=(0, 0, 0, 0)))
-        return result
+        return pane(*parts, spacing_px=8)
 
     def _refresh(self) -> None:
         model = self._model

@@ -12,7 +12,6 @@ from PySide6.QtWidgets import (
     QHeaderView,
     QLabel,
     QPlainTextEdit,
-    QProgressBar,
     QTextBrowser,
     QWidget,
 )
@@ -20,9 +19,10 @@ from PySide6.QtWidgets import (
 from sd2app.batch.model import BatchModel
 from sd2app.batch.questions import BatchQuestions
 from sd2app.batch.text import failure_text, headline, step_facts, time_text
-from sd2app.widgets.layouts import STRETCH, column_of, row_of
+from sd2app.widgets.layouts import STRETCH, column_of, pane, row_of
 from sd2app.widgets.pages import InnerPage, InnerPages
 from sd2app.widgets.panel import ElidedLabel, outlined, sentence, show_words, side_by_side
+from sd2app.widgets.progress_bar import ProgressBar
 from sd2app.widgets.table import RecordTable
 
 _MOST_STEPS = 6
@@ -48,7 +48,7 @@ class BatchRunView(QWidget):
         self._reason = sentence("", "warning")
         parts = (self._name, self._headline, self._time, self._reason)
         below = (self._bars(), self._button_row(), (self._pages(), 1))
-        self.setLayout(column_of(*parts, *below, spacing_px=8, margins_px=(0, 0, 0, 0)))
+        self.setLayout(column_of(*parts, *below, spacing_px=8, margins_px=0))
         batch.changed.connect(self._refresh)
         self._refresh()
 
@@ -59,12 +59,9 @@ class BatchRunView(QWidget):
         grid.setHorizontalSpacing(12)
         grid.setVerticalSpacing(4)
         grid.setColumnStretch(1, 1)
-        self._steps: list[tuple[QLabel, QProgressBar, QLabel]] = []
+        self._steps: list[tuple[QLabel, ProgressBar, QLabel]] = []
         for row in range(_MOST_STEPS):
-            bar = QProgressBar(self)
-            bar.setMaximumHeight(12)
-            bar.setTextVisible(False)
-            widgets = (QLabel(self), bar, sentence(""))
+            widgets = (QLabel(self), ProgressBar("", height_px=12), sentence(""))
             widgets[2].setWordWrap(False)
             for column, widget in enumerate(widgets):
                 grid.addWidget(widget, row, column)
@@ -96,9 +93,8 @@ class BatchRunView(QWidget):
             self,
         )
         self._no_results = sentence("What was made is listed once the batch has come to its end.")
-        results = QWidget(self)
-        parts = (self._no_results, (self._table, 1), row_of(self._open_result, STRETCH))
-        results.setLayout(column_of(*parts, spacing_px=6, margins_px=(0, 0, 0, 0)))
+        open_row = row_of(self._open_result, STRETCH)
+        results = pane(self._no_results, (self._table, 1), open_row, spacing_px=6)
         self._inner = InnerPages(
             (
                 InnerPage("Results", "The maps that were made", results),
@@ -148,8 +144,7 @@ class BatchRunView(QWidget):
             if shown:
                 text, done, total, said = facts[row]
                 name.setText(text)
-                bar.setRange(0, max(total, 1))
-                bar.setValue(done)
+                bar.show_count(done, total)
                 bar.setAccessibleName(f"{text}: {said}")
                 words.setText(said)
 

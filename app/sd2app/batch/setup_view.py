@@ -69,7 +69,7 @@ class BatchSetupView(QWidget):
         self._problem = sentence("")
         estimate = (rule(), self._total, self._facts, self._problem, STRETCH)
         parts = (self._recordings_row(), (self._list, 1), self._form(), *estimate, self._buttons())
-        self.setLayout(column_of(*parts, spacing_px=8, margins_px=(0, 0, 0, 0)))
+        self.setLayout(column_of(*parts, spacing_px=8, margins_px=0))
         batch.changed.connect(self.refresh)
         self.refresh()
 

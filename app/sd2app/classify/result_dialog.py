@@ -172,7 +172,7 @@ class _MatrixColumn(QWidget):
         head.addStrut(28)
         self._view = ConfusionView(display)
         self._recall = sentence("", "plain")
-        self.setLayout(column_of(head, self._view, self._recall, STRETCH, margins_px=(0, 0, 0, 0)))
+        self.setLayout(column_of(head, self._view, self._recall, STRETCH, margins_px=0))
 
     def show_matrix(self, matrix: Matrix, result: ClassResult) -> None:
         self._view.show_matrix(matrix, result.classes)

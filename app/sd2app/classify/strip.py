@@ -57,15 +57,14 @@ class ClassStrip(QWidget):
         self._classify = classify
         self._source = Choice("The map that the classifier looks at", self)
         self._source.activated.connect(lambda at: classify.set_source(classify.sources[at]))
-        self._status = ElidedLabel(self)
-        self._status.setObjectName("muted")
+        self._status = ElidedLabel(self, "muted")
         self.readout = ClassReadout(session.display, classify, labels)
         line = row_of(
             title("Classifier"), button, self._source, (self._status, 1), self.readout,
             spacing_px=8, margins_px=(8, 2, MARGIN_PX, 2),
         )  # fmt: skip
         plot = ClassPlot(session, classify, labels)
-        self.setLayout(column_of(line, plot, spacing_px=0, margins_px=(0, 0, 0, 0)))
+        self.setLayout(column_of(line, plot, spacing_px=0, margins_px=0))
         classify.changed.connect(self._refresh)
         classify.moved.connect(self._say)
         self._refresh()

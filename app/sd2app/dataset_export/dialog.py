@@ -46,7 +46,7 @@ class ExportDialog(QDialog):
         self._build_foot()
         words = (self._size, self._labels, self._splits, self._message)
         parts = (self._form, rule(), *words, (self._sheet, 1), (None, 0), self._bar, self._foot)
-        self.setLayout(column_of(*parts, spacing_px=12, margins_px=(16, 16, 16, 16)))
+        self.setLayout(column_of(*parts, spacing_px=12, margins_px=16))
         model.changed.connect(self._refresh)
         self._refresh()
         self.resize(*_SIZE_PX)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Any, ClassVar
 
-from PySide6.QtCore import QSize, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QPainter
 from PySide6.QtWidgets import (
     QDialog,
@@ -32,16 +32,14 @@ _ROWS = {"video": "video", "mesh": "mesh", "overlay": "mesh over video"}
 class FigurePreview(Canvas):
     """A figure on its own background, as large as there is room."""
 
+    USUAL_PX = 960, 320
+
     def __init__(self, model: DrawnFigure, palette: Palette, parent: QWidget) -> None:
         super().__init__(parent)
         self._model, self._colours = model, palette
         self.setAccessibleName("Preview of the figure")
         self.setMinimumSize(480, 200)
         self.follow(model.drawn, model.changed)
-
-    def sizeHint(self) -> QSize:
-        """Wide size, as figures have."""
-        return QSize(960, 320)
 
     def paint(self, painter: QPainter) -> None:
         """Paint the figure, or a message."""
@@ -69,7 +67,7 @@ class FigureDialog(QDialog):
         self.setWindowTitle(self.TITLE)
         self._buttons = ExportButtons(self, self._ask)
         parts = ((FigurePreview(model, palette, self), 1), self._choices(), self._buttons)
-        self.setLayout(column_of(*parts, spacing_px=16, margins_px=(16, 16, 16, 16)))
+        self.setLayout(column_of(*parts, spacing_px=16, margins_px=16))
         model.changed.connect(self._refresh)
         model.written.connect(lambda _: self.accept())
         self._refresh()

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from PySide6.QtWidgets import QFrame, QLabel, QProgressBar, QToolButton
+from PySide6.QtWidgets import QFrame, QLabel, QToolButton
 
 from sd2app.fit.model import FitModel
 from sd2app.fit.on_screen import FitOnScreen
 from sd2app.widgets.layouts import row_of
 from sd2app.widgets.panel import ElidedLabel, outlined, sentence
+from sd2app.widgets.progress_bar import ProgressBar
 from sd2app.widgets.text import about
 
-_STEPS = 1000
 _HEIGHT = 40
 """Height in all states, so that the view below does not move."""
 
@@ -37,15 +37,10 @@ class FitBar(QFrame):
         self.setAccessibleName("Fit of a body")
         self.setMinimumHeight(_HEIGHT)
         self._fit, self._on_screen = fit, on_screen
-        self._title = ElidedLabel(self)
-        self._title.setObjectName("title")
-        self._stage = ElidedLabel(self)
-        self._stage.setObjectName("muted")
+        self._title = ElidedLabel(self, "title")
+        self._stage = ElidedLabel(self, "muted")
         self._reason = sentence("", "warning")
-        self._bar = QProgressBar(self)
-        self._bar.setFixedWidth(200)
-        self._bar.setMaximumHeight(14)
-        self._bar.setTextVisible(False)
+        self._bar = ProgressBar("", width_px=200)
         self._left = QLabel(self)
         self._left.setObjectName("muted")
         self._left.setMinimumWidth(self._left.fontMetrics().horizontalAdvance("about 55 min left"))
@@ -138,10 +133,7 @@ class FitBar(QFrame):
         share = progress.share if progress is not None else None
         if share is None and progress is not None and progress.total:
             share = progress.done / progress.total  # the models, before the video is open
-        # Without a maximum the bar says that it is busy.
-        self._bar.setRange(0, 0 if share is None else _STEPS)
-        if share is not None:
-            self._bar.setValue(round(share * _STEPS))
+        self._bar.show_share(share)
         left_s = progress.left_s if progress and self._fit.state == "running" else None
         self._left.setText("" if left_s is None else f"{about(left_s)} left")
 

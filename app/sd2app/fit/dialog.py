@@ -121,9 +121,7 @@ class NewFromVideoDialog(QDialog):
         left = column_of((self.picker, 1), row_of((self._slider, 1), self._where))
         right = column_of(form, STRETCH, self._message)
         columns = row_of((left, 3), (right, 2), spacing_px=24)
-        self.setLayout(
-            column_of((columns, 1), self._buttons, spacing_px=16, margins_px=(16, 16, 16, 16))
-        )
+        self.setLayout(column_of((columns, 1), self._buttons, spacing_px=16, margins_px=16))
 
     # --- following the model --------------------------------------------------------------
 

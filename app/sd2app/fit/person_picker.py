@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPainterPath, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
@@ -16,6 +16,8 @@ _DIMMED = 110
 
 class PersonPicker(Canvas):
     """Picture on which a drag draws a rectangle and a click removes it."""
+
+    USUAL_PX = 560, 420
 
     def __init__(
         self, setup: FitSetupModel, palette: Palette, parent: QWidget | None = None
@@ -30,10 +32,6 @@ class PersonPicker(Canvas):
         self.setCursor(Qt.CursorShape.CrossCursor)
         self.setAccessibleName("Drag a rectangle around the person")
         self.follow(setup.changed, setup.picture_changed)
-
-    def sizeHint(self) -> QSize:
-        """Size a little below VGA."""
-        return QSize(560, 420)
 
     @property
     def box(self) -> QRectF:

@@ -215,7 +215,7 @@ class CutOutDialog(QDialog):
         parts = side_by_side(*self._parts.values(), spacing_px=16)
         form = form_of(("Spans", self._which), ("Parts", parts))
         content = form, self._size, sentence(_ABOUT), STRETCH, buttons
-        self.setLayout(column_of(*content, spacing_px=12, margins_px=(16, 16, 16, 16)))
+        self.setLayout(column_of(*content, spacing_px=12, margins_px=16))
         self._refresh()
         self.setMinimumWidth(520)
 

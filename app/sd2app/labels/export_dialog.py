@@ -82,7 +82,7 @@ class LabelExportDialog(QDialog):
             STRETCH,
             self._buttons,
         )
-        self.setLayout(column_of(*parts, spacing_px=8, margins_px=(16, 16, 16, 16)))
+        self.setLayout(column_of(*parts, spacing_px=8, margins_px=16))
         self._look()
         self.resize(560, 300)
 

@@ -110,7 +110,7 @@ class LabelImportDialog(QDialog):
         take = form_of(("Take them", self._way))
         content = form, rule(), self._said, self._facts, rule(), take, self._consequence
         parts = title(path.name), *content, 8, buttons
-        self.setLayout(column_of(*parts, spacing_px=8, margins_px=(16, 16, 16, 16)))
+        self.setLayout(column_of(*parts, spacing_px=8, margins_px=16))
         self._read()
         self.setMinimumWidth(560)
 

@@ -51,8 +51,7 @@ class LabelSetPage(QWidget):
         self._name.ended.connect(self._rename)
         self.table = table = LabelSetTable(model, self)
         table.removed.connect(self._remove)
-        self._warning = ElidedLabel(self)
-        self._warning.setObjectName("warning")
+        self._warning = ElidedLabel(self, "warning")
         self._add = outlined("Add", "Add a label", self._added, self)
         self._less = outlined("Remove", "Remove the label of the current row", self._remove, self)
         self._up = outlined("Up", "Offer it earlier", lambda: self._move(-1), self)
@@ -63,7 +62,7 @@ class LabelSetPage(QWidget):
         top = row_of((self._name, 1), file, spacing_px=6)
         below = row_of(self._add, self._less, self._up, self._down, STRETCH, spacing_px=6)
         parts = top, (table, 1), self._warning, below
-        self.setLayout(column_of(*parts, spacing_px=6, margins_px=(0, 0, 0, 0)))
+        self.setLayout(column_of(*parts, spacing_px=6, margins_px=0))
         model.modelReset.connect(self._refresh)
         model.dataChanged.connect(self._refresh)
         table.selectionModel().currentRowChanged.connect(self._refresh)

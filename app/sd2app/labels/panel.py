@@ -45,7 +45,7 @@ class SpanPage(QWidget):
         filters = row_of(
             (self.search, 5), *((one, 4) for one in self._chosen.values()), columns, spacing_px=6
         )
-        self.setLayout(column_of(filters, (table, 1), spacing_px=6, margins_px=(0, 0, 0, 0)))
+        self.setLayout(column_of(filters, (table, 1), spacing_px=6, margins_px=0))
         self.search.textChanged.connect(self._filter)
         self.search.returnPressed.connect(table.setFocus)
         labels.changed.connect(self._offer)
@@ -97,8 +97,7 @@ class LabelsPanel(QWidget):
         self.spans = SpanPage(model, labels, table, self)
         set_model = LabelSetModel(edits, shell.keys, self)
         self._label_set = LabelSetPage(set_model, shell, self)
-        self._count = ElidedLabel(self)
-        self._count.setObjectName("muted")
+        self._count = ElidedLabel(self, "muted")
         self._count.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         pages = self.spans, StatisticsPage(labels, edits.playback, self), self._label_set
         self._pages = InnerPages(

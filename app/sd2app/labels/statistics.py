@@ -89,7 +89,7 @@ class StatisticsPage(QWidget):
             )
         )
         buttons = row_of(STRETCH, to_paste, csv, spacing_px=6)
-        self.setLayout(column_of((table, 1), buttons, spacing_px=6, margins_px=(0, 0, 0, 0)))
+        self.setLayout(column_of((table, 1), buttons, spacing_px=6, margins_px=0))
 
     def _copy(self, separator: str) -> None:
         text = self._model.text(separator)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QBrush, QColor, QMouseEvent, QPainter, QPen, QWheelEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
@@ -34,6 +34,7 @@ class HeatmapView(MapWidget):
     """
 
     TOP_PX = _HEADER_PX
+    USUAL_PX = 640, _HEADER_PX + 160  # room for 32 bins of 5 pixels
 
     def __init__(
         self,
@@ -56,10 +57,6 @@ class HeatmapView(MapWidget):
         self._span.changed.connect(self.invalidate)
         track.status_changed.connect(self.redraw)
         self.follow(self._pointer.changed)
-
-    def sizeHint(self) -> QSize:
-        """Size with room for 32 bins of 5 pixels."""
-        return QSize(640, _HEADER_PX + 160)
 
     def set_hint(self, hint: str) -> None:
         """Text shown while there is no map."""

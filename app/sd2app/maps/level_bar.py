@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from PySide6.QtCore import QRectF, QSize
+from PySide6.QtCore import QRectF
 from PySide6.QtGui import QAction, QColor, QImage, QPainter
 from PySide6.QtWidgets import QWidget
 
@@ -21,14 +21,13 @@ _STRIP_PX = 14
 class _ColourStrip(Canvas):
     """The colours of the levels; below them those of uncertain cells, where there are any."""
 
+    USUAL_PX = 200, _STRIP_PX
+
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._display, self._tracks = session.display, session.maps.all
         self.setFixedHeight(_STRIP_PX)
         self.follow(self._display.levels_changed, *(track.changed for track in self._tracks))
-
-    def sizeHint(self) -> QSize:
-        return QSize(200, _STRIP_PX)
 
     def paint(self, painter: QPainter) -> None:
         name = self._display.levels.colour_map
@@ -68,9 +67,7 @@ class LevelBar(QWidget):
             lambda name: set_levels(colour_map=name),
         )
         # One line each: the plot above needs the height.
-        self._references = [ElidedLabel(self) for _ in self._tracks]
-        for label in self._references:
-            label.setObjectName("muted")
+        self._references = [ElidedLabel(self, "muted") for _ in self._tracks]
         ends = row_of(
             self._low, STRETCH, action_button(uncertain, "Uncertain"), STRETCH, self._high
         )

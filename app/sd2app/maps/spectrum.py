@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QBrush, QColor, QFontMetrics, QPainter, QPen, QPolygonF
 
 from sd2app.session.maps import MapModel
@@ -39,6 +39,8 @@ class _Curve:
 class SpectrumView(Canvas):
     """Level to the right, velocity upwards like in the heatmaps beside it."""
 
+    USUAL_PX = 240, 280
+
     def __init__(self, session: Session) -> None:
         super().__init__()
         self._maps, self._playback = session.maps, session.playback
@@ -51,10 +53,6 @@ class SpectrumView(Canvas):
             session.pointer.changed,
             *(track.changed for track in session.maps.all),
         )
-
-    def sizeHint(self) -> QSize:
-        """Width of the level bar below."""
-        return QSize(240, 280)
 
     def _curves(self) -> list[_Curve]:
         time_s, palette = self._playback.time_s, self._display.palette

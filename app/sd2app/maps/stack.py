@@ -38,7 +38,7 @@ class MapStack(QWidget):
         self.overview = Overview(session, over_all)
         self._offer: QWidget | None = None
         views = [(view, 1) for view in self.views]
-        self.setLayout(column_of(*views, spacing_px=0, margins_px=(0, 0, 0, 0)))
+        self.setLayout(column_of(*views, spacing_px=0, margins_px=0))
         self._shown: object = None
         for track in maps.all:
             track.changed.connect(self.refresh)

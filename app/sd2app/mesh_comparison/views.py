@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from PySide6.QtCore import QPointF, QRect, QRectF, QSignalBlocker, QSize, Qt
+from PySide6.QtCore import QPointF, QRect, QRectF, QSignalBlocker, Qt
 from PySide6.QtGui import QBrush, QColor, QMouseEvent, QPainter, QPen
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -42,6 +42,8 @@ def colour_of(display: DisplayModel, number: int) -> QColor:
 class ComparedPicture(Canvas):
     """One of the two meshes over the picture on screen."""
 
+    USUAL_PX = 400, 300 + _TITLE_PX
+
     def __init__(
         self, number: int, comparison: ComparisonModel, session: Session, overlay: OverlayModel
     ) -> None:
@@ -57,10 +59,6 @@ class ComparedPicture(Canvas):
             overlay.changed,
             clock.frame_changed,
         )
-
-    def sizeHint(self) -> QSize:
-        """Half of VGA, and its title."""
-        return QSize(400, 300 + _TITLE_PX)
 
     def paint(self, painter: QPainter) -> None:
         """Title, and the picture below."""
@@ -91,6 +89,7 @@ class JointCurves(TimePlot):
     """Velocity of one joint towards the sensor, from both meshes; click or drag seeks."""
 
     TOP_PX, BOTTOM_PX = _TITLE_PX, 4
+    USUAL_PX = 640, 140
 
     def __init__(self, comparison: ComparisonModel, session: Session) -> None:
         super().__init__(session.span)
@@ -104,10 +103,6 @@ class JointCurves(TimePlot):
             session.playback.frame_changed,
             session.display.theme_changed,
         )
-
-    def sizeHint(self) -> QSize:
-        """Width of the maps above."""
-        return QSize(640, 140)
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         """Seek."""

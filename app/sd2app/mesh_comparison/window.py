@@ -55,16 +55,13 @@ class ComparisonWindow(QWidget):
         body = splitter(Qt.Orientation.Horizontal, [left, table], (820, 400))
         self._notes = QLabel(self)
         self._notes.setWordWrap(True)
-        self.setLayout(
-            column_of(head, (body, 1), self._notes, spacing_px=8, margins_px=(8, 8, 8, 8))
-        )
+        self.setLayout(column_of(head, (body, 1), self._notes, spacing_px=8, margins_px=8))
         model.changed.connect(self._refresh)
         self._refresh()
         self.resize(1240, 820)
 
     def _head(self) -> QHBoxLayout:
-        self._summary = ElidedLabel(self)
-        self._summary.setObjectName("title")
+        self._summary = ElidedLabel(self, "title")
         self._reference = Choice("The mesh that is taken to be right", self)
         # However long the names of the meshes are.
         self._reference.setSizeAdjustPolicy(

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QComboBox, QFormLayout, QGridLayout, QLabel, QWidg
 from sd2app.maps.model import SynthesisModel
 from sd2app.session.session import Session
 from sd2app.widgets.inputs import Choice, NumberBox
-from sd2app.widgets.layouts import STRETCH, column_of, form_of, row_of
+from sd2app.widgets.layouts import STRETCH, column_of, form_of, pane, row_of
 from sd2app.widgets.panel import outlined, rule, sentence, title
 from sd2core.radar_config import RadarConfig
 from sd2core.sensor import aimed_at, position_from_spherical, spherical_from_position
@@ -133,7 +133,7 @@ class SensorPanel(QWidget):
         )
 
     def _capture_part(self) -> QWidget:
-        edits, part = self._session.edits, QWidget(self)
+        edits = self._session.edits
         self._capture_title = title("Radar capture")
         self._offset = NumberBox(
             -1e5, 1e5, " s", "Time of the first radar frame here", decimals=3, step=0.01
@@ -157,13 +157,7 @@ class SensorPanel(QWidget):
             limits.addWidget(label, line, 2 * left + 1)
             limits.setColumnStretch(2 * left + 1, 1)
         self._warning = sentence("", "warning")
-        part.setLayout(
-            column_of(
-                rule(), self._capture_title, form, limits, self._warning,
-                spacing_px=5, margins_px=(0, 0, 0, 0),
-            )
-        )  # fmt: skip
-        return part
+        return pane(rule(), self._capture_title, form, limits, self._warning, spacing_px=5)
 
     # --- typing ---------------------------------------------------------------------------
 

@@ -25,7 +25,7 @@ from sd2app.sensor.placements import (
 from sd2app.widgets.canvas import Canvas
 from sd2app.widgets.dialogs import ask_file, ask_new
 from sd2app.widgets.inputs import CheckBox, Choice, TypedLine
-from sd2app.widgets.layouts import STRETCH, column_of, row_of
+from sd2app.widgets.layouts import STRETCH, column_of, pane, row_of
 from sd2app.widgets.panel import FactRows, outlined, rule, sentence, show_words, title
 from sd2core.figures.colours import SEQUENTIAL
 from sd2core.placements.placements import read_placements, write_placements
@@ -94,7 +94,7 @@ class PlacementsPage(QWidget):
     # --- building -------------------------------------------------------------------------
 
     def _plan_part(self) -> QWidget:
-        model, part = self._model, QWidget(self)
+        model = self._model
         self._how, self._problem = sentence(""), sentence("", "warning")
         self._count, self._cost = title(""), title("")
         self._count.setAccessibleName("How many placements")
@@ -110,25 +110,21 @@ class PlacementsPage(QWidget):
             outlined(text, "Put the sensor there", partial(model.step, by), self)
             for text, by in (("Previous", -1), ("Next", 1))
         )
-        part.setLayout(
-            column_of(
-                self._form(),
-                self._how,
-                self._problem,
-                rule(),
-                row_of((self._count, 1), self._shown, spacing_px=6),
-                self._scale,
-                self._limits,
-                self._radar,
-                row_of((self._current, 1), back, on, spacing_px=6),
-                rule(),
-                self._cost,
-                self._source,
-                spacing_px=6,
-                margins_px=(0, 0, 0, 0),
-            )
+        return pane(
+            self._form(),
+            self._how,
+            self._problem,
+            rule(),
+            row_of((self._count, 1), self._shown, spacing_px=6),
+            self._scale,
+            self._limits,
+            self._radar,
+            row_of((self._current, 1), back, on, spacing_px=6),
+            rule(),
+            self._cost,
+            self._source,
+            spacing_px=6,
         )
-        return part
 
     def _form(self) -> QGridLayout:
         grid = QGridLayout()

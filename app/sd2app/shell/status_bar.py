@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtWidgets import QLabel, QProgressBar, QToolButton, QWidget
+from PySide6.QtWidgets import QLabel, QToolButton, QWidget
 
 from sd2app.accuracy.model import AccuracyModel
 from sd2app.background.latest import delayed
@@ -11,6 +11,7 @@ from sd2app.session.maps import Reading
 from sd2app.session.session import Session
 from sd2app.widgets.layouts import STRETCH, row_of
 from sd2app.widgets.panel import ElidedLabel
+from sd2app.widgets.progress_bar import ProgressBar
 from sd2app.widgets.time_axis import clock_text
 
 _QUIET_MS = 300
@@ -29,16 +30,10 @@ class StatusLine(QWidget):
         super().__init__(parent)
         self._pointer, self._jobs = session.pointer, session.jobs
         self._accuracy, self._synthesis = accuracy, synthesis
-        self._reading = ElidedLabel(self)
-        self._plan = ElidedLabel(self)
-        for label in (self._reading, self._plan):
-            label.setObjectName("muted")
+        self._reading, self._plan = ElidedLabel(self, "muted"), ElidedLabel(self, "muted")
         self._title = QLabel(self)
         self._title.setObjectName("muted")
-        self._bar = QProgressBar(self)
-        self._bar.setFixedWidth(140)
-        self._bar.setMaximumHeight(14)
-        self._bar.setTextVisible(False)
+        self._bar = ProgressBar("", width_px=140)
         self._cancel = QToolButton(self)
         self._cancel.setText("Cancel")
         self._cancel.clicked.connect(self._cancel_job)
@@ -83,8 +78,7 @@ class StatusLine(QWidget):
             return
         self._title.setText("Cancelling…" if job.cancelling else job.title)
         self._cancel.setEnabled(not job.cancelling)
-        self._bar.setRange(0, job.total)
-        self._bar.setValue(job.done)
+        self._bar.show_count(job.done, job.total)
 
     def _cancel_job(self) -> None:
         if self._jobs.jobs:

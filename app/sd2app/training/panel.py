@@ -26,7 +26,7 @@ from sd2app.training.text import (
 )
 from sd2app.widgets.chart import Chart, ChartView, Curve, Mark, Scale
 from sd2app.widgets.inputs import CheckBox, Choice
-from sd2app.widgets.layouts import STRETCH, column_of, row_of
+from sd2app.widgets.layouts import STRETCH, column_of, pane, row_of
 from sd2app.widgets.panel import FactRows, outlined, sentence, title
 from sd2app.widgets.plot import tick_text
 from sd2app.widgets.run_panel import Button, RunPanel, RunView
@@ -86,16 +86,13 @@ class TrainingRunView(RunView[TrainingMonitor]):
         self.refresh()
 
     def _closing_part(self) -> QWidget:
-        self._closing = QWidget(self)
         self._choice = Choice(
             "What happens to the training when the window is closed",
             self,
             _CLOSING_TEXT,
             self._training.set_closing,
         )
-        self._closing.setLayout(
-            row_of(sentence("When closing:"), (self._choice, 1), margins_px=(0, 0, 0, 0))
-        )
+        self._closing = pane(row_of(sentence("When closing:"), (self._choice, 1)))
         return self._closing
 
     def texts(self, run: TrainingMonitor) -> tuple[str, str, str]:
@@ -144,12 +141,8 @@ class TrainingGainView(QWidget):
         )
         back = outlined("Go back", "Denoise with what was in use before", adoption.go_back, self)
         buttons = row_of(self._both, STRETCH, back)
-        self.setLayout(
-            column_of(
-                title("In use"), self._summary, self._table, buttons,
-                spacing_px=4, margins_px=(0, 0, 0, 0),
-            )
-        )  # fmt: skip
+        parts = title("In use"), self._summary, self._table, buttons
+        self.setLayout(column_of(*parts, spacing_px=4, margins_px=0))
         adoption.changed.connect(self._refresh)
         self._refresh()
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QGridLayout, QProgressBar, QToolButton, QWidget
+from PySide6.QtWidgets import QGridLayout, QToolButton, QWidget
 
 from sd2app.training.dialogs import TrainingDialogs
 from sd2app.training.model import TrainingModel
 from sd2app.training.text import MODEL_WORDS, division_text
-from sd2app.widgets.layouts import STRETCH, row_of
+from sd2app.widgets.layouts import STRETCH, pane, row_of
 from sd2app.widgets.panel import ElidedLabel, outlined, sentence, title
+from sd2app.widgets.progress_bar import ProgressBar
 from sd2app.widgets.text import counted
 from sd2app.widgets.training_form import Field, TrainingForm, labelled
 
@@ -59,18 +60,11 @@ class TrainingSetupView(TrainingForm):
 
     def _making_part(self) -> QWidget:
         maker = self._training.pair_maker
-        self._making = QWidget(self)
-        self._making_text = ElidedLabel(self)
-        self._making_text.setObjectName("muted")
-        bar = QProgressBar(self)
-        bar.setRange(0, 0)
-        bar.setMaximumHeight(14)
-        bar.setMaximumWidth(64)
-        bar.setAccessibleName("Pairs are being made")
+        self._making_text = ElidedLabel(self, "muted")
+        bar = ProgressBar("Pairs are being made", width_px=64)
+        bar.show_share(None)
         self._making_cancel = outlined("Cancel", "Make no pairs", maker.cancel, self)
-        self._making.setLayout(
-            row_of((self._making_text, 1), bar, self._making_cancel, margins_px=(0, 0, 0, 0))
-        )
+        self._making = pane(row_of((self._making_text, 1), bar, self._making_cancel))
         return self._making
 
     def _add_model(self) -> None:

@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QRectF, QSignalBlocker, QSize, Qt, SignalInstance
+from PySide6.QtCore import QRectF, QSignalBlocker, Qt, SignalInstance
 from PySide6.QtGui import QAction, QColor, QPainter
 from PySide6.QtWidgets import QSlider, QWidget
 
@@ -37,6 +37,8 @@ class Landmarks(Protocol):
 class VideoView(Canvas):
     """Fits the picture into the space there is."""
 
+    USUAL_PX = 427, 320
+
     def __init__(self, session: Session, overlay: OverlayModel, landmarks: Landmarks) -> None:
         super().__init__()
         self._session, self._overlay, self._found = session, overlay, landmarks
@@ -48,10 +50,6 @@ class VideoView(Canvas):
             overlay.changed,
             *landmarks.landmarks_changed,
         )
-
-    def sizeHint(self) -> QSize:
-        """Size of two thirds of VGA."""
-        return QSize(427, 320)
 
     def paint(self, painter: QPainter) -> None:
         """Paint the picture, or why there is none."""

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import ClassVar
 
-from PySide6.QtCore import Qt, SignalInstance
+from PySide6.QtCore import QSize, Qt, SignalInstance
 from PySide6.QtGui import QPainter, QPaintEvent, QPixmap
 from PySide6.QtWidgets import QWidget
 
@@ -12,9 +13,16 @@ from PySide6.QtWidgets import QWidget
 class Canvas(QWidget):
     """Widget that paints itself; a subclass may keep a picture of what rarely changes."""
 
+    USUAL_PX: ClassVar[tuple[int, int]] = (-1, -1)
+    """Width and height where there is a choice; negative ones leave them to the layout."""
+
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._kept: QPixmap | None = None
+
+    def sizeHint(self) -> QSize:
+        """Width and height where there is a choice."""
+        return QSize(*self.USUAL_PX)
 
     def follow(self, *signals: SignalInstance) -> None:
         """Paint again after each of these; what is kept stays."""

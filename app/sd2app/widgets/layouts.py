@@ -15,8 +15,8 @@ Part = QWidget | QLayout | int | tuple[QWidget | QLayout | None, int]
 """A widget or a layout, perhaps with its share of what room is left over; or pixels of a gap."""
 STRETCH: Part = (None, 1)
 """Empty room."""
-Margins = tuple[int, int, int, int]
-"""Left, top, right and bottom, in pixels."""
+Margins = int | tuple[int, int, int, int]
+"""All four, or left, top, right and bottom, in pixels."""
 
 
 def row_of(
@@ -50,10 +50,10 @@ def form_of(
     return form
 
 
-def pane(*parts: Part) -> QWidget:
-    """Widget of parts below each other without gaps."""
+def pane(*parts: Part, spacing_px: int = 0) -> QWidget:
+    """Widget of parts below each other, without margins."""
     widget = QWidget()
-    widget.setLayout(column_of(*parts, spacing_px=0, margins_px=(0, 0, 0, 0)))
+    widget.setLayout(column_of(*parts, spacing_px=spacing_px, margins_px=0))
     return widget
 
 
@@ -63,7 +63,8 @@ def _fill(
     if spacing_px is not None:
         layout.setSpacing(spacing_px)
     if margins_px is not None:
-        layout.setContentsMargins(*margins_px)
+        sides = (margins_px,) * 4 if isinstance(margins_px, int) else margins_px
+        layout.setContentsMargins(*sides)
     for part in parts:
         content, stretch = part if isinstance(part, tuple) else (part, 0)
         if isinstance(content, int):

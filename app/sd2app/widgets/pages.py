@@ -46,7 +46,7 @@ class InnerPages(QWidget):
         top = row_of(
             *self._buttons.buttons(), STRETCH if beside is None else (beside, 1), spacing_px=6
         )
-        self.setLayout(column_of(top, (self._pages, 1), spacing_px=6, margins_px=(0, 0, 0, 0)))
+        self.setLayout(column_of(top, (self._pages, 1), spacing_px=6, margins_px=0))
 
     @property
     def shown(self) -> int:

@@ -116,8 +116,9 @@ class FactRows(QWidget):
 class ElidedLabel(QLabel):
     """A label as narrow as need be; the whole text is in its tooltip and its accessible name."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    def __init__(self, parent: QWidget | None = None, role: str = "") -> None:
         super().__init__(parent)
+        self.setObjectName(role)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Preferred)
 
     def setText(self, text: str) -> None:
@@ -174,4 +175,4 @@ def splitter(
 
 def fill(frame: QFrame, content: QWidget | QLayout) -> None:
     """Fill an empty panel."""
-    frame.setLayout(column_of(content, spacing_px=0, margins_px=(1, 1, 1, 1)))
+    frame.setLayout(column_of(content, spacing_px=0, margins_px=1))

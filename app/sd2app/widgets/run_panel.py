@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Generic, NamedTuple
 
 from PySide6.QtGui import QHideEvent, QShowEvent
-from PySide6.QtWidgets import QProgressBar, QSizePolicy, QWidget
+from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from sd2app.background.run_monitor import UNDER_WAY
 from sd2app.background.runs import Run, Runs
@@ -17,9 +17,9 @@ from sd2app.widgets.dialogs import may_delete
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import outlined, sentence, show_words, side_by_side, title
+from sd2app.widgets.progress_bar import ProgressBar
 
 _NEW = "New training"
-_PARTS = 1000
 
 
 class RunPanel(QWidget):
@@ -114,10 +114,7 @@ class RunView(QWidget, Generic[Run]):
         self._headline = title("")
         self._headline.setWordWrap(True)
         self._headline.setAccessibleName("How the training stands")
-        self._bar = QProgressBar(self)
-        self._bar.setMaximumHeight(14)
-        self._bar.setTextVisible(False)
-        self._bar.setAccessibleName("Progress of the training")
+        self._bar = ProgressBar("Progress of the training")
         self._time, self._reason = sentence(""), sentence("", "warning")
         self._note = sentence("")
         self._buttons = {one.name: outlined(one.text, one.tip, one.run, self) for one in buttons}
@@ -133,7 +130,7 @@ class RunView(QWidget, Generic[Run]):
             self._reason,
             self._note,
             spacing_px=6,
-            margins_px=(0, 0, 0, 0),
+            margins_px=0,
         )
         self.setLayout(self.column)
         runs.changed.connect(self.refresh)
@@ -175,10 +172,7 @@ class RunView(QWidget, Generic[Run]):
         show_words(self._reason, run.text)
         show_words(self._note, note)
         self._bar.setVisible(run.phase in UNDER_WAY)
-        # Without a maximum the bar says that it is busy.
-        self._bar.setRange(0, 0 if run.share is None else _PARTS)
-        if run.share is not None:
-            self._bar.setValue(round(run.share * _PARTS))
+        self._bar.show_share(run.share)
         shown, ending = self.shown(run), run.phase in ("stopping", "cancelling")
         for name, button in self._buttons.items():
             button.setVisible(name in shown)

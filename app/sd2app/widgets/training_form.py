@@ -47,7 +47,7 @@ class TrainingForm(QWidget):
         self._shown_data: Sequence[Any] | None = None
         self._numbers: dict[str, NumberBox] = {}
         self._choices: dict[str, Choice] = {}
-        self.column = column_of(spacing_px=6, margins_px=(0, 0, 0, 0))
+        self.column = column_of(spacing_px=6, margins_px=0)
         self.setLayout(self.column)
 
     # --- building -------------------------------------------------------------------------
