@@ -31,9 +31,7 @@ class MeasuredModel(QObject):
     changed = Signal()
     failed = Signal(str)
 
-    def __init__(
-        self, jobs: TaskList, library: AccuracyLibrary, parent: QObject | None = None
-    ) -> None:
+    def __init__(self, jobs: TaskList, library: AccuracyLibrary, parent: QObject) -> None:
         super().__init__(parent)
         self._library = library
         self.family: Family = "histogram"  # of the plans that are shown

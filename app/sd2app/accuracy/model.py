@@ -57,11 +57,7 @@ class AccuracyModel(QObject):
     failed = Signal(str)
 
     def __init__(
-        self,
-        jobs: TaskList,
-        settings: Settings,
-        library: AccuracyLibrary,
-        parent: QObject | None = None,
+        self, jobs: TaskList, settings: Settings, library: AccuracyLibrary, parent: QObject
     ) -> None:
         super().__init__(parent)
         self._settings = settings

@@ -161,7 +161,7 @@ def _unbroken(plan: str) -> str:
 class ReasonList(QWidget):
     """One line per reason: ✓ is modelled, – is left out."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
         self._shown: tuple[Reason, ...] = ()
         self._grid = QGridLayout(self)
@@ -195,7 +195,7 @@ class ReasonList(QWidget):
 class ToleranceRow(QWidget):
     """Row of the panel that sets the tolerance: the accepted error of the map."""
 
-    def __init__(self, accuracy: AccuracyModel, parent: QWidget | None = None) -> None:
+    def __init__(self, accuracy: AccuracyModel, parent: QWidget) -> None:
         super().__init__(parent)
         self._accuracy = accuracy
         self._box = NumberBox(

@@ -39,9 +39,7 @@ class AccuracyPlot(ChartView):
     STEPS: ClassVar = {**ChartView.STEPS, **_UP_AND_DOWN}
     KEYS = ChartView.KEYS | _USE
 
-    def __init__(
-        self, accuracy: AccuracyModel, display: DisplayModel, parent: QWidget | None = None
-    ) -> None:
+    def __init__(self, accuracy: AccuracyModel, display: DisplayModel, parent: QWidget) -> None:
         name = "Error against cost of every plan"
         super().__init__(display, name, accuracy_chart(accuracy), parent)
         self._accuracy = accuracy

@@ -37,10 +37,7 @@ class BatchModel(Runs[BatchMonitor]):
     """
 
     def __init__(
-        self,
-        settings: Settings,
-        parent: QObject | None = None,
-        command: Sequence[str] = COMMAND,
+        self, settings: Settings, parent: QObject, command: Sequence[str] = COMMAND
     ) -> None:
         super().__init__(BatchMonitor, settings, "batch/last", _SENTENCES, parent)
         self._command = tuple(command)

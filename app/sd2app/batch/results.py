@@ -41,7 +41,7 @@ class BatchResults(RecordTableModel[Result]):
 
     changed = Signal()
 
-    def __init__(self, parent: QObject | None = None) -> None:
+    def __init__(self, parent: QObject) -> None:
         super().__init__([Heading(text) for text in _COLUMNS], parent)
         self.card = ""  # of the exported data set, as Markdown; empty where there is none
         self._runner = LatestRunner("results", self, self._take)

@@ -33,9 +33,7 @@ _FAILURES, _FAILURES_PAGE = "Failures", 2
 class BatchRunView(QWidget):
     """A view of :class:`BatchMonitor` and of its results."""
 
-    def __init__(
-        self, batch: BatchModel, asks: BatchQuestions, parent: QWidget | None = None
-    ) -> None:
+    def __init__(self, batch: BatchModel, asks: BatchQuestions, parent: QWidget) -> None:
         super().__init__(parent)
         self._batch, self._asks = batch, asks
         self._shown_card: str | None = None

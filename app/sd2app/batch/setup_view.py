@@ -55,9 +55,7 @@ _MOST_FACTS = 8
 class BatchSetupView(QWidget):
     """A view of :class:`BatchSetupModel` and of its estimate."""
 
-    def __init__(
-        self, batch: BatchModel, asks: BatchQuestions, parent: QWidget | None = None
-    ) -> None:
+    def __init__(self, batch: BatchModel, asks: BatchQuestions, parent: QWidget) -> None:
         super().__init__(parent)
         self._batch, self._setup, self._asks = batch, batch.setup, asks
         self._list = _Paths(self._drop, self)
@@ -172,7 +170,7 @@ class BatchSetupView(QWidget):
 class _Paths(QListWidget):
     """Files and folders; Delete removes what is selected."""
 
-    def __init__(self, drop: Callable[[], None], parent: QWidget | None = None) -> None:
+    def __init__(self, drop: Callable[[], None], parent: QWidget) -> None:
         super().__init__(parent)
         self._drop = drop
         self._shown: list[tuple[Path, str, bool]] = []

@@ -45,7 +45,7 @@ class ClassifyModel(QObject):
         validity: MapValidity,
         labels: LabelsModel,
         library: ClassifierLibrary,
-        parent: QObject | None = None,
+        parent: QObject,
     ) -> None:
         super().__init__(parent)
         maps = session.maps

@@ -91,7 +91,7 @@ class DataSource:
 class ClassSetup(RunSetup[DataSource]):
     """Labelled data and settings for a classifier."""
 
-    def __init__(self, settings: Settings, parent: QObject | None = None) -> None:
+    def __init__(self, settings: Settings, parent: QObject) -> None:
         values = StoredChoices(settings, "classify/train", _DEFAULTS, _CHOICES)
         if not 0 <= values["delay_s"] <= LONGEST_DELAY_S:
             values.set("delay_s", DELAY_S)

@@ -39,7 +39,7 @@ class ClassTraining(Runs[ClassRun]):
         self,
         settings: Settings,
         use: Callable[[Path], None],
-        parent: QObject | None = None,
+        parent: QObject,
         folder: Path | None = None,
         command: Sequence[str] = COMMAND_IN_FOLDER,
     ) -> None:

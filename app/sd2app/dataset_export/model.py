@@ -117,7 +117,7 @@ class ExportModel(Runs[ExportRun]):
     def __init__(
         self,
         jobs: TaskList,
-        parent: QObject | None = None,
+        parent: QObject,
         command: Sequence[str] = COMMAND_IN_FOLDER,
         folder: Path | None = None,
     ) -> None:

@@ -36,9 +36,7 @@ class LiveDenoiseModel(QObject):
 
     changed = Signal()
 
-    def __init__(
-        self, session: Session, denoise: DenoiseModel, parent: QObject | None = None
-    ) -> None:
+    def __init__(self, session: Session, denoise: DenoiseModel, parent: QObject) -> None:
         super().__init__(parent)
         self._playback, self._synthetic = session.playback, session.maps.synthetic
         self._settings, self._denoise = session.settings, denoise

@@ -75,11 +75,7 @@ class DenoisedMap(QObject):
     _stumbled = Signal(str)
 
     def __init__(
-        self,
-        track: MapModel,
-        view: Callable[[], View],
-        jobs: TaskList,
-        parent: QObject | None = None,
+        self, track: MapModel, view: Callable[[], View], jobs: TaskList, parent: QObject
     ) -> None:
         super().__init__(parent)
         self.track = track

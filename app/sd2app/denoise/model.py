@@ -45,11 +45,7 @@ class DenoiseModel(QObject):
     failed = Signal(str)
 
     def __init__(
-        self,
-        session: Session,
-        synthesis: SynthesisModel,
-        library: DenoiserLibrary,
-        parent: QObject | None = None,
+        self, session: Session, synthesis: SynthesisModel, library: DenoiserLibrary, parent: QObject
     ) -> None:
         super().__init__(parent)
         self._session, self._synthesis, self._library = session, synthesis, library

@@ -59,9 +59,7 @@ class FigureDialog(QDialog):
 
     TITLE: ClassVar[str]
 
-    def __init__(
-        self, model: Any, palette: Palette, name: str, parent: QWidget | None = None
-    ) -> None:
+    def __init__(self, model: Any, palette: Palette, name: str, parent: QWidget) -> None:
         super().__init__(parent)
         self._model, self._name = model, name
         self.setWindowTitle(self.TITLE)
@@ -90,9 +88,7 @@ class MapFigureDialog(FigureDialog):
 
     TITLE = "Export figure of the maps"
 
-    def __init__(
-        self, model: MapFigure, palette: Palette, name: str, parent: QWidget | None = None
-    ) -> None:
+    def __init__(self, model: MapFigure, palette: Palette, name: str, parent: QWidget) -> None:
         super().__init__(model, palette, name, parent)
         self.resize(900, 720)
 
@@ -129,9 +125,7 @@ class StripDialog(FigureDialog):
 
     TITLE = "Export strip of frames"
 
-    def __init__(
-        self, model: StripModel, palette: Palette, name: str, parent: QWidget | None = None
-    ) -> None:
+    def __init__(self, model: StripModel, palette: Palette, name: str, parent: QWidget) -> None:
         super().__init__(model, palette, name, parent)
         self.resize(1040, 640)
 

@@ -152,7 +152,7 @@ class MapFigure(DrawnFigure):
         difference: DifferenceModel,
         labels: Labels,
         denoiser: str,
-        parent: QObject | None = None,
+        parent: QObject,
     ) -> None:
         super().__init__("figure", MapChoice(), parent)
         s, levels, clock = session, session.display.levels, session.playback.timebase

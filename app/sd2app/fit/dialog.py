@@ -33,9 +33,7 @@ _CAMERAS = {
 class NewFromVideoDialog(QDialog):
     """A view of :class:`FitSetupModel`; what is asked for is in the model."""
 
-    def __init__(
-        self, setup: FitSetupModel, palette: Palette, parent: QWidget | None = None
-    ) -> None:
+    def __init__(self, setup: FitSetupModel, palette: Palette, parent: QWidget) -> None:
         super().__init__(parent)
         self._setup = setup
         self.setWindowTitle("New from video")

@@ -27,7 +27,7 @@ class FitOnScreen(QObject):
     changed = Signal()
     noted = Signal(str)  # remarks of the fit, once its recording is on screen
 
-    def __init__(self, session: Session, fit: FitModel, parent: QObject | None = None) -> None:
+    def __init__(self, session: Session, fit: FitModel, parent: QObject) -> None:
         super().__init__(parent)
         self._settings, self._document = session.settings, session.document
         self._playback, self._fit = session.playback, fit

@@ -19,9 +19,7 @@ class PersonPicker(Canvas):
 
     USUAL_PX = 560, 420
 
-    def __init__(
-        self, setup: FitSetupModel, palette: Palette, parent: QWidget | None = None
-    ) -> None:
+    def __init__(self, setup: FitSetupModel, palette: Palette, parent: QWidget) -> None:
         super().__init__(parent)
         self._setup = setup
         self._colours = palette

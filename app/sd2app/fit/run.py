@@ -151,7 +151,7 @@ class FitRun(RunMonitor[CommandFolder]):
         self,
         folder: CommandFolder,
         landmarks: dict[int, NDArray[np.float32]],
-        parent: QObject | None = None,
+        parent: QObject,
         *,
         process: ProcessId | None = None,
     ) -> None:

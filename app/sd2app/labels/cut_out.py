@@ -52,7 +52,7 @@ class CutOutModel(QObject):
     noted = Signal(str)
     failed = Signal(str)
 
-    def __init__(self, session: Session, parent: QObject | None = None) -> None:
+    def __init__(self, session: Session, parent: QObject) -> None:
         super().__init__(parent)
         self._session = session
         self._plan: _Plan | None = None
@@ -188,10 +188,7 @@ class CutOutDialog(QDialog):
     """Accepted to choose a folder for :attr:`spans` and :attr:`parts`."""
 
     def __init__(
-        self,
-        groups: Sequence[tuple[str, tuple[Span, ...]]],
-        source: CutSource,
-        parent: QWidget | None = None,
+        self, groups: Sequence[tuple[str, tuple[Span, ...]]], source: CutSource, parent: QWidget
     ) -> None:
         super().__init__(parent)
         self.setWindowTitle("Export cut-outs")

@@ -44,7 +44,7 @@ _FILES = "Label set (*.json);;All files (*)"
 class LabelSetPage(QWidget):
     """The table, warnings about colours, and buttons."""
 
-    def __init__(self, model: LabelSetModel, shell: Shell, parent: QWidget | None = None) -> None:
+    def __init__(self, model: LabelSetModel, shell: Shell, parent: QWidget) -> None:
         super().__init__(parent)
         self._model, self._shell = model, shell
         self._name = TypedLine("Name of the label set", "Name of the label set", self)

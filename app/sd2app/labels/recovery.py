@@ -140,7 +140,7 @@ def recover(autosave: LabelAutosave, document: DocumentModel, shell: Shell) -> N
 class RecoverLabelsDialog(QDialog):
     """A row for each session with unsaved edits: open, write to a file, discard."""
 
-    def __init__(self, autosave: LabelAutosave, parent: QWidget | None = None) -> None:
+    def __init__(self, autosave: LabelAutosave, parent: QWidget) -> None:
         super().__init__(parent)
         self._autosave = autosave
         self.setWindowTitle("Recover labels")

@@ -35,9 +35,7 @@ _PADDING_PX = 10
 class StatisticsTableModel(RecordTableModel[tuple[str, ...]]):
     """A row per label."""
 
-    def __init__(
-        self, labels: LabelsModel, playback: PlaybackModel, parent: QObject | None = None
-    ) -> None:
+    def __init__(self, labels: LabelsModel, playback: PlaybackModel, parent: QObject) -> None:
         texts = (text.capitalize().replace("Sd ", "SD ") for text in HEADINGS)
         headings = [
             Heading(text, tip, number=place > 0)
@@ -68,9 +66,7 @@ class StatisticsTableModel(RecordTableModel[tuple[str, ...]]):
 class StatisticsPage(QWidget):
     """A row per label; kept up to date while it is shown."""
 
-    def __init__(
-        self, labels: LabelsModel, playback: PlaybackModel, parent: QWidget | None = None
-    ) -> None:
+    def __init__(self, labels: LabelsModel, playback: PlaybackModel, parent: QWidget) -> None:
         super().__init__(parent)
         self._model = StatisticsTableModel(labels, playback, self)
         table = RecordTable("Statistics per label", self)

@@ -63,7 +63,7 @@ class SpanTable(CellTable):
         edits: LabelEdits,
         session: Session,
         shell: Shell,
-        parent: QWidget | None = None,
+        parent: QWidget,
     ) -> None:
         super().__init__("Spans", parent=parent)
         self._model, self._edits, self._session, self._shell = model, edits, session, shell

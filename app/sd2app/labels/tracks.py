@@ -111,7 +111,7 @@ class LabelTracks:
 class TrackDialog(QDialog):
     """Name of a new track, and a choice if its spans may overlap."""
 
-    def __init__(self, name: str, parent: QWidget | None = None) -> None:
+    def __init__(self, name: str, parent: QWidget) -> None:
         super().__init__(parent)
         self.setWindowTitle("Add track")
         self._name = QLineEdit(name, self)

@@ -24,7 +24,7 @@ class DifferenceModel(QObject):
     changed = Signal()  # values
     state_changed = Signal()  # existence or visibility
 
-    def __init__(self, session: Session, parent: QObject | None = None) -> None:
+    def __init__(self, session: Session, parent: QObject) -> None:
         super().__init__(parent)
         self.denoised, self.real = session.maps.denoised, session.maps.real
         self._session = session

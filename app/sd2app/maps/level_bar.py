@@ -23,7 +23,7 @@ class _ColourStrip(Canvas):
 
     USUAL_PX = 200, _STRIP_PX
 
-    def __init__(self, session: Session, parent: QWidget | None = None) -> None:
+    def __init__(self, session: Session, parent: QWidget) -> None:
         super().__init__(parent)
         self._display, self._tracks = session.display, session.maps.all
         self.setFixedHeight(_STRIP_PX)

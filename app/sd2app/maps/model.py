@@ -58,9 +58,7 @@ class SynthesisModel(QObject):
     painted = Signal(object)  # Part that came onto the map
     failed = Signal(str)
 
-    def __init__(
-        self, session: Session, accuracy: AccuracyModel, parent: QObject | None = None
-    ) -> None:
+    def __init__(self, session: Session, accuracy: AccuracyModel, parent: QObject) -> None:
         super().__init__(parent)
         self._session, self._accuracy = session, accuracy
         self.moving = False  # then the time budget decides, otherwise the tolerance

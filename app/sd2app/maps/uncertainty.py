@@ -24,11 +24,7 @@ class UncertaintyModel(QObject):
     failed = Signal(str)
 
     def __init__(
-        self,
-        session: Session,
-        synthesis: SynthesisModel,
-        accuracy: AccuracyModel,
-        parent: QObject | None = None,
+        self, session: Session, synthesis: SynthesisModel, accuracy: AccuracyModel, parent: QObject
     ) -> None:
         super().__init__(parent)
         self._session, self._synthesis, self._accuracy = session, synthesis, accuracy

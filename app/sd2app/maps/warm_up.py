@@ -22,7 +22,7 @@ _POLL_MS = 500
 class MaskPrefetcher(LatestRunner):
     """Prepares the mesh of the plan for dragging, and its masks from where the sensor rests."""
 
-    def __init__(self, parent: QObject | None = None) -> None:
+    def __init__(self, parent: QObject) -> None:
         super().__init__("ready", parent)
         self.prefetched_for: VirtualSensor | None = None  # whose masks are there
         self.finished.connect(self._note)
@@ -57,7 +57,7 @@ class CompilerModel(QObject):
 
     finished = Signal()
 
-    def __init__(self, parent: QObject | None = None) -> None:
+    def __init__(self, parent: QObject) -> None:
         super().__init__(parent)
         self._process: subprocess.Popen[bytes] | None = None
         self._poll = QTimer(self, interval=_POLL_MS)

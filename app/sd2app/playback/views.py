@@ -33,7 +33,7 @@ class TransportBar(QWidget):
         playback: PlaybackModel,
         looped: SpanLoop,
         action: Callable[[str], QAction],
-        parent: QWidget | None = None,
+        parent: QWidget,
     ) -> None:
         super().__init__(parent)
         self._playback, self._looped = playback, looped

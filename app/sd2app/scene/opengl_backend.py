@@ -27,7 +27,7 @@ class InteractorBackend:
 
     name = "gl"
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    def __init__(self, parent: QWidget) -> None:
         library = missing_library("gl")
         if library is not None:
             raise NoOpenGL(GL_MISSING.format(library=library))

@@ -208,7 +208,7 @@ class RangeScale(Canvas):
 
     _BAR = 8
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
         self._ends = ("", "")
         self.setAccessibleName("Colours of the placements: range")

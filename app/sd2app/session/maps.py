@@ -224,7 +224,7 @@ class PointerModel(QObject):
 
     changed = Signal()
 
-    def __init__(self, parent: QObject | None = None) -> None:
+    def __init__(self, parent: QObject) -> None:
         super().__init__(parent)
         self.time_s: float | None = None  # None while the pointer is elsewhere
         self.velocity_mps: float | None = None

@@ -75,7 +75,7 @@ class ListedRunner(LatestRunner):
         self,
         name: str,
         tasks: TaskList,
-        parent: QObject | None = None,
+        parent: QObject,
         take: Callable[[Any], object] | None = None,
         refuse: Callable[[Exception], object] | None = None,
     ) -> None:

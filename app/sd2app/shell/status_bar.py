@@ -21,11 +21,7 @@ class StatusLine(QWidget):
     """Pointer read-out, plan in use, and the oldest job with a cancel button on the right."""
 
     def __init__(
-        self,
-        session: Session,
-        accuracy: AccuracyModel,
-        synthesis: SynthesisModel,
-        parent: QWidget | None = None,
+        self, session: Session, accuracy: AccuracyModel, synthesis: SynthesisModel, parent: QWidget
     ) -> None:
         super().__init__(parent)
         self._pointer, self._jobs = session.pointer, session.jobs

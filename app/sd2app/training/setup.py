@@ -74,7 +74,7 @@ class Estimate:
 class TrainingSetupModel(RunSetup[Store]):
     """Pairs and settings for a denoiser."""
 
-    def __init__(self, settings: Settings, parent: QObject | None = None) -> None:
+    def __init__(self, settings: Settings, parent: QObject) -> None:
         values = StoredChoices(settings, "training", _DEFAULTS, {"model": MODELS})
         stores = [Store(path) for path in settings.paths(_PAIRS)]
         super().__init__(settings, values, _PAIRS, stores, parent)

@@ -115,7 +115,7 @@ class Choice(QComboBox):
     def __init__(
         self,
         tip: str,
-        parent: QWidget | None = None,
+        parent: QWidget,
         texts: Mapping[Any, str] | None = None,
         chosen: Callable[[Any], object] | None = None,
     ) -> None:
@@ -202,7 +202,7 @@ def claims(event: QEvent, keys: Collection[Qt.Key] | None = None) -> bool:
 class SearchLine(QLineEdit):
     """Search field; Escape empties it, then gives the keyboard back to the window."""
 
-    def __init__(self, hint: str, parent: QWidget | None = None) -> None:
+    def __init__(self, hint: str, parent: QWidget) -> None:
         super().__init__(parent)
         self.setPlaceholderText(hint)
         self.setAccessibleName(hint)

@@ -12,7 +12,7 @@ from sd2app.widgets.panel import say, sentence
 class MessageBar(QFrame):
     """Bar of one message, hidden while there is none."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
         self.setObjectName("panel")
         self._text = sentence("")

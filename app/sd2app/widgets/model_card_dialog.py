@@ -20,7 +20,7 @@ from sd2app.widgets.panel import sentence, side_by_side, title
 class ModelCardDialog(QDialog):
     """Dialog of facts from the header of a model file, which is not loaded for it."""
 
-    def __init__(self, page: ModelPage, parent: QWidget | None = None) -> None:
+    def __init__(self, page: ModelPage, parent: QWidget) -> None:
         super().__init__(parent)
         self.setWindowTitle(f"Model: {page.title}")
         inside = QWidget(self)

@@ -86,7 +86,7 @@ class FactRows(QWidget):
     following names.
     """
 
-    def __init__(self, most: int, at_the_edge: bool, parent: QWidget | None = None) -> None:
+    def __init__(self, most: int, at_the_edge: bool, parent: QWidget) -> None:
         super().__init__(parent)
         grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)

@@ -41,9 +41,7 @@ _KEYPAD = Qt.KeyboardModifier.KeypadModifier
 class KeysDialog(QDialog):
     """A list of what keys and mouse do; Return or a double click waits for another key."""
 
-    def __init__(
-        self, model: KeyListModel, bindings: KeyBindings, parent: QWidget | None = None
-    ) -> None:
+    def __init__(self, model: KeyListModel, bindings: KeyBindings, parent: QWidget) -> None:
         super().__init__(parent)
         self.setWindowTitle("Keys")
         self._model = model
@@ -188,7 +186,7 @@ class KeyCapture(QLineEdit):
     captured = Signal(str)  # the key that was pressed, as Qt writes it
     given_up = Signal()  # Escape
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
         self.setReadOnly(True)
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.NoContextMenu)
