@@ -16,7 +16,7 @@ from sd2app.settings import Settings
 from sd2app.shell.menus import in_order
 from sd2app.shell.parts import Parts
 from sd2app.shell.window import MainWindow
-from sd2app.shell.wiring import Features, build_features
+from sd2app.shell.wiring import Features
 
 
 def models_of(window: MainWindow) -> SimpleNamespace:
@@ -27,7 +27,7 @@ def models_of(window: MainWindow) -> SimpleNamespace:
 def build_models(parent: QObject, settings: Settings, parts: Parts | None = None) -> Any:
     """Models without a window."""
     session, shell = build_session(parent, settings), NoShell()
-    features = build_features(session, shell, parts or Parts(), parent)
+    features = Features(session, shell, parts or Parts(), parent)
     return _named(session, features, shell=shell)
 
 
@@ -35,7 +35,7 @@ def all_actions() -> tuple[Action, ...]:
     """Actions of all features in the order of the menus; they belong to nothing that is open."""
     parent = QObject()
     session = build_session(parent, Settings.forgetful())
-    features = build_features(session, NoShell(), Parts(), parent)
+    features = Features(session, NoShell(), Parts(), parent)
     return in_order(action for feature in features for action in feature.actions())
 
 

@@ -96,11 +96,15 @@ class Feature:
     """Signals after which an action may be possible that was not, or the reverse."""
     closing: Sequence[Any] = ()
     """Models with a method ``close``, closed with the window in this order."""
+    working: Sequence[Any] = ()
+    """Models with a property ``busy``, which a picture of the window should wait for."""
+    running: Sequence[Any] = ()
+    """Models of runs in the background, which an earlier window may have begun."""
 
     @property
     def busy(self) -> bool:
         """True while something is being computed that a picture of the window should wait for."""
-        return False
+        return any(model.busy for model in self.working)
 
     def actions(self) -> Sequence[Action]:
         """Rows of the menus."""
@@ -130,6 +134,8 @@ class Feature:
 
     def look_for_unfinished(self) -> None:
         """Find runs in the background that an earlier window began."""
+        for model in self.running:
+            model.look_for_runs()
 
     def may_close(self) -> bool:
         """Ask the user what becomes of running work; False if the window is to stay."""

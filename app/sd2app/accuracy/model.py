@@ -153,10 +153,6 @@ class AccuracyModel(QObject):
         self.plan_changed.emit()
         self.changed.emit()
 
-    def rest_at(self, sensor: VirtualSensor) -> None:
-        """Take over the position of the resting sensor."""
-        self.measured.rest_at(sensor)
-
     def choose(self, sensor: VirtualSensor, budget_ms: float) -> None:
         """Choose for the sensor at rest, and for a drag from there at ``budget_ms`` per frame."""
         wish = self._wish(sensor, budget_ms)

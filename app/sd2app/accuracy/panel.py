@@ -71,7 +71,7 @@ class AccuracyPanel(QWidget):
     def _plot_part(self, display: DisplayModel, measure: QAction) -> QWidget:
         measured = self._accuracy.measured
         self._empty, self._source = sentence(""), sentence("")
-        self._plot = AccuracyPlot(self._accuracy, display, self)
+        self._plot = AccuracyPlot(self._accuracy, display)
         self._family = Choice(
             "Plans of which signal model", self, _FAMILY_TEXT, measured.set_family
         )
@@ -136,14 +136,11 @@ class AccuracyPanel(QWidget):
         self._source.setVisible(measurement is not None)
         if measurement is not None:
             here = f"{len(measurement.frames)} frames, {measurement.machine}"
+            text, role = f"Measured on {here}", "muted"
             if measurement.stale:
-                say(
-                    self._source,
-                    f"Measured for another placement, options or machine: {here}",
-                    "warning",
-                )
-            else:
-                say(self._source, f"Measured on {here}", "muted")
+                text = f"Measured for another placement, options or machine: {here}"
+                role = "warning"
+            say(self._source, text, role)
         self._measure.setVisible(job is None)
         self._measure.setEnabled(measured.can_measure)
         self._bar.setVisible(job is not None)

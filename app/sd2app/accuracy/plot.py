@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, ClassVar
 
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPen
-from PySide6.QtWidgets import QWidget
 
 from sd2app.accuracy.measurements import front_at_rest, serves_at_rest
 from sd2app.accuracy.model import AccuracyModel
@@ -39,9 +38,8 @@ class AccuracyPlot(ChartView):
     STEPS: ClassVar = {**ChartView.STEPS, **_UP_AND_DOWN}
     KEYS = ChartView.KEYS | _USE
 
-    def __init__(self, accuracy: AccuracyModel, display: DisplayModel, parent: QWidget) -> None:
-        name = "Error against cost of every plan"
-        super().__init__(display, name, accuracy_chart(accuracy), parent)
+    def __init__(self, accuracy: AccuracyModel, display: DisplayModel) -> None:
+        super().__init__(display, "Error against cost of every plan", accuracy_chart(accuracy))
         self._accuracy = accuracy
         accuracy.changed.connect(self._refresh)
         accuracy.plan_changed.connect(self._refresh)

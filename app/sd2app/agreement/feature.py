@@ -39,7 +39,7 @@ class AgreementFeature(Feature):
             Action(
                 "compare_labels", "Labels", "Compare with another's labels…", ("Ctrl+K",),
                 "Show how far another person's labels agree with these, and where they do not",
-                self._compare, lambda: self._session.has_content,
+                self._compare, self._session.has_content,
             ),
             Action(
                 "next_disagreement", "Labels", "Next disagreement", ("Shift+N",),
@@ -60,8 +60,7 @@ class AgreementFeature(Feature):
 
     def _compare(self) -> None:
         parent = self._shell.dialog_parent
-        path = ask_file(parent, "Compare with another's labels", LABEL_FILES)
-        if path is not None:
+        if path := ask_file(parent, "Compare with another's labels", LABEL_FILES):
             self.model.open(path)
             self._shell.bring_up("Agree")
 

@@ -28,9 +28,7 @@ class AgreementModel(QObject):
     changed = Signal()
     failed = Signal(str)  # reason why a file could not be read
 
-    def __init__(
-        self, session: Session, labels: LabelsModel, parent: QObject | None = None
-    ) -> None:
+    def __init__(self, session: Session, labels: LabelsModel, parent: QObject) -> None:
         super().__init__(parent)
         self._labels, self._playback, self._span = labels, session.playback, session.span
         self.other = LabelsModel(self)
@@ -65,10 +63,8 @@ class AgreementModel(QObject):
     def current(self) -> int | None:
         """Index of the disagreement at the cursor, or None."""
         now_s = self._playback.timebase.time_of(self._playback.frame)
-        for number, one in enumerate(self.disagreements):
-            if one.start_s <= now_s < one.end_s:
-                return number
-        return None
+        places = enumerate(self.disagreements)
+        return next((k for k, one in places if one.start_s <= now_s < one.end_s), None)
 
     # --- asking ---------------------------------------------------------------------------
 

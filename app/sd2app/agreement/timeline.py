@@ -9,8 +9,8 @@ from PySide6.QtWidgets import QSizePolicy
 from sd2app.agreement.model import AgreementModel
 from sd2app.labels.painting import LabelRows, paint_tracks
 from sd2app.session.session import Session
+from sd2app.widgets.canvas import TimePlot, clipped
 from sd2app.widgets.time_axis import GUTTER_PX, paint_cursor
-from sd2app.widgets.time_plot import TimePlot
 
 _MARKS_PX = 7.0
 
@@ -51,14 +51,12 @@ class OtherTimeline(TimePlot):
         """Paint marks, names, spans and the cursor."""
         palette, scale, whole = self._session.display.palette, self.scale, self.plot_rect()
         painter.fillRect(self.rect(), QColor(palette.panel))
-        painter.save()
-        painter.setClipRect(whole)
-        for one in self._model.disagreements:
-            if one.end_s > scale.start_s and one.start_s < scale.end_s:
-                left, right = scale.x_of(one.start_s), scale.x_of(one.end_s)
-                mark = QRectF(left, 2.0, max(right - left, 2.0), _MARKS_PX - 3.0)
-                painter.fillRect(mark, QColor(palette.warning))
-        painter.restore()
+        with clipped(painter, whole):
+            for one in self._model.disagreements:
+                if one.end_s > scale.start_s and one.start_s < scale.end_s:
+                    left, right = scale.x_of(one.start_s), scale.x_of(one.end_s)
+                    mark = QRectF(left, 2.0, max(right - left, 2.0), _MARKS_PX - 3.0)
+                    painter.fillRect(mark, QColor(palette.warning))
         painter.translate(0.0, _MARKS_PX)
         plot = QRectF(GUTTER_PX, 0, whole.width(), self._rows.height_px)
         other, rows = self._model.other, self._rows.tracks

@@ -153,11 +153,6 @@ class RunMonitor(QObject, Generic[F]):
         return None
 
     @property
-    def share(self) -> float | None:
-        """Share of the whole that is done; None while that is not known."""
-        return self.history.share
-
-    @property
     def error(self) -> str:
         """Reason of a failure as the run reported it; empty without one."""
         return self.history.error
@@ -216,10 +211,6 @@ class RunMonitor(QObject, Generic[F]):
     def stop(self) -> None:
         """End it now and keep what there is."""
         self.tell("stop")
-
-    def cancel(self) -> None:
-        """End it now and delete what it made."""
-        self.tell("cancel")
 
     def delete(self) -> None:
         """Delete what it made; only after its end."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
 from PySide6.QtCore import QObject, Signal
 
@@ -34,6 +34,9 @@ class RunSetup(QObject, Generic[D]):
     The paths of the data are kept in the settings under ``stored``.
     """
 
+    kind: ClassVar[type[Any]]
+    """Class of the data, made of its path alone until it has been looked into."""
+
     changed = Signal()
 
     def __init__(
@@ -47,15 +50,10 @@ class RunSetup(QObject, Generic[D]):
         super().__init__(parent)
         self._settings, self._values, self._stored = settings, values, stored
         self.data = tuple(data)  # to work on
-        self._runner = LatestRunner("data of a run", self)
-        self._runner.finished.connect(self._take)
+        self._runner = LatestRunner("data of a run", self, self._take)
         self.refresh()
 
     # --- what subclasses say ----------------------------------------------------------------
-
-    def unread(self, path: Path) -> D:
-        """Data that has not been looked into."""
-        raise NotImplementedError
 
     def look_into(self, source: D) -> D:
         """Read the content of data from disk, in the background."""
@@ -81,7 +79,7 @@ class RunSetup(QObject, Generic[D]):
         known = {one.path for one in self.data}
         new = [path for path in dict.fromkeys(meant) if path not in known]
         if new:
-            self.keep((*self.data, *map(self.unread, new)))
+            self.keep((*self.data, *map(self.kind, new)))
 
     def remove(self, *paths: Path) -> None:
         """Remove data."""
@@ -108,8 +106,3 @@ class RunSetup(QObject, Generic[D]):
     def _take(self, data: tuple[D, ...]) -> None:
         self.data = data
         self.changed.emit()
-
-
-def _meant(path: Path) -> Path:
-    path = plain_path(path)
-    return path.parent if path.name in ("zarr.json", "recording.json") else path

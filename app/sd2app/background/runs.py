@@ -100,7 +100,7 @@ class Runs(QObject, Generic[Run]):
             return ""
         if self.run.phase == "paused":
             return "paused"
-        share = self.run.share
+        share = self.run.history.share
         return "…" if share is None else f"{100 * share:.0f} %"
 
     def follow_setup(self, setup: RunSetup[Any]) -> None:

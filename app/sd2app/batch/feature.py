@@ -28,6 +28,7 @@ class BatchFeature(Feature):
         parent: QObject,
     ) -> None:
         self.model = BatchModel(session.settings, parent, command or COMMAND)
+        self.running = (self.model,)
         self.model.failed.connect(shell.warn)
         self.model.noted.connect(shell.note)
         self._shell = shell
@@ -66,10 +67,6 @@ class BatchFeature(Feature):
                 self.show,
             ),
         )  # fmt: skip
-
-    def look_for_unfinished(self) -> None:
-        """Find a batch that outlived its window."""
-        self.model.look_for_runs()
 
     def close(self) -> None:
         """Close the window of the batch, which goes on."""

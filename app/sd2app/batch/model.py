@@ -47,9 +47,8 @@ class BatchModel(Runs[BatchMonitor]):
         self.estimate: BatchEstimate | None = None
         self._asked: tuple[BatchPlan, int] | None = None
         self._refusal = ""
-        self._estimating = LatestRunner("estimate", self)
-        self._estimating.finished.connect(self._take_estimate)
-        self._estimating.failed.connect(self._refuse_estimate)
+        take, refuse = self._take_estimate, self._refuse_estimate
+        self._estimating = LatestRunner("estimate", self, take, refuse)
         self.follow_setup(self.setup)
         self.results.changed.connect(self.changed)
 

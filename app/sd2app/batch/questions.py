@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from pathlib import Path
+from typing import TypeVar
 
 from PySide6.QtCore import QObject, QUrl, Signal
 from PySide6.QtGui import QDesktopServices
@@ -24,6 +25,7 @@ from sd2core.io.kinds import VIDEO_SUFFIXES
 from sd2core.placements.placements import Placements, read_placements
 from sd2core.recording.recording import is_recording, open_recording
 
+T = TypeVar("T")
 _FILES = (
     "Recordings, videos, meshes (*.mp4 *.mkv *.mov *.avi *.webm *.npz *.zip *.obj *.ply *.glb"
     " *.pkl recording.json zarr.json);;All files (*)"
@@ -77,8 +79,7 @@ class BatchQuestions(QObject):
 
     def add_folder(self) -> None:
         """Let the user choose a folder of recordings, videos or meshes."""
-        path = ask_folder(self._over, "A recording, or a folder of some")
-        if path is not None:
+        if path := ask_folder(self._over, "A recording, or a folder of some"):
             self._batch.setup.add(path)
 
     def placement_choices(self) -> Sequence[str]:
@@ -114,12 +115,10 @@ class BatchQuestions(QObject):
         self._batch.changed.emit()  # the choice goes back where nothing was chosen
 
     def _ask_placements(self) -> None:
-        path = ask_file(self._over, "Placements", _PLACEMENTS)
-        if path is not None:
-            found: list[Placements] = []
-            self._attempt(lambda: found.append(read_placements(path)))
-            if found:
-                self._batch.setup.set_placements(found[0], path.name)
+        if path := ask_file(self._over, "Placements", _PLACEMENTS):
+            placements = self._attempt(lambda: read_placements(path))
+            if placements is not None:
+                self._batch.setup.set_placements(placements, path.name)
 
     def _follow_plan(self) -> None:
         """Follow the plan of the open recording, if that was chosen."""
@@ -134,15 +133,13 @@ class BatchQuestions(QObject):
     def choose_out(self) -> None:
         """Let the user choose the folder of the results."""
         start = str(self._batch.setup.out or "")
-        folder = ask_new(self._over, "Folder of the results", start)
-        if folder is not None:
+        if folder := ask_new(self._over, "Folder of the results", start):
             self._batch.setup.set_out(folder)
 
     def save_plan(self) -> None:
         """Let the user choose a file for the plan."""
         kinds = "Plan of a batch (*.toml)"
-        path = ask_new(self._over, "Save plan", "plan.toml", kinds, ".toml")
-        if path is not None:
+        if path := ask_new(self._over, "Save plan", "plan.toml", kinds, ".toml"):
             self._attempt(lambda: write_plan(path, self._batch.setup.plan()))
 
     def start(self) -> None:
@@ -153,8 +150,7 @@ class BatchQuestions(QObject):
 
     def open_batch(self) -> None:
         """Let the user choose a batch in another folder, such as one started in a terminal."""
-        path = ask_folder(self._over, "Folder of a batch")
-        if path is not None:
+        if path := ask_folder(self._over, "Folder of a batch"):
             self._attempt(lambda: self._batch.open_batch(path))
 
     def resume(self) -> None:
@@ -169,11 +165,10 @@ class BatchQuestions(QObject):
     def open_result(self, row: int) -> None:
         """Open a recording in the window, with the sensor where a result says."""
         result = self._batch.results.rows[row]
-        found: list[list[Path]] = []
-        self._attempt(lambda: found.append(paths_of(result)))
-        if found and self._shell.may_discard():
-            self._shell.open_paths(found[0])
-            self._opening = (result, set(map(plain_path, found[0])))
+        paths = self._attempt(lambda: paths_of(result))
+        if paths is not None and self._shell.may_discard():
+            self._shell.open_paths(paths)
+            self._opening = (result, set(map(plain_path, paths)))
 
     def _place_sensor(self) -> None:
         recording, opening = self._session.document.recording, self._opening
@@ -193,12 +188,14 @@ class BatchQuestions(QObject):
         """Parent of the file choosers."""
         return QApplication.activeWindow() or self._shell.dialog_parent
 
-    def _attempt(self, work: Callable[[], object]) -> None:
+    def _attempt(self, work: Callable[[], T]) -> T | None:
+        """Result of ``work``; an error is said, and None returned."""
         self.said.emit("")
         try:
-            work()
+            return work()
         except (Sd2Error, OSError) as error:
             self.said.emit(str(error))
+            return None
 
 
 def paths_of(result: Result) -> list[Path]:

@@ -21,7 +21,7 @@ from sd2app.batch.questions import BatchQuestions
 from sd2app.batch.text import failure_text, headline, step_facts, time_text
 from sd2app.widgets.layouts import STRETCH, column_of, pane, row_of
 from sd2app.widgets.pages import InnerPage, InnerPages
-from sd2app.widgets.panel import ElidedLabel, outlined, sentence, show_words, side_by_side
+from sd2app.widgets.panel import ElidedLabel, outlined, sentence, show_words, side_by_side, title
 from sd2app.widgets.progress_bar import ProgressBar
 from sd2app.widgets.table import RecordTable
 
@@ -38,10 +38,7 @@ class BatchRunView(QWidget):
         self._batch, self._asks = batch, asks
         self._shown_card: str | None = None
         self._name = ElidedLabel(self)
-        self._headline = QLabel(self)
-        self._headline.setObjectName("title")
-        self._headline.setWordWrap(True)
-        self._headline.setAccessibleName("How the batch stands")
+        self._headline = title("", "How the batch stands")
         self._time = sentence("")
         self._reason = sentence("", "warning")
         parts = (self._name, self._headline, self._time, self._reason)
@@ -99,8 +96,7 @@ class BatchRunView(QWidget):
                 InnerPage("Data set", "What was exported to learn from", self._card),
                 InnerPage(_FAILURES, "Tasks that could not be done, and why", self._failures),
                 InnerPage("Log", "What happened, as it happened", self._log),
-            ),
-            parent=self,
+            )
         )
         return self._inner
 

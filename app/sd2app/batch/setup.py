@@ -19,7 +19,6 @@ from sd2core.numerics.compiled import worker_count
 from sd2core.placements.placements import Placements
 
 OptionalStep = Literal["fit", "denoise", "export"]
-OPTIONAL_STEPS: tuple[OptionalStep, ...] = get_args(OptionalStep)
 Accuracy = Literal["exact", "tolerance"]
 ACCURACIES: tuple[Accuracy, ...] = get_args(Accuracy)
 FORMATS: tuple[Literal["zarr", "h5", "npz"], ...] = ("zarr", "h5", "npz")
@@ -52,6 +51,8 @@ class Entry:
 class BatchSetupModel(RunSetup[Entry]):
     """Choices of a batch; all but the placements are kept from one start to the next."""
 
+    kind = Entry
+
     def __init__(self, settings: Settings, parent: QObject | None = None) -> None:
         known = {"accuracy": ACCURACIES, "format": FORMATS, "subjects": SUBJECTS}
         values = StoredChoices(settings, "batch", _DEFAULTS, known)
@@ -61,10 +62,6 @@ class BatchSetupModel(RunSetup[Entry]):
         self.placements: Placements | None = None  # None: each recording's own
         self.placed = ""  # where the placements are from, in words
         super().__init__(settings, values, _RECORDINGS, entries, parent)
-
-    def unread(self, path: Path) -> Entry:
-        """Recording, video, mesh or folder of some that has not been looked at."""
-        return Entry(path)
 
     def look_into(self, source: Entry) -> Entry:
         """Count what there is, once."""

@@ -60,9 +60,7 @@ class BatchSetupView(QWidget):
         self._batch, self._setup, self._asks = batch, batch.setup, asks
         self._list = _Paths(self._drop, self)
         self._list.itemSelectionChanged.connect(self._follow_selection)
-        self._total = title("")
-        self._total.setWordWrap(True)
-        self._total.setAccessibleName("What the batch would take")
+        self._total = title("", "What the batch would take")
         self._facts = FactRows(_MOST_FACTS, at_the_edge=False, parent=self)
         self._problem = sentence("")
         estimate = (rule(), self._total, self._facts, self._problem, STRETCH)

@@ -32,8 +32,7 @@ class ClassifyDialogs:
     def open_classifier(self) -> None:
         """Choose a file, and use it."""
         start = str(self._classify.path or "")
-        path = ask_file(self._parent, "Open classifier file", _FILES, start)
-        if path is not None:
+        if path := ask_file(self._parent, "Open classifier file", _FILES, start):
             self.use(path)
 
     def use(self, path: Path | None) -> None:
@@ -60,14 +59,12 @@ class ClassifyDialogs:
     def add_folder(self) -> None:
         """Let the user choose a folder with labelled data."""
         title = "A campaign, a data set, a recording, or a folder of recordings"
-        path = ask_folder(self._parent, title)
-        if path is not None:
+        if path := ask_folder(self._parent, title):
             self._training.setup.add(path)
 
     def add_file(self) -> None:
         """Let the user choose a data set or a labelled radar file."""
-        path = ask_file(self._parent, "Data set or labelled radar file", _DATA)
-        if path is not None:
+        if path := ask_file(self._parent, "Data set or labelled radar file", _DATA):
             self._training.setup.add(path)
 
     def add_this(self) -> None:
@@ -89,8 +86,7 @@ class ClassifyDialogs:
 
     def open_result(self) -> None:
         """Let the user choose a result, and show it."""
-        path = ask_file(self._parent, "Open a result", _RESULTS)
-        if path is not None:
+        if path := ask_file(self._parent, "Open a result", _RESULTS):
             self._show(path)
 
     def _show(self, path: Path) -> None:

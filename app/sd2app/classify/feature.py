@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 
 from PySide6.QtCore import QObject
@@ -60,14 +61,9 @@ class ClassifyFeature(Feature):
         self.model.failed.connect(shell.warn)
         self.training.failed.connect(shell.warn)
         self.training.noted.connect(shell.note)
-        self._menu: ModelMenu | None = None
         self.changing = (self.model.changed,)
         self.closing = (self.training, self.model)  # runs go on
-
-    @property
-    def busy(self) -> bool:
-        """True while a map is being classified."""
-        return self.model.busy
+        self.working, self.running = (self.model,), (self.training,)
 
     def actions(self) -> Sequence[Action]:
         """Classifier, its probabilities, gestures as suggestions, training."""
@@ -110,18 +106,16 @@ class ClassifyFeature(Feature):
 
     def menus(self) -> Mapping[str, Callable[[QMenu], object]]:
         """The classifiers to choose from."""
-        return {"classifiers": lambda menu: menu.addMenu(self._classifiers())}
+        return {"classifiers": lambda menu: menu.addMenu(self._classifiers)}
 
+    @cached_property
     def _classifiers(self) -> ModelMenu:
-        if self._menu is None:
-            below = [self._shell.action(name) for name in ("open_classifier", "classifier_card")]
-            parent = self._shell.dialog_parent
-            self._menu = ModelMenu(self.model, _WORDS, self.dialogs.use, below, parent)
-        return self._menu
+        below = [self._shell.action(name) for name in ("open_classifier", "classifier_card")]
+        return ModelMenu(self.model, _WORDS, self.dialogs.use, below, self._shell.dialog_parent)
 
     def panels(self) -> Mapping[str, QWidget]:
         """Probabilities below the maps."""
-        button = ModelButton(self._classifiers())
+        button = ModelButton(self._classifiers)
         return {"classes": ClassStrip(self._session, self.model, self._labels, button)}
 
     def panel(self) -> QWidget:
@@ -131,7 +125,3 @@ class ClassifyFeature(Feature):
     def take_dropped(self, path: Path) -> bool:
         """Use a classifier that was dropped."""
         return path.suffix == ".safetensors" and self.dialogs.take_dropped(path)
-
-    def look_for_unfinished(self) -> None:
-        """Find runs under way and ended."""
-        self.training.look_for_runs()

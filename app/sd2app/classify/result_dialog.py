@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
 
 from sd2app.classify.result import ClassResult, Matrix
 from sd2app.session.display import DisplayModel
-from sd2app.widgets.canvas import Canvas
+from sd2app.widgets.canvas import AT_RIGHT, Canvas
 from sd2app.widgets.chart import Chart, ChartView, Curve, Mark, Scale
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
@@ -91,11 +91,8 @@ class ConfusionView(Canvas):
         for number, name in enumerate(self._classes):
             painter.setPen(QColor(palette.muted))
             painter.drawText(QRectF(left + number * width, line, width, line), centre, name)
-            painter.drawText(
-                QRectF(0, top + number * height, left - _GAP_PX, height),
-                Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter,
-                name,
-            )
+            room = QRectF(0, top + number * height, left - _GAP_PX, height)
+            painter.drawText(room, AT_RIGHT, name)
             for column in range(len(self._classes)):
                 box = QRectF(left + column * width, top + number * height, width, height)
                 self._paint_cell(painter, box, number, column)

@@ -91,6 +91,8 @@ class DataSource:
 class ClassSetup(RunSetup[DataSource]):
     """Labelled data and settings for a classifier."""
 
+    kind = DataSource
+
     def __init__(self, settings: Settings, parent: QObject) -> None:
         values = StoredChoices(settings, "classify/train", _DEFAULTS, _CHOICES)
         if not 0 <= values["delay_s"] <= LONGEST_DELAY_S:
@@ -99,13 +101,16 @@ class ClassSetup(RunSetup[DataSource]):
         data = [DataSource(path, people.get(str(path), "")) for path in settings.paths(_DATA)]
         super().__init__(settings, values, _DATA, data, parent)
 
-    def unread(self, path: Path) -> DataSource:
-        """A source of data that has not been read."""
-        return DataSource(path)
-
     def look_into(self, source: DataSource) -> DataSource:
         """Read the content of a source of data."""
-        return looked_into(source.path, source.person)
+        path, person = source.path, source.person
+        try:
+            facts = tuple(map(labelled_facts, unfolded([LabelledSource(path, person)])))
+        except (Sd2Error, OSError) as error:
+            return DataSource(path, person, problem=str(error))
+        # A name that was given before is no reason to refuse those that state it themselves.
+        named = all(one.kind in ("pairs", "data set") for one in facts)
+        return DataSource(path, "" if named else person, facts)
 
     def keep(self, data: tuple[DataSource, ...]) -> None:
         """Learn from this data, and remember it with its people."""
@@ -206,18 +211,6 @@ def _people(text: str) -> dict[str, str]:
         return {str(path): str(name) for path, name in json.loads(text).items()}
     except (ValueError, AttributeError):
         return {}
-
-
-def looked_into(path: Path, person: str) -> DataSource:
-    """Read the content of a source of data; may wait for the disk."""
-    try:
-        sources = unfolded([LabelledSource(path, person)])
-        facts = tuple(labelled_facts(one) for one in sources)
-        of_itself = [one.path for one in facts if one.kind in ("pairs", "data set")]
-        # A name that was given before is no reason to refuse them.
-        return DataSource(path, "" if len(of_itself) == len(facts) else person, facts)
-    except (Sd2Error, OSError) as error:
-        return DataSource(path, person, problem=str(error))
 
 
 def division_of(data: Sequence[DataSource]) -> Split | None:

@@ -20,16 +20,16 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from sd2app.classify.model import ClassifyModel
 from sd2app.classify.text import ago_text, delay_text, reading_text
 from sd2app.classify.track import ClassReading
+from sd2app.labels.arrays import UNKNOWN_COLOUR
 from sd2app.labels.model import LabelsModel
 from sd2app.session.display import DisplayModel
 from sd2app.session.session import Session
-from sd2app.widgets.canvas import Canvas
+from sd2app.widgets.canvas import AT_RIGHT, Canvas, TimePlot, clipped, image_of
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.layouts import column_of, row_of
 from sd2app.widgets.model_menu import ModelButton
 from sd2app.widgets.panel import ElidedLabel, title
 from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, paint_cursor, turn_wheel
-from sd2app.widgets.time_plot import TimePlot
 from sd2core.labels.label_set import LabelSet
 
 _PLOT_PX = 30
@@ -37,14 +37,13 @@ _BAR_PX = (28, 8)
 _GAP_PX = 10
 _FAINT = 90
 """Opacity of probabilities that are not of the current map."""
-_UNKNOWN_CLASS = "#8a8f98"
 
 
 def class_colour(name: str, offered: LabelSet) -> str:
     """Colour of a class: that of the first label that it stands for."""
     labels = offered.of_class(name)
     known = offered.find(name) or (labels[0] if labels else None)
-    return _UNKNOWN_CLASS if known is None else known.colour
+    return UNKNOWN_COLOUR if known is None else known.colour
 
 
 class ClassStrip(QWidget):
@@ -155,11 +154,7 @@ class ClassReadout(Canvas):
         font.setBold(reading.current)
         painter.setFont(font)
         painter.setPen(QColor(palette.text if reading.current else palette.muted))
-        painter.drawText(
-            self.rect(),
-            Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignRight,
-            reading_text(reading) if reading.current else "…",
-        )
+        painter.drawText(self.rect(), AT_RIGHT, reading_text(reading) if reading.current else "…")
 
     def _paint_bars(self, painter: QPainter, reading: ClassReading) -> None:
         palette, offered = self._display.palette, self._labels.labels.label_set
@@ -228,14 +223,12 @@ class ClassPlot(TimePlot):
         done = track.done if track.current else np.zeros_like(track.done)
         image = stacked_image(track.shares, done, frames, colours, round(plot.height() * ratio))
         painter.drawImage(plot, image)
-        painter.save()
-        painter.setClipRect(plot)
-        for start_s, end_s in source.gaps_s:
-            left, end = self.scale.x_of(start_s), self.scale.x_of(end_s)
-            box = QRectF(left, plot.top(), max(end - left, 1.0), plot.height())
-            painter.fillRect(box, QColor(palette.well))
-            painter.fillRect(box, QBrush(QColor(palette.hatch), Qt.BrushStyle.FDiagPattern))
-        painter.restore()
+        with clipped(painter, plot):
+            for start_s, end_s in source.gaps_s:
+                left, end = self.scale.x_of(start_s), self.scale.x_of(end_s)
+                box = QRectF(left, plot.top(), max(end - left, 1.0), plot.height())
+                painter.fillRect(box, QColor(palette.well))
+                painter.fillRect(box, QBrush(QColor(palette.hatch), Qt.BrushStyle.FDiagPattern))
 
     def _frames(self, columns: int) -> NDArray[np.int64]:
         """Frame of the map in every column; −1 where there is none."""
@@ -252,14 +245,11 @@ class ClassPlot(TimePlot):
     # --- the hand -------------------------------------------------------------------------
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        """Go to a time."""
-        if event.button() == Qt.MouseButton.LeftButton:
-            self._playback.seek(self.scale.time_of(event.position().x()))
-
-    def mouseMoveEvent(self, event: QMouseEvent) -> None:
         """Seek while the button is down."""
         if event.buttons() & Qt.MouseButton.LeftButton:
             self._playback.seek(self.scale.time_of(event.position().x()))
+
+    mouseMoveEvent = mousePressEvent
 
     def wheelEvent(self, event: QWheelEvent) -> None:
         """Zoom about the pointer, or pan with Shift or a sideways wheel."""
@@ -289,6 +279,4 @@ def stacked_image(
     rgb = np.array(colours, np.uint32) & np.uint32(0xFFFFFF)
     alpha = np.where(done[np.where(known, frames, 0)], 255, _FAINT).astype(np.uint32)
     pixels = rgb[np.minimum(index, len(colours) - 1)] | (alpha << np.uint32(24))[None]
-    pixels = np.ascontiguousarray(np.where(known[None], pixels, 0).astype(np.uint32))
-    image = QImage(pixels.data, len(frames), height, 4 * len(frames), QImage.Format.Format_ARGB32)
-    return image.copy()
+    return image_of(np.where(known[None], pixels, 0).astype(np.uint32))

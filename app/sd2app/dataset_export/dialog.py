@@ -116,7 +116,7 @@ class ExportDialog(QDialog):
         self._foot = row_of(self._open, STRETCH, *buttons, spacing_px=8)
 
     def _frames(self, tip: str, low: int) -> NumberBox:
-        return NumberBox(low, 10_000, " frames", tip, decimals=0, step=1.0, parent=self)
+        return NumberBox(low, 10_000, " frames", tip, decimals=0, step=1.0)
 
     # --- following the model --------------------------------------------------------------
 
@@ -227,8 +227,7 @@ class ExportDialog(QDialog):
         self._model.choose(subjects=names)
 
     def _ask_place(self) -> None:
-        path = ask_folder(self, "A recording, or a folder of recordings")
-        if path is not None:
+        if path := ask_folder(self, "A recording, or a folder of recordings"):
             self._model.begin(path)
 
     def _ask_out(self) -> None:

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from PySide6.QtCore import QObject, Qt
-from PySide6.QtWidgets import QMessageBox
 
 from sd2app.dataset_export.dialog import ExportDialog
 from sd2app.dataset_export.model import ExportModel
 from sd2app.feature import Action, Feature, Shell
 from sd2app.session.session import Session
+from sd2app.widgets.dialogs import Answer, confirmed
 
 
 class DatasetExportFeature(Feature):
@@ -21,7 +21,7 @@ class DatasetExportFeature(Feature):
         self.model = ExportModel(session.jobs, parent)
         self.model.failed.connect(shell.warn)
         self.model.noted.connect(shell.note)
-        self.closing = (self.model,)  # an export goes on
+        self.closing = self.running = (self.model,)  # an export goes on
 
     def actions(self) -> Sequence[Action]:
         """The dialog."""
@@ -39,7 +39,10 @@ class DatasetExportFeature(Feature):
         document = self._session.document
         recording = document.recording
         if recording is not None and (document.modified or not recording.folder.exists()):
-            if not self._may_save("A data set is made of what is saved."):
+            changed = f"{document.title} has changes that are not saved."
+            words = f"{changed} A data set is made of what is saved."
+            window = self._shell.dialog_parent
+            if not confirmed(window, "Save changes?", words, Answer.Save) or not self._shell.save():
                 return
             recording = document.recording
         opened = None if recording is None else recording.folder
@@ -48,19 +51,3 @@ class DatasetExportFeature(Feature):
         dialog = ExportDialog(self.model, opened, self._shell.dialog_parent)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.open()
-
-    def _may_save(self, why: str) -> bool:
-        buttons = QMessageBox.StandardButton
-        words = f"{self._session.document.title} has changes that are not saved. {why}"
-        answer = QMessageBox.question(
-            self._shell.dialog_parent,
-            "Save changes?",
-            words,
-            buttons.Save | buttons.Cancel,
-            buttons.Save,
-        )
-        return answer == buttons.Save and self._shell.save()
-
-    def look_for_unfinished(self) -> None:
-        """Find an export that outlived its window."""
-        self.model.look_for_runs()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -76,15 +76,7 @@ class ExportChoice:
 
     def to_json(self) -> dict[str, Any]:
         """Choices by name."""
-        return {
-            "place": str(self.place),
-            "maps": sorted(self.maps),
-            "planned": self.planned,
-            "subjects": list(self.subjects),
-            "length": self.length,
-            "overlap": self.overlap,
-            "ending": self.ending,
-        }
+        return asdict(self) | {"place": str(self.place), "maps": sorted(self.maps)}
 
     @classmethod
     def from_json(cls, content: Mapping[str, Any]) -> ExportChoice:

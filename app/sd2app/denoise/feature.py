@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 
 from PySide6.QtCore import QObject
@@ -47,14 +48,8 @@ class DenoiseFeature(Feature):
         self.model.failed.connect(shell.warn)
         self.model.noted.connect(shell.note)
         self.live = LiveDenoiseModel(session, self.model, parent)
-        self._menu: ModelMenu | None = None
         self.changing = (self.model.changed, self.live.changed)
-        self.closing = (self.live, self.model)
-
-    @property
-    def busy(self) -> bool:
-        """True while a map is being denoised."""
-        return self.model.busy
+        self.closing, self.working = (self.live, self.model), (self.model,)
 
     def actions(self) -> Sequence[Action]:
         """Models and what is done with them."""
@@ -68,7 +63,7 @@ class DenoiseFeature(Feature):
             Action(
                 "open_model", "Model", "Open model file…", (),
                 "Denoise this recording with a model of your own (.safetensors)",
-                self._open, lambda: self._session.has_content,
+                self._open, self._session.has_content,
             ),
             Action(
                 "model_card", "Model", "About this model…", (),
@@ -94,18 +89,16 @@ class DenoiseFeature(Feature):
 
     def menus(self) -> Mapping[str, Callable[[QMenu], object]]:
         """The models to choose from."""
-        return {"denoisers": lambda menu: menu.addMenu(self._models())}
+        return {"denoisers": lambda menu: menu.addMenu(self._models)}
 
+    @cached_property
     def _models(self) -> ModelMenu:
-        if self._menu is None:
-            below = [self._shell.action(name) for name in ("open_model", "model_card")]
-            parent = self._shell.dialog_parent
-            self._menu = ModelMenu(self.model, _WORDS, self.use, below, parent)
-        return self._menu
+        below = [self._shell.action(name) for name in ("open_model", "model_card")]
+        return ModelMenu(self.model, _WORDS, self.use, below, self._shell.dialog_parent)
 
     def put_buttons(self, stack: MapStack) -> None:
         """Offer the models on the maps too."""
-        stack.set_denoiser_buttons(ModelButton(self._models()), ModelButton(self._models()))
+        stack.set_denoiser_buttons(ModelButton(self._models), ModelButton(self._models))
 
     def use(self, path: Path | None) -> None:
         """Denoise with a model file, or with none."""
@@ -120,8 +113,7 @@ class DenoiseFeature(Feature):
 
     def _open(self) -> None:
         start = str(self.model.path or "")
-        path = ask_file(self._shell.dialog_parent, "Open model file", _MODELS, start)
-        if path is not None:
+        if path := ask_file(self._shell.dialog_parent, "Open model file", _MODELS, start):
             self.use(path)
 
     def _show_card(self) -> None:
@@ -129,6 +121,5 @@ class DenoiseFeature(Feature):
             ModelCardDialog(denoiser_page(self.model.card), self._shell.dialog_parent).exec()
 
     def _export(self) -> None:
-        path = ask_map(self._shell.dialog_parent, "Export denoised map", "denoised.npz")
-        if path is not None:
+        if path := ask_map(self._shell.dialog_parent, "Export denoised map", "denoised.npz"):
             self._shell.attempt(lambda: self.model.export(path))

@@ -85,8 +85,7 @@ class DenoisedMap(QObject):
         self.denoiser: RemoteDenoiser | None = None  # the model in use
         self.words = ""
         self._held = False
-        self._runner = LatestRunner("denoise", self)
-        self._runner.finished.connect(self._receive)
+        self._runner = LatestRunner("denoise", self, self._receive)
         self._runner.failed.connect(lambda error: self._fail(str(error)))
         self._stumbled.connect(self._fail)
         self._again = delayed(self._go_on, _BETWEEN_MS, self)

@@ -90,15 +90,10 @@ class DenoiseModel(QObject):
         return self._comparing and self._before is not None
 
     @property
-    def loading(self) -> bool:
-        """True while a model is being loaded."""
-        return self._runner.busy
-
-    @property
     def busy(self) -> bool:
         """True while a model is being loaded or a map denoised."""
         waiting = self.path is not None and self._patience.isActive()
-        return waiting or self.loading or self.map.busy or self.before_map.busy
+        return waiting or self._runner.busy or self.map.busy or self.before_map.busy
 
     @property
     def can_export(self) -> bool:
@@ -114,10 +109,6 @@ class DenoiseModel(QObject):
     def installed(self) -> list[str]:
         """Names of the installed models."""
         return [card.name for card in self._library.available()]
-
-    def describe(self, path: Path) -> ModelCard:
-        """Card of a model file; raises where it is none."""
-        return self._library.describe(path)
 
     # --- requests -------------------------------------------------------------------------
 

@@ -19,11 +19,7 @@ class MapValidity(QObject):
     changed = Signal()
 
     def __init__(
-        self,
-        session: Session,
-        synthesis: SynthesisModel,
-        denoise: DenoiseModel,
-        parent: QObject | None = None,
+        self, session: Session, synthesis: SynthesisModel, denoise: DenoiseModel, parent: QObject
     ) -> None:
         super().__init__(parent)
         self._maps, self._synthesis, self._denoise = session.maps, synthesis, denoise

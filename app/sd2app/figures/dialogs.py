@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from sd2app.figures.model import DrawnFigure, MapFigure, StripModel
+from sd2app.figures.model import DrawnFigure
 from sd2app.palette import Palette
 from sd2app.widgets.canvas import Canvas
 from sd2app.widgets.dialogs import ExportButtons, ask_figure
@@ -58,6 +58,8 @@ class FigureDialog(QDialog):
     """Preview, choices and a button to export; ``name`` is proposed for the file."""
 
     TITLE: ClassVar[str]
+    USUAL_PX: ClassVar[tuple[int, int]]
+    """Width and height at first."""
 
     def __init__(self, model: Any, palette: Palette, name: str, parent: QWidget) -> None:
         super().__init__(parent)
@@ -69,6 +71,7 @@ class FigureDialog(QDialog):
         model.changed.connect(self._refresh)
         model.written.connect(lambda _: self.accept())
         self._refresh()
+        self.resize(*self.USUAL_PX)
 
     def _choices(self) -> QLayout:
         raise NotImplementedError
@@ -78,8 +81,7 @@ class FigureDialog(QDialog):
         self._buttons.show_state(possible=not model.problem, exporting=model.exporting)
 
     def _ask(self) -> None:
-        path = ask_figure(self, self.TITLE, self._name)
-        if path is not None:
+        if path := ask_figure(self, self.TITLE, self._name):
             self._model.export(path)
 
 
@@ -87,10 +89,7 @@ class MapFigureDialog(FigureDialog):
     """Choices of a :class:`MapFigure`."""
 
     TITLE = "Export figure of the maps"
-
-    def __init__(self, model: MapFigure, palette: Palette, name: str, parent: QWidget) -> None:
-        super().__init__(model, palette, name, parent)
-        self.resize(900, 720)
+    USUAL_PX = 900, 720
 
     def _choices(self) -> QLayout:
         model = self._model
@@ -124,10 +123,7 @@ class StripDialog(FigureDialog):
     """Choices of a :class:`StripModel`."""
 
     TITLE = "Export strip of frames"
-
-    def __init__(self, model: StripModel, palette: Palette, name: str, parent: QWidget) -> None:
-        super().__init__(model, palette, name, parent)
-        self.resize(1040, 640)
+    USUAL_PX = 1040, 640
 
     def _choices(self) -> QLayout:
         model = self._model

@@ -43,7 +43,7 @@ class FiguresFeature(Feature):
             Action(
                 "export_strip", "File", "Export strip of frames…", ("Ctrl+Shift+E",),
                 "Write frames side by side, the video above its mesh (.png, .svg, .pdf)",
-                self._export_strip, lambda: s.document.video is not None or s.has_mesh,
+                self._export_strip, lambda: s.document.video is not None or s.has_mesh(),
             ),
         )  # fmt: skip
 

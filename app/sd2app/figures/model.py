@@ -171,8 +171,10 @@ class MapFigure(DrawnFigure):
         self._pair: tuple[str, str] | None = None
         if difference.shown:
             self._pair = difference.denoised.title, difference.real.title
+        self.has_difference = difference.shown  # the difference to the radar is on screen
         self._levels = Levels(levels.scale, levels.low_db, levels.high_db, levels.colour_map)
         self._labels = labels
+        self.has_labels = bool(labels.spans)  # there are labels to draw
         self._view_s = s.span.start_s, s.span.end_s
         self._whole_s = clock.start_s, clock.end_s
         self._heading = f"{s.document.title}{' (simulated)' if s.document.simulated else ''}"
@@ -189,16 +191,6 @@ class MapFigure(DrawnFigure):
     def titles(self) -> tuple[str, ...]:
         """Maps that can be shown."""
         return tuple(self._rows)
-
-    @property
-    def has_labels(self) -> bool:
-        """True if there are labels."""
-        return bool(self._labels.spans)
-
-    @property
-    def has_difference(self) -> bool:
-        """True while the difference to the radar is on screen."""
-        return self._pair is not None
 
     def set_shown(self, title: str, shown: bool) -> None:
         """Show a map, or leave it out."""
@@ -258,8 +250,7 @@ class StripModel(DrawnFigure):
     @property
     def options(self) -> StripOptions:
         """Chosen layout."""
-        options: StripOptions = self.choice.options
-        return options
+        return self.choice.options
 
     @property
     def available(self) -> tuple[Row, ...]:

@@ -171,14 +171,12 @@ class NewFromVideoDialog(QDialog):
 
     def _ask_video(self) -> None:
         start = str(self._setup.video.parent) if self._setup.video is not None else ""
-        path = ask_file(self, "Video of a person", VIDEOS, start)
-        if path is not None:
+        if path := ask_file(self, "Video of a person", VIDEOS, start):
             self._setup.choose_video(path)
 
     def _ask_folder(self) -> None:
         start = str(self._setup.choices.folder)
-        folder = ask_new(self, "Save recording as", start, "Recording (*.sd2)")
-        if folder is not None:
+        if folder := ask_new(self, "Save recording as", start, "Recording (*.sd2)"):
             self._setup.change(folder=folder)
 
 

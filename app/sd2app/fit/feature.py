@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, SignalInstance
-from PySide6.QtWidgets import QDialog, QMessageBox, QWidget
+from PySide6.QtWidgets import QDialog, QWidget
 
 from sd2app.feature import Action, Feature, Shell
 from sd2app.fit.bar import FitBar
@@ -18,7 +18,7 @@ from sd2app.fit.on_screen import FitOnScreen
 from sd2app.fit.request import FitRequest
 from sd2app.fit.setup import FitSetupModel
 from sd2app.session.session import Session
-from sd2app.widgets.dialogs import ask_file
+from sd2app.widgets.dialogs import Answer, ask_file, confirmed
 from sd2core.runs.command_folder import COMMAND_IN_FOLDER
 
 
@@ -33,7 +33,7 @@ class FitFeature(Feature):
         self.on_screen = FitOnScreen(session, self.model, parent)
         self.on_screen.noted.connect(shell.note)
         self.changing = (self.model.state_changed,)
-        self.closing = (self.model,)  # a fit stops, and can be continued
+        self.closing = self.running = (self.model,)  # a fit stops, and can be continued
 
     @property
     def landmarks_changed(self) -> tuple[SignalInstance, ...]:
@@ -72,10 +72,6 @@ class FitFeature(Feature):
         """Follow the fit again: staying elsewhere was a wish about the recording before."""
         self.on_screen.set_following(True)
 
-    def look_for_unfinished(self) -> None:
-        """Find a fit that was stopped."""
-        self.model.look_for_unfinished()
-
     def new_from_video(self, video: Path | None = None) -> None:
         """Ask for the settings of a fit, begin it, and show its video.
 
@@ -111,7 +107,7 @@ class FitFeature(Feature):
         """Continue a stopped fit; where nothing else is open, its video is."""
         if self._shell.attempt(lambda: (self.model.resume(), True)) is None:
             return
-        if not self._session.has_content and self.model.busy and self.model.request:
+        if not self._session.has_content() and self.model.busy and self.model.request:
             self._session.document.open([self.model.request.video])
 
     def _open_result(self) -> None:
@@ -123,13 +119,8 @@ class FitFeature(Feature):
         request = self.model.request
         if not self.model.busy or request is None:
             return True
-        buttons = QMessageBox.StandardButton
-        answer = QMessageBox.question(
-            self._shell.dialog_parent,
-            "Stop the fit?",
+        words = (
             f"A body is being fitted to {request.video.name}. It stops with the window and can"
-            " be continued when the program is started again.",
-            buttons.Ok | buttons.Cancel,
-            buttons.Ok,
+            " be continued when the program is started again."
         )
-        return answer == buttons.Ok
+        return confirmed(self._shell.dialog_parent, "Stop the fit?", words, Answer.Ok)

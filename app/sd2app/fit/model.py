@@ -125,7 +125,7 @@ class FitModel(QObject):
         self.text = text
         self._set_state("failed")
 
-    def look_for_unfinished(self) -> None:
+    def look_for_runs(self) -> None:
         """Take up what was under way when the program last ended."""
         folder = self._settings.unfinished_fit
         if folder is not None:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPainterPath, QPen
+from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPainterPath, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from sd2app.fit.setup import FitSetupModel
 from sd2app.palette import Palette
 from sd2app.widgets.canvas import Canvas
+from sd2app.widgets.mesh_painting import paint_picture
 
 _DIMMED = 110
 
@@ -83,11 +83,7 @@ class PersonPicker(Canvas):
             text = "Reading the video…" if self._setup.reading else ""
             painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, text)
             return
-        picture = np.ascontiguousarray(picture)
-        height, width = picture.shape[:2]
-        image = QImage(picture.data, width, height, 3 * width, QImage.Format.Format_RGB888)
-        painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
-        painter.drawImage(self.box, image)
+        paint_picture(painter, self.rect(), picture)
         rectangle = self._rectangle()
         if rectangle is None:
             return

@@ -77,8 +77,7 @@ class SpanArrays:
     def rows(self) -> NDArray[np.int64]:
         """Lane of every span, counted over all tracks from the top."""
         before = np.concatenate([[0], np.cumsum(self.lanes_of_track, dtype=np.int64)])
-        rows: NDArray[np.int64] = before[self.tracks] + self.lanes
-        return rows
+        return before[self.tracks] + self.lanes
 
     def rows_of(self, ids: Collection[int]) -> NDArray[np.int64]:
         """Return the rows of the spans of some ids, in order."""

@@ -33,11 +33,7 @@ class LabelAutosave(QObject):
     failed = Signal(str)
 
     def __init__(
-        self,
-        document: DocumentModel,
-        labels: LabelsModel,
-        root: Path,
-        parent: QObject | None = None,
+        self, document: DocumentModel, labels: LabelsModel, root: Path, parent: QObject
     ) -> None:
         super().__init__(parent)
         self._document, self._labels, self._root = document, labels, root

@@ -56,8 +56,7 @@ class CutOutModel(QObject):
         super().__init__(parent)
         self._session = session
         self._plan: _Plan | None = None
-        self._runner = ListedRunner("cut", session.jobs, self)
-        self._runner.finished.connect(self._receive)
+        self._runner = ListedRunner("cut", session.jobs, self, self._receive)
         self._runner.failed.connect(lambda error: self.failed.emit(str(error)))
 
     def source(self, parts: Iterable[Part] = ("video", "mesh", "maps")) -> CutSource | None:
@@ -150,8 +149,7 @@ def ask_for_cut_outs(shell: Shell, labels: LabelsModel, model: CutOutModel) -> N
     dialog.deleteLater()
     if not accepted:
         return
-    folder = ask_folder(shell.dialog_parent, "Folder for the cut-outs")
-    if folder is not None:
+    if folder := ask_folder(shell.dialog_parent, "Folder for the cut-outs"):
         model.start(spans, parts, folder)
 
 

@@ -154,6 +154,5 @@ class LabelExportDialog(QDialog):
         chosen = self.format
         kinds = " ".join(f"*{suffix}" for suffix in chosen.suffixes)
         start = f"{self._name}{chosen.suffixes[0]}"
-        path = ask_new(self, "Export labels", start, f"{chosen.title} ({kinds})")
-        if path is not None:
+        if path := ask_new(self, "Export labels", start, f"{chosen.title} ({kinds})"):
             self.export(path)

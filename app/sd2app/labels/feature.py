@@ -25,7 +25,7 @@ from sd2app.labels.recovery import LabelBar, recover
 from sd2app.labels.timeline import LabelArea, LabelTimeline
 from sd2app.labels.tracks import LabelTracks, TrackMenu
 from sd2app.session.session import Session
-from sd2app.widgets.time_plot import TimePlot
+from sd2app.widgets.canvas import TimePlot
 
 
 class LabelsFeature(Feature):
@@ -81,9 +81,6 @@ class LabelsFeature(Feature):
         s, labels, edits, loop = self._session, self.model, self.edits, self.loop
         marking, tracks, autosave = self.marking, self.tracks, self.autosave
         shell = self._shell
-
-        def has_content() -> bool:
-            return s.has_content
 
         def has_spans() -> bool:
             return bool(labels.labels.spans)
@@ -166,7 +163,7 @@ class LabelsFeature(Feature):
                     "fill_gaps", "Labels", "Fill gaps of the track with background", ("Shift+F",),
                     "A span in every gap, with the label of the class background or the one last"
                     " used",
-                    edits.fill_gaps, lambda: has_content() and has_track(),
+                    edits.fill_gaps, lambda: s.has_content() and has_track(),
                 ),
                 Action(
                     "spans_up", "Tracks", "Put selected spans on the track above", ("Alt+Up",),
@@ -178,7 +175,7 @@ class LabelsFeature(Feature):
                 ),
                 Action(
                     "add_track", "Tracks", "Add track…", (), "A row of spans below the others",
-                    tracks.ask_to_add, has_content,
+                    tracks.ask_to_add, s.has_content,
                 ),
                 Action(
                     "rename_track", "Tracks", "Rename track…", (),
@@ -205,7 +202,7 @@ class LabelsFeature(Feature):
                     "import_labels", "Labels", "Import labels…", ("Ctrl+I",),
                     "Take the labels of a file: SD² Studio, table, Audacity, ELAN, Praat, BORIS,"
                     " MNE",
-                    lambda: import_labels(shell, edits), has_content,
+                    lambda: import_labels(shell, edits), s.has_content,
                 ),
                 Action(
                     "restore_labels", "Labels", "Restore labels that were not saved", (),
@@ -247,7 +244,7 @@ class LabelsFeature(Feature):
             Action(
                 "export_labels", "Labels", "Export labels…", ("Ctrl+Shift+I",),
                 "Write the labels for another program, and say what its file cannot hold",
-                lambda: export_labels(shell, s, labels), has_content,
+                lambda: export_labels(shell, s, labels), s.has_content,
             ),
             Action(
                 "cut_out", "Labels", "Export cut-outs…", ("Ctrl+Shift+X",),
@@ -268,7 +265,7 @@ class LabelsFeature(Feature):
             Action(
                 "find_spans", "Labels", "Find spans…", ("Ctrl+F",),
                 "Search the table of spans for a label, a note or a track",
-                lambda: shell.bring_up("Labels", "Search"), has_content,
+                lambda: shell.bring_up("Labels", "Search"), s.has_content,
             ),
             Action(
                 "label_set", "Labels", "Label set…", ("Ctrl+L",),

@@ -98,11 +98,7 @@ class LabelImportDialog(QDialog):
         self._observation_name = QLabel("Observation", self)
         self._facts = FactRows(_MOST_FACTS, at_the_edge=False, parent=self)
         self._said, self._consequence = sentence(""), sentence("")
-        ways = {
-            "add": "on tracks of their own",
-            "replace": "instead of all labels of this recording",
-        }
-        self._way = Choice("What becomes of the labels that are there", self, ways)
+        self._way = Choice("What becomes of the labels that are there", self, _WAYS)
         self._way.show_value("add" if labels.spans else "replace")
         self._way.currentIndexChanged.connect(self._refresh)
         buttons, self._import = accepting(self, "Import")

@@ -84,15 +84,13 @@ class LabelSetPage(QWidget):
             self._model.use(replace(shown, name=name))
 
     def _import(self) -> None:
-        path = ask_file(self, "Import label set", _FILES)
-        if path is not None:
+        if path := ask_file(self, "Import label set", _FILES):
             self._shell.attempt(lambda: self._model.use(read_label_set(path)))
 
     def _export(self) -> None:
         shown = self._model.label_set
         start = f"{shown.name or 'labels'}.json".replace("/", "-")
-        path = ask_new(self, "Export label set", start, _FILES)
-        if path is not None:
+        if path := ask_new(self, "Export label set", start, _FILES):
             self._shell.attempt(lambda: write_label_set(path, shown))
 
     def _added(self) -> None:

@@ -14,9 +14,7 @@ class SpanLoop(QObject):
 
     changed = Signal()
 
-    def __init__(
-        self, labels: LabelsModel, playback: PlaybackModel, parent: QObject | None = None
-    ) -> None:
+    def __init__(self, labels: LabelsModel, playback: PlaybackModel, parent: QObject) -> None:
         super().__init__(parent)
         self._labels, self._playback = labels, playback
         self.span: Span | None = None  # played in a loop

@@ -15,8 +15,8 @@ from PySide6.QtGui import QBrush, QColor, QImage, QPainter, QPen
 from sd2app.labels.arrays import WIDE_PX, SpanArrays, SpanColumns
 from sd2app.labels.model import LabelsModel, Mark
 from sd2app.palette import Palette
+from sd2app.widgets.canvas import AT_RIGHT, Overlay, clipped, image_of
 from sd2app.widgets.time_axis import GUTTER_PX, TimeScale
-from sd2app.widgets.time_plot import Overlay
 from sd2core.labels.spans import LabelTrack, Span
 
 ROW_PX = 24.0
@@ -100,10 +100,8 @@ class LabelRows:
 
     def row_at(self, y_px: float) -> TrackRow | None:
         """Return the row at a height."""
-        for row in self.tracks:
-            if row.top_px <= y_px < row.top_px + row.height_px:
-                return row
-        return None
+        rows = (row for row in self.tracks if row.top_px <= y_px < row.top_px + row.height_px)
+        return next(rows, None)
 
     def row_of(self, track: str) -> TrackRow:
         """Return the row of a track; it must exist."""
@@ -176,10 +174,8 @@ def paint_tracks(
         painter.fillRect(well, QColor(palette.well))
         if foreign:
             painter.fillRect(well, QBrush(QColor(palette.border), Qt.BrushStyle.FDiagPattern))
-    painter.save()
-    painter.setClipRect(plot)
-    _paint_spans(painter, plot, scale, model, rows, palette)
-    painter.restore()
+    with clipped(painter, plot):
+        _paint_spans(painter, plot, scale, model, rows, palette)
 
 
 def _paint_names(
@@ -197,7 +193,6 @@ def _paint_names(
         font.setPixelSize(round(_SMALL * painter.fontInfo().pixelSize()))
         painter.setFont(font)
     metrics = painter.fontMetrics()
-    place = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
     for name, row in zip(names, rows, strict=True):
         chosen = not foreign and name == model.track and len(rows) > 1
         painter.setPen(QColor(palette.accent if chosen else palette.muted))
@@ -208,10 +203,10 @@ def _paint_names(
         whole = metrics.horizontalAdvance(name) <= room_px
         words = max(map(metrics.horizontalAdvance, name.split()), default=0)
         if not whole and words <= room_px and row.height_px > 2 * metrics.height():
-            painter.drawText(room, place | Qt.TextFlag.TextWordWrap, name)
+            painter.drawText(room, AT_RIGHT | Qt.TextFlag.TextWordWrap, name)
         else:
             shown = metrics.elidedText(name, Qt.TextElideMode.ElideRight, room_px)
-            painter.drawText(room, place, shown)
+            painter.drawText(room, AT_RIGHT, shown)
     painter.restore()
 
 
@@ -266,21 +261,19 @@ def map_overlay(model: LabelsModel) -> Overlay:
         columns = _columns_in(painter, plot, scale, model, together=True, wide_px=math.inf)
         arrays = model.arrays
         tints = np.where(columns.selected, _SELECTED_REGION_TINT, _REGION_TINT) * columns.share
-        painter.save()
-        painter.setClipRect(plot)
-        painter.drawImage(plot, _coloured(columns, arrays.colours, tints))
-        edges: dict[tuple[int, bool], list[QLineF]] = {}
-        for number in _columns_in(painter, plot, scale, model).wide.tolist():
-            span, tone = arrays.spans[number], int(arrays.tones[number])
-            left, right = scale.x_of(span.start_s), scale.x_of(span.end_s)
-            if right - left >= _EDGES_FROM_PX:
-                lines = edges.setdefault((tone, span.origin == "suggestion"), [])
-                lines += [QLineF(x, plot.top(), x, plot.bottom()) for x in (left, right)]
-        for (tone, suggested), lines in edges.items():
-            style = Qt.PenStyle.DashLine if suggested else Qt.PenStyle.SolidLine
-            painter.setPen(QPen(QColor(arrays.colours[tone]), 1.0, style))
-            painter.drawLines(lines)
-        painter.restore()
+        with clipped(painter, plot):
+            painter.drawImage(plot, _coloured(columns, arrays.colours, tints))
+            edges: dict[tuple[int, bool], list[QLineF]] = {}
+            for number in _columns_in(painter, plot, scale, model).wide.tolist():
+                span, tone = arrays.spans[number], int(arrays.tones[number])
+                left, right = scale.x_of(span.start_s), scale.x_of(span.end_s)
+                if right - left >= _EDGES_FROM_PX:
+                    lines = edges.setdefault((tone, span.origin == "suggestion"), [])
+                    lines += [QLineF(x, plot.top(), x, plot.bottom()) for x in (left, right)]
+            for (tone, suggested), lines in edges.items():
+                style = Qt.PenStyle.DashLine if suggested else Qt.PenStyle.SolidLine
+                painter.setPen(QPen(QColor(arrays.colours[tone]), 1.0, style))
+                painter.drawLines(lines)
 
     return Overlay(paint, (model.changed, model.selection_changed))
 
@@ -336,16 +329,9 @@ def _coloured(
     columns: SpanColumns, colours: tuple[str, ...], alphas: NDArray[np.floating]
 ) -> QImage:
     table = np.array([QColor(colour).rgb() & 0xFFFFFF for colour in colours], np.uint32)
-    return _image(table[columns.tone] | (alphas.astype(np.uint32) << np.uint32(24)))
+    return image_of(table[columns.tone] | (alphas.astype(np.uint32) << np.uint32(24)))
 
 
 def _marked(columns: SpanColumns, palette: Palette) -> QImage:
     """A line per lane that marks selected spans."""
-    return _image(np.where(columns.selected, QColor(palette.text).rgb(), 0).astype(np.uint32))
-
-
-def _image(pixels: NDArray[np.uint32]) -> QImage:
-    height, width = pixels.shape
-    pixels = np.ascontiguousarray(pixels)
-    made = QImage(pixels.data, width, height, 4 * width, QImage.Format.Format_ARGB32)
-    return made.copy()
+    return image_of(np.where(columns.selected, QColor(palette.text).rgb(), 0).astype(np.uint32))

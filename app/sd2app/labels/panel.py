@@ -15,6 +15,7 @@ from sd2app.labels.statistics import StatisticsPage
 from sd2app.labels.table import SpanTable
 from sd2app.labels.table_model import SpanFilter, SpanTableModel
 from sd2app.session.session import Session
+from sd2app.widgets.canvas import AT_RIGHT
 from sd2app.widgets.inputs import Choice, SearchLine
 from sd2app.widgets.layouts import column_of, row_of
 from sd2app.widgets.pages import InnerPage, InnerPages
@@ -98,12 +99,11 @@ class LabelsPanel(QWidget):
         set_model = LabelSetModel(edits, shell.keys, self)
         self._label_set = LabelSetPage(set_model, shell, self)
         self._count = ElidedLabel(self, "muted")
-        self._count.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        self._count.setAlignment(AT_RIGHT)
         pages = self.spans, StatisticsPage(labels, edits.playback, self), self._label_set
         self._pages = InnerPages(
             [InnerPage(*words, page) for words, page in zip(_PAGES, pages, strict=True)],
             self._count,
-            self,
         )
         self.setLayout(column_of(self._pages, margins_px=(8, 6, 8, 6)))
         for signal in (

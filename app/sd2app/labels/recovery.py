@@ -214,8 +214,7 @@ class RecoverLabelsDialog(QDialog):
         offer = self.offer
         assert offer is not None
         start = f"{offer.recording.stem}-labels.json"
-        path = ask_new(self, "Write labels", start, "Labels (*.json)")
-        if path is not None:
+        if path := ask_new(self, "Write labels", start, "Labels (*.json)"):
             try:
                 write_labels(path, offer.labels, recording=offer.recording)
             except (OSError, Sd2Error) as error:

@@ -14,8 +14,8 @@ from sd2app.labels.loop import SpanLoop
 from sd2app.labels.model import LabelsModel
 from sd2app.labels.painting import ROW_PX, LabelRows, lane_box, paint_span, paint_tracks
 from sd2app.session.session import Session
+from sd2app.widgets.canvas import AT_LEFT, TimePlot
 from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, paint_cursor, turn_wheel
-from sd2app.widgets.time_plot import TimePlot
 from sd2core.labels.spans import Span
 
 _EDGE_PX = 5.0
@@ -112,11 +112,8 @@ class LabelTimeline(TimePlot):
         keys = [one.key for one in self._labels.labels.label_set.labels if one.key]
         pressed = f"Press {keys[0]} to {keys[-1]} while it plays" if keys else "Drag here"
         painter.setPen(QColor(self._session.display.palette.muted))
-        painter.drawText(
-            row.adjusted(GUTTER_PX + 8, 0, -MARGIN_PX, 0),
-            Qt.AlignmentFlag.AlignVCenter,
-            f"{pressed} to mark a gesture, again to end it – or drag here",
-        )
+        hint = f"{pressed} to mark a gesture, again to end it – or drag here"
+        painter.drawText(row.adjusted(GUTTER_PX + 8, 0, -MARGIN_PX, 0), AT_LEFT, hint)
 
     def _follow(self) -> None:
         labels = self._labels

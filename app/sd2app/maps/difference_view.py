@@ -13,8 +13,8 @@ from sd2app.maps.heatmap import HeatmapView
 from sd2app.maps.heatmap_image import difference_image
 from sd2app.session.maps import Reading
 from sd2app.session.session import Session
+from sd2app.widgets.canvas import AT_RIGHT, Overlay, image_of
 from sd2app.widgets.colour_maps import signed_table
-from sd2app.widgets.time_plot import Overlay
 
 _BAR_PX = 72
 
@@ -84,12 +84,10 @@ class DifferenceView(HeatmapView):
                 break
         else:
             return 0.0
-        table = np.ascontiguousarray(self._table()[None])
-        bar = QImage(table.tobytes(), 255, 1, 1020, QImage.Format.Format_RGB32)
+        bar = image_of(self._table()[None])
         place = QRectF(box.right() - widths[1] - _BAR_PX, box.center().y() - 5, _BAR_PX, 10)
         painter.drawImage(place, bar)
-        centred = Qt.AlignmentFlag.AlignVCenter
-        painter.drawText(box, centred | Qt.AlignmentFlag.AlignRight, ends[1])
+        painter.drawText(box, AT_RIGHT, ends[1])
         before = QRectF(place.left() - widths[0], box.top(), widths[0] - 8, box.height())
-        painter.drawText(before, centred | Qt.AlignmentFlag.AlignRight, ends[0])
+        painter.drawText(before, AT_RIGHT, ends[0])
         return width

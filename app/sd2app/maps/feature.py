@@ -18,9 +18,9 @@ from sd2app.maps.stack import MapStack
 from sd2app.maps.uncertainty import UncertaintyModel
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
+from sd2app.widgets.canvas import Overlay
 from sd2app.widgets.dialogs import ask_map
 from sd2app.widgets.layouts import pane
-from sd2app.widgets.time_plot import Overlay
 
 
 class MapsFeature(Feature):
@@ -41,12 +41,7 @@ class MapsFeature(Feature):
             self.uncertainty.changed,
             self.difference.state_changed,
         )
-        self.closing = (self.uncertainty, self.synthesis)
-
-    @property
-    def busy(self) -> bool:
-        """True while a map is being computed."""
-        return self.synthesis.busy
+        self.closing, self.working = (self.uncertainty, self.synthesis), (self.synthesis,)
 
     def actions(self) -> Sequence[Action]:
         """Export, levels, uncertainty, difference."""
@@ -60,7 +55,7 @@ class MapsFeature(Feature):
             Action(
                 "reset_reference", "View", "Set 0 dB to what is shown", ("R",),
                 "Make the strongest bin of each map 0 dB",
-                self._session.maps.reset_references, lambda: self._session.has_content,
+                self._session.maps.reset_references, self._session.has_content,
             ),
             Action(
                 "uncertain", "View", "Show uncertain cells", ("U",),
@@ -82,8 +77,7 @@ class MapsFeature(Feature):
         )  # fmt: skip
 
     def _export(self) -> None:
-        path = ask_map(self._shell.dialog_parent, "Export synthetic map", "synthetic.npz")
-        if path is not None:
+        if path := ask_map(self._shell.dialog_parent, "Export synthetic map", "synthetic.npz"):
             self._shell.attempt(lambda: self.synthesis.export(path))
 
     def stack(self, over_maps: Sequence[Overlay], over_all: Sequence[Overlay]) -> MapStack:

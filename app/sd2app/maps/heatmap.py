@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from sd2app.maps.heatmap_image import MapWidget
 from sd2app.session.maps import UNCERTAIN_SHARE, MapModel, Reading
 from sd2app.session.session import Session
+from sd2app.widgets.canvas import AT_LEFT, AT_RIGHT, Overlay, clipped
 from sd2app.widgets.colour_maps import lookup_table
 from sd2app.widgets.time_axis import (
     GUTTER_PX,
@@ -21,7 +22,6 @@ from sd2app.widgets.time_axis import (
     ticks,
     turn_wheel,
 )
-from sd2app.widgets.time_plot import Overlay
 from sd2core.maps import DopplerMap
 
 _HEADER_PX = 24
@@ -132,7 +132,7 @@ class HeatmapView(MapWidget):
 
     def _paint_header(self, painter: QPainter) -> None:
         colours = self._display.palette
-        box, centred = QRectF(8, 0, self.width() - 16, _HEADER_PX), Qt.AlignmentFlag.AlignVCenter
+        box = QRectF(8, 0, self.width() - 16, _HEADER_PX)
         left = 8 + paint_title(painter, box, self.title(), colours.text) + 12
         painter.setPen(QColor(colours.muted))
         left += self._place_button(left)
@@ -140,9 +140,7 @@ class HeatmapView(MapWidget):
         status = painter.fontMetrics().elidedText(
             self._status(), Qt.TextElideMode.ElideRight, int(max(room - 16, 40))
         )
-        painter.drawText(
-            QRectF(left, 0, self.width(), _HEADER_PX), centred | Qt.AlignmentFlag.AlignLeft, status
-        )
+        painter.drawText(QRectF(left, 0, self.width(), _HEADER_PX), AT_LEFT, status)
 
     @property
     def _button_px(self) -> int:
@@ -167,7 +165,7 @@ class HeatmapView(MapWidget):
         width = painter.fontMetrics().horizontalAdvance(text)
         if self.width() - 16 - left - width <= 60:
             return 0.0
-        painter.drawText(box, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignRight, text)
+        painter.drawText(box, AT_RIGHT, text)
         return width
 
     def _status(self) -> str:
@@ -192,17 +190,15 @@ class HeatmapView(MapWidget):
         ]
         nothing = self.null_colour()
         hatch = self.hatch_colour()
-        painter.save()
-        painter.setClipRect(plot)
-        painter.setPen(Qt.PenStyle.NoPen)
-        for bins, pattern in self.marked_bins():
-            for index in bins:
-                top, bottom = self.y_of(edges[index + 1]), self.y_of(edges[index])
-                for left, right in stretches:
-                    band = QRectF(left, top, right - left, bottom - top)
-                    painter.fillRect(band, nothing)
-                    painter.fillRect(band, QBrush(hatch, pattern))
-        painter.restore()
+        with clipped(painter, plot):
+            painter.setPen(Qt.PenStyle.NoPen)
+            for bins, pattern in self.marked_bins():
+                for index in bins:
+                    top, bottom = self.y_of(edges[index + 1]), self.y_of(edges[index])
+                    for left, right in stretches:
+                        band = QRectF(left, top, right - left, bottom - top)
+                        painter.fillRect(band, nothing)
+                        painter.fillRect(band, QBrush(hatch, pattern))
 
     def _paint_axis(self, painter: QPainter, plot: QRectF) -> None:
         colours, v_max = self._display.palette, self._map.axis.v_max_mps
@@ -214,25 +210,20 @@ class HeatmapView(MapWidget):
             painter.setPen(QPen(QColor(colours.muted), 1))
             painter.drawLine(QPointF(plot.left() - 4, y), QPointF(plot.left(), y))
             y_text = min(max(y, plot.top() + line_px / 2 - 2), plot.bottom() - line_px / 2 + 2)
-            painter.drawText(
-                QRectF(0, y_text - line_px / 2, GUTTER_PX - 8, line_px),
-                Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter,
-                signed_text(velocity),
-            )
+            room = QRectF(0, y_text - line_px / 2, GUTTER_PX - 8, line_px)
+            painter.drawText(room, AT_RIGHT, signed_text(velocity))
 
     def _paint_cursors(self, painter: QPainter, plot: QRectF) -> None:
-        painter.save()
-        painter.setClipRect(plot)
-        scale = self.scale
-        if self._pointer.time_s is not None:
-            painter.setPen(QPen(QColor(255, 255, 255, 120), 1, Qt.PenStyle.DotLine))
-            x = scale.x_of(self._pointer.time_s)
-            painter.drawLine(QPointF(x, plot.top()), QPointF(x, plot.bottom()))
-            if self._pointer.velocity_mps is not None:
-                y = self.y_of(self._pointer.velocity_mps)
-                painter.drawLine(QPointF(plot.left(), y), QPointF(plot.right(), y))
-        paint_cursor(painter, plot, scale.x_of(self._playback.time_s))
-        painter.restore()
+        with clipped(painter, plot):
+            scale = self.scale
+            if self._pointer.time_s is not None:
+                painter.setPen(QPen(QColor(255, 255, 255, 120), 1, Qt.PenStyle.DotLine))
+                x = scale.x_of(self._pointer.time_s)
+                painter.drawLine(QPointF(x, plot.top()), QPointF(x, plot.bottom()))
+                if self._pointer.velocity_mps is not None:
+                    y = self.y_of(self._pointer.velocity_mps)
+                    painter.drawLine(QPointF(plot.left(), y), QPointF(plot.right(), y))
+            paint_cursor(painter, plot, scale.x_of(self._playback.time_s))
 
     # --- mouse ----------------------------------------------------------------------------
 

@@ -15,9 +15,9 @@ from sd2app.maps.difference import DifferenceModel
 from sd2app.session.display import HeatmapLevels
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
+from sd2app.widgets.canvas import Overlay, TimePlot, clipped, image_of
 from sd2app.widgets.colour_maps import lookup_table, uncertain_table
 from sd2app.widgets.time_axis import TimeScale
-from sd2app.widgets.time_plot import Overlay, TimePlot
 
 _NOBODY = "no person"
 
@@ -68,8 +68,7 @@ class Columns:
     def strongest(self, values: NDArray[Any]) -> NDArray[Any]:
         """The largest of every column's frames, (bins, filled columns), of (bins, end - begin)."""
         if values.shape[1] > self.starts.size:
-            largest: NDArray[Any] = np.maximum.reduceat(values, self.starts, axis=1)
-            return largest
+            return np.maximum.reduceat(values, self.starts, axis=1)
         return values[:, self.starts]
 
 
@@ -122,7 +121,7 @@ def heatmap_image(
     if uncertain is not None:
         colours = np.where(uncertain, uncertain_table(levels.colour_map)[numbers], colours)
     colours[:, ~filled] = background
-    return image_of(colours)
+    return image_of(colours[::-1], QImage.Format.Format_RGB32)
 
 
 def difference_image(
@@ -145,7 +144,7 @@ def difference_image(
     shades = difference.shades(denoised, real, levels)
     colours = table[127 + np.rint(127.0 * shades).astype(np.int16)]
     colours[:, ~(there & as_well)] = background
-    return image_of(colours)
+    return image_of(colours[::-1], QImage.Format.Format_RGB32)
 
 
 def _strongest_columns(
@@ -161,13 +160,6 @@ def _strongest_columns(
         if track.covered is not None:
             filled[filled] = track.covered[view.starts + view.begin]
     return values, filled
-
-
-def image_of(colours: NDArray[np.uint32]) -> QImage:
-    """Colours (bins, columns), the fastest approach on top."""
-    pixels = np.ascontiguousarray(colours[::-1])
-    height, width = pixels.shape
-    return QImage(pixels.data, width, height, 4 * width, QImage.Format.Format_RGB32).copy()
 
 
 class MapWidget(TimePlot):
@@ -216,18 +208,16 @@ class MapWidget(TimePlot):
     def paint_gaps(self, painter: QPainter, plot: QRectF, scale: TimeScale) -> None:
         """Hatch the frames without a person."""
         colours = self._display.palette
-        painter.save()
-        painter.setClipRect(plot)
-        for start_s, end_s in self._track.gaps_s:
-            left, right = scale.x_of(start_s), scale.x_of(end_s)
-            # The narrowest is still seen.
-            box = QRectF(left, plot.top(), max(right - left, 1.0), plot.height())
-            if not box.intersects(plot):
-                continue
-            painter.fillRect(box, QColor(colours.well))
-            painter.fillRect(box, QBrush(QColor(colours.hatch), Qt.BrushStyle.FDiagPattern))
-            self._name_gap(painter, box & plot)
-        painter.restore()
+        with clipped(painter, plot):
+            for start_s, end_s in self._track.gaps_s:
+                left, right = scale.x_of(start_s), scale.x_of(end_s)
+                # The narrowest is still seen.
+                box = QRectF(left, plot.top(), max(right - left, 1.0), plot.height())
+                if not box.intersects(plot):
+                    continue
+                painter.fillRect(box, QColor(colours.well))
+                painter.fillRect(box, QBrush(QColor(colours.hatch), Qt.BrushStyle.FDiagPattern))
+                self._name_gap(painter, box & plot)
 
     def _name_gap(self, painter: QPainter, box: QRectF) -> None:
         size = painter.fontMetrics().size(Qt.TextFlag.TextSingleLine, _NOBODY)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 from PySide6.QtCore import QRectF
-from PySide6.QtGui import QAction, QColor, QImage, QPainter
+from PySide6.QtGui import QAction, QColor, QPainter
 from PySide6.QtWidgets import QWidget
 
 from sd2app.session.display import COLOUR_MAPS
 from sd2app.session.session import Session
-from sd2app.widgets.canvas import Canvas
+from sd2app.widgets.canvas import Canvas, image_of
 from sd2app.widgets.colour_maps import lookup_table, uncertain_table
 from sd2app.widgets.inputs import Choice, NumberBox, action_button
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
@@ -34,9 +34,7 @@ class _ColourStrip(Canvas):
         strips = [lookup_table(name)]
         if any(track.uncertainty is not None for track in self._tracks):
             strips.append(uncertain_table(name))
-        pixels = np.ascontiguousarray(strips)
-        image = QImage(pixels.tobytes(), 256, len(strips), 1024, QImage.Format.Format_RGB32)
-        painter.drawImage(QRectF(self.rect()), image)
+        painter.drawImage(QRectF(self.rect()), image_of(np.stack(strips)))
         painter.setPen(QColor(self._display.palette.border))
         painter.drawRect(self.rect().adjusted(0, 0, -1, -1))
 

@@ -261,7 +261,7 @@ class SynthesisModel(QObject):
         self._rest.stop()
         self._again = self._sweeping = False
         sensor = self._sensor
-        self._accuracy.rest_at(sensor)
+        self._accuracy.measured.rest_at(sensor)
         quality = self._shown_map.partial.quality_for(sensor)
         if quality.min() >= FINAL:
             self._set_moving(False)

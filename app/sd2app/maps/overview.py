@@ -10,8 +10,8 @@ from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPen
 from sd2app.maps.heatmap_image import MapWidget
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
+from sd2app.widgets.canvas import AT_RIGHT, Overlay
 from sd2app.widgets.time_axis import GUTTER_PX, TimeScale, paint_cursor
-from sd2app.widgets.time_plot import Overlay
 
 _EDGE_PX = 6
 _LABELS_PX = 4.0
@@ -44,11 +44,7 @@ class Overview(MapWidget):
         colours, scale, plot = self._display.palette, self.scale, self.plot_rect()
         painter.fillRect(self.rect(), QColor(colours.panel))
         painter.setPen(QColor(colours.muted))
-        painter.drawText(
-            QRectF(0, plot.top(), GUTTER_PX - 8, plot.height()),
-            Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter,
-            "All",
-        )
+        painter.drawText(QRectF(0, plot.top(), GUTTER_PX - 8, plot.height()), AT_RIGHT, "All")
         if self._track.map is not None:
             self.paint_map(painter, plot, *self._span.extent_s)
             self.paint_gaps(painter, plot, scale)

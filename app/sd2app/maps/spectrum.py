@@ -11,7 +11,7 @@ from PySide6.QtGui import QBrush, QColor, QFontMetrics, QPainter, QPen, QPolygon
 
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
-from sd2app.widgets.canvas import Canvas
+from sd2app.widgets.canvas import Canvas, clipped
 from sd2app.widgets.plot import paint_axes
 from sd2app.widgets.time_axis import paint_title, signed_text, ticks
 from sd2core.maps import DopplerMap
@@ -79,16 +79,14 @@ class SpectrumView(Canvas):
             return
         v_max = curves[0].map.axis.v_max_mps
         self._paint_axes(painter, plot, curves[0].map)
-        painter.save()
-        painter.setClipRect(plot)
-        for curve in curves:
-            if curve.frame is not None and not curve.nobody:
-                self._paint_curve(painter, plot, curve, curve.frame, v_max)
-        if self._pointer.velocity_mps is not None:
-            y = _y_of(plot, self._pointer.velocity_mps, v_max)
-            painter.setPen(QPen(QColor(colours.muted), 1, Qt.PenStyle.DotLine))
-            painter.drawLine(QPointF(plot.left(), y), QPointF(plot.right(), y))
-        painter.restore()
+        with clipped(painter, plot):
+            for curve in curves:
+                if curve.frame is not None and not curve.nobody:
+                    self._paint_curve(painter, plot, curve, curve.frame, v_max)
+            if self._pointer.velocity_mps is not None:
+                y = _y_of(plot, self._pointer.velocity_mps, v_max)
+                painter.setPen(QPen(QColor(colours.muted), 1, Qt.PenStyle.DotLine))
+                painter.drawLine(QPointF(plot.left(), y), QPointF(plot.right(), y))
         self._paint_legend(painter, legend)
 
     def _paint_axes(self, painter: QPainter, plot: QRectF, doppler_map: DopplerMap) -> None:

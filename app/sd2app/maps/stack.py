@@ -11,8 +11,8 @@ from sd2app.maps.difference_view import DifferenceView
 from sd2app.maps.heatmap import HeatmapView
 from sd2app.maps.overview import Overview
 from sd2app.session.session import Session
+from sd2app.widgets.canvas import Overlay
 from sd2app.widgets.layouts import column_of
-from sd2app.widgets.time_plot import Overlay
 
 _LOWEST_PX = {1: 96, 2: 96, 3: 72, 4: 54}
 """Least height of a map, by the number of maps."""

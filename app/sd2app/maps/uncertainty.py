@@ -31,8 +31,7 @@ class UncertaintyModel(QObject):
         self._track = session.maps.synthetic
         self.shown = session.settings.flag(_SHOWN, False)  # the user wants uncertain cells marked
         self._of: DopplerMap | None = None
-        self._runner = ListedRunner("uncertainty", session.jobs, self)
-        self._runner.finished.connect(self._take)
+        self._runner = ListedRunner("uncertainty", session.jobs, self, self._take)
         self._runner.failed.connect(lambda error: self.failed.emit(str(error)))
         self._runner.cancelled.connect(lambda: self.set_shown(False))
         self._track.changed.connect(self._follow)

@@ -53,7 +53,7 @@ class MeshComparisonFeature(Feature):
             Action(
                 "compare", "File", "Compare with mesh…", (),
                 "Measure another mesh of this video against the one that is open",
-                self.compare, lambda: self._session.has_mesh,
+                self.compare, self._session.has_mesh,
             ),
         )  # fmt: skip
 
@@ -61,7 +61,7 @@ class MeshComparisonFeature(Feature):
         """Measure another mesh, which is asked for, against the one that is open."""
         s, shell = self._session, self._shell
         path = path or self._ask()
-        if path is None or not s.has_mesh:
+        if path is None or not s.has_mesh():
             return
         self.close()
         window = ComparisonWindow(

@@ -18,11 +18,10 @@ from sd2app.mesh_comparison.model import ComparisonModel, JointRow, joint_words
 from sd2app.session.display import DisplayModel
 from sd2app.session.session import Session
 from sd2app.video.overlay_settings import OverlayModel
-from sd2app.widgets.canvas import Canvas
+from sd2app.widgets.canvas import AT_RIGHT, Canvas, TimePlot
 from sd2app.widgets.mesh_painting import draw_mesh, paint_picture
 from sd2app.widgets.plot import paint_axes
 from sd2app.widgets.time_axis import paint_title, signed_text, ticks
-from sd2app.widgets.time_plot import TimePlot
 from sd2core.mesh.presence import runs
 
 _TITLE_PX = 24
@@ -106,12 +105,10 @@ class JointCurves(TimePlot):
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         """Seek."""
-        self.mouseMoveEvent(event)
-
-    def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        """Seek."""
         if event.buttons() & Qt.MouseButton.LeftButton:
             self._playback.seek(self.scale.time_of(event.position().x()))
+
+    mouseMoveEvent = mousePressEvent
 
     def paint(self, painter: QPainter) -> None:
         """Title, axis, lines, cursor."""
@@ -120,8 +117,7 @@ class JointCurves(TimePlot):
         heading = QRectF(8, 0, self.width() - 16, _TITLE_PX)
         paint_title(painter, heading, joint_words(self._comparison.joint), colours.text)
         painter.setPen(QColor(colours.muted))
-        flags = Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignRight
-        painter.drawText(heading, flags, "towards the sensor +  /  away −   m/s")
+        painter.drawText(heading, AT_RIGHT, "towards the sensor +  /  away −   m/s")
         curves = [self._comparison.curve(number) for number in (0, 1)]
         known = np.concatenate([velocity[np.isfinite(velocity)] for _, velocity in curves])
         limit = max(1.1 * float(np.abs(known).max(initial=0.0)), _LEAST_MPS)
@@ -196,7 +192,7 @@ class JointTable(QTableWidget):
     def _item(self, column: int, text: str) -> QTableWidgetItem:
         item = QTableWidgetItem(text)
         if column:
-            item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+            item.setTextAlignment(AT_RIGHT)
         if column >= len(_HEADS) - 2:
             number = column - (len(_HEADS) - 2)
             item.setForeground(QBrush(QColor(colour_of(self._display, number))))

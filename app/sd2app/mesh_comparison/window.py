@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QAction, QCloseEvent
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QWidget
 
 from sd2app.mesh_comparison.model import ComparisonModel
 from sd2app.mesh_comparison.views import ComparedPicture, JointCurves, JointTable
@@ -45,14 +45,13 @@ class ComparisonWindow(QWidget):
         head = self._head()
         pictures = [ComparedPicture(number, model, session, overlay) for number in (0, 1)]
         tracks = [*map(map_view, model.tracks), JointCurves(model, session)]
-        table = panel("joints")
-        fill(table, JointTable(model, session.display))
-        left = splitter(
-            Qt.Orientation.Vertical,
-            [_side_by_side("pictures", pictures), _below("tracks", tracks, ruler)],
-            (320, 420),
-        )
-        body = splitter(Qt.Orientation.Horizontal, [left, table], (820, 400))
+        panels = {name: panel(name) for name in ("pictures", "tracks", "joints")}
+        fill(panels["pictures"], row_of(*((one, 1) for one in pictures)))
+        fill(panels["tracks"], column_of(*((one, 1) for one in tracks), ruler))
+        fill(panels["joints"], JointTable(model, session.display))
+        parts = [panels["pictures"], panels["tracks"]]
+        left = splitter(Qt.Orientation.Vertical, parts, (320, 420))
+        body = splitter(Qt.Orientation.Horizontal, [left, panels["joints"]], (820, 400))
         self._notes = QLabel(self)
         self._notes.setWordWrap(True)
         self.setLayout(column_of(head, (body, 1), self._notes, spacing_px=8, margins_px=8))
@@ -104,8 +103,7 @@ class ComparisonWindow(QWidget):
         )
 
     def _ask(self) -> None:
-        path = ask_figure(self, "Export comparison", "comparison")
-        if path is not None:
+        if path := ask_figure(self, "Export comparison", "comparison"):
             self._attempt(lambda: self._model.save_figure(path))
 
     def closeEvent(self, event: QCloseEvent) -> None:
@@ -113,15 +111,3 @@ class ComparisonWindow(QWidget):
         self._model.close()
         event.accept()
         self.closed.emit()
-
-
-def _side_by_side(name: str, widgets: Sequence[QWidget]) -> QFrame:
-    frame = panel(name)
-    fill(frame, row_of(*((widget, 1) for widget in widgets)))
-    return frame
-
-
-def _below(name: str, widgets: Sequence[QWidget], ruler: QWidget) -> QFrame:
-    frame = panel(name)
-    fill(frame, column_of(*((widget, 1) for widget in widgets), ruler))
-    return frame

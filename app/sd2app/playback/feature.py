@@ -17,7 +17,8 @@ class PlaybackFeature(Feature):
 
     def actions(self) -> Sequence[Action]:
         """Play, step, speed, zoom."""
-        playback, span, there = self._session.playback, self._session.span, self._there
+        s = self._session
+        playback, span, there = s.playback, s.span, s.has_content
         return (
             Action(
                 "play", "Play", "Play", ("Space",), "Play or pause", playback.toggle, there,
@@ -73,6 +74,3 @@ class PlaybackFeature(Feature):
                 "zoom_fit", "View", "Whole recording", ("0",), "Show all of it", span.fit, there
             ),
         )  # fmt: skip
-
-    def _there(self) -> bool:
-        return self._session.has_content

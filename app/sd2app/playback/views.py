@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QLabel, QSlider, QToolButton, QWidget
 from sd2app.labels.loop import SpanLoop
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.session import Session
+from sd2app.widgets.canvas import TimePlot
 from sd2app.widgets.layouts import Part, row_of
 from sd2app.widgets.time_axis import (
     GUTTER_PX,
@@ -20,7 +21,6 @@ from sd2app.widgets.time_axis import (
     tick_step,
     ticks,
 )
-from sd2app.widgets.time_plot import TimePlot
 
 _BUTTONS = ("first_frame", "previous_frame", "play", "next_frame", "last_frame", "loop")
 

@@ -59,7 +59,7 @@ class SceneFeature(Feature):
 
     def actions(self) -> Sequence[Action]:
         """Colours, dots and views."""
-        display, there = self._session.display, self._there
+        display, there = self._session.display, self._session.has_mesh
         colours = (
             Action(
                 f"colour_{colour}", "View", text, (f"Alt+{number}",), tip,
@@ -87,9 +87,6 @@ class SceneFeature(Feature):
     def _look_from(self, preset: Preset) -> None:
         if self.view is not None:
             self.view.set_view(preset)
-
-    def _there(self) -> bool:
-        return self._session.has_mesh
 
     def make_view(self) -> QWidget:
         """The 3D view under its bar."""

@@ -48,8 +48,7 @@ class InteractorBackend:
     @property
     def widget(self) -> QWidget:
         """The QtInteractor."""
-        widget: QWidget = self._interactor
-        return widget
+        return self._interactor
 
     def start(self, prepare: Prepare) -> None:
         """Draw from now on."""

@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QWidget
 from sd2app.scene.colours import Colouring, SceneColours
 from sd2app.scene.navigation import Navigator
 from sd2app.scene.scene import Scene
-from sd2app.widgets.canvas import Canvas
+from sd2app.widgets.canvas import AT_RIGHT, Canvas
 from sd2app.widgets.time_axis import tick_step, ticks
 from sd2core.figures.colours import DIVERGING, SEQUENTIAL, Rgb
 
@@ -25,7 +25,6 @@ _BAR_WIDTH = 10.0
 _PAD = 10.0
 _GAP = 6.0
 _CENTRE = Qt.AlignmentFlag.AlignCenter
-_RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 
 
 @dataclass(frozen=True)
@@ -242,15 +241,15 @@ class Overlay(Canvas):
             swatch = QRectF(0.0, 0.0, _BAR_WIDTH, _BAR_WIDTH)
             swatch.moveCenter(QPointF(row.right() - _BAR_WIDTH / 2, row.center().y()))
             painter.fillRect(swatch, QColor(colour))
-            self._write(painter, row.adjusted(0.0, 0.0, -_BAR_WIDTH - _GAP, 0.0), text, _RIGHT)
+            self._write(painter, row.adjusted(0.0, 0.0, -_BAR_WIDTH - _GAP, 0.0), text, AT_RIGHT)
             row.translate(0.0, line + _GAP)
 
     def _paint_bar(self, painter: QPainter, bar: _Bar, row: QRectF, length: float) -> None:
         """Paint title, ends and ticks of a bar, and move ``row`` below it."""
         line, text = row.height(), self._colours.text
-        self._write(painter, row, bar.title, _RIGHT, text)
+        self._write(painter, row, bar.title, AT_RIGHT, text)
         row.translate(0.0, line + _GAP)
-        self._write(painter, row, bar.ends[0], _RIGHT)
+        self._write(painter, row, bar.ends[0], AT_RIGHT)
         # Half a line more than needed: the first and last tick reach beyond the bar.
         strip = QRectF(row.right() - _BAR_WIDTH, row.bottom() + line / 2, _BAR_WIDTH, length)
         table = np.ascontiguousarray(bar.table)
@@ -260,9 +259,9 @@ class Overlay(Canvas):
             painter.setPen(QPen(QColor(self._colours.muted), 1.0))
             painter.drawLine(QPointF(strip.left() - 4.0, y), QPointF(strip.left() - 1.0, y))
             tick = QRectF(row.left(), y - line / 2, strip.left() - _GAP - row.left(), line)
-            self._write(painter, tick, words, _RIGHT, text)
+            self._write(painter, tick, words, AT_RIGHT, text)
         row.moveTop(strip.bottom() + line / 2)
-        self._write(painter, row, bar.ends[1], _RIGHT)
+        self._write(painter, row, bar.ends[1], AT_RIGHT)
         row.translate(0.0, line + _GAP)
 
     def _chip(self, painter: QPainter, box: QRectF) -> None:

@@ -34,12 +34,7 @@ class SensorFeature(Feature):
         self.placements = PlacementsModel(session, accuracy, parent)
         self.placements.failed.connect(shell.warn)
         self.changing = (self.placements.changed,)
-        self.closing = (self.placements,)
-
-    @property
-    def busy(self) -> bool:
-        """True while placements are being checked."""
-        return self.placements.busy
+        self.closing = self.working = (self.placements,)
 
     def actions(self) -> Sequence[Action]:
         """Sensor and placements."""

@@ -43,9 +43,7 @@ class PlacementsModel(QObject):
     current_changed = Signal()  # the sensor is at another of them, or elsewhere
     failed = Signal(str)
 
-    def __init__(
-        self, session: Session, accuracy: AccuracyModel, parent: QObject | None = None
-    ) -> None:
+    def __init__(self, session: Session, accuracy: AccuracyModel, parent: QObject) -> None:
         super().__init__(parent)
         self._document, self._sensor = session.document, session.sensor
         self._accuracy = accuracy
@@ -88,11 +86,8 @@ class PlacementsModel(QObject):
     @property
     def current(self) -> int | None:
         """Index of the placement that the sensor is at; None elsewhere."""
-        position = self._sensor.sensor.position_m
-        for number, sensor in enumerate(self.planned.sensors):
-            if sensor.position_m == position:
-                return number
-        return None
+        position, places = self._sensor.sensor.position_m, self.planned.sensors
+        return next((k for k, one in enumerate(places) if one.position_m == position), None)
 
     @property
     def cost(self) -> PlacementCost | None:

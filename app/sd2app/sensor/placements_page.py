@@ -22,7 +22,7 @@ from sd2app.sensor.placements import (
     limit_facts,
     limits_text,
 )
-from sd2app.widgets.canvas import Canvas
+from sd2app.widgets.canvas import AT_LEFT, AT_RIGHT, Canvas
 from sd2app.widgets.dialogs import ask_file, ask_new
 from sd2app.widgets.inputs import CheckBox, Choice, TypedLine
 from sd2app.widgets.layouts import STRETCH, column_of, pane, row_of
@@ -96,10 +96,8 @@ class PlacementsPage(QWidget):
     def _plan_part(self) -> QWidget:
         model = self._model
         self._how, self._problem = sentence(""), sentence("", "warning")
-        self._count, self._cost = title(""), title("")
+        self._count, self._cost = title(""), title("", "What the maps cost")
         self._count.setAccessibleName("How many placements")
-        self._cost.setWordWrap(True)
-        self._cost.setAccessibleName("What the maps cost")
         self._scale = RangeScale(self)
         self._limits = FactRows(3, at_the_edge=True, parent=self)
         self._radar, self._source = sentence(""), sentence("")
@@ -148,8 +146,7 @@ class PlacementsPage(QWidget):
 
     def _import_plan(self) -> None:
         parent = self._shell.dialog_parent
-        path = ask_file(parent, "Take placements", _READ)
-        if path is not None:
+        if path := ask_file(parent, "Take placements", _READ):
             self._shell.attempt(lambda: self._model.edits.plan_placements(read_placements(path)))
 
     def _export_plan(self) -> None:
@@ -235,9 +232,8 @@ class RangeScale(Canvas):
         """Paint a colour bar between two texts."""
         painter.setPen(QColor(self.palette().text().color()))
         near, far = self._ends
-        flags = Qt.AlignmentFlag.AlignVCenter
-        painter.drawText(self.rect(), flags | Qt.AlignmentFlag.AlignLeft, near)
-        painter.drawText(self.rect(), flags | Qt.AlignmentFlag.AlignRight, far)
+        painter.drawText(self.rect(), AT_LEFT, near)
+        painter.drawText(self.rect(), AT_RIGHT, far)
         left, right = (self.fontMetrics().horizontalAdvance(word) + 8 for word in (near, far))
         strip = np.ascontiguousarray(SEQUENTIAL).reshape(1, -1, 3)
         image = QImage(

@@ -20,7 +20,6 @@ from sd2core.mesh.sequence import MeshSequence
 from sd2core.recording.recording import Recording
 from sd2core.recording.relinking import Relinked
 from sd2core.sensor import VelocityAxis
-from sd2core.timebase import Timebase
 
 if TYPE_CHECKING:
     from sd2core.fmcw.processing import Clutter
@@ -44,12 +43,10 @@ class DocumentModel(QObject):
         self.clutter: Clutter = "mean"  # method that removes static echoes from the capture
         self.goes_on = False  # the recording is the one that was open before, with other files
         self._base: Recording | None = None
-        self._runner = ListedRunner("open", jobs, self)
-        self._runner.finished.connect(self._receive)
-        self._runner.failed.connect(lambda error: self.failed.emit(str(error)))
-        self._maps = LatestRunner("radar", self)
-        self._maps.finished.connect(self._receive_map)
-        self._maps.failed.connect(lambda error: self.failed.emit(str(error)))
+        self._runner = ListedRunner("open", jobs, self, self._receive)
+        self._maps = LatestRunner("radar", self, self._receive_map)
+        for runner in (self._runner, self._maps):
+            runner.failed.connect(lambda error: self.failed.emit(str(error)))
 
     # --- what is there --------------------------------------------------------------------
 
@@ -77,11 +74,6 @@ class DocumentModel(QObject):
     def radar_map(self) -> DopplerMap | None:
         """Doppler map of the capture, on its own clock."""
         return self.content.radar_map if self.content else None
-
-    @property
-    def timebase(self) -> Timebase | None:
-        """Frames of the recording's clock: the video's, else the mesh's, else the radar's."""
-        return self.content.timebase if self.content else None
 
     @property
     def title(self) -> str:

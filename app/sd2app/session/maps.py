@@ -188,8 +188,7 @@ class MapModel(QObject):
         shows = np.float32(UNCERTAIN_SHARE) * values
         limit = np.where(values >= faintest, shows, np.float32(_SHOWS_SHARE * highest))
         deviation = self.uncertainty.between(start, stop).deviation(values)
-        found: NDArray[np.bool_] = deviation > limit
-        return found
+        return deviation > limit
 
     def read(self, time_s: float, velocity_mps: float) -> Reading | None:
         """Cell at a time and velocity, or None where there is none."""

@@ -56,12 +56,10 @@ class Session:
     maps: Maps
     edits: Edits
 
-    @property
     def has_content(self) -> bool:
         """True while something is open."""
         return self.document.content is not None
 
-    @property
     def has_mesh(self) -> bool:
         """True while a mesh is open."""
         return self.document.mesh is not None

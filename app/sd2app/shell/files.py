@@ -31,11 +31,7 @@ class FilesFeature(Feature):
 
     def actions(self) -> Sequence[Action]:
         """Open, add, find, save."""
-        document = self._document
-
-        def has_content() -> bool:
-            return document.content is not None
-
+        document, has_content = self._document, self._session.has_content
         return (
             Action(
                 "open", "File", "Open…", ("Ctrl+O",),

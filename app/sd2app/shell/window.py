@@ -101,12 +101,12 @@ class MainWindow(QMainWindow):
         from sd2app.shell.keys.bindings import KeyBindings
         from sd2app.shell.menus import Menus, in_order
         from sd2app.shell.status_bar import StatusLine
-        from sd2app.shell.wiring import build_features
+        from sd2app.shell.wiring import Features
 
         self.messages = MessageBar(self)
         self.session = s = build_session(self, self._settings)
         s.display.set_dark(is_dark(self._settings))
-        self.features = build_features(s, self, self._parts, self)
+        self.features = Features(s, self, self._parts, self)
         actions = in_order(action for feature in self.features for action in feature.actions())
         self.keys = KeyBindings(actions, self.features.labels.model, self._settings, self)
         self._menus = Menus(self, s, actions, self.keys)
@@ -132,8 +132,7 @@ class MainWindow(QMainWindow):
         for feature in self.features:
             feature.look_for_unfinished()
         # VTK last, imported in a thread: everything else is usable while it loads.
-        self._importer = LatestRunner("import", self)
-        self._importer.finished.connect(self._add_scene)
+        self._importer = LatestRunner("import", self, lambda _: self._add_scene())
         self._importer.submit(lambda emit: import_module("sd2app.scene.view"))
 
     def _fill_panels(self) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields
 
 from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QWidget
@@ -41,32 +40,87 @@ from sd2app.widgets.pages import InnerPage, paged_panel
 from sd2core.labels.recovery import recovery_folder
 
 
-@dataclass(frozen=True)
 class Features:
-    """All features, in the order in which they are closed."""
+    """All features, which follow the document."""
 
-    mesh_comparison: MeshComparisonFeature
-    sensor: SensorFeature
+    # Others are made before these, and ask them later.
     suggestions: SuggestionsFeature
-    agreement: AgreementFeature
-    dataset_export: DatasetExportFeature
-    fit: FitFeature
     batch: BatchFeature
-    training: TrainingFeature
-    classify: ClassifyFeature
-    denoise: DenoiseFeature
-    maps: MapsFeature
-    accuracy: AccuracyFeature
-    video: VideoFeature
-    labels: LabelsFeature
-    figures: FiguresFeature
-    playback: PlaybackFeature
-    program: ProgramFeature
-    files: FilesFeature
-    scene: SceneFeature
+
+    def __init__(self, session: Session, shell: Shell, parts: Parts, parent: QObject) -> None:
+        process = ModelProcess()
+        self.accuracy = accuracy = AccuracyFeature(session, shell, parts.accuracy, parent)
+        self.maps = maps = MapsFeature(session, shell, accuracy.model, parent)
+        denoisers = parts.denoisers or core_denoisers(process)
+        self.denoise = denoise = DenoiseFeature(session, shell, maps.synthesis, denoisers, parent)
+        self.fit = FitFeature(session, shell, parts.fit_command, parent)
+        self.video = VideoFeature(session, shell, self.fit, parent)
+        self.training = TrainingFeature(session, shell, denoise.model, parts.train_command, parent)
+        self.labels = labels = LabelsFeature(
+            session,
+            shell,
+            parts.recovery or recovery_folder(),
+            lambda label: self.suggestions.model.accept(label),
+            parent,
+        )
+        self.sensor = SensorFeature(
+            session,
+            shell,
+            accuracy.model,
+            maps.synthesis,
+            lambda: self.batch.show_with_placements(),
+            parent,
+        )
+        self.classify = ClassifyFeature(
+            session,
+            shell,
+            MapValidity(session, maps.synthesis, denoise.model, parent),
+            labels.model,
+            labels.edits,
+            parts.classifiers or core_classifiers(process),
+            lambda finder: self.suggestions.model.start(finder),
+            parent,
+        )
+        finders = (self.classify.gestures,)
+        self.suggestions = SuggestionsFeature(session, shell, labels.edits, finders, parent)
+        self.agreement = AgreementFeature(session, shell, labels.model, parent)
+        self.mesh_comparison = MeshComparisonFeature(
+            session,
+            shell,
+            self.video.overlay,
+            lambda track: maps.view_of(track, (labels.over_maps,)),
+        )
+        self.dataset_export = DatasetExportFeature(session, shell, parent)
+        self.batch = BatchFeature(
+            session,
+            shell,
+            self.sensor.placements,
+            denoise.model.installed,
+            parts.batch_command,
+            parent,
+        )
+        self.figures = FiguresFeature(
+            session,
+            shell,
+            maps.difference,
+            lambda: labels.model.labels,
+            lambda: track_words(denoise.model.card),
+        )
+        self.playback = PlaybackFeature(session)
+        self.program = ProgramFeature(session, shell, labels)
+        self.files = FilesFeature(session, shell)
+        self.scene = SceneFeature(session, shell, maps.synthesis, self.sensor.placements)
+        self._in_order: tuple[Feature, ...] = (
+            self.mesh_comparison, self.sensor, self.suggestions, self.agreement,
+            self.dataset_export, self.fit, self.batch, self.training, self.classify,
+            self.denoise, self.maps, self.accuracy, self.video, self.labels, self.figures,
+            self.playback, self.program, self.files, self.scene,
+        )  # fmt: skip
+        session.document.opened.connect(lambda: _take_over(session, self))
 
     def __iter__(self) -> Iterator[Feature]:
-        return (getattr(self, field.name) for field in fields(self))
+        """Iterate over all of them, in the order in which they are closed."""
+        return iter(self._in_order)
 
     def close(self) -> None:
         """Stop every thread and let go of the files."""
@@ -74,88 +128,8 @@ class Features:
             feature.close()
 
 
-def build_features(session: Session, shell: Shell, parts: Parts, parent: QObject) -> Features:
-    """Make all features and let them follow the document."""
-    process = ModelProcess()
-    accuracy = AccuracyFeature(session, shell, parts.accuracy, parent)
-    maps = MapsFeature(session, shell, accuracy.model, parent)
-    denoisers = parts.denoisers or core_denoisers(process)
-    denoise = DenoiseFeature(session, shell, maps.synthesis, denoisers, parent)
-    fit = FitFeature(session, shell, parts.fit_command, parent)
-    video = VideoFeature(session, shell, fit, parent)
-    training = TrainingFeature(session, shell, denoise.model, parts.train_command, parent)
-    labels = LabelsFeature(
-        session,
-        shell,
-        parts.recovery or recovery_folder(),
-        lambda label: features.suggestions.model.accept(label),
-        parent,
-    )
-    sensor = SensorFeature(
-        session,
-        shell,
-        accuracy.model,
-        maps.synthesis,
-        lambda: features.batch.show_with_placements(),
-        parent,
-    )
-    classify = ClassifyFeature(
-        session,
-        shell,
-        MapValidity(session, maps.synthesis, denoise.model, parent),
-        labels.model,
-        labels.edits,
-        parts.classifiers or core_classifiers(process),
-        lambda finder: features.suggestions.model.start(finder),
-        parent,
-    )
-    suggestions = SuggestionsFeature(session, shell, labels.edits, (classify.gestures,), parent)
-    agreement = AgreementFeature(session, shell, labels.model, parent)
-    features = Features(
-        mesh_comparison=MeshComparisonFeature(
-            session,
-            shell,
-            video.overlay,
-            lambda track: maps.view_of(track, (labels.over_maps,)),
-        ),
-        sensor=sensor,
-        suggestions=suggestions,
-        agreement=agreement,
-        dataset_export=DatasetExportFeature(session, shell, parent),
-        fit=fit,
-        batch=BatchFeature(
-            session,
-            shell,
-            sensor.placements,
-            denoise.model.installed,
-            parts.batch_command,
-            parent,
-        ),
-        training=training,
-        classify=classify,
-        denoise=denoise,
-        maps=maps,
-        accuracy=accuracy,
-        video=video,
-        labels=labels,
-        figures=FiguresFeature(
-            session,
-            shell,
-            maps.difference,
-            lambda: labels.model.labels,
-            lambda: track_words(denoise.model.card),
-        ),
-        playback=PlaybackFeature(session),
-        program=ProgramFeature(session, shell, labels),
-        files=FilesFeature(session, shell),
-        scene=SceneFeature(session, shell, maps.synthesis, sensor.placements),
-    )
-    session.document.opened.connect(lambda: _take_over(session, features))
-    return features
-
-
 def _take_over(session: Session, features: Features) -> None:
-    if session.has_content:
+    if session.has_content():
         session.take_over()
         # Each of them uses what those before it have taken over.
         for feature in (
@@ -175,13 +149,8 @@ def side_pages(features: Features, views: Mapping[str, QWidget]) -> dict[str, QW
         InnerPage("Denoiser", "Train what makes synthetic maps a radar's", denoisers),
         InnerPage("Classifier", "Train what tells gestures apart", classifiers),
     )
-    return {
-        "Sensor": views["Sensor"],
-        "Accuracy": views["Accuracy"],
-        "Train": train,
-        "Labels": views["Labels"],
-        "Agree": views["Agree"],
-    }
+    pages = {**views, "Train": train}
+    return {name: pages[name] for name in ("Sensor", "Accuracy", "Train", "Labels", "Agree")}
 
 
 def track_stack(

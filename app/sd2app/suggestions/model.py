@@ -26,9 +26,7 @@ class SuggestionsModel(QObject):
 
     changed = Signal()  # use of suggestions, their number, or their source
 
-    def __init__(
-        self, edits: LabelEdits, finders: Sequence[SpanFinder], parent: QObject | None = None
-    ) -> None:
+    def __init__(self, edits: LabelEdits, finders: Sequence[SpanFinder], parent: QObject) -> None:
         super().__init__(parent)
         self.finders, self.finder = tuple(finders), finders[0]
         self.active = False  # while the bar of suggestions is shown

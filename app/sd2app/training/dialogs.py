@@ -18,20 +18,17 @@ class TrainingDialogs:
 
     def ask_store(self) -> None:
         """Let the user choose a store of pairs."""
-        path = ask_folder(self._parent, "Folder of pairs to learn from")
-        if path is not None:
+        if path := ask_folder(self._parent, "Folder of pairs to learn from"):
             self._training.setup.add(path)
 
     def ask_recordings(self) -> None:
         """Let the user choose recordings to make pairs of."""
-        path = ask_folder(self._parent, "A recording, or a folder of some")
-        if path is not None:
+        if path := ask_folder(self._parent, "A recording, or a folder of some"):
             self.shell.attempt(lambda: self._training.pair_maker.make(path))
 
     def open_run(self) -> None:
         """Let the user choose a run in another folder, such as one started in a terminal."""
-        path = ask_folder(self._parent, "Folder of a run")
-        if path is not None:
+        if path := ask_folder(self._parent, "Folder of a run"):
             self.shell.attempt(lambda: self._training.open_run(path))
 
     def may_leave(self) -> bool:

@@ -35,7 +35,7 @@ class TrainingFeature(Feature):
         for model in (self.model, self.adoption):
             model.failed.connect(shell.warn)
             model.noted.connect(shell.note)
-        self.closing = (self.adoption, self.model)  # runs go on
+        self.closing, self.running = (self.adoption, self.model), (self.model,)  # runs go on
 
     def actions(self) -> Sequence[Action]:
         """The panel."""
@@ -50,10 +50,6 @@ class TrainingFeature(Feature):
     def panel(self) -> QWidget:
         """Page of the Train panel."""
         return TrainingPanel(self.model, self.adoption, self._session.display, self._dialogs)
-
-    def look_for_unfinished(self) -> None:
-        """Find runs under way and ended."""
-        self.model.look_for_runs()
 
     def may_close(self) -> bool:
         """Ask what becomes of a run under way."""

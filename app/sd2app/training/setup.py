@@ -74,14 +74,12 @@ class Estimate:
 class TrainingSetupModel(RunSetup[Store]):
     """Pairs and settings for a denoiser."""
 
+    kind = Store
+
     def __init__(self, settings: Settings, parent: QObject) -> None:
         values = StoredChoices(settings, "training", _DEFAULTS, {"model": MODELS})
         stores = [Store(path) for path in settings.paths(_PAIRS)]
         super().__init__(settings, values, _PAIRS, stores, parent)
-
-    def unread(self, path: Path) -> Store:
-        """A store of pairs that has not been read."""
-        return Store(path)
 
     def look_into(self, source: Store) -> Store:
         """Read what a store of pairs holds."""

@@ -24,27 +24,22 @@ class VideoFeature(Feature):
         self.overlay = OverlayModel(session.settings, parent)
         session.video.failed.connect(shell.warn)
         self.changing = (self.overlay.changed,)
-        self.closing = (session.video,)
-
-    @property
-    def busy(self) -> bool:
-        """True while a frame is being decoded."""
-        return self._session.video.busy
+        self.closing = self.working = (session.video,)
 
     def actions(self) -> Sequence[Action]:
         """Mesh over the video."""
-        overlay = self.overlay
+        overlay, has_mesh = self.overlay, self._session.has_mesh
         return (
             Action(
                 "overlay", "View", "Mesh over the video", ("M",), "Draw the mesh over the video",
-                lambda: overlay.set_style(shown=not overlay.style.shown), self._has_mesh,
+                lambda: overlay.set_style(shown=not overlay.style.shown), has_mesh,
                 lambda: overlay.style.shown,
             ),
             Action(
                 "overlay_dots", "View", "Mesh over the video as dots", ("Shift+M",),
                 "Draw vertices over the video instead of the surface",
                 lambda: overlay.set_style(as_dots=not overlay.style.as_dots),
-                self._has_mesh, lambda: overlay.style.as_dots,
+                has_mesh, lambda: overlay.style.as_dots,
             ),
         )  # fmt: skip
 
@@ -52,6 +47,3 @@ class VideoFeature(Feature):
         """The video under its bar."""
         view = VideoView(self._session, self.overlay, self._landmarks)
         return {"video": pane(VideoBar(self.overlay, self._shell.action), (view, 1))}
-
-    def _has_mesh(self) -> bool:
-        return self._session.has_mesh

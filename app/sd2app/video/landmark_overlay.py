@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPen
 
+from sd2app.widgets.canvas import clipped
 from sd2core.body.track import LANDMARKS
 
 _LIMBS = (
@@ -57,17 +58,15 @@ def draw_landmarks(
     places = [QPointF(box.x() + x * scale[0], box.y() + y * scale[1]) for x, y, _ in points]
     visibility = np.clip(points[:, 2], 0.0, 1.0)
     known = np.asarray(np.isfinite(points).all(axis=1))
-    painter.save()
-    painter.setClipRect(box)
-    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-    # The dark edge first, so that the lines stand out on any picture.
-    for width, edge in ((5.0, True), (2.5, False)):
-        for a, b, colour in _BONES:
-            if known[a] and known[b]:
-                strength = max(float(min(visibility[a], visibility[b])), _FAINTEST)
-                painter.setPen(_pen(_EDGE if edge else colour, width, strength))
-                painter.drawLine(places[a], places[b])
-    painter.restore()
+    with clipped(painter, box):
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        # The dark edge first, so that the lines stand out on any picture.
+        for width, edge in ((5.0, True), (2.5, False)):
+            for a, b, colour in _BONES:
+                if known[a] and known[b]:
+                    strength = max(float(min(visibility[a], visibility[b])), _FAINTEST)
+                    painter.setPen(_pen(_EDGE if edge else colour, width, strength))
+                    painter.drawLine(places[a], places[b])
 
 
 def _pen(colour: str, width: float, strength: float) -> QPen:

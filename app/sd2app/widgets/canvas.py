@@ -1,13 +1,42 @@
-"""Base of the widgets that paint themselves."""
+"""Bases of the widgets that paint themselves, and what their painting has in common."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import ClassVar
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import ClassVar, NamedTuple
 
-from PySide6.QtCore import QSize, Qt, SignalInstance
-from PySide6.QtGui import QPainter, QPaintEvent, QPixmap
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QRectF, QSize, Qt, SignalInstance
+from PySide6.QtGui import QImage, QPainter, QPaintEvent, QPixmap
 from PySide6.QtWidgets import QWidget
+
+from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, ShownTime, TimeScale
+
+AT_LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
+AT_RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+"""Places of a line of text in its box."""
+
+
+@contextmanager
+def clipped(painter: QPainter, area: QRectF) -> Iterator[None]:
+    """Paint within an area only; pen, brush and all else are as before at the end."""
+    painter.save()
+    painter.setClipRect(area)
+    try:
+        yield
+    finally:
+        painter.restore()
+
+
+def image_of(
+    pixels: NDArray[np.uint32], form: QImage.Format = QImage.Format.Format_ARGB32
+) -> QImage:
+    """Image of pixels ``0xAARRGGBB``, (H, W), the first row on top."""
+    height, width = pixels.shape
+    pixels = np.ascontiguousarray(pixels)
+    return QImage(pixels.data, width, height, 4 * width, form).copy()
 
 
 class Canvas(QWidget):
@@ -55,3 +84,33 @@ class Canvas(QWidget):
         """Paint everything."""
         with QPainter(self) as painter:
             self.paint(painter)
+
+
+class Overlay(NamedTuple):
+    """Painter of something over a map, such as labels, and the signals after which it differs."""
+
+    paint: Callable[[QPainter, QRectF, TimeScale], None]
+    changed: tuple[SignalInstance, ...] = ()
+
+
+class TimePlot(Canvas):
+    """Widget with a plot over the shared time axis."""
+
+    TOP_PX: ClassVar[int] = 0
+    """Room above the plot."""
+    BOTTOM_PX: ClassVar[int] = 0
+    """Room below the plot."""
+
+    def __init__(self, span: ShownTime) -> None:
+        super().__init__()
+        self._shown = span
+
+    @property
+    def scale(self) -> TimeScale:
+        """Time axis of this widget."""
+        return TimeScale(self._shown.start_s, self._shown.end_s, self.width())
+
+    def plot_rect(self) -> QRectF:
+        """Rectangle of the plot, in pixels."""
+        width, height = self.width() - GUTTER_PX - MARGIN_PX, self.height() - self.TOP_PX
+        return QRectF(GUTTER_PX, self.TOP_PX, max(width, 1), max(height - self.BOTTOM_PX, 1))

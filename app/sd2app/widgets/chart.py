@@ -18,9 +18,9 @@ from PySide6.QtGui import (
     QPen,
     QPolygonF,
 )
-from PySide6.QtWidgets import QSizePolicy, QToolTip, QWidget
+from PySide6.QtWidgets import QSizePolicy, QToolTip
 
-from sd2app.widgets.canvas import Canvas
+from sd2app.widgets.canvas import Canvas, clipped
 from sd2app.widgets.plot import Themed, paint_axes
 from sd2app.widgets.time_axis import ticks
 
@@ -154,10 +154,8 @@ class ChartView(Canvas):
     KEYS: ClassVar = frozenset({Qt.Key.Key_Home, Qt.Key.Key_End, Qt.Key.Key_Escape})
     """Further keys that belong to the chart while it has the keyboard."""
 
-    def __init__(
-        self, display: Themed, name: str, chart: Chart, parent: QWidget | None = None
-    ) -> None:
-        super().__init__(parent)
+    def __init__(self, display: Themed, name: str, chart: Chart) -> None:
+        super().__init__()
         self._display, self._chart = display, chart
         self.pointed: Mark | None = None  # under the pointer, or where the keyboard is
         self.setMouseTracking(True)
@@ -278,12 +276,10 @@ class ChartView(Canvas):
             chart.below,
         )
         self._paint_legend(painter)
-        painter.save()
-        painter.setClipRect(plot.adjusted(-8, -8, 8, 8))
-        for curve in chart.curves:
-            self._paint_curve(painter, curve)
-        self.paint_marks(painter)
-        painter.restore()
+        with clipped(painter, plot.adjusted(-8, -8, 8, 8)):
+            for curve in chart.curves:
+                self._paint_curve(painter, curve)
+            self.paint_marks(painter)
 
     def _paint_legend(self, painter: QPainter) -> None:
         """Paint over the plot the unit on the left, each curve's line and name on the right."""

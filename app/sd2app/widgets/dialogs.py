@@ -17,6 +17,7 @@ from PySide6.QtWidgets import (
 from sd2core.files.figure_files import SUFFIXES
 from sd2core.labels.formats import FORMATS
 
+Answer = QMessageBox.StandardButton
 LABEL_SUFFIXES = tuple(dict.fromkeys(suffix for one in FORMATS for suffix in one.suffixes))
 LABEL_FILES = f"Labels ({' '.join(f'*{suffix}' for suffix in LABEL_SUFFIXES)});;All files (*)"
 FIGURES = ";;".join(f"{suffix[1:].upper()} (*{suffix})" for suffix in SUFFIXES)
@@ -24,10 +25,15 @@ FIGURES = ";;".join(f"{suffix[1:].upper()} (*{suffix})" for suffix in SUFFIXES)
 
 def may_delete(parent: QWidget, title: str, what: str) -> bool:
     """Ask if something may be deleted; Escape and Return keep it."""
-    buttons = QMessageBox.StandardButton
-    either = buttons.Discard | buttons.Cancel
-    answer = QMessageBox.question(parent, title, what, either, buttons.Cancel)
-    return bool(answer == buttons.Discard)
+    return confirmed(parent, title, what, Answer.Discard, usual=Answer.Cancel)
+
+
+def confirmed(
+    parent: QWidget, title: str, words: str, answer: Answer, usual: Answer | None = None
+) -> bool:
+    """Ask if something is to be done, or to be cancelled; Return gives the usual answer."""
+    given = QMessageBox.question(parent, title, words, answer | Answer.Cancel, usual or answer)
+    return bool(given == answer)
 
 
 def accepting(dialog: QDialog, text: str) -> tuple[QDialogButtonBox, QPushButton]:

@@ -51,9 +51,8 @@ class NumberBox(QDoubleSpinBox):
         *,
         decimals: int = 2,
         step: float = 0.1,
-        parent: QWidget | None = None,
     ) -> None:
-        super().__init__(parent)
+        super().__init__()
         self.setRange(low, high)
         self.setDecimals(decimals)
         self.setSingleStep(step)

@@ -71,5 +71,4 @@ def tinted(
     red, green, blue = np.rint(steps * colour).astype(np.uint32).T
     table = (np.uint32(round(255 * opacity)) << 24) | (red << 16) | (green << 8) | blue
     table[0] = 0  # beside the mesh; on it the darkest is a third
-    pixels: NDArray[np.uint32] = table[np.rint(light * 255).astype(np.uint8)]
-    return pixels
+    return table[np.rint(light * 255).astype(np.uint8)]

@@ -24,13 +24,8 @@ class InnerPages(QWidget):
 
     turned = Signal(int)  # number of the page that is shown now
 
-    def __init__(
-        self,
-        pages: Sequence[InnerPage],
-        beside: QWidget | None = None,
-        parent: QWidget | None = None,
-    ) -> None:
-        super().__init__(parent)
+    def __init__(self, pages: Sequence[InnerPage], beside: QWidget | None = None) -> None:
+        super().__init__()
         self._names = [page.name for page in pages]
         self._pages = QStackedWidget(self)
         self._pages.currentChanged.connect(self.turned)

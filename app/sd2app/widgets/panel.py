@@ -21,10 +21,12 @@ from PySide6.QtWidgets import (
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
 
 
-def title(text: str) -> QLabel:
-    """A heading."""
+def title(text: str, name: str = "") -> QLabel:
+    """A heading; one that changes has a name for screen readers, and wraps."""
     label = QLabel(text)
     label.setObjectName("title")
+    label.setAccessibleName(name)
+    label.setWordWrap(bool(name))
     return label
 
 
@@ -158,7 +160,7 @@ def panel(name: str) -> QFrame:
 
 
 def splitter(
-    orientation: Qt.Orientation, widgets: list[QWidget], sizes: tuple[int, ...]
+    orientation: Qt.Orientation, widgets: Sequence[QWidget], sizes: tuple[int, ...]
 ) -> QSplitter:
     """Widgets side by side or below each other, of these sizes to begin with."""
     made = QSplitter(orientation)

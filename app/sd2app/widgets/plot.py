@@ -9,6 +9,7 @@ from PySide6.QtCore import QPointF, QRectF, Qt, SignalInstance
 from PySide6.QtGui import QColor, QPainter, QPen
 
 from sd2app.palette import Palette
+from sd2app.widgets.canvas import AT_RIGHT
 
 Tick = tuple[float, str]
 """A pixel along an axis, and its text."""
@@ -53,8 +54,7 @@ def paint_axes(
         painter.drawLine(QPointF(plot.left(), y), QPointF(plot.right(), y))
         painter.setPen(ink)
         box = QRectF(0, y - line_px / 2, plot.left() - 6, line_px)
-        right = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-        painter.drawText(box, right, text)
+        painter.drawText(box, AT_RIGHT, text)
     painter.setPen(QPen(QColor(colours.hatch), 1))
     painter.drawLine(plot.bottomLeft(), plot.bottomRight())
     painter.drawLine(plot.topLeft(), plot.bottomLeft())

@@ -111,9 +111,7 @@ class RunView(QWidget, Generic[Run]):
             Button("cancel", "Cancel", "End it now and delete what it made", cancel),
             Button("delete", "Delete…", "Delete this run with what it made", self._delete),
         )
-        self._headline = title("")
-        self._headline.setWordWrap(True)
-        self._headline.setAccessibleName("How the training stands")
+        self._headline = title("", "How the training stands")
         self._bar = ProgressBar("Progress of the training")
         self._time, self._reason = sentence(""), sentence("", "warning")
         self._note = sentence("")
@@ -172,7 +170,7 @@ class RunView(QWidget, Generic[Run]):
         show_words(self._reason, run.text)
         show_words(self._note, note)
         self._bar.setVisible(run.phase in UNDER_WAY)
-        self._bar.show_share(run.share)
+        self._bar.show_share(run.history.share)
         shown, ending = self.shown(run), run.phase in ("stopping", "cancelling")
         for name, button in self._buttons.items():
             button.setVisible(name in shown)

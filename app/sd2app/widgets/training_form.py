@@ -71,7 +71,7 @@ class TrainingForm(QWidget):
         """Make the box of a setting."""
         box = NumberBox(
             field.low, field.high, field.suffix, field.tip,
-            decimals=field.decimals, step=field.step, parent=self,
+            decimals=field.decimals, step=field.step,
         )  # fmt: skip
         box.setMinimumWidth(64)
         box.setGroupSeparatorShown(field.decimals == 0 and field.name != "seed")
@@ -88,9 +88,7 @@ class TrainingForm(QWidget):
 
     def add_start(self, start: Callable[[], None], command: Callable[[], str]) -> None:
         """Add the estimate, why it cannot start, and the buttons to start it or to copy it."""
-        self._time = title("")
-        self._time.setWordWrap(True)
-        self._time.setAccessibleName("How long it will take")
+        self._time = title("", "How long it will take")
         self._basis = sentence("")
         self._problem = sentence("", "warning")
         for label in (self._time, self._basis, self._problem):

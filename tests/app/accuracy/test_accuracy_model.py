@@ -48,7 +48,7 @@ class Desk:
         self.trade.failed.connect(self.failures.append)
         self.trade.noted.connect(self.notes.append)
         self.trade.take_over(still_mesh(), PRESETS["paper"])
-        self.trade.rest_at(HERE)
+        self.trade.measured.rest_at(HERE)
 
     def choose(self, qtbot, sensor=HERE):
         with qtbot.waitSignal(self.trade.decided):
@@ -207,7 +207,7 @@ def test_measuring_is_a_job_and_is_remembered(desk, qtbot):
 
 def test_no_plan_within_a_tolerance_has_no_cost(desk, qtbot):
     desk.fake.known["histogram", THERE] = measurement_of(*COUNTING[:1])
-    desk.trade.rest_at(THERE)
+    desk.trade.measured.rest_at(THERE)
     qtbot.waitUntil(lambda: desk.trade.measured.counting is not None)
     assert desk.trade.cost_at(0.01) is None
     assert desk.trade.cost_at(0.2) == 0.02
@@ -217,7 +217,7 @@ def test_the_cost_of_a_tolerance_counts_the_chosen_plan_and_no_kept_mask(desk, q
     kept = result_of(AccuracyPlan(mask_reuse_m=0.1), 0.004, 0.01)
     desk.fake.known["histogram", THERE] = measurement_of(*COUNTING, kept)
     desk.fake.plan, desk.fake.error = AccuracyPlan(mask_stride=10), 0.001
-    desk.trade.rest_at(THERE)
+    desk.trade.measured.rest_at(THERE)
     qtbot.waitUntil(lambda: desk.trade.measured.counting is not None)
     assert desk.trade.cost_at(0.005) == 2.1
     desk.choose(qtbot, THERE)
@@ -250,13 +250,13 @@ def test_what_is_remembered_is_shown_and_a_move_makes_it_stale(desk, qtbot):
         ("histogram", HERE): stale(here),
         ("fmcw", THERE): measurement_of(*WAVES, family="fmcw"),
     }
-    desk.trade.rest_at(THERE)
+    desk.trade.measured.rest_at(THERE)
     qtbot.waitUntil(lambda: measured.measurement is not None)
     assert not measured.measurement.stale
     measured.set_family("fmcw")
     assert measured.measurement.family == "fmcw"
     assert measured.counting == here
-    desk.trade.rest_at(HERE)
+    desk.trade.measured.rest_at(HERE)
     # At once, before anything is read.
     assert measured.measurement.stale
     qtbot.waitUntil(lambda: measured.counting is not None)
@@ -267,7 +267,7 @@ def test_a_measurement_that_ends_after_a_move_is_of_another_place(desk, qtbot):
     measured = desk.trade.measured
     desk.fake.gate.clear()
     measured.measure()
-    desk.trade.rest_at(THERE)
+    desk.trade.measured.rest_at(THERE)
     desk.fake.gate.set()
     qtbot.waitUntil(lambda: measured.job is None)
     assert measured.measurement.stale
@@ -280,11 +280,11 @@ def test_a_clicked_point_says_when_it_was_measured_elsewhere(desk, qtbot):
     qtbot.waitUntil(lambda: trade.measured.job is None)
     trade.use(trade.measured.measurement.of(FACING))
     assert not trade.in_use.elsewhere
-    trade.rest_at(THERE)
+    trade.measured.rest_at(THERE)
     assert trade.in_use.elsewhere
     assert "elsewhere" in str(trade.in_use)
     desk.fake.known["histogram", HERE] = measurement_of(result_of(FACING, 0.2, 0.03))
-    trade.rest_at(HERE)
+    trade.measured.rest_at(HERE)
     qtbot.waitUntil(lambda: not trade.in_use.elsewhere)
     assert trade.in_use.error == 0.2
 

@@ -37,7 +37,7 @@ class Compared:
         self.playback.set_timebase(FRAMES)
         self.span.set_extent(0.0, 10.0)
         self.labels.open(MINE)
-        self.model = AgreementModel(session, self.labels)
+        self.model = AgreementModel(session, self.labels, self.labels)
 
     def wait(self) -> None:
         self._qtbot.waitUntil(lambda: not self.model.busy, timeout=10_000)

@@ -51,7 +51,7 @@ def set_up(qtbot, tmp_path):
     yield SimpleNamespace(training=training, ready=ready, ended=ended, used=used, data=data)
     for one in made:
         if one.under_way:
-            one.run.cancel()
+            one.run.tell("cancel")
             ended(one)
         one.close()
 
@@ -259,7 +259,7 @@ def test_cancel_deletes_what_it_made(set_up, qtbot):
     model.train()
     folder = model.run.folder.path
     qtbot.waitUntil(lambda: model.run.history.begun, timeout=20_000)
-    model.run.cancel()
+    model.run.tell("cancel")
     qtbot.waitUntil(lambda: model.run is None, timeout=20_000)
     assert not folder.exists()
 

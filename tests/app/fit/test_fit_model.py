@@ -105,7 +105,7 @@ def test_another_start_of_the_program_offers_to_continue(made, qtbot, request_, 
     qtbot.waitUntil(lambda: model.landmarks_at(12) is not None, timeout=20_000)
     model.close()  # as when the program is closed, or killed
     later = made("--frames", 30)
-    later.look_for_unfinished()
+    later.look_for_runs()
     assert later.state == "stopped"
     assert later.request == request_
     later.resume()
@@ -125,7 +125,7 @@ def test_a_fit_that_goes_on_without_its_window_is_found_again(
     launched.write_text(json.dumps(told))
     model._run.close()
     later = made()
-    later.look_for_unfinished()
+    later.look_for_runs()
     assert later.state == "running"
     # It is this window's now.
     assert not made().take_up(request_.folder)

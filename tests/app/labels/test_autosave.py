@@ -33,7 +33,7 @@ class Desk:
         self.qtbot, self.root = qtbot, root
         self.document = DocumentModel(TaskList())
         self.labels, self.playback = LabelsModel(), PlaybackModel()
-        self.session = LabelAutosave(self.document, self.labels, root)
+        self.session = LabelAutosave(self.document, self.labels, root, self.document)
         self.edits = LabelEdits(self.document, self.labels, self.playback, self.session)
         self.marking = LabelMarking(self.edits, Reaction(Settings.forgetful()))
         self.hand = LabelDragging(self.edits)

@@ -34,7 +34,7 @@ class Edited:
         edits = label_edits(Timebase.regular(100, 10.0))
         self.labels, self.refused = edits.labels, []
         edits.failed.connect(self.refused.append)
-        keys = KeyBindings([Named()], self.labels, Settings.forgetful())
+        keys = KeyBindings([Named()], self.labels, Settings.forgetful(), self.labels)
         self.model = LabelSetModel(edits, keys)
         self.labels.open(
             Labels(

@@ -85,7 +85,7 @@ def test_the_loop_follows_its_span(playback) -> None:
     labels = LabelsModel()
     span = Span(1, "Gestures", 1.0, 1.5, "wave")
     labels.open(Labels(spans=(span,)))
-    loop = SpanLoop(labels, playback)
+    loop = SpanLoop(labels, playback, playback)
     loop.play(span)
     longer = replace(span, end_s=1.8)
     labels.set_labels(Labels(spans=(longer,)))

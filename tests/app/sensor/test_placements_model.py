@@ -82,7 +82,9 @@ def a_cube(fast=False):
 def stage(qtbot):
     document, sensor, trade = Document(), SensorModel(), Trade()
     edits = Edits(document, sensor)
-    model = PlacementsModel(SimpleNamespace(document=document, sensor=sensor, edits=edits), trade)
+    model = PlacementsModel(
+        SimpleNamespace(document=document, sensor=sensor, edits=edits), trade, sensor
+    )
     model.test = (document, sensor, trade, edits)
     yield model
     model.close()

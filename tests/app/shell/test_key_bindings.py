@@ -54,7 +54,7 @@ def labels() -> LabelsModel:
 
 @pytest.fixture
 def bindings(labels, settings) -> KeyBindings:
-    return KeyBindings((PLAY, NEXT, HELP), labels, settings)
+    return KeyBindings((PLAY, NEXT, HELP), labels, settings, labels)
 
 
 def with_keys(*keys: str) -> Labels:
@@ -107,10 +107,12 @@ def test_a_key_that_was_given_up_can_be_had(bindings) -> None:
 
 def test_chosen_keys_are_kept_in_the_settings(bindings, labels, settings) -> None:
     bindings.bind("next", ["X", "/"])
-    again = KeyBindings((PLAY, NEXT, HELP), labels, settings)
+    again = KeyBindings((PLAY, NEXT, HELP), labels, settings, labels)
     assert again.keys_of("next") == ("X", "/")
     # A later version gives another action a key that was chosen: it is the chosen one's.
-    later = KeyBindings((PLAY, NEXT, Named("new", "Edit", "New", ("X", "Q"))), labels, settings)
+    later = KeyBindings(
+        (PLAY, NEXT, Named("new", "Edit", "New", ("X", "Q"))), labels, settings, labels
+    )
     assert (later.keys_of("next"), later.keys_of("new")) == (("X", "/"), ("Q",))
 
 
@@ -120,13 +122,13 @@ def test_chosen_keys_are_kept_in_the_settings(bindings, labels, settings) -> Non
 )
 def test_settings_that_make_no_sense_do_no_harm(labels, settings, stored: str) -> None:
     settings.set_value("keys", stored)
-    made = KeyBindings((PLAY, NEXT, HELP), labels, settings)
+    made = KeyBindings((PLAY, NEXT, HELP), labels, settings, labels)
     assert made.keys_of("play") == ("Space",)
 
 
 def test_of_two_with_one_key_in_the_settings_the_first_has_it(labels, settings) -> None:
     settings.set_value("keys", json.dumps({"next": ["X"], "play": ["X", "Tab", "Y"]}))
-    made = KeyBindings((PLAY, NEXT, HELP), labels, settings)
+    made = KeyBindings((PLAY, NEXT, HELP), labels, settings, labels)
     assert (made.keys_of("next"), made.keys_of("play")) == (("X",), ("Y",))
 
 
@@ -143,7 +145,7 @@ def test_a_label_has_its_key_for_as_long_as_its_recording_is_open(bindings, labe
 @given(seed=st.integers(0, 2**32))
 def test_no_key_ever_does_two_things(seed: int) -> None:
     rng, labels = random.Random(seed), LabelsModel()
-    bindings = KeyBindings(ACTIONS, labels, Settings.forgetful())
+    bindings = KeyBindings(ACTIONS, labels, Settings.forgetful(), labels)
     ids = [action.id for action in ACTIONS]
     keys = [key for action in ACTIONS for key in action.keys] + ["Ctrl+K", "J", "Tab"]
     for _ in range(30):

@@ -57,7 +57,7 @@ def set_up(qtbot):
     real = MapModel("Real")
     real.set_map(moving((100, 130, 100.0), (200, 230, 20.0), (300, 330, 100.0), (400, 420, 100.0)))
     finders = MotionFinder((MapModel("Synthetic"), real)), KnownSpans(real)
-    model = SuggestionsModel(edits, finders)
+    model = SuggestionsModel(edits, finders, edits)
 
     def look(threshold_db: float | None = None) -> None:
         model.start() if threshold_db is None else model.set_threshold(threshold_db)

@@ -243,7 +243,7 @@ def test_many_points_are_painted_in_both_themes(panel, window, fake, qtbot):
     ]
     fake.known["histogram", here] = measurement_of(*many)
     models_of(window).trade.measured._place = None
-    models_of(window).trade.rest_at(here)
+    models_of(window).trade.measured.rest_at(here)
     qtbot.waitUntil(lambda: models_of(window).trade.measured.measurement is not None)
     plot = panel.findChild(AccuracyPlot)
     pictures = set()

@@ -90,10 +90,10 @@ def test_a_file_is_chosen_and_the_strip_appears(window, fake_classes, qtbot, mon
     assert not strip.isVisible()
     key(window, "I", SHIFT)
     assert strip.isVisible()
-    window.features.classify._classifiers().fill()
+    window.features.classify._classifiers.fill()
     entries = {
         action.text().split("\t")[0]: action
-        for action in window.features.classify._classifiers().actions()
+        for action in window.features.classify._classifiers.actions()
     }
     assert entries["waves"].isChecked()
     entries["No model"].trigger()
@@ -285,7 +285,7 @@ def trainable(window, tmp_path, qtbot):
     qtbot.waitUntil(lambda: not training.setup.problem, timeout=10_000)
     yield window
     if training.under_way:
-        training.run.cancel()
+        training.run.tell("cancel")
         qtbot.waitUntil(lambda: training.run is None, timeout=20_000)
 
 

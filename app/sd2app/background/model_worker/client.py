@@ -162,8 +162,7 @@ class RemoteClassifier(_Remote):
     def probabilities(self, doppler: DopplerMap) -> NDArray[np.float32]:
         """Class probabilities of every frame of a map, (frames, classes)."""
         given = replace(doppler, uncertainty=None)
-        found: NDArray[np.float32] = self._process.ask("classify", self._ready(), given)
-        return found
+        return self._process.ask("classify", self._ready(), given)
 
     def live(self) -> RemoteClasses:
         """Session for live frames of one stretch, all with a person."""
@@ -187,8 +186,7 @@ class _RemoteSession:
                 "The process in which the models work was started again",
                 remedy="Choose the model again",
             )
-        found: NDArray[np.float32] = self._process.ask(do, self._clip, *arguments)
-        return found
+        return self._process.ask(do, self._clip, *arguments)
 
 
 class RemoteClasses(_RemoteSession):

@@ -52,13 +52,11 @@ class Worker:
 
     def denoise(self, model: int, doppler: DopplerMap) -> DopplerMap:
         """Denoised map."""
-        denoised: DopplerMap = _newest(self._models, model).denoise(doppler)
-        return denoised
+        return _newest(self._models, model).denoise(doppler)
 
     def classify(self, model: int, doppler: DopplerMap) -> NDArray[np.float32]:
         """Class probabilities of every frame of a map, (frames, classes)."""
-        found: NDArray[np.float32] = _newest(self._models, model).probabilities(doppler)
-        return found
+        return _newest(self._models, model).probabilities(doppler)
 
     def begin(self, model: int) -> int:
         """Number of a new clip whose frames come one after another."""
@@ -66,13 +64,11 @@ class Worker:
 
     def step(self, clip: int, energies: NDArray[np.float32], present: bool) -> NDArray[np.float32]:
         """Answer to the next frame (bins,) of a denoiser's clip."""
-        found: NDArray[np.float32] = _newest(self._live, clip).step(energies, present)
-        return found
+        return _newest(self._live, clip).step(energies, present)
 
     def advance(self, clip: int, *frames: NDArray[Any]) -> NDArray[np.float32]:
         """Answers to the next frames (frames, bins) of a clip, with a mask for a denoiser."""
-        found: NDArray[np.float32] = _newest(self._live, clip).advance(*frames)
-        return found
+        return _newest(self._live, clip).advance(*frames)
 
     def finish(self, clip: int) -> NDArray[np.float32]:
         """Outstanding answers of a clip."""

@@ -34,11 +34,7 @@ class KeyBindings(QObject):
     changed = Signal()  # some action has other keys
 
     def __init__(
-        self,
-        actions: Iterable[Action],
-        labels: LabelsModel,
-        settings: Settings,
-        parent: QObject | None = None,
+        self, actions: Iterable[Action], labels: LabelsModel, settings: Settings, parent: QObject
     ) -> None:
         super().__init__(parent)
         self._actions = {one.id: one for one in actions}
