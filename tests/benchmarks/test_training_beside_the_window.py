@@ -26,7 +26,7 @@ def sample_window(qtbot, tmp_path, monkeypatch):
     with window_on_sample(qtbot) as window:
         window.side.bring_up("Train")
         yield window
-        models_of(window).training.cancel()
+        models_of(window).training.tell("cancel")
         qtbot.waitUntil(lambda: not models_of(window).training.under_way, timeout=60_000)
 
 

@@ -26,6 +26,7 @@ class AgreementFeature(Feature):
         self.model = AgreementModel(session, labels, parent)
         self.changing = (self.model.changed,)
         self.closing = (self.model,)
+        self.model.failed.connect(shell.warn)
 
     def actions(self) -> Sequence[Action]:
         """Comparison of labels."""

@@ -45,6 +45,15 @@ def test_side_by_side_and_from_one_difference_to_the_next(compared, qtbot) -> No
     assert c.playback.frame == 30
 
 
+def test_a_file_that_holds_no_labels_is_said(window, qtbot, monkeypatch, tmp_path) -> None:
+    path = tmp_path / "broken.eaf"
+    path.write_text("<ANNOTATION_DOCUMENT>")
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (str(path), ""))
+    qtbot.keyClick(window, Qt.Key.Key_K, CONTROL)
+    qtbot.waitUntil(lambda: "broken.eaf" in window.messages.text, timeout=10_000)
+    assert not models_of(window).agreement.active
+
+
 def test_editing_is_followed_and_nothing_of_theirs_is_changed(compared, qtbot) -> None:
     c, below = models_of(compared), compared.findChild(OtherTimeline)
     qtbot.mouseClick(below, LEFT, pos=QPoint(round(below.scale.x_of(1.5)), below.height() - 8))
