@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from av.error import FFmpegError
+from av.video.reformatter import VideoReformatter
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
@@ -52,6 +53,7 @@ class VideoReader:
         self._index = index
         self._notes = list(index.notes)
         self._lock = threading.Lock()
+        self._converter = VideoReformatter()
         self._cache: OrderedDict[int, tuple[Any, int]] = OrderedDict()  # frame, its bytes
         self._cached_bytes = 0
         self._substitutes: dict[int, int] = {}
@@ -135,8 +137,9 @@ class VideoReader:
             if self._container is None:
                 raise Sd2Error(f"{self.path} is closed", "an open video", "Open it again")
             width, height = self._size
-            # Inside the lock: a frame keeps its converter, which two threads must not share.
-            rgb = self._find(frame).to_ndarray(format="rgb24", width=width, height=height)
+            # A frame that converts itself makes a converter of its own, with a pool of threads.
+            picture = self._converter.reformat(self._find(frame), width, height, "rgb24", threads=1)
+            rgb = picture.to_ndarray()
         return np.ascontiguousarray(np.rot90(rgb, self._turns))
 
     def frames(self, start: int = 0, stop: int | None = None) -> Iterator[NDArray[np.uint8]]:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import av
 import numpy as np
+import psutil
 import pytest
 from numbered_videos import number_in, picture, write_video
 
@@ -320,6 +321,16 @@ def test_the_cache_keeps_to_its_bytes(tmp_path: Path, monkeypatch: pytest.Monkey
             reader.read(k)
             assert 0 < reader._cached_bytes <= 6 * frame_bytes
             assert reader._cached_bytes == sum(size for _, size in reader._cache.values())
+
+
+def test_reading_on_starts_no_threads(tmp_path: Path) -> None:
+    with open_video(write_video(tmp_path / "v.mp4", 40, options={"bf": "2", "g": "10"})) as reader:
+        reader.read(0)
+        process = psutil.Process()
+        before = process.num_threads()
+        for k in range(40):
+            reader.read(k)
+        assert process.num_threads() <= before
 
 
 def test_threads_read_their_own_frames(tmp_path: Path) -> None:
