@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from PySide6.QtCore import QByteArray, QCoreApplication, QEvent
+from PySide6.QtCore import QByteArray, QCoreApplication, QEvent, QModelIndex
 from PySide6.QtGui import QAction, QUndoStack
-from PySide6.QtWidgets import QApplication, QSplitter, QWidget
+from PySide6.QtWidgets import QApplication, QSplitter, QTableView, QWidget
 from window_models import models_of
 
 from sd2app.session.display import HeatmapLevels
@@ -35,7 +35,10 @@ _PASSING = (
     *("_reader._frame", "_prefetcher"),  # looked ahead, for the next frame
     *("_lister", "_thread", "_synthesizers._made", "_kept"),  # made in the background, or kept
     *("edits._before", "_last_px"),  # of a drag that is over
-    "_placements._body",  # what places were last drawn about
+    *("._body", "scene.markers.points", "scene.markers._colours", "scene.markers._colour_array"),
+    *("spans.table._model._rows", "spans.table._model._row_of"),  # filled when next on screen
+    *("_label_set._model._rows", "_label_set._model._counts", "_label_set._model._alike"),
+    "_label_set._model.label_set",
 )
 """Ends of names of what says nothing of what is shown or will be."""
 _HASHED_BYTES = 1 << 20
@@ -143,6 +146,8 @@ class KeptWindow:
         models.pointer.leave()
         models.keys.reset_all()
         models.trade.tolerance = DEFAULT_TOLERANCE
+        for table in window.findChildren(QTableView):
+            table.setCurrentIndex(QModelIndex())
         window.side.bring_up("Sensor")
         window.messages.hide()
         for splitter, state in self._splitters:
