@@ -16,6 +16,10 @@ from sd2core.body.track import TORSO_CORNERS, Landmarks, LandmarkTrack, parts
 
 _PICTURE_SD = 0.006
 """Standard deviation of a well visible landmark, in apparent statures: 3 pixels of 480."""
+_GUESSED = 0.1
+"""Error across the view over that of the depth: of what is hidden both are guessed."""
+_VELOCITY = 0.7
+"""Depths err for long, so that their many frames count for too much beside the velocities."""
 _LEAST_TRUST = 0.05
 _OUTSIDE = 0.05
 """Share of the picture's height beyond whose edges a landmark is surely a guess."""
@@ -66,18 +70,20 @@ def evidence_of(
     """Landmarks and depths of the same frames in metres and seconds, scaled by the stature."""
     trust = trust_of(track)
     depth_m = stature_m * lifted.centre_depth
+    depth_sd_m = stature_m * lifted.depth_sigma / trust
+    across_sd_m = np.hypot(_PICTURE_SD * stature_m / trust, _GUESSED * depth_sd_m)
     return Evidence(
         times_s=np.array(track.timebase.times_s),
         slopes=camera.slopes(track.image_px.astype(np.float64)),
-        slopes_sd=_PICTURE_SD * (stature_m / depth_m)[:, None] / trust,
+        slopes_sd=across_sd_m / depth_m[:, None],
         size_sd=_SIZE_SD,
         trunk=TORSO_CORNERS,
         depth_m=stature_m * lifted.depth,
-        depth_sd_m=stature_m * lifted.depth_sigma / trust,
+        depth_sd_m=depth_sd_m,
         trunk_m=depth_m,
         trunk_sd_m=stature_m * lifted.centre_sigma,
         velocity_mps=stature_m * lifted.velocity,
-        velocity_sd_mps=stature_m * lifted.velocity_sigma / trust,
+        velocity_sd_mps=_VELOCITY * stature_m * lifted.velocity_sigma / trust,
         standing_sd_mps=np.hypot(_STANDING_MPS, _STEPPING_MPS * np.sqrt(1.0 - lifted.standing))
         / trust[:, FEET],
     )

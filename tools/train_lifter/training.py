@@ -62,10 +62,10 @@ class Recipe:
         Motions to emulate, of either kind.
     """
 
-    width: int = 128
+    width: int = 192
     dilations: tuple[int, ...] = (1, 2, 4, 8, 16, 4, 1)
     dropout: float = 0.1
-    steps: int = 11000
+    steps: int = 12000
     emulated_share: float = 0.25
     captured_share: float = 0.4
     batch: int = 24

@@ -4,9 +4,11 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sd2core.body.evidence import Evidence, trust_of
+from sd2core.body.camera import PinholeCamera
+from sd2core.body.evidence import Evidence, evidence_of, trust_of
 from sd2core.body.fit_video import fit_doubts
 from sd2core.body.fitted import FittedMotion
+from sd2core.body.lifter import LiftedTrack
 from sd2core.body.limbs import LIMBS
 from sd2core.body.shape import BodyShape
 from sd2core.body.solve import _size_error
@@ -73,6 +75,24 @@ def test_what_is_outside_the_picture_was_never_seen() -> None:
     )
     np.testing.assert_allclose([inside, edge], [0.9, 0.45], atol=1e-6)
     assert outside == hidden == 0.05
+
+
+def test_what_is_guessed_in_depth_is_guessed_across_the_view() -> None:
+    camera, wrist = PinholeCamera(640, 480, 600.0), LANDMARK["wrist.L"]
+
+    def across_m(depth_sigma: float) -> float:
+        ones, spread = np.ones((1, 33)), np.full((1, 33), 0.01)
+        spread[0, wrist] = depth_sigma
+        lifted = LiftedTrack(
+            Timebase(np.zeros(1)),
+            *(2.0 * ones[:, 0], 0.1 * ones[:, 0], 0.0 * ones, spread),
+            *(0.0 * ones, ones, ones[:, :4]),
+        )
+        evidence = evidence_of(track(320.0, 1.0), lifted, camera, 1.7)
+        return float(evidence.slopes_sd[0, wrist] * evidence.trunk_m[0])
+
+    plain_m, guessed_m = across_m(0.0), across_m(0.3)
+    np.testing.assert_allclose(guessed_m**2 - plain_m**2, (0.1 * 0.3 * 1.7) ** 2, rtol=1e-6)
 
 
 def fitted(residual_m: float, **share: float) -> FittedMotion:
