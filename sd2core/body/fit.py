@@ -42,7 +42,7 @@ _OUTLINES = 16
 
 # The fit's error along the view per error that the lifter states (docs/decisions/0046), and
 # across the view per error of a landmark there (docs/decisions/0022).
-_ALONG = 0.9
+_ALONG = 0.95
 _ACROSS_PER_S = 3.0
 
 _UNSEEN_MPS = 0.3
