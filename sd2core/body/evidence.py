@@ -16,10 +16,11 @@ from sd2core.body.track import TORSO_CORNERS, Landmarks, LandmarkTrack, parts
 
 _PICTURE_SD = 0.006
 """Standard deviation of a well visible landmark, in apparent statures: 3 pixels of 480."""
-_GUESSED = 0.1
+_GUESSED_SHARE = 0.1
 """Error across the view over that of the depth: of what is hidden both are guessed."""
-_VELOCITY = 0.7
-"""Depths err for long, so that their many frames count for too much beside the velocities."""
+_VELOCITY_SHARE = 0.7
+"""Standard deviation of a velocity over the lifter's: depths err for long, so that their many
+frames count for too much beside the velocities."""
 _LEAST_TRUST = 0.05
 _OUTSIDE = 0.05
 """Share of the picture's height beyond whose edges a landmark is surely a guess."""
@@ -71,7 +72,7 @@ def evidence_of(
     trust = trust_of(track)
     depth_m = stature_m * lifted.centre_depth
     depth_sd_m = stature_m * lifted.depth_sigma / trust
-    across_sd_m = np.hypot(_PICTURE_SD * stature_m / trust, _GUESSED * depth_sd_m)
+    across_sd_m = np.hypot(_PICTURE_SD * stature_m / trust, _GUESSED_SHARE * depth_sd_m)
     return Evidence(
         times_s=np.array(track.timebase.times_s),
         slopes=camera.slopes(track.image_px.astype(np.float64)),
@@ -83,7 +84,7 @@ def evidence_of(
         trunk_m=depth_m,
         trunk_sd_m=stature_m * lifted.centre_sigma,
         velocity_mps=stature_m * lifted.velocity,
-        velocity_sd_mps=_VELOCITY * stature_m * lifted.velocity_sigma / trust,
+        velocity_sd_mps=_VELOCITY_SHARE * stature_m * lifted.velocity_sigma / trust,
         standing_sd_mps=np.hypot(_STANDING_MPS, _STEPPING_MPS * np.sqrt(1.0 - lifted.standing))
         / trust[:, FEET],
     )

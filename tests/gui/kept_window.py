@@ -35,8 +35,10 @@ _PASSING = (
     *("_reader._frame", "_prefetcher"),  # looked ahead, for the next frame
     *("_lister", "_thread", "_synthesizers._made", "_kept"),  # made in the background, or kept
     *("edits._before", "_last_px"),  # of a drag that is over
-    *("._body", "scene.markers.points", "scene.markers._colours", "scene.markers._colour_array"),
-    *("spans.table._model._rows", "spans.table._model._row_of"),  # filled when next on screen
+    "._body",  # what places were last drawn about, and their markers
+    *("scene.markers.points", "scene.markers._colours", "scene.markers._colour_array"),
+    # Tables that are filled when they are next on screen.
+    *("spans.table._model._rows", "spans.table._model._row_of"),
     *("_label_set._model._rows", "_label_set._model._counts", "_label_set._model._alike"),
     "_label_set._model.label_set",
 )

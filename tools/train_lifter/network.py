@@ -21,7 +21,7 @@ _FAR = 8.0
 _EPSILON = 1e-5
 
 
-class LifterNetwork(nn.Module):
+class TemporalNetwork(nn.Module):
     """See :class:`sd2core.body.network.Network`.
 
     Parameters
@@ -111,7 +111,7 @@ def _normed(x: torch.Tensor, gain: torch.Tensor) -> torch.Tensor:
 
 
 def trained(
-    network: LifterNetwork,
+    network: TemporalNetwork,
     steps: int,
     rate: float,
     lost: Callable[[], tuple[torch.Tensor, Mapping[str, float]]],

@@ -14,7 +14,7 @@ from sd2core.body.network import Network
 from sd2core.body.sides import FORMAT, SIDED_PARTS, VERSION, free_of_place
 from sd2core.progress import Progress, silent
 from tools.train_lifter.examples import emulated
-from tools.train_lifter.network import LifterNetwork, trained
+from tools.train_lifter.network import TemporalNetwork, trained
 from tools.train_lifter.swaps import Known, known_of, spoilt, varied
 from tools.train_lifter.training import Material
 
@@ -46,7 +46,7 @@ def train_sides(
     learnt = [known_of(take) for take in known.takes]
     told = np.concatenate([features(free_of_place(one.seen)) for one in learnt[:200]])
     spread = np.maximum(told.std(axis=0), 1e-3)
-    network = LifterNetwork(
+    network = TemporalNetwork(
         told.mean(axis=0), spread, recipe.width, recipe.dilations, recipe.dropout, len(SIDED_PARTS)
     )
     walks = (*known.captured, *known.walks)

@@ -28,7 +28,7 @@ from sd2core.progress import Progress, silent
 from tools.motion_capture.bodies import BodyMotion
 from tools.train_lifter.emulate import Emulator, Walk, captured_walks, random_walks
 from tools.train_lifter.examples import Batch, Example, batch, emulated, example, varied
-from tools.train_lifter.network import LifterNetwork, save_network, trained
+from tools.train_lifter.network import TemporalNetwork, save_network, trained
 from tools.train_lifter.takes import Take
 
 Singles = NDArray[np.float32]
@@ -126,7 +126,7 @@ def train(
     learnt = [example(take) for take in known.takes]
     told = np.concatenate([batch([one]).told[0] for one in learnt[:200]])
     spread = np.maximum(told.std(axis=0), 1e-3)
-    network = LifterNetwork(
+    network = TemporalNetwork(
         told.mean(axis=0), spread, recipe.width, recipe.dilations, recipe.dropout, OUTPUTS
     )
 

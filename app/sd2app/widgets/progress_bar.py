@@ -25,6 +25,7 @@ class ProgressBar(QProgressBar):
 
     def show_share(self, share: float | None) -> None:
         """Show the share that is done; None: not known, it is busy."""
-        self.show_count(
-            0 if share is None else round(share * _PARTS), 0 if share is None else _PARTS
-        )
+        if share is None:
+            self.show_count(0, 0)
+        else:
+            self.show_count(round(share * _PARTS), _PARTS)

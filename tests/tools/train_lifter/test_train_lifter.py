@@ -196,12 +196,12 @@ def _swaying() -> BodyMotion:
 
 def test_numpy_and_torch_agree() -> None:
     torch = pytest.importorskip("torch")
-    from tools.train_lifter.network import LifterNetwork
+    from tools.train_lifter.network import TemporalNetwork
 
     torch.manual_seed(1)
     rng = np.random.default_rng(1)
     spread = rng.uniform(0.5, 2.0, 9).astype(np.float32)
-    network = LifterNetwork(
+    network = TemporalNetwork(
         rng.standard_normal(9).astype(np.float32), spread, 16, (1, 3, 2), 0.5, 7
     )
     network.eval()
