@@ -7,6 +7,7 @@ from functools import lru_cache
 from pathlib import Path
 
 import av
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -61,13 +62,22 @@ def _shift(picture: Picture, columns: int) -> Picture:
     return picture[:, index]
 
 
-def person_at(room: Picture, columns: int, *, red: bool = False) -> Picture:
-    """A standing person pasted into a room, moved to the right, in other clothes if red."""
+def person_at(room: Picture, columns: int, *, red: bool = False, nearer: float = 1.0) -> Picture:
+    """A standing person pasted into a room, moved to the right, in other clothes if red.
+
+    Who is ``nearer`` by a factor is larger by it, about the middle of the picture.
+    """
     standing = swiping()[0][0]
     away = np.abs(standing.astype(int) - empty_room().astype(int)).max(axis=2)
     person = (away > 24) & (np.abs(np.arange(CAMERA.width) - CAMERA.width / 2) < 75)
     coloured = standing[..., [2, 0, 1]] if red else standing
-    moved = _shift(np.where(person[..., None], 1, 0).astype(np.uint8), columns)[..., 0] > 0
+    mask = person.astype(np.uint8)
+    if nearer != 1.0:
+        middle = np.array([CAMERA.width, CAMERA.height]) / 2.0
+        zoom = np.column_stack([nearer * np.eye(2), (1.0 - nearer) * middle])
+        size = (CAMERA.width, CAMERA.height)
+        mask, coloured = (cv2.warpAffine(each, zoom, size) for each in (mask, coloured))
+    moved = _shift(mask[..., None], columns)[..., 0] > 0
     return np.where(moved[..., None], _shift(coloured, columns), room)
 
 

@@ -26,7 +26,7 @@ from sd2core.timebase import Timebase
 
 FORMAT = "sd2-landmarks"
 VERSION = 1
-_SEARCH_VERSION = 1
+_SEARCH_VERSION = 2
 
 _ARRAYS = (*PER_FRAME, "silhouette_frames", "silhouettes")
 _PLACES = ("image_px", "depth_px", "world_m", "visibility")
@@ -190,6 +190,7 @@ class TrackInParts:
         height: int,
         refined: RefinedStretches,
         max_gap_s: float,
+        unclear: NDArray[np.bool_] | None = None,
     ) -> None:
         self.timebase, self.width, self.height = timebase, width, height
         self.silhouette_frames, self.silhouettes = refined.silhouettes()
@@ -208,7 +209,7 @@ class TrackInParts:
             written = frames.stop
 
         self.notes = repair_landmarks(
-            refined.found, timebase.times_s, refined.confidence > 0.0, max_gap_s, write
+            refined.found, timebase.times_s, refined.confidence > 0.0, max_gap_s, write, unclear
         )
 
     def __len__(self) -> int:

@@ -183,10 +183,12 @@ def repair_landmarks(
     seen: NDArray[np.bool_],
     max_gap_s: float,
     write: Callable[[RawTrack], None],
+    unclear: NDArray[np.bool_] | None = None,
 ) -> tuple[str, ...]:
     """Repair a whole clip part by part; return sentences about it.
 
-    ``seen`` (T,) marks the frames in which the person was found. Gaps up to ``max_gap_s``,
+    ``seen`` (T,) marks the frames in which the person was found, ``unclear`` (T,) those in which
+    whoever is there may be another person. Gaps up to ``max_gap_s``,
     from the last frame before to the first after, are bridged. ``write`` is called with the
     repaired parts, in order.
     """
@@ -201,7 +203,7 @@ def repair_landmarks(
         found = bridge_gaps(found, max_gap_s).part(start - first, stop - first)
         tally.add(found, replaced[start - first : stop - first])
         write(found)
-    return tally.sentences(max_gap_s)
+    return tally.sentences(max_gap_s, np.zeros(len(seen), bool) if unclear is None else unclear)
 
 
 def _around(
@@ -237,15 +239,15 @@ class _Tally:
     missing: list[NDArray[np.bool_]] = field(default_factory=list)
     landmarks: int = 0
     outlying: int = 0
-    bridged: int = 0
+    bridged: list[NDArray[np.bool_]] = field(default_factory=list)
 
     def add(self, found: RawTrack, replaced: NDArray[np.bool_]) -> None:
         self.landmarks += int(replaced.sum())
         self.outlying += int(replaced.any(axis=1).sum())
-        self.bridged += int(found.bridged.sum())
+        self.bridged.append(found.bridged)
         self.missing.append(~found.present)
 
-    def sentences(self, max_gap_s: float) -> tuple[str, ...]:
+    def sentences(self, max_gap_s: float, unclear: NDArray[np.bool_]) -> tuple[str, ...]:
         notes = [
             f"Left and right of {part} swapped back in {_which(frames)}."
             for part, frames in self.swapped.items()
@@ -256,14 +258,19 @@ class _Tally:
                 "Replaced from the frames around them:"
                 f" {_count(self.landmarks, 'outlying landmark')} in {_count(self.outlying)}."
             )
-        if self.bridged:
+        missing, bridged = np.concatenate(self.missing), np.concatenate(self.bridged)
+        if bridged.any():
             notes.append(
                 f"Interpolated, in gaps of up to {max_gap_s:g} s without the person:"
-                f" {_count(self.bridged)}."
+                f" {_count(int(bridged.sum()))}."
             )
-        missing = np.concatenate(self.missing)
-        if missing.any():
-            notes.append(f"Left empty, without the person: {_which(missing)}.")
+        for which, why in (
+            (missing & ~unclear, "Left empty, without the person"),
+            (missing & unclear, "Left empty, because whoever is seen may be somebody else"),
+            (~missing & ~bridged & unclear, "Found again elsewhere and known by their looks alone"),
+        ):
+            if which.any():
+                notes.append(f"{why}: {_which(which)}.")
         return tuple(notes)
 
 

@@ -104,7 +104,15 @@ def find_landmarks(
             "a person who is seen in some frames in succession",
             "Say where the person is: --person X,Y,WIDTH,HEIGHT --person-frame FRAME",
         )
-    return TrackInParts(store, video.timebase, video.width, video.height, refined, max_gap_s)
+    return TrackInParts(
+        store,
+        video.timebase,
+        video.width,
+        video.height,
+        refined,
+        max_gap_s,
+        sightings.unclear_frames(len(video)),
+    )
 
 
 def _found(

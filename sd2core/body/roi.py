@@ -96,6 +96,13 @@ class Sightings:
     frames: NDArray[np.intp]  # (N,) ascending
     rois: Floats  # (N, 4) centre x and y, size, angle of the square; NaN where not found
     confidence: Floats  # (N,)
+    unclear: NDArray[np.bool_]  # (N,) whoever is seen may be another person
+
+    def unclear_frames(self, frames: int) -> NDArray[np.bool_]:
+        """Frames (T,) of a video whose nearest sighting is not clear."""
+        after = np.searchsorted(self.frames, np.arange(frames)).clip(1, len(self.frames) - 1)
+        middle = (self.frames[after - 1] + self.frames[after]) / 2.0
+        return self.unclear[np.where(np.arange(frames) <= middle, after - 1, after)]
 
 
 def roi_numbers(roi: Roi) -> Floats:

@@ -3,77 +3,41 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.blazepose import Detection, Pose, PoseDetector, PoseLandmarker
+from sd2core.body.identity import (
+    ALIKE,
+    Bystander,
+    Looks,
+    Signature,
+    Trail,
+    apart_px,
+    signature,
+    similarity,
+)
 from sd2core.body.person_selection import FOUND, Start
-from sd2core.body.roi import CROP_PX, Floats, Pixels, Roi, Sightings, roi_numbers
-from sd2core.body.track import LANDMARKS
+from sd2core.body.roi import Floats, Pixels, Roi, Sightings, roi_numbers
 from sd2core.io.video import VideoReader
-
-Signature = NDArray[np.float32]
-"""Histograms of colour of torso and thighs, shape (2, 512); each adds up to 1, or is 0."""
 
 _STEP_S = 1.0 / 15.0
 """Time between frames that are searched; the path in between is smooth."""
-_LOOK_ROUND_S = 0.5
+_LOOK_ROUND_S = 1.0 / 3.0
+_GONE_S = 1.0
+"""Time after which it is not known where another person has gone."""
 _MAX_CANDIDATES = 4
+_JUST_NOW_S = 0.25
+_LONG_S = 3.0
 _SMALL = 0.6
+_BESIDE = 0.2
+"""Distance in squares within which two may be taken for one another."""
+_SAME_OTHER = 0.5
+_TELLING = 0.08
+"""Difference of sizes, as logarithms, that tells people apart."""
 _BLOCK_BYTES = 192 * 2**20
-_SMALL_PX = 64
-_BINS = 8
-_SHOULDERS, _HIPS, _KNEES = (
-    [LANDMARKS.index(f"{name}.L"), LANDMARKS.index(f"{name}.R")]
-    for name in ("shoulder", "hip", "knee")
-)
-
-
-def signature(crop: Pixels, pose: Pose) -> Signature:
-    """Colours of a person in a crop of :data:`CROP_PX` pixels."""
-    import cv2
-
-    size = (_SMALL_PX, _SMALL_PX)
-    small = cv2.cvtColor(cv2.resize(crop, size, interpolation=cv2.INTER_AREA), cv2.COLOR_RGB2LAB)
-    person = cv2.resize(pose.mask, size, interpolation=cv2.INTER_AREA) > 0.5
-    heights = _in_crop(pose)[:, 1] * (_SMALL_PX / CROP_PX)
-    top, middle, end = (float(heights[rows].mean()) for rows in (_SHOULDERS, _HIPS, _KNEES))
-    rows = np.arange(_SMALL_PX)[:, None]
-    cells = (small // (256 // _BINS)).astype(np.intp)
-    numbers = (cells[..., 0] * _BINS + cells[..., 1]) * _BINS + cells[..., 2]
-    return np.stack(
-        [
-            _histogram(numbers[person & (rows >= upper) & (rows < lower)])
-            for upper, lower in ((top, middle), (middle, end))
-        ]
-    )
-
-
-def similarity(one: Signature, two: Signature) -> float:
-    """Similarity of colours, from 0 (nothing in common) to 1 (the same)."""
-    both = (one.any(axis=1)) & (two.any(axis=1))
-    if not both.any():
-        return 0.0
-    return float(np.sqrt(one[both] * two[both]).sum(axis=1).mean())
-
-
-def _histogram(numbers: NDArray[np.intp]) -> NDArray[np.float32]:
-    counts = np.bincount(numbers, minlength=_BINS**3).astype(np.float32)
-    cube = counts.reshape(_BINS, _BINS, _BINS)
-    # Spread over neighbouring bins: a little more light must not change everything.
-    for axis in range(3):
-        padded = np.pad(cube, [(1, 1) if each == axis else (0, 0) for each in range(3)], "edge")
-        ahead, behind = (np.take(padded, np.arange(_BINS) + step, axis) for step in (2, 0))
-        cube = 0.5 * cube + 0.25 * (ahead + behind)
-    total = cube.sum()
-    return (cube / total if total > 0 else cube).ravel()
-
-
-def _in_crop(pose: Pose) -> Floats:
-    matrix = pose.roi.matrix()
-    return np.asarray((pose.image_px - matrix[:, 2]) @ np.linalg.inv(matrix[:, :2]).T)
 
 
 Seen = Callable[[int, Pose | None], None]
@@ -86,88 +50,113 @@ class PersonTracker:
 
     detector: PoseDetector
     landmarker: PoseLandmarker
-    roi: Roi | None = None
-    time_s: float = 0.0
+    trail: Trail | None = None
     lost: bool = False
-    velocity: Floats = field(default_factory=lambda: np.zeros(2))
-    own: Signature | None = None
-    others: list[Signature] = field(default_factory=list)
+    unclear: bool = False
+    """True if whom the last picture shows may be another person."""
+    own: Looks | None = None
+    others: list[Bystander] = field(default_factory=list)
     looked_round_s: float = -np.inf
 
     def begin(self, roi: Roi, time_s: float) -> None:
         """Start at a square with the person, whose colours are still to be learnt."""
-        self.roi, self.time_s, self.lost = roi, time_s, False
-        self.velocity = np.zeros(2)
+        self.trail, self.lost, self.unclear = Trail(roi, time_s), False, False
         self.looked_round_s = -np.inf
+        for other in self.others:
+            other.trail = replace(other.trail, time_s=-np.inf)
 
     def step(self, picture: Pixels, time_s: float) -> Pose | None:
         """Find the person in the next picture."""
-        pose = None if self.lost else self._look(picture, self._predicted(time_s))
-        if pose is not None and (self._jumped(pose) or self._is_other(picture, pose)):
-            pose = None
-        if pose is None:
-            pose = self._search(picture, time_s)
-        if pose is None:
+        assert self.trail is not None
+        self.unclear = False
+        people = self._watched(picture, time_s)
+        pose = looks = None
+        if not self.lost:
+            pose = self._look(picture, self.trail.predicted(time_s))
+        if pose is not None:
+            looks = None if _jumped(pose) else self._recognised(picture, pose, time_s)
+        if looks is None:
+            if people is None:
+                people = self._people(picture, self.trail.predicted(time_s))
+            pose, looks = self._search(picture, people, time_s)
+        if pose is None or looks is None:
             self.lost = True
             return None
-        self._accept(picture, pose, time_s)
+        # After so long a gap, and elsewhere, nothing but their looks tells who it is.
+        gone = self.lost and time_s - self.trail.time_s > _GONE_S
+        self.unclear = gone and not self.trail.goes_on(pose.next_roi, time_s)
+        self._accept(pose, looks, time_s)
         if time_s - self.looked_round_s >= _LOOK_ROUND_S:
             self.looked_round_s = time_s
-            self._look_round(picture, pose)
+            if people is None:
+                people = self._people(picture, pose.next_roi)
+            self._look_round(picture, people, pose, time_s)
         return pose
 
     def _look(self, picture: Pixels, roi: Roi) -> Pose | None:
         pose = self.landmarker.in_picture(picture, roi)
         return pose if pose.confidence >= FOUND else None
 
-    def _predicted(self, time_s: float) -> Roi:
-        assert self.roi is not None
-        move = self.velocity * min(time_s - self.time_s, 0.5)
-        limit = 0.25 * self.roi.size_px
-        move = np.clip(move, -limit, limit)
-        roi = self.roi
-        return Roi(roi.centre_x_px + move[0], roi.centre_y_px + move[1], roi.size_px, roi.angle_rad)
+    def _recognised(
+        self, picture: Pixels, pose: Pose, time_s: float, *, followed: bool = True
+    ) -> Signature | None:
+        """Looks of the person, if this is them; who is followed may change their looks."""
+        assert self.trail is not None
+        roi, looks = pose.next_roi, signature(pose.roi.cut(picture), pose)
+        if self.own is None:
+            return looks
+        mine, theirs = self._likeness(looks)
+        twins = [each for each in self.others if self.own.likeness(each.looks) >= ALIKE]
+        if (
+            self.trail.reaches(roi, time_s)
+            and theirs <= mine + 0.05
+            and (followed or mine >= ALIKE)
+            and not any(self._may_be(twin, roi, time_s, followed) for twin in twins)
+        ):
+            return looks
+        self.unclear = True
+        return None
 
-    def _away(self, roi: Roi, time_s: float) -> float:
-        """Distance of a square from the predicted one, in squares."""
-        predicted = self._predicted(time_s)
-        return _apart(predicted, roi) / predicted.size_px
-
-    def _jumped(self, pose: Pose) -> bool:
-        """True if another person in the square, or none, was taken for the person."""
-        ratio = pose.next_roi.size_px / pose.roi.size_px
-        return _apart(pose.roi, pose.next_roi) > 0.35 * pose.roi.size_px or not 0.4 < ratio < 2.0
-
-    def _is_other(self, picture: Pixels, pose: Pose) -> bool:
-        """True if the colours are rather those of another person seen before."""
-        if self.own is None or not self.others:
+    def _may_be(self, twin: Bystander, roi: Roi, time_s: float, followed: bool) -> bool:
+        """True if a square may show another person who looks like the one that is followed."""
+        assert self.trail is not None
+        if self.trail.growth(roi) + _TELLING < twin.trail.growth(roi):
             return False
-        mine, theirs = self._likeness(signature(pose.roi.cut(picture), pose))
-        return theirs > mine + 0.05
+        unseen_s = time_s - twin.trail.time_s
+        if unseen_s < _GONE_S and twin.trail.away(roi, time_s) < _BESIDE:
+            return True
+        # Who was about when the person was lost, and is not seen elsewhere now, may be here.
+        about = self.trail.time_s - twin.trail.time_s < _GONE_S
+        if followed or not about or unseen_s < _JUST_NOW_S:
+            return False
+        return unseen_s < _LONG_S or not self.trail.goes_on(roi, time_s)
 
     def _likeness(self, looks: Signature) -> tuple[float, float]:
         assert self.own is not None
-        theirs = max((similarity(looks, other) for other in self.others), default=0.0)
-        return similarity(looks, self.own), theirs
+        theirs = max((similarity(looks, other.looks) for other in self.others), default=0.0)
+        return self.own.likeness(looks), theirs
 
-    def _search(self, picture: Pixels, time_s: float) -> Pose | None:
-        """Look for the person in the whole picture."""
-        gap_s = time_s - self.time_s
-        best, best_rank = None, -np.inf
-        for found in self._people(picture, self._predicted(time_s))[:_MAX_CANDIDATES]:
-            away = self._away(found.roi, time_s)
-            # A person far away this soon is another one.
-            if away > 0.5 + 1.5 * gap_s:
+    def _search(
+        self, picture: Pixels, people: list[Detection], time_s: float
+    ) -> tuple[Pose | None, Signature | None]:
+        """Look for the person among all who are seen."""
+        assert self.trail is not None
+        best: tuple[Pose | None, Signature | None] = None, None
+        best_rank = -np.inf
+        for found in people[:_MAX_CANDIDATES]:
+            if not self.trail.is_near(found.roi, time_s):
+                self.unclear = True
                 continue
             pose = self._look(picture, found.roi)
-            if pose is None or self._is_other(picture, pose):
+            if pose is None:
                 continue
-            mine = 1.0
-            if self.own is not None:
-                mine = similarity(signature(pose.roi.cut(picture), pose), self.own)
-            rank = mine - 0.3 * min(away, 2.0)
+            looks = self._recognised(picture, pose, time_s, followed=False)
+            if looks is None:
+                continue
+            mine = 1.0 if self.own is None else self.own.likeness(looks)
+            rank = mine - 0.3 * min(self.trail.unlike(pose.next_roi, time_s), 2.0)
             if rank > best_rank:
-                best, best_rank = pose, rank
+                best, best_rank = (pose, looks), rank
         return best
 
     def _people(self, picture: Pixels, near: Roi) -> list[Detection]:
@@ -177,63 +166,90 @@ class PersonTracker:
         around = Roi(near.centre_x_px, near.centre_y_px, 1.5 * near.size_px)
         return self.detector.look(picture, around)[0] + self.detector.people(picture)
 
-    def _accept(self, picture: Pixels, pose: Pose, time_s: float) -> None:
-        roi, gap_s = pose.next_roi, time_s - self.time_s
-        if self.roi is not None and not self.lost and 0.0 < gap_s < 0.5:
-            moved = [roi.centre_x_px - self.roi.centre_x_px, roi.centre_y_px - self.roi.centre_y_px]
-            share = 1.0 - np.exp(-gap_s / 0.15)
-            self.velocity = self.velocity + share * (np.array(moved) / gap_s - self.velocity)
-        else:
-            self.velocity = np.zeros(2)
-        self.roi, self.time_s, self.lost = roi, time_s, False
-        looks = signature(pose.roi.cut(picture), pose)
+    def _accept(self, pose: Pose, looks: Signature, time_s: float) -> None:
+        assert self.trail is not None
+        self.trail = self.trail.followed(pose.next_roi, time_s, steady=not self.lost)
+        self.lost = False
         if self.own is None:
-            self.own = looks
+            self.own = Looks(looks)
             return
         mine, theirs = self._likeness(looks)
         # While another person covers them, the colours are not the person's own.
         if mine > theirs + 0.1:
-            self.own = self.own + np.float32(0.05) * (looks - self.own)
+            self.own.learn(looks)
 
-    def _look_round(self, picture: Pixels, pose: Pose) -> None:
+    def _watched(self, picture: Pixels, time_s: float) -> list[Detection] | None:
+        """People in the picture, if others may be near; these are followed."""
+        assert self.trail is not None
+        since_s = min((time_s - each.trail.time_s for each in self.others), default=np.inf)
+        if since_s > _GONE_S and not self.lost:
+            return None
+        people = self._people(picture, self.trail.predicted(time_s))
+        for other in self.others if people else ():
+            roi = min(
+                (each.roi for each in people), key=lambda roi: other.trail.unlike(roi, time_s)
+            )
+            own = self.trail.unlike(roi, time_s)
+            if other.trail.unlike(roi, time_s) < min(_SAME_OTHER, own):
+                other.trail = other.trail.followed(roi, time_s)
+        return people
+
+    def _look_round(
+        self, picture: Pixels, people: list[Detection], pose: Pose, time_s: float
+    ) -> None:
         """Learn the colours of others while they stand apart."""
-        for found in self._people(picture, pose.next_roi)[: _MAX_CANDIDATES + 1]:
-            if _apart(found.roi, pose.next_roi) < 0.2 * pose.next_roi.size_px:
+        for found in people[: _MAX_CANDIDATES + 1]:
+            if apart_px(found.roi, pose.next_roi) < _BESIDE * pose.next_roi.size_px:
                 continue
             other = self._look(picture, found.roi)
-            if other is None or _apart(other.next_roi, pose.next_roi) < 0.2 * pose.roi.size_px:
+            if other is None or apart_px(other.next_roi, pose.next_roi) < (
+                _BESIDE * pose.roi.size_px
+            ):
                 continue
             looks = signature(other.roi.cut(picture), other)
-            known = [similarity(looks, each) for each in self.others]
-            if known and max(known) > 0.85:
-                continue
-            self.others = [*self.others, looks][-_MAX_CANDIDATES:]
+            known = max(self.others, key=lambda each: similarity(looks, each.looks), default=None)
+            if known is None or similarity(looks, known.looks) <= ALIKE:
+                known = Bystander(looks, Trail(other.next_roi, time_s))
+                self.others = [*self.others, known][-_MAX_CANDIDATES:]
+            elif known.trail.time_s < time_s:
+                known.trail = known.trail.followed(other.next_roi, time_s)
 
     def state(self) -> dict[str, NDArray[np.generic]]:
         """State that the next step depends on, as arrays."""
-        assert self.roi is not None
+        assert self.trail is not None
         assert self.own is not None
+        looks = [each.looks for each in self.others]
+        trails = [each.trail.numbers() for each in self.others]
         return {
-            "roi": roi_numbers(self.roi),
-            "velocity": self.velocity,
-            "clock": np.array([self.time_s, self.looked_round_s, float(self.lost)]),
-            "own": self.own,
-            "others": np.array(self.others, np.float32).reshape(-1, *self.own.shape),
+            "trail": self.trail.numbers(),
+            "clock": np.array([self.looked_round_s, float(self.lost)]),
+            "own": np.array([self.own.recent, *self.own.kept]),
+            "others": np.array(looks, np.float32).reshape(-1, *self.own.recent.shape),
+            "trails": np.array(trails, np.float64).reshape(-1, 7),
         }
 
     def restore(self, state: dict[str, NDArray[np.generic]]) -> None:
         """Go on from :meth:`state`."""
-        x, y, size, angle = (float(value) for value in state["roi"])
-        self.roi = Roi(x, y, size, angle)
-        self.velocity = np.asarray(state["velocity"], np.float64)
-        time_s, looked_round_s, lost = (float(value) for value in state["clock"])
-        self.time_s, self.looked_round_s, self.lost = time_s, looked_round_s, bool(lost)
-        self.own = np.asarray(state["own"], np.float32)
-        self.others = list(np.asarray(state["others"], np.float32))
+        self.trail = Trail.of(np.asarray(state["trail"], np.float64))
+        looked_round_s, lost = (float(value) for value in state["clock"])
+        self.looked_round_s, self.lost = looked_round_s, bool(lost)
+        recent, *kept = np.asarray(state["own"], np.float32)
+        self.own = Looks(recent, kept)
+        self.others = [
+            Bystander(looks, Trail.of(numbers))
+            for looks, numbers in zip(
+                np.asarray(state["others"], np.float32),
+                np.asarray(state["trails"], np.float64),
+                strict=True,
+            )
+        ]
 
 
-def _apart(one: Roi, two: Roi) -> float:
-    return float(np.hypot(one.centre_x_px - two.centre_x_px, one.centre_y_px - two.centre_y_px))
+def _jumped(pose: Pose) -> bool:
+    """True if another person in the square, or none, was taken for the person."""
+    ratio = pose.next_roi.size_px / pose.roi.size_px
+    away_px = apart_px(pose.roi, pose.next_roi)
+    return away_px > 0.35 * pose.roi.size_px or not 0.4 < ratio < 2.0
 
 
 class Search:
@@ -250,6 +266,7 @@ class Search:
         self._turn = len(ahead)
         self._rois = np.full((len(self._order), 4), np.nan)
         self._confidence = np.zeros(len(self._order))
+        self._unclear = np.zeros(len(self._order), bool)
         self._done = 0
 
     @property
@@ -271,10 +288,13 @@ class Search:
             if pose is not None:
                 self._rois[number] = roi_numbers(pose.next_roi)
                 self._confidence[number] = pose.confidence
+            self._unclear[number] = self._follower.unclear
             self._done += 1
             seen(frame, pose)
         rank = np.argsort(self._order, kind="stable")
-        return Sightings(self._order[rank], self._rois[rank], self._confidence[rank])
+        return Sightings(
+            self._order[rank], self._rois[rank], self._confidence[rank], self._unclear[rank]
+        )
 
     def _pictures(self) -> Iterator[Pixels]:
         """Pictures still to be searched, in that order."""
@@ -294,6 +314,7 @@ class Search:
         return self._follower.state() | {
             "rois": self._rois[: self._done],
             "confidence": self._confidence[: self._done],
+            "unclear": self._unclear[: self._done],
         }
 
     def restore(self, state: dict[str, NDArray[np.generic]]) -> None:
@@ -302,6 +323,7 @@ class Search:
         self._done = len(state["confidence"])
         self._rois[: self._done] = state["rois"]
         self._confidence[: self._done] = state["confidence"]
+        self._unclear[: self._done] = state["unclear"]
 
 
 def _looked_at(times_s: Floats) -> NDArray[np.intp]:

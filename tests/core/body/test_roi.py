@@ -50,7 +50,9 @@ class TestPath:
             [10.0 * frames, 100.0 - frames, np.full(11, 50.0), np.full(11, 0.1)], axis=1
         ).astype(float)
         rois[5:8] = np.nan
-        rows = roi_path(Sightings(frames, rois, np.ones(11)), np.arange(21) / 30.0)
+        rows = roi_path(
+            Sightings(frames, rois, np.ones(11), np.zeros(11, bool)), np.arange(21) / 30.0
+        )
         path = [roi_of(row) for row in rows]
         there = [k for k, roi in enumerate(path) if roi is not None]
         assert there == [*range(9), *range(16, 21)]
@@ -66,7 +68,9 @@ class TestPath:
         angles = np.pi + 0.05 * np.arange(-10, 11)
         rois = np.stack([np.full(21, 9.0), np.full(21, 9.0), np.full(21, 5.0), angles], axis=1)
         rois[:, 3] = np.remainder(angles + np.pi, 2 * np.pi) - np.pi
-        path = roi_path(Sightings(np.arange(21), rois, np.ones(21)), np.arange(21) / 15.0)
+        path = roi_path(
+            Sightings(np.arange(21), rois, np.ones(21), np.zeros(21, bool)), np.arange(21) / 15.0
+        )
         np.testing.assert_allclose(np.remainder(path[:, 3], 2 * np.pi), angles, atol=1e-9)
 
 

@@ -1,0 +1,182 @@
+"""Who is who in a video: how people look, and where they can have got to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.body.blazepose import Pose
+from sd2core.body.roi import CROP_PX, Floats, Pixels, Roi, roi_numbers
+from sd2core.body.track import LANDMARKS
+
+Signature = NDArray[np.float32]
+"""Histograms of colour of torso and thighs, shape (2, 512); each adds up to 1, or is 0."""
+
+ALIKE = 0.85
+"""Similarity from which on looks may be the same person's (docs/decisions/0048)."""
+
+_SMALL_PX = 64
+_BINS = 8
+_SHOULDERS, _HIPS, _KNEES = (
+    [LANDMARKS.index(f"{name}.L"), LANDMARKS.index(f"{name}.R")]
+    for name in ("shoulder", "hip", "knee")
+)
+_MOST_LOOKS = 6
+_ANOTHER_LOOK = 0.93
+
+# Squares, and logarithms of their size: what people do from one look to the next, how much
+# farther they get per second squared (4 m/s²), and how fast they come nearer.
+_SIDEWAYS, _SIDEWAYS_PER_S2 = 0.06, 0.85
+_GROWTH, _GROWTH_PER_S = 0.16, 0.5
+_AWAY, _AWAY_PER_S = 0.5, 1.5
+# The same for one who goes on as before.
+_STEADY, _STEADY_PER_S = 0.1, 0.15
+
+
+def signature(crop: Pixels, pose: Pose) -> Signature:
+    """Colours of a person in a crop of :data:`CROP_PX` pixels."""
+    import cv2
+
+    size = (_SMALL_PX, _SMALL_PX)
+    small = cv2.cvtColor(cv2.resize(crop, size, interpolation=cv2.INTER_AREA), cv2.COLOR_RGB2LAB)
+    person = cv2.resize(pose.mask, size, interpolation=cv2.INTER_AREA) > 0.5
+    heights = _in_crop(pose)[:, 1] * (_SMALL_PX / CROP_PX)
+    top, middle, end = (float(heights[rows].mean()) for rows in (_SHOULDERS, _HIPS, _KNEES))
+    rows = np.arange(_SMALL_PX)[:, None]
+    cells = (small // (256 // _BINS)).astype(np.intp)
+    numbers = (cells[..., 0] * _BINS + cells[..., 1]) * _BINS + cells[..., 2]
+    return np.stack(
+        [
+            _histogram(numbers[person & (rows >= upper) & (rows < lower)])
+            for upper, lower in ((top, middle), (middle, end))
+        ]
+    )
+
+
+def similarity(one: Signature, two: Signature) -> float:
+    """Similarity of colours, from 0 (nothing in common) to 1 (the same)."""
+    both = (one.any(axis=1)) & (two.any(axis=1))
+    if not both.any():
+        return 0.0
+    return float(np.sqrt(one[both] * two[both]).sum(axis=1).mean())
+
+
+def _histogram(numbers: NDArray[np.intp]) -> NDArray[np.float32]:
+    counts = np.bincount(numbers, minlength=_BINS**3).astype(np.float32)
+    cube = counts.reshape(_BINS, _BINS, _BINS)
+    # Spread over neighbouring bins: a little more light must not change everything.
+    for axis in range(3):
+        padded = np.pad(cube, [(1, 1) if each == axis else (0, 0) for each in range(3)], "edge")
+        ahead, behind = (np.take(padded, np.arange(_BINS) + step, axis) for step in (2, 0))
+        cube = 0.5 * cube + 0.25 * (ahead + behind)
+    total = cube.sum()
+    return (cube / total if total > 0 else cube).ravel()
+
+
+def _in_crop(pose: Pose) -> Floats:
+    matrix = pose.roi.matrix()
+    return np.asarray((pose.image_px - matrix[:, 2]) @ np.linalg.inv(matrix[:, :2]).T)
+
+
+def apart_px(one: Roi, two: Roi) -> float:
+    """Distance between the centres of two squares."""
+    return float(np.hypot(one.centre_x_px - two.centre_x_px, one.centre_y_px - two.centre_y_px))
+
+
+@dataclass(eq=False)
+class Looks:
+    """Looks of one person from all sides, as far as seen."""
+
+    recent: Signature  # mean over the last second or so
+    kept: list[Signature] = field(default_factory=list)  # of earlier seconds, unlike one another
+
+    def likeness(self, looks: Signature) -> float:
+        """Similarity to the look that is most alike."""
+        return max(similarity(looks, each) for each in (self.recent, *self.kept))
+
+    def learn(self, looks: Signature) -> None:
+        """Take in how the person looks now; what lasts for a second is kept."""
+        self.recent = self.recent + np.float32(0.05) * (looks - self.recent)
+        if max((similarity(self.recent, each) for each in self.kept), default=0.0) < _ANOTHER_LOOK:
+            self.kept = [*self.kept, self.recent][-_MOST_LOOKS:]
+
+
+@dataclass(frozen=True, eq=False)
+class Trail:
+    """Place of a person at a time, and how they moved, in pixels per second (2,)."""
+
+    roi: Roi
+    time_s: float
+    velocity: Floats = field(default_factory=lambda: np.zeros(2))
+
+    def followed(self, roi: Roi, time_s: float, *, steady: bool = True) -> Trail:
+        """The trail at its next place; unless it is steady, the velocity is to be learnt anew."""
+        gap_s = time_s - self.time_s
+        if not steady or not 0.0 < gap_s < 0.5:
+            return Trail(roi, time_s)
+        moved = [roi.centre_x_px - self.roi.centre_x_px, roi.centre_y_px - self.roi.centre_y_px]
+        share = 1.0 - np.exp(-gap_s / 0.15)
+        return Trail(roi, time_s, self.velocity + share * (np.array(moved) / gap_s - self.velocity))
+
+    def predicted(self, time_s: float) -> Roi:
+        """Square in which the person is expected."""
+        move = self.velocity * min(time_s - self.time_s, 1.0)
+        limit = 0.5 * self.roi.size_px
+        move = np.clip(move, -limit, limit)
+        roi = self.roi
+        return Roi(roi.centre_x_px + move[0], roi.centre_y_px + move[1], roi.size_px, roi.angle_rad)
+
+    def away(self, roi: Roi, time_s: float) -> float:
+        """Distance of a square from the predicted one, in squares."""
+        predicted = self.predicted(time_s)
+        return apart_px(predicted, roi) / predicted.size_px
+
+    def unlike(self, roi: Roi, time_s: float) -> float:
+        """Distance of a square from the predicted one in place and size."""
+        return self.away(roi, time_s) + self.growth(roi)
+
+    def reaches(self, roi: Roi, time_s: float) -> bool:
+        """True if somebody can have got to a square: sideways and in size nobody jumps."""
+        gap_s = time_s - self.time_s
+        return (
+            self._sideways(roi, time_s) < _SIDEWAYS + _SIDEWAYS_PER_S2 * gap_s**2
+            and self.growth(roi) < _GROWTH + _GROWTH_PER_S * gap_s
+            and self.is_near(roi, time_s)
+        )
+
+    def is_near(self, roi: Roi, time_s: float) -> bool:
+        """True unless a square is so far away that it shows somebody else."""
+        return self.away(roi, time_s) < _AWAY + _AWAY_PER_S * (time_s - self.time_s)
+
+    def goes_on(self, roi: Roi, time_s: float) -> bool:
+        """True if a square is where somebody is who has not changed their way."""
+        limit = _STEADY + _STEADY_PER_S * min(time_s - self.time_s, 1.0)
+        return self._sideways(roi, time_s) < limit and self.growth(roi) < _STEADY
+
+    def growth(self, roi: Roi) -> float:
+        """Change of size, as the absolute logarithm of the ratio."""
+        return abs(float(np.log(roi.size_px / self.roi.size_px)))
+
+    def _sideways(self, roi: Roi, time_s: float) -> float:
+        predicted = self.predicted(time_s)
+        return abs(roi.centre_x_px - predicted.centre_x_px) / predicted.size_px
+
+    def numbers(self) -> Floats:
+        """The trail as a row of seven numbers."""
+        return np.array([*roi_numbers(self.roi), self.time_s, *self.velocity])
+
+    @classmethod
+    def of(cls, numbers: Floats) -> Trail:
+        """The trail of :meth:`numbers`."""
+        x, y, size, angle, time_s = (float(value) for value in numbers[:5])
+        return cls(Roi(x, y, size, angle), time_s, np.array(numbers[5:], np.float64))
+
+
+@dataclass(eq=False)
+class Bystander:
+    """Somebody else in the video."""
+
+    looks: Signature
+    trail: Trail
