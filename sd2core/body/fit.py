@@ -38,7 +38,7 @@ _SEEN = 0.5
 
 _FINISHED_FRAMES = 600
 _MASK_SURE = 128
-_OUTLINES = 16
+_OUTLINES = 8
 
 # The fit's error along the view per error that the lifter states (docs/decisions/0046), and
 # across the view per error of a landmark there (docs/decisions/0022).

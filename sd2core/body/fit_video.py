@@ -26,6 +26,7 @@ from sd2core.body.landmarks import DEFAULT_MAX_GAP_S, SIGHTINGS, OnFrame, find_l
 from sd2core.body.limbs import LIMB_LANDMARKS, LIMBS
 from sd2core.body.model import Resolution
 from sd2core.body.person_selection import Rectangle
+from sd2core.body.solve import one_thread
 from sd2core.body.track import LANDMARK, Landmarks, parts
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text, replace_folder
@@ -136,7 +137,7 @@ def fit_video(
     with open_video(path) as video:
         camera, camera_source = camera_of(video, choices.focal_px, choices.field_of_view_deg)
         found_models = landmark_models(models, report.progress_of("models"))
-        with claim_folder(partial, restart), remove_without_landmarks(partial):
+        with claim_folder(partial, restart), remove_without_landmarks(partial), one_thread():
             report.started(video, (partial / LANDMARKS).is_dir())
             stages = _Stages(report)
             track = find_landmarks(

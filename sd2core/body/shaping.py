@@ -35,7 +35,7 @@ _SEEN = 0.5
 _ENOUGH_FRAMES = 3
 _OUTLINE_WEIGHT = 60.0
 """Worth of a whole overlap against half a squared standard deviation of shape."""
-_TRIALS = 90
+_TRIALS = 60
 
 NEAREST_M = 0.05
 """Smallest depth that is drawn."""

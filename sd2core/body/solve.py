@@ -384,9 +384,10 @@ _LEAST_TRANSLATION_MPS2 = 0.05
 _LIVELINESS = 0.7
 """Standard deviation of an acceleration over what was found around it."""
 _AROUND_S = 0.3
-ROUNDS = 4
+ROUNDS = 3
 _STEPS = 8
-_CONVERGED = 1e-3
+_CONVERGED = 1e-2
+"""Share of the cost below which a step's gain ends a round: further ones change no velocity."""
 
 
 def solve(

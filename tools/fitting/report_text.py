@@ -42,6 +42,9 @@ _REAL = (
     ("overlap_least", "least"),
     ("reprojection_px", "landmarks (px)"),
     ("reprojection_m", "(m)"),
+    ("residual_m", "residual (m)"),
+    ("residual_near_m", "with 0.7 of the focal length"),
+    ("residual_far_m", "with 1.5 of it"),
 )
 
 

@@ -6,6 +6,7 @@ import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import get_args
 
 from sd2core.body.lifter import Lifter
 from sd2core.body.track import LANDMARKS
@@ -16,6 +17,7 @@ from sd2core.errors import Sd2Error
 from tools.command_line import run_tool
 from tools.motion_capture.bodies import load_motions
 from tools.train_lifter.data import load_takes, make_lifter_data
+from tools.train_lifter.deeds import Manner
 from tools.train_lifter.emulate import landmark_offsets
 from tools.train_lifter.score import score
 from tools.train_lifter.swaps import score_sides
@@ -53,11 +55,11 @@ def _add_commands(kinds: argparse._SubParsersAction) -> None:
     )
     data.add_argument(
         "--manner",
-        choices=("any", "natural", "gestures"),
+        choices=get_args(Manner),
         default="any",
         help=(
             "how people move: with elbows any way they can be (default), as people have them,"
-            " or gesturing before the camera"
+            " or gesturing before the camera, with arms or with forearms alone"
         ),
     )
     data.add_argument(

@@ -39,7 +39,7 @@ def make_lifter_data(
         How many there shall be.
     held_out : bool
         With the motion that is kept for testing.
-    manner : {"any", "natural", "gestures"}
+    manner : {"any", "natural", "gestures", "forearms"}
         How simulated people move.
     motions : Path, optional
         Folder made by ``python -m tools.motion_capture``: people move as those in it do. With

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -10,9 +11,10 @@ from sd2core.simulate.people.arms import STYLES, ArmStyle
 from sd2core.simulate.people.motion import Deed
 from sd2core.simulate.people.walking import Mode
 
-Manner = Literal["any", "natural", "gestures"]
+Manner = Literal["any", "natural", "gestures", "forearms"]
 """Manner of simulated motion: elbows any way they can be, elbows as people have them, or standing
-or sitting before the camera and making strokes with one hand or both."""
+or sitting before the camera and making strokes with one hand or both: with arms that sweep about
+the shoulder, or with forearms that turn about elbows that stay."""
 
 LEGS: dict[Mode, float] = {"stand": 0.56, "shift": 0.18, "walk": 0.14, "turn": 0.05, "sit": 0.07}
 """Actions of the legs, each with its probability."""
@@ -40,8 +42,8 @@ def random_deed(
     rng: np.random.Generator, *, held_out: bool = False, manner: Manner = "any"
 ) -> Deed:
     """Random action; ``held_out`` takes the arms' styles from those kept for testing."""
-    if manner == "gestures" and not held_out:
-        return _gestures(rng)
+    if manner in ("gestures", "forearms") and not held_out:
+        return replace(_gestures(rng), elbows_rest=manner == "forearms")
     styles = list(HELD_OUT_STYLES if held_out else STYLES)
     legs: Mode = rng.choice(list(LEGS), p=list(LEGS.values()))
     if held_out and legs in ("walk", "turn") and rng.random() < 0.5:

@@ -31,7 +31,7 @@ _WRISTS = [LANDMARKS.index("wrist.L"), LANDMARKS.index("wrist.R")]
 _ANKLES = [LANDMARKS.index("ankle.L"), LANDMARKS.index("ankle.R")]
 _WALK = 2  # takes have 0 and 1 in this place
 _CAPTURED = 3
-_MANNERS: tuple[Manner, ...] = ("any", "natural", "gestures", "gestures")
+_MANNERS: tuple[Manner, ...] = ("any", "natural", "gestures", "forearms")
 """Manners of the motions, in turn."""
 _CANDIDATES = 24
 _ROBUST = 0.06

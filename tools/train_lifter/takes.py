@@ -135,7 +135,7 @@ class Stage:
             shape = self.space.random(rng)
             skeleton = self.space.skeleton(shape)
             deed = random_deed(rng, held_out=held_out, manner=manner)
-            deed = replace(deed, elbows_rest=elbows_rest)
+            deed = replace(deed, elbows_rest=deed.elbows_rest or elbows_rest)
             motion = random_motion(rng, skeleton, shape.stature_m, times, deed)
             transforms = skeleton.transforms(*motion)
             keypoints = self._keypoints.of(shape)
@@ -218,7 +218,7 @@ class TakeMaker:
         ----------
         held_out : bool
             With the motion that is kept for testing.
-        manner : {"any", "natural", "gestures"}
+        manner : {"any", "natural", "gestures", "forearms"}
             How people move.
         """
         rng = np.random.default_rng(seed)
