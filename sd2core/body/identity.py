@@ -123,7 +123,7 @@ class Trail:
     def predicted(self, time_s: float) -> Roi:
         """Square in which the person is expected."""
         move = self.velocity * min(time_s - self.time_s, 1.0)
-        limit = 0.5 * self.roi.size_px
+        limit = self.roi.size_px
         move = np.clip(move, -limit, limit)
         roi = self.roi
         return Roi(roi.centre_x_px + move[0], roi.centre_y_px + move[1], roi.size_px, roi.angle_rad)

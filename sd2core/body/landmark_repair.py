@@ -98,7 +98,9 @@ def _outlying_runs(
     around_s = times_s[support[:, 2]] - times_s[support[:, 1]]
     before, after = places_m[support[:, 1], None], places_m[support[:, 2], None]
     share = ((times_s[inner] - times_s[support[:, 1, None]]) / around_s[:, None])[..., None]
-    curve = np.einsum("slk,skd->sld", _cubic(times_s[support], times_s[inner]), places_m[support])
+    curve = np.einsum(
+        "slk,skd->sld", cubic_weights(times_s[support], times_s[inner]), places_m[support]
+    )
     # A curve through an outlier bends far; the line between the nearest two does not.
     line = before + share * (after - before)
     off = np.minimum(
@@ -120,7 +122,7 @@ def _outlying_runs(
     return found
 
 
-def _cubic(support: Floats, at: Floats) -> Floats:
+def cubic_weights(support: Floats, at: Floats) -> Floats:
     """Lagrange weights (S, L, 4) of values at ``support`` (S, 4) for times ``at`` (S, L)."""
     weights = np.ones((*at.shape, 4))
     for k in range(4):
@@ -141,7 +143,7 @@ def _filled(times_s: Floats, values: Floats, wrong: NDArray[np.bool_]) -> Floats
         support = right[np.clip(after - 2, 0, max(len(right) - 4, 0)) :][:4]
         if len(support) < 4:
             continue
-        weights = _cubic(times_s[support][None], times_s[[frame]][None])[0, 0]
+        weights = cubic_weights(times_s[support][None], times_s[[frame]][None])[0, 0]
         filled[frame] = np.tensordot(weights, values[support], 1)
     return filled
 

@@ -1,12 +1,14 @@
-"""Second pass over a video: every frame again, in the smoothed square around the person.
+"""Second pass over a video: the person again, in the smoothed square around them.
 
-Frames do not depend on one another here, so several threads share them.
+Fifteen frames a second are looked at, and those in between where something moves fast; the others
+follow by cubics (docs/decisions/0049). Frames do not depend on one another here, so several threads
+share them.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from queue import SimpleQueue
@@ -15,8 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.blazepose import CLOSE_UP, Pose, PoseLandmarker
+from sd2core.body.landmark_repair import cubic_weights
 from sd2core.body.person_selection import FOUND
 from sd2core.body.roi import CROP_PX, Pixels, Roi
+from sd2core.body.tracking import looked_at
 from sd2core.io.video import VideoReader
 
 Singles = NDArray[np.float32]
@@ -25,6 +29,11 @@ SILHOUETTE_PX = 256
 """Longer side of a silhouette."""
 
 _STRAYED = 0.25
+_STEP_S = 1.0 / 15.0
+_FAST_PER_S = 0.6
+"""Change of a landmark's velocity in a fifteenth of a second, in squares per second (20 m/s²), from
+where on the frames in between are looked at."""
+_VISIBLE = 0.5
 _AHEAD_BYTES = 128 * 2**20
 """Memory of pictures that wait for a thread."""
 
@@ -68,10 +77,15 @@ class Refiner:
     ) -> Stretch:
         """Landmarks of the frames from ``start`` on, one for each of ``rois`` (None: no person).
 
-        The silhouettes of the frames in ``kept`` are kept. ``seen`` is called with each frame and
-        its result, in order; it may raise ``Cancelled``.
+        The silhouettes of the frames in ``kept`` are kept. ``seen`` is called with each frame, in
+        order, and what was seen in it, None where it is not looked at now; it may raise
+        ``Cancelled``.
         """
         frames = len(rois)
+        times_s = video.timebase.times_s[start : start + frames]
+        first = np.zeros(frames, bool)
+        first[looked_at(times_s, _STEP_S)] = True
+        first[[frame - start for frame in kept if start <= frame < start + frames]] = True
         found = Stretch(
             image_px=np.full((frames, 33, 2), np.nan, np.float32),
             depth_px=np.full((frames, 33), np.nan, np.float32),
@@ -82,17 +96,35 @@ class Refiner:
             silhouettes=np.empty((0, *silhouette_shape(video)), np.uint8),
         )
         numbers, masks = [], []
-        for number, pose in enumerate(self._poses(video, start, rois)):
+        between: dict[int, Future[Pixels]] = {}
+        waiting: deque[tuple[int, Future[Pose | None] | None]] = deque()
+
+        def settle(number: int, looking: Future[Pose | None] | None) -> None:
+            pose = None if looking is None else looking.result()
             if pose is not None:
-                found.image_px[number] = pose.image_px[:33]
-                found.depth_px[number] = pose.depth_px
-                found.world_m[number] = pose.world_m
-                found.visibility[number] = pose.visibility * pose.presence
-                found.confidence[number] = pose.confidence
+                _write(found, number, pose)
                 if start + number in kept:
                     numbers.append(start + number)
                     masks.append(_silhouette(pose, video))
             seen(start + number, pose)
+
+        # Few pictures are in memory at once, and fewer where they are large.
+        room = _AHEAD_BYTES // (3 * video.width * video.height)
+        ahead = max(min(2 * self._threads, room), 1)
+        for number, roi in enumerate(rois):
+            looking = None
+            if roi is not None:
+                picture = video.read(start + number)
+                if first[number]:
+                    looking = self._pool.submit(self._look, picture, roi)
+                else:
+                    between[number] = self._pool.submit(roi.scaled(CLOSE_UP).cut, picture)
+            waiting.append((number, looking))
+            if len(waiting) > ahead:
+                settle(*waiting.popleft())
+        while waiting:
+            settle(*waiting.popleft())
+        self._fill(found, times_s, first, rois, between)
         if not masks:
             return found
         return Stretch(
@@ -100,28 +132,44 @@ class Refiner:
             | {"silhouette_frames": np.array(numbers, np.intp), "silhouettes": np.stack(masks)}
         )
 
-    def _poses(
-        self, video: VideoReader, start: int, rois: Sequence[Roi | None]
-    ) -> Iterator[Pose | None]:
-        """Poses in order; few pictures are in memory at once, and fewer where they are large."""
-        room = _AHEAD_BYTES // (3 * video.width * video.height)
-        ahead = max(min(2 * self._threads, room), 1)
-        waiting: deque[Future[Pose | None] | None] = deque()
-        for number, roi in enumerate(rois):
-            if roi is None:
-                waiting.append(None)
-            else:
-                waiting.append(self._pool.submit(self._look, video.read(start + number), roi))
-            if len(waiting) > ahead:
-                yield _outcome(waiting.popleft())
-        while waiting:
-            yield _outcome(waiting.popleft())
+    def _fill(
+        self,
+        found: Stretch,
+        times_s: NDArray[np.float64],
+        first: NDArray[np.bool_],
+        rois: Sequence[Roi | None],
+        between: dict[int, Future[Pixels]],
+    ) -> None:
+        """Landmarks of the frames in between: looked at where something moves fast, or cubics."""
+        known = np.flatnonzero(first)
+        sizes_px = [np.nan if roi is None else roi.size_px for roi in rois]
+        slow = ~_fast(found, known, times_s, np.array(sizes_px))
+        before = np.searchsorted(known, list(between)) - 1
+        looking = {}
+        for number, row in zip(between, before, strict=True):
+            roi = rois[number]
+            if roi is not None and not (slow[row] and slow[row + 1]):
+                crop = between[number].result()
+                looking[number] = self._pool.submit(self._look_closely, crop, roi)
+                continue
+            support = known[row - 1 : row + 3]
+            weights = cubic_weights(times_s[support][None], times_s[[number]][None])[0, 0]
+            for name in ("image_px", "depth_px", "world_m", "visibility", "confidence"):
+                values = getattr(found, name)
+                values[number] = np.tensordot(weights, values[support], 1)
+            np.clip(found.visibility[number], 0.0, 1.0, out=found.visibility[number])
+            found.confidence[number] = found.confidence[support[1:3]].min()
+        for number, pose in looking.items():
+            if (seen := pose.result()) is not None:
+                _write(found, number, seen)
 
     def _look(self, picture: Pixels, roi: Roi) -> Pose | None:
+        return self._look_closely(roi.scaled(CLOSE_UP).cut(picture), roi)
+
+    def _look_closely(self, crop: Pixels, roi: Roi) -> Pose | None:
         landmarker = self._free.get()
         try:
-            close = roi.scaled(CLOSE_UP)
-            pose = landmarker.on_both_sides(close.cut(picture), close)
+            pose = landmarker.on_crop(crop, roi.scaled(CLOSE_UP))
         finally:
             self._free.put(landmarker)
         there = pose.next_roi
@@ -130,8 +178,33 @@ class Refiner:
         return pose if pose.confidence >= FOUND and away < _STRAYED * roi.size_px else None
 
 
-def _outcome(waiting: Future[Pose | None] | None) -> Pose | None:
-    return None if waiting is None else waiting.result()
+def _write(found: Stretch, number: int, pose: Pose) -> None:
+    found.image_px[number] = pose.image_px[:33]
+    found.depth_px[number] = pose.depth_px
+    found.world_m[number] = pose.world_m
+    found.visibility[number] = pose.visibility * pose.presence
+    found.confidence[number] = pose.confidence
+
+
+def _fast(
+    found: Stretch,
+    known: NDArray[np.intp],
+    times_s: NDArray[np.float64],
+    sizes_px: NDArray[np.float64],
+) -> NDArray[np.bool_]:
+    """Frames of those that are known (K,) at which a landmark that is seen moves fast.
+
+    So are those at both ends, and next to a frame without the person.
+    """
+    fast = np.ones(len(known), bool)
+    if len(known) > 2:
+        moved_px = np.diff(found.image_px[known], axis=0)  # (K - 1, 33, 2)
+        rates = moved_px / np.diff(times_s[known])[:, None, None]
+        inner = known[1:-1]
+        changes = np.linalg.norm(np.diff(rates, axis=0), axis=-1) / sizes_px[inner, None]
+        hidden = (found.visibility[inner] < _VISIBLE) & np.isfinite(changes)
+        fast[1:-1] = ~((changes < _FAST_PER_S) | hidden).all(axis=1)
+    return fast
 
 
 def silhouette_shape(video: VideoReader) -> tuple[int, int]:

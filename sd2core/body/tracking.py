@@ -23,7 +23,7 @@ from sd2core.body.person_selection import FOUND, Start
 from sd2core.body.roi import Floats, Pixels, Roi, Sightings, roi_numbers
 from sd2core.io.video import VideoReader
 
-_STEP_S = 1.0 / 15.0
+_SEARCH_STEP_S = 1.0 / 10.0
 """Time between frames that are searched; the path in between is smooth."""
 _LOOK_ROUND_S = 1.0 / 3.0
 _GONE_S = 1.0
@@ -260,8 +260,10 @@ class Search:
         self._follower = follower
         self._start = start
         times = video.timebase.times_s
-        ahead = _looked_at(times[start.frame :]) + start.frame
-        behind = start.frame - _looked_at(times[start.frame] - times[start.frame :: -1])
+        ahead = looked_at(times[start.frame :], _SEARCH_STEP_S) + start.frame
+        behind = start.frame - looked_at(
+            times[start.frame] - times[start.frame :: -1], _SEARCH_STEP_S
+        )
         self._order = np.concatenate([ahead, behind[1:]])
         self._turn = len(ahead)
         self._rois = np.full((len(self._order), 4), np.nan)
@@ -326,13 +328,11 @@ class Search:
         self._unclear[: self._done] = state["unclear"]
 
 
-def _looked_at(times_s: Floats) -> NDArray[np.intp]:
-    """Numbers of frames a fifteenth of a second apart or a little less, the last included."""
+def looked_at(times_s: Floats, step_s: float) -> NDArray[np.intp]:
+    """Numbers of frames that are a step apart or a little less, the last included."""
     chosen = [0]
     for number in range(1, len(times_s)):
-        nearly = number + 1 == len(times_s) or times_s[number + 1] - times_s[chosen[-1]] > 1.05 * (
-            _STEP_S
-        )
-        if nearly:
+        last = number + 1 == len(times_s)
+        if last or times_s[number + 1] - times_s[chosen[-1]] > 1.05 * step_s:
             chosen.append(number)
     return np.array(chosen, np.intp)

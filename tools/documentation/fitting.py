@@ -65,13 +65,13 @@ differences between the synthetic Doppler maps of the fitted and of the true mes
 preset, smoothed) over the sum of the true one. **Peak kept** is the fitted hand's largest speed
 along the line of sight over the true one's; more than 1 is too much. **Ends** are the first and
 last five frames, over those between. Joints are patches of the surface. The **residual** is the
-mean distance in space of the landmarks that were seen, at the depth that the lifter gives them, from
-the body. Time by the clock counts whatever else the machine did; processor time is the fit's own, on
-all cores together.
+mean distance in space of the landmarks that were seen, at the depth that the lifter gives them,
+from the body. Time by the clock counts whatever else the machine did; processor time is the fit's
+own, on all cores together.
 
 Of a real video neither focal length nor height is known. A wrong height scales the residual, every
-distance and every velocity alike; how much of the residual may be due to the focal length is told by
-fits with others (last table).
+distance and every velocity alike; how much of the residual may be due to the focal length is told
+by fits with others (last table).
 
 What limits the figures is depth: given the true depths and velocities along the optical axis in
 the lifter's place, the same fit of the same landmarks is well within all of them ([decision
