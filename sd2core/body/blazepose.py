@@ -10,7 +10,7 @@ import os
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.roi import CROP_PX, Floats, Pixels, Roi
+from sd2core.body.track import MIRRORED
 from sd2core.errors import Sd2Error
 
 Singles = NDArray[np.float32]
@@ -37,7 +38,9 @@ _ANCHORS_PER_CELL = 2
 _CELL_PX = 4
 _REFINE_CELLS = 3
 _REFINE_FROM = 0.5
+_DISAGREEMENT = 0.04
 _CHATTER = threading.Lock()
+_MIRRORED = list(MIRRORED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,6 +152,29 @@ class PoseLandmarker:
             roi=roi,
         )
 
+    def on_both_sides(self, crop: Pixels, roi: Roi) -> Pose:
+        """Landmarks of the person in a crop and in its mirror image, averaged.
+
+        The network is not symmetric: the mean has 0.7 times the jitter and a better depth, and
+        takes twice as long. Where the two differ by much more than 4 % of the square, one of
+        them has taken one hand for the other, and only the first counts.
+        """
+        one = self.on_crop(crop, roi)
+        two = _unmirrored(self.on_crop(np.ascontiguousarray(crop[:, ::-1]), _upright(roi)), roi)
+        apart = np.hypot(*(one.image_px - two.image_px).T) / (_DISAGREEMENT * roi.size_px)
+        share = 0.5 * np.exp(-(apart**2))  # (39,)
+        body = share[:33]
+        return replace(
+            one,
+            image_px=_mean(one.image_px, two.image_px, share),
+            depth_px=_mean(one.depth_px, two.depth_px, body),
+            world_m=_mean(one.world_m, two.world_m, body),
+            visibility=_mean(one.visibility, two.visibility, body),
+            presence=_mean(one.presence, two.presence, body),
+            confidence=0.5 * (one.confidence + two.confidence),
+            mask=0.5 * (one.mask + two.mask),
+        )
+
 
 class _Network:
     """One file, run by LiteRT."""
@@ -194,6 +220,37 @@ def _without_chatter() -> Iterator[None]:
             os.dup2(kept, 2)
             os.close(kept)
             os.close(nowhere)
+
+
+def _upright(roi: Roi) -> Roi:
+    """Square of the same size that is the whole picture: points are those of the crop."""
+    return Roi(roi.size_px / 2.0, roi.size_px / 2.0, roi.size_px)
+
+
+def _unmirrored(pose: Pose, roi: Roi) -> Pose:
+    """Landmarks found in a mirror image, turned back into those of the square."""
+    turned = roi.matrix()
+    turn = turned[:, :2] / (roi.size_px / CROP_PX)
+    points = pose.image_px[[*_MIRRORED, *range(33, POINTS)]] * [-1.0, 1.0] + [roi.size_px, 0.0]
+    points = points @ turn.T + turned[:, 2]
+    metres = pose.world_m[_MIRRORED] * [-1.0, 1.0, 1.0]
+    metres[:, :2] = metres[:, :2] @ turn.T
+    return Pose(
+        image_px=points,
+        depth_px=pose.depth_px[_MIRRORED],
+        world_m=metres,
+        visibility=pose.visibility[_MIRRORED],
+        presence=pose.presence[_MIRRORED],
+        confidence=pose.confidence,
+        mask=pose.mask[:, ::-1],
+        roi=roi,
+    )
+
+
+def _mean(one: Floats, two: Floats, share: Floats) -> Floats:
+    """Weighted mean of rows, ``share`` (up to a half) of the second."""
+    share = share.reshape(-1, *(1,) * (one.ndim - 1))
+    return (1.0 - share) * one + share * two
 
 
 def _same_person(centres: Floats, sizes: Floats, scores: Floats) -> list[NDArray[np.intp]]:

@@ -137,12 +137,12 @@ class Trail:
         """Distance of a square from the predicted one in place and size."""
         return self.away(roi, time_s) + self.growth(roi)
 
-    def reaches(self, roi: Roi, time_s: float) -> bool:
+    def reaches(self, roi: Roi, time_s: float, *, any_size: bool = False) -> bool:
         """True if somebody can have got to a square: sideways and in size nobody jumps."""
         gap_s = time_s - self.time_s
         return (
             self._sideways(roi, time_s) < _SIDEWAYS + _SIDEWAYS_PER_S2 * gap_s**2
-            and self.growth(roi) < _GROWTH + _GROWTH_PER_S * gap_s
+            and (any_size or self.growth(roi) < _GROWTH + _GROWTH_PER_S * gap_s)
             and self.is_near(roi, time_s)
         )
 

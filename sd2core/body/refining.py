@@ -169,7 +169,7 @@ class Refiner:
     def _look_closely(self, crop: Pixels, roi: Roi) -> Pose | None:
         landmarker = self._free.get()
         try:
-            pose = landmarker.on_crop(crop, roi.scaled(CLOSE_UP))
+            pose = landmarker.on_both_sides(crop, roi.scaled(CLOSE_UP))
         finally:
             self._free.put(landmarker)
         there = pose.next_roi

@@ -107,8 +107,10 @@ class PersonTracker:
             return looks
         mine, theirs = self._likeness(looks)
         twins = [each for each in self.others if self.own.likeness(each.looks) >= ALIKE]
+        # Who comes back from behind the edge of the picture was seen in part, and in a wrong size.
+        any_size = not followed and not twins
         if (
-            self.trail.reaches(roi, time_s)
+            self.trail.reaches(roi, time_s, any_size=any_size)
             and theirs <= mine + 0.05
             and (followed or mine >= ALIKE)
             and not any(self._may_be(twin, roi, time_s, followed) for twin in twins)

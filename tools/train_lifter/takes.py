@@ -23,7 +23,6 @@ from sd2core.mocap.driving import resample_pose
 from sd2core.simulate.people.motion import random_motion
 from tools.motion_capture.bodies import BodyMotion
 from tools.motion_capture.catalogue import RATE_HZ
-from tools.train_lifter.both_sides import on_both_sides
 from tools.train_lifter.crops import (
     CropPainter,
     Furniture,
@@ -272,8 +271,9 @@ class TakeMaker:
         roi = self._landmarker.on_crop(*_first(rng, painter, vertices[0], places_px[0])).next_roi
         poses = []
         for frame, surface in enumerate(vertices):
+            # As the tracker's second pass looks.
             near = roi.scaled(CLOSE_UP)
-            pose = on_both_sides(self._landmarker, painter.crop(surface, near), near)
+            pose = self._landmarker.on_both_sides(painter.crop(surface, near), near)
             poses.append(pose)
             if pose.confidence < _LOST:
                 roi = _around(places_px[frame])

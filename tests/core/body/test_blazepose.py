@@ -14,7 +14,6 @@ from sd2core.body.landmark_models import LandmarkModels
 from sd2core.body.model import Body
 from sd2core.body.track import LANDMARKS, MIRRORED
 from tools.build_sample.render import Camera, Renderer
-from tools.train_lifter.both_sides import on_both_sides
 
 CAMERA = Camera()
 PLACE = np.array([0.2, CAMERA.above_floor_m, 2.6])
@@ -156,8 +155,8 @@ class TestLandmarker:
         roi = replace(self.roi(detector, picture), angle_rad=0.2)
         crop = roi.cut(picture)
         other = replace(roi, centre_x_px=640 - roi.centre_x_px, angle_rad=-0.2)
-        one = on_both_sides(landmarker, crop, roi)
-        two = on_both_sides(landmarker, np.ascontiguousarray(crop[:, ::-1]), other)
+        one = landmarker.on_both_sides(crop, roi)
+        two = landmarker.on_both_sides(np.ascontiguousarray(crop[:, ::-1]), other)
         mirrored = list(MIRRORED)
         expected = two.image_px[mirrored] * [-1, 1] + [640, 0]
         np.testing.assert_allclose(one.image_px[:33], expected, atol=1.0)
@@ -171,7 +170,7 @@ class TestLandmarker:
     ) -> None:
         roi = replace(self.roi(detector, picture), angle_rad=0.2)
         crop = roi.cut(picture)
-        one, both = landmarker.on_crop(crop, roi), on_both_sides(landmarker, crop, roi)
+        one, both = landmarker.on_crop(crop, roi), landmarker.on_both_sides(crop, roi)
         assert np.hypot(*(one.image_px - both.image_px)[:33].T).max() < 0.04 * roi.size_px
         assert np.abs(one.world_m - both.world_m).max() < 0.15
 

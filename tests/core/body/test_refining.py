@@ -24,7 +24,7 @@ class Landmarker:
         self._frames_per_s, self._path, self._gone = frames_per_s, path, gone
         self.looked: list[int] = []
 
-    def on_crop(self, crop: np.ndarray, roi: Roi) -> Pose:
+    def on_both_sides(self, crop: np.ndarray, roi: Roi) -> Pose:
         number = int(crop.max()) - 1
         self.looked.append(number)
         points = np.full((POINTS, 2), 120.0)

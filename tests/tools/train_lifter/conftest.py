@@ -22,6 +22,8 @@ class _PerfectLandmarker:
         world = np.sin(np.arange(99.0)).reshape(33, 3)
         return Pose(image, ones, world, ones, ones, 1.0, mask, roi)
 
+    on_both_sides = on_crop
+
 
 @pytest.fixture(scope="module")
 def takes() -> list[Take]:
