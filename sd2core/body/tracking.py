@@ -28,13 +28,17 @@ _SEARCH_STEP_S = 1.0 / 10.0
 _LOOK_ROUND_S = 1.0 / 3.0
 _GONE_S = 1.0
 """Time after which it is not known where another person has gone."""
-_MAX_CANDIDATES = 4
 _JUST_NOW_S = 0.25
+"""Who was seen elsewhere so long ago or less is not here."""
 _LONG_S = 3.0
+"""Who was not seen anywhere for so long may have left."""
+_MAX_CANDIDATES = 4
 _SMALL = 0.6
+"""Share of the picture below which a person is searched for around their place too."""
 _BESIDE = 0.2
 """Distance in squares within which two may be taken for one another."""
 _SAME_OTHER = 0.5
+"""Difference in place and size up to which a detection is taken for another person who is known."""
 _TELLING = 0.08
 """Difference of sizes, as logarithms, that tells people apart."""
 _BLOCK_BYTES = 192 * 2**20
