@@ -107,7 +107,9 @@ def residual_with_focal(track: LandmarkTrack, camera: PinholeCamera, share: floa
     Another stature would only scale it: a fit knows no unit but that one.
     """
     other = PinholeCamera(camera.width, camera.height, share * camera.focal_px)
-    return float(np.nanmean(fit_body(track, other).residual_m))
+    residual_m = fit_body(track, other).residual_m
+    seen_m = residual_m[np.isfinite(residual_m)]
+    return float(seen_m.mean()) if seen_m.size else float("nan")
 
 
 def reprojection(
