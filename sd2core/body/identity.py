@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.blazepose import Pose
-from sd2core.body.roi import CROP_PX, Floats, Pixels, Roi, roi_numbers
+from sd2core.body.roi import CROP_PX, Floats, Pixels, Roi, apart_px, roi_numbers
 from sd2core.body.track import LANDMARKS
 
 Signature = NDArray[np.float32]
@@ -80,11 +80,6 @@ def _in_crop(pose: Pose) -> Floats:
     return np.asarray((pose.image_px - matrix[:, 2]) @ np.linalg.inv(matrix[:, :2]).T)
 
 
-def apart_px(one: Roi, two: Roi) -> float:
-    """Distance between the centres of two squares."""
-    return float(np.hypot(one.centre_x_px - two.centre_x_px, one.centre_y_px - two.centre_y_px))
-
-
 @dataclass(eq=False)
 class Looks:
     """Looks of one person from all sides, as far as seen."""
@@ -123,10 +118,9 @@ class Trail:
     def predicted(self, time_s: float) -> Roi:
         """Square in which the person is expected."""
         move = self.velocity * min(time_s - self.time_s, 1.0)
-        limit = self.roi.size_px
-        move = np.clip(move, -limit, limit)
         roi = self.roi
-        return Roi(roi.centre_x_px + move[0], roi.centre_y_px + move[1], roi.size_px, roi.angle_rad)
+        x, y = np.clip(move, -roi.size_px, roi.size_px)
+        return replace(roi, centre_x_px=roi.centre_x_px + x, centre_y_px=roi.centre_y_px + y)
 
     def away(self, roi: Roi, time_s: float) -> float:
         """Distance of a square from the predicted one, in squares."""
@@ -170,8 +164,8 @@ class Trail:
     @classmethod
     def of(cls, numbers: Floats) -> Trail:
         """The trail of :meth:`numbers`."""
-        x, y, size, angle, time_s = (float(value) for value in numbers[:5])
-        return cls(Roi(x, y, size, angle), time_s, np.array(numbers[5:], np.float64))
+        values = numbers.tolist()
+        return cls(Roi(*values[:4]), values[4], np.array(values[5:]))
 
 
 @dataclass(eq=False)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,7 +62,7 @@ def replace_outliers(found: RawTrack) -> tuple[RawTrack, NDArray[np.bool_]]:
         ):
             if wrong.any():
                 values = changed[name][rows, landmark]
-                changed[name][rows, landmark] = _filled(times, values, wrong)
+                changed[name][rows, landmark] = on_cubics(times, values, wrong)
     return replace(found, **changed), replaced
 
 
@@ -84,7 +85,7 @@ def find_spikes(times_s: Floats, places_m: Floats) -> NDArray[np.bool_]:
             if not found.any():
                 break
             wrong |= found
-            current = _filled(times_s, places_m, wrong)
+            current = on_cubics(times_s, places_m, wrong)
     return wrong
 
 
@@ -98,9 +99,7 @@ def _outlying_runs(
     around_s = times_s[support[:, 2]] - times_s[support[:, 1]]
     before, after = places_m[support[:, 1], None], places_m[support[:, 2], None]
     share = ((times_s[inner] - times_s[support[:, 1, None]]) / around_s[:, None])[..., None]
-    curve = np.einsum(
-        "slk,skd->sld", cubic_weights(times_s[support], times_s[inner]), places_m[support]
-    )
+    curve = np.einsum("slk,skd->sld", _cubic(times_s[support], times_s[inner]), places_m[support])
     # A curve through an outlier bends far; the line between the nearest two does not.
     line = before + share * (after - before)
     off = np.minimum(
@@ -122,7 +121,7 @@ def _outlying_runs(
     return found
 
 
-def cubic_weights(support: Floats, at: Floats) -> Floats:
+def _cubic(support: Floats, at: Floats) -> Floats:
     """Lagrange weights (S, L, 4) of values at ``support`` (S, 4) for times ``at`` (S, L)."""
     weights = np.ones((*at.shape, 4))
     for k in range(4):
@@ -134,7 +133,7 @@ def cubic_weights(support: Floats, at: Floats) -> Floats:
     return weights
 
 
-def _filled(times_s: Floats, values: Floats, wrong: NDArray[np.bool_]) -> Floats:
+def on_cubics(times_s: Floats, values: NDArray[Any], wrong: NDArray[np.bool_]) -> NDArray[Any]:
     """Values (T, ...) with wrong ones put on the cubic through two right ones on either side."""
     right = np.flatnonzero(~wrong)
     filled = values.copy()
@@ -143,7 +142,7 @@ def _filled(times_s: Floats, values: Floats, wrong: NDArray[np.bool_]) -> Floats
         support = right[np.clip(after - 2, 0, max(len(right) - 4, 0)) :][:4]
         if len(support) < 4:
             continue
-        weights = cubic_weights(times_s[support][None], times_s[[frame]][None])[0, 0]
+        weights = _cubic(times_s[support][None], times_s[[frame]][None])[0, 0]
         filled[frame] = np.tensordot(weights, values[support], 1)
     return filled
 

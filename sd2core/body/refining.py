@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.blazepose import CLOSE_UP, Pose, PoseLandmarker
-from sd2core.body.landmark_repair import cubic_weights
+from sd2core.body.landmark_repair import on_cubics
 from sd2core.body.person_selection import FOUND
-from sd2core.body.roi import CROP_PX, Pixels, Roi
+from sd2core.body.roi import CROP_PX, Pixels, Roi, apart_px
 from sd2core.body.tracking import looked_at
 from sd2core.io.video import VideoReader
 
@@ -144,21 +144,20 @@ class Refiner:
         known = np.flatnonzero(first)
         sizes_px = [np.nan if roi is None else roi.size_px for roi in rois]
         slow = ~_fast(found, known, times_s, np.array(sizes_px))
-        before = np.searchsorted(known, list(between)) - 1
-        looking = {}
-        for number, row in zip(between, before, strict=True):
-            roi = rois[number]
-            if roi is not None and not (slow[row] and slow[row + 1]):
-                crop = between[number].result()
-                looking[number] = self._pool.submit(self._look_closely, crop, roi)
-                continue
-            support = known[row - 1 : row + 3]
-            weights = cubic_weights(times_s[support][None], times_s[[number]][None])[0, 0]
-            for name in ("image_px", "depth_px", "world_m", "visibility", "confidence"):
-                values = getattr(found, name)
-                values[number] = np.tensordot(weights, values[support], 1)
-            np.clip(found.visibility[number], 0.0, 1.0, out=found.visibility[number])
-            found.confidence[number] = found.confidence[support[1:3]].min()
+        numbers = np.array(list(between), np.intp)
+        before = np.searchsorted(known, numbers) - 1
+        calm = slow[before] & slow[before + 1]
+        looking = {
+            number: self._pool.submit(self._look_closely, between[number].result(), roi)
+            for number in numbers[~calm].tolist()
+            if (roi := rois[number]) is not None
+        }
+        numbers, before = numbers[calm], before[calm]
+        for values in (found.image_px, found.depth_px, found.world_m, found.visibility):
+            values[numbers] = on_cubics(times_s, values, ~first)[numbers]
+        np.clip(found.visibility, 0.0, 1.0, out=found.visibility)
+        sure = found.confidence[known]
+        found.confidence[numbers] = np.minimum(sure[before], sure[before + 1])
         for number, pose in looking.items():
             if (seen := pose.result()) is not None:
                 _write(found, number, seen)
@@ -172,10 +171,9 @@ class Refiner:
             pose = landmarker.on_both_sides(crop, roi.scaled(CLOSE_UP))
         finally:
             self._free.put(landmarker)
-        there = pose.next_roi
-        away = np.hypot(there.centre_x_px - roi.centre_x_px, there.centre_y_px - roi.centre_y_px)
         # Another person in the square is not the one who was followed.
-        return pose if pose.confidence >= FOUND and away < _STRAYED * roi.size_px else None
+        stayed = apart_px(pose.next_roi, roi) < _STRAYED * roi.size_px
+        return pose if pose.confidence >= FOUND and stayed else None
 
 
 def _write(found: Stretch, number: int, pose: Pose) -> None:

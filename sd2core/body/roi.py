@@ -105,6 +105,11 @@ class Sightings:
         return self.unclear[np.where(np.arange(frames) <= middle, after - 1, after)]
 
 
+def apart_px(one: Roi, two: Roi) -> float:
+    """Distance between the centres of two squares."""
+    return float(np.hypot(one.centre_x_px - two.centre_x_px, one.centre_y_px - two.centre_y_px))
+
+
 def roi_numbers(roi: Roi) -> Floats:
     """Row of :attr:`Sightings.rois`."""
     return np.array([roi.centre_x_px, roi.centre_y_px, roi.size_px, roi.angle_rad])

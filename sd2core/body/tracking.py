@@ -15,12 +15,11 @@ from sd2core.body.identity import (
     Looks,
     Signature,
     Trail,
-    apart_px,
     signature,
     similarity,
 )
 from sd2core.body.person_selection import FOUND, Start
-from sd2core.body.roi import Floats, Pixels, Roi, Sightings, roi_numbers
+from sd2core.body.roi import Floats, Pixels, Roi, Sightings, apart_px, roi_numbers
 from sd2core.io.video import VideoReader
 
 _SEARCH_STEP_S = 1.0 / 10.0
@@ -191,12 +190,12 @@ class PersonTracker:
         if since_s > _GONE_S and not self.lost:
             return None
         people = self._people(picture, self.trail.predicted(time_s))
-        for other in self.others if people else ():
-            roi = min(
-                (each.roi for each in people), key=lambda roi: other.trail.unlike(roi, time_s)
-            )
-            own = self.trail.unlike(roi, time_s)
-            if other.trail.unlike(roi, time_s) < min(_SAME_OTHER, own):
+        if not people:
+            return people
+        for other in self.others:
+            unlike = [other.trail.unlike(each.roi, time_s) for each in people]
+            roi = people[int(np.argmin(unlike))].roi
+            if min(unlike) < min(_SAME_OTHER, self.trail.unlike(roi, time_s)):
                 other.trail = other.trail.followed(roi, time_s)
         return people
 
@@ -259,7 +258,7 @@ def _jumped(pose: Pose) -> bool:
 
 
 class Search:
-    """First pass: the person in every fifteenth of a second, from the start both ways."""
+    """First pass: the person ten times a second, from the start both ways."""
 
     def __init__(self, video: VideoReader, start: Start, follower: PersonTracker) -> None:
         self._video = video

@@ -61,7 +61,10 @@ def test_one_look(benchmark: object, video: VideoReader, models: LandmarkModels)
         crop = roi.cut(picture)
         whole = 1e3 * best_s(partial(detector.people, picture), 20)
         one = 1e3 * best_s(partial(landmarker.on_crop, crop, roi), 20)
-        print(f"\n{threads} threads: detection {whole:.1f} ms, one look {one:.1f} ms")
+        both = 1e3 * best_s(partial(landmarker.on_both_sides, crop, roi), 20)
+        print(f"\n{threads} threads: detection {whole:.1f} ms, one look {one:.1f} ms,", end="")
+        print(f" from both sides {both:.1f} ms")
+        assert both < 3.0 * one
     benchmark(lambda: landmarker.on_crop(crop, roi))  # type: ignore[operator]
 
 
