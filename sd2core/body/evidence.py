@@ -24,6 +24,9 @@ frames count for too much beside the velocities."""
 _LEAST_TRUST = 0.05
 _OUTSIDE = 0.05
 """Share of the picture's height beyond whose edges a landmark is surely a guess."""
+_DRAWN_IN = 0.4
+"""How far inside the edges a limb that has left may be put, as a share of the picture's height,
+if it is not visible at all."""
 _STANDING_MPS = 0.05
 _STEPPING_MPS = 1.0
 """Standard deviations of a foot's velocity, on the ground and in a step."""
@@ -95,8 +98,22 @@ def trust_of(track: LandmarkTrack) -> Floats:
 
     What is outside the picture or hidden was never seen; the model guesses it.
     """
+    return _trust(track, 0.0)
+
+
+def sight_of(track: LandmarkTrack) -> Floats:
+    """Whether each landmark was seen (T, 33), from 0.05 to 1.
+
+    A limb that leaves the picture is often put just inside its edges, less visible. Its place
+    still says more than nothing, and so it is trusted for a fit; nobody saw it all the same.
+    """
+    return _trust(track, _DRAWN_IN)
+
+
+def _trust(track: LandmarkTrack, drawn_in: float) -> Floats:
     size = np.array([track.width, track.height])
     beyond = np.maximum(-track.image_px, track.image_px - size).max(axis=2) / track.height
+    beyond += drawn_in * (1.0 - track.visibility)
     inside = 1.0 - np.clip(beyond / _OUTSIDE, 0.0, 1.0)
     return np.asarray(np.clip(track.visibility * inside, _LEAST_TRUST, 1.0), np.float64)
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.camera import PinholeCamera
-from sd2core.body.evidence import EvidenceInParts, trust_of
+from sd2core.body.evidence import EvidenceInParts, sight_of, trust_of
 from sd2core.body.fit_windows import Windows
 from sd2core.body.fitted import PER_FRAME, BodyFit, FittedMotion, mean_over_limbs
 from sd2core.body.initial import initial_pose
@@ -34,7 +34,7 @@ DEFAULT_STATURE_M = 1.72
 STATURES_M = (0.5, 2.6)
 
 _SEEN = 0.5
-"""Trust from which on a landmark counts as seen."""
+"""Sight from which on a landmark counts as seen."""
 
 _FINISHED_FRAMES = 600
 _MASK_SURE = 128
@@ -222,8 +222,8 @@ class Fitting:
         trunk_m = keypoints_m[:, evidence.trunk, 2].mean(axis=1)
         seen_m = replace(evidence, trunk_m=trunk_m).points_m
         residual_m = np.linalg.norm(keypoints_m - seen_m, axis=-1)
-        trust = trust_of(track)
-        residual_m[~track.present[:, None] | (trust < _SEEN)] = np.nan
+        sight = sight_of(track)
+        residual_m[~track.present[:, None] | (sight < _SEEN)] = np.nan
         return BodyFit(
             timebase=track.timebase,
             shape=shape,
@@ -235,7 +235,7 @@ class Fitting:
             along_sd_mps=_there(
                 np.hypot(
                     _ALONG * shape.stature_m * lifted.velocity_sigma,
-                    _UNSEEN_MPS * (1.0 - trust) ** 4,
+                    _UNSEEN_MPS * (1.0 - sight) ** 4,
                 ),
                 track.present,
             ),

@@ -51,7 +51,7 @@ make fitting
 ```
 
 on {machine}: sixteen videos of simulated people (`python -m tools.fitting clips`) and, where the
-motion capture is there, twenty-one whose motion is that of recorded people, all of motions and
+motion capture is there, twenty-two whose motion is that of recorded people, all of motions and
 persons that nothing in the program was trained with; fitted by `sd2 fit` with the camera's focal
 length and the person's height given, and measured by `python -m tools.fitting score`. What the
 clips can and cannot say is [decision 19](decisions/0019-known-truth-for-the-fit.md); how the

@@ -34,6 +34,15 @@ Floats = NDArray[np.float64]
 LIMBS = ("hand", "wrist", "elbow")
 """Parts of the moving arm that are measured during strokes."""
 
+_PARENTS = {
+    "elbow": "shoulder",
+    "wrist": "elbow",
+    "hand": "elbow",
+    "knee": "pelvis",
+    "ankle": "knee",
+}
+"""Joints of limbs, and those that they hang on."""
+
 _MASK = (160, 120)
 _MASK_STEP = 5
 
@@ -120,6 +129,11 @@ class ClipScore:
         joints, ``truth`` their actual errors.
     seconds_per_frame, processor_s_per_frame : float or None
         That the fit took by the clock, and on all cores together.
+    unseen : Pair
+        Of the joints of limbs while they are out of the picture, (n,): velocity along the
+        line of sight against the joint that they hang on.
+    unseen_sigma : Pair or None
+        Of the same joints, as ``sigma``.
     residual_m : float or None
         Mean distance of joints from the landmarks that were found, in the picture at
         the joint's depth.
@@ -137,7 +151,9 @@ class ClipScore:
     edge: Floats
     middle: Floats
     overlap: float
+    unseen: Pair
     sigma: Pair | None = None
+    unseen_sigma: Pair | None = None
     seconds_per_frame: float | None = None
     processor_s_per_frame: float | None = None
     residual_m: float | None = None
@@ -217,6 +233,10 @@ def score_clip(
             )
         )
     errors = np.stack([velocity[1] - velocity[0], apart])  # (2, T, J)
+    everywhere = np.broadcast_to(measured[:, None], apart.shape)
+    pixels = truth.camera.project(joints[0])
+    size = truth.camera.width, truth.camera.height
+    out = ((pixels < 0) | (pixels > size)).any(axis=-1) & everywhere
     edge = np.zeros(len(times_s), bool)
     edge[:EDGE_FRAMES] = edge[-EDGE_FRAMES:] = True
     return ClipScore(
@@ -232,7 +252,9 @@ def score_clip(
         edge=np.array([rms(one[edge & measured]) for one in errors]),
         middle=np.array([rms(one[~edge & measured]) for one in errors]),
         overlap=_overlap(pair[0], pair[1], truth),
-        sigma=_sigma(pair[1], patches[1], errors[0], measured),
+        unseen=Pair(*(_against_parents(one, out) for one in velocity[::-1])),
+        sigma=_sigma(pair[1], patches[1], errors[0], everywhere),
+        unseen_sigma=_sigma(pair[1], patches[1], errors[0], out),
         seconds_per_frame=None if seconds is None else seconds[0] / len(fitted.timebase),
         processor_s_per_frame=None if seconds is None else seconds[1] / len(fitted.timebase),
         residual_m=None
@@ -280,14 +302,26 @@ def _overlap(true: MeshSequence, fitted: MeshSequence, truth: Truth) -> float:
     return float(np.nanmean(found))
 
 
+def _against_parents(velocity_mps: Floats, chosen: NDArray[np.bool_]) -> Floats:
+    """Velocities (n,) of the chosen joints of limbs, less those of the joints they hang on."""
+    found = []
+    for child, parent in _PARENTS.items():
+        for side in ".L", ".R":
+            row = JOINTS.index(child + side)
+            rows = chosen[:, row]
+            above = JOINTS.index(parent if parent in JOINTS else parent + side)
+            found.append(velocity_mps[rows, row] - velocity_mps[rows, above])
+    return np.concatenate(found)
+
+
 def _sigma(
-    fitted: MeshSequence, patches: JointPatches, errors: Floats, measured: NDArray[np.bool_]
+    fitted: MeshSequence, patches: JointPatches, errors: Floats, chosen: NDArray[np.bool_]
 ) -> Pair | None:
-    """Standard deviations of the joints, as the vertices of their patches have them."""
+    """Standard deviations of the chosen joints, as the vertices of their patches have them."""
     known = fitted.uncertainty
     if known is None:
         return None
     sigma = np.stack(
         [known.along_mps[:, known.vertex_limb[rows]].mean(axis=1) for rows in patches.rows], axis=1
     ).astype(np.float64)
-    return Pair(sigma[measured].ravel(), errors[measured].ravel())
+    return Pair(sigma[chosen], errors[chosen])

@@ -151,9 +151,12 @@ REAL_MOTION = (
         "cropped-lunge", _captured("ui_m04_s10_e02", 0.0, 2.0, 20.0), "bo", "studio", 2.2, 1.6, 50
     ),
     Clip("cropped-walk", _captured("12_01", 1.0, 2.0, 90.0), "dora", "evening", 2.3, 1.4, 51),
+    Clip(
+        "arms-leaving", _captured("ui_m07_s09_e02", 0.0, 2.4, 0.0), "emil", "window", 1.3, 1.3, 52
+    ),
 )
 """Clips with the motion of real people whom nothing was learnt from or tuned on; the cropped ones
-are cut off at the knees."""
+are cut off at the knees, and in one an arm leaves the picture and comes back."""
 
 TUNING = (
     Clip("tune-1", _swipes(_ALL, "fast"), "ada", "window", 2.4, 1.2, 101, 0.1),

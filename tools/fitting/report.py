@@ -129,6 +129,7 @@ def reach_table(scores: Sequence[ClipScore], real: Sequence[RealScore] = ()) -> 
     )
     rows += _edge_rows(scores)
     rows += _walk_rows(scores) + _captured_rows(scores) + _coverage_rows(scores)
+    rows += _unseen_rows(scores)
     taken = [one.seconds_per_frame for one in scores if one.seconds_per_frame is not None]
     worked = [one.processor_s_per_frame for one in scores if one.processor_s_per_frame is not None]
     detail = f"with the program's start; processor time {_mean(worked):.3f} s/frame"
@@ -298,6 +299,30 @@ def _coverage_rows(scores: Sequence[ClipScore]) -> list[Row]:
         what = "of the velocity covers"
         rows.append(Row(f"{name}: 1σ {what}", within, "", (">=", 0.60), 0.75, detail))
         rows.append(Row(f"{name}: 2σ {what}", twice, "", (">=", 0.90)))
+    return rows
+
+
+def _unseen_rows(scores: Sequence[ClipScore]) -> list[Row]:
+    """Limbs while they are out of the picture."""
+    clips = [one for one in scores if len(one.unseen.truth)]
+    if not clips:
+        return []
+    both = pooled([one.unseen for one in clips])
+    each = ", ".join(f"{one.name} {rms(one.unseen.fitted):.2f}" for one in clips)
+    rows = [
+        Row(
+            "limbs out of the picture, velocity against what they hang on: RMS",
+            rms(both.fitted),
+            "m/s",
+            detail=f"true {rms(both.truth):.2f} m/s; {each}",
+        )
+    ]
+    known = [one.unseen_sigma for one in clips if one.unseen_sigma is not None]
+    if known:
+        sigma = pooled(known)
+        what = "limbs out of the picture"
+        rows.append(Row(f"{what}: 1σ covers", coverage(sigma.truth, sigma.fitted)))
+        rows.append(Row(f"{what}: 2σ covers", coverage(sigma.truth, 2.0 * sigma.fitted)))
     return rows
 
 

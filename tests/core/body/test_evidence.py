@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sd2core.body.camera import PinholeCamera
-from sd2core.body.evidence import Evidence, evidence_of, trust_of
+from sd2core.body.evidence import Evidence, evidence_of, sight_of, trust_of
 from sd2core.body.fit_video import fit_doubts
 from sd2core.body.fitted import FittedMotion
 from sd2core.body.lifter import LiftedTrack
@@ -75,6 +75,17 @@ def test_what_is_outside_the_picture_was_never_seen() -> None:
     )
     np.testing.assert_allclose([inside, edge], [0.9, 0.45], atol=1e-6)
     assert outside == hidden == 0.05
+
+
+def test_what_is_half_visible_beside_an_edge_was_not_seen() -> None:
+    wrist = LANDMARK["wrist.L"]
+    middle, clear, drawn_in = (
+        (track(x_px, visibility), sight_of(track(x_px, visibility))[0, wrist])
+        for x_px, visibility in ((320.0, 0.6), (600.0, 1.0), (600.0, 0.6))
+    )
+    for of_track, sight in (middle, clear):
+        assert sight == trust_of(of_track)[0, wrist]
+    assert drawn_in[1] == 0.05 < trust_of(drawn_in[0])[0, wrist]
 
 
 def test_what_is_guessed_in_depth_is_guessed_across_the_view() -> None:

@@ -134,6 +134,26 @@ def test_sigma_covers_what_it_is_larger_than(truth: Truth, factor: float, covere
     assert row([score], "1σ of the velocity covers").met is False
 
 
+def test_limbs_out_of_the_picture_are_measured_against_what_they_hang_on(truth: Truth) -> None:
+    """The elbow stays; a hand that is held there, too, has all of the true motion for an error."""
+    camera = {**truth.meta["camera"], "width": 240, "height": 2000}
+    narrow = replace(truth, meta={**truth.meta, "camera": camera})
+    mesh = truth.mesh()
+    joints = own_patches("low").of(mesh)
+    off_px = np.abs(narrow.camera.project(joints)[..., 0] - 120.0) > 120.0
+    assert off_px[:, JOINTS.index("hand.R")].sum() > 0
+    assert not off_px[:, JOINTS.index("elbow.R")].any()
+    same, held = (
+        score_clip(narrow, one)
+        for one in (mesh, replace(mesh, vertices=np.repeat(mesh.read(0, 1), len(TIMES), axis=0)))
+    )
+    np.testing.assert_array_equal(same.unseen.fitted, same.unseen.truth)
+    assert len(same.unseen.truth) == off_px.sum()
+    assert row([same], "limbs out of the picture").value == rms(same.unseen.truth) > 0.1
+    assert row([held], "limbs out of the picture").value == 0.0
+    assert len(score_clip(truth, mesh).unseen.truth) == 0
+
+
 def test_frames_without_a_person_are_left_out(truth: Truth) -> None:
     there = np.ones(len(TIMES), bool)
     there[20:] = False
