@@ -53,6 +53,28 @@ class CellUncertainty:
 
 
 @dataclass(frozen=True, eq=False)
+class LimbMaps:
+    """Split of a map by the parts of the body; added up, they are the map."""
+
+    parts: tuple[str, ...]
+    values: NDArray[np.float32]  # (parts, bins, frames)
+
+    def __post_init__(self) -> None:
+        values = np.ascontiguousarray(self.values, np.float32)
+        if values.ndim != 3 or not len(self.parts) == len(values) > 0:
+            raise Sd2Error(
+                f"Limb maps of shape {values.shape} and {len(self.parts)} parts",
+                "(parts, bins, frames), at least one part",
+            )
+        object.__setattr__(self, "parts", tuple(str(part) for part in self.parts))
+        object.__setattr__(self, "values", values)
+
+    def between(self, start: int, stop: int) -> LimbMaps:
+        """Limb maps of frames ``start`` to ``stop`` (exclusive)."""
+        return LimbMaps(self.parts, self.values[..., start:stop])
+
+
+@dataclass(frozen=True, eq=False)
 class DopplerMap:
     """Doppler energy on a velocity axis over time.
 
@@ -74,6 +96,8 @@ class DopplerMap:
         False in columns without a person. None: there is a person in all of them.
     uncertainty : CellUncertainty, optional
         Uncertainty of the values, if the mesh states that of its velocities.
+    limbs : LimbMaps, optional
+        The same map split by the parts of the body.
 
     Examples
     --------
@@ -97,6 +121,7 @@ class DopplerMap:
     meta: dict[str, Any] = field(default_factory=dict)
     present: NDArray[np.bool_] | None = None
     uncertainty: CellUncertainty | None = None
+    limbs: LimbMaps | None = None
 
     def __post_init__(self) -> None:
         values = np.ascontiguousarray(self.values, dtype=np.float32)
@@ -122,6 +147,12 @@ class DopplerMap:
                 f" {self.uncertainty.sd.shape}",
                 "the same",
             )
+        if self.limbs is not None and self.limbs.values.shape[1:] != values.shape:
+            raise Sd2Error(
+                f"The map is of shape {values.shape}, its limb maps of"
+                f" {self.limbs.values.shape[1:]}",
+                "the same",
+            )
 
     @property
     def times_s(self) -> NDArray[np.float64]:
@@ -141,6 +172,7 @@ class DopplerMap:
             timebase=Timebase(self.times_s[start:stop]),
             present=None if self.present is None else self.present[start:stop],
             uncertainty=None if known is None else known.between(start, stop),
+            limbs=None if self.limbs is None else self.limbs.between(start, stop),
         )
 
     def mean_velocity_mps(self) -> NDArray[np.float64]:
@@ -154,8 +186,8 @@ class DopplerMap:
     def save(self, path: Path) -> None:
         """Write ``values``, ``velocity_mps``, ``times_s`` and ``meta`` to one ``.npz``.
 
-        Also ``present`` if there are columns without a person, and ``expected`` and ``sd`` if
-        the uncertainty of the values is known.
+        Also ``present`` if there are columns without a person, ``expected`` and ``sd`` if
+        the uncertainty of the values is known, and ``parts`` and ``limbs`` if the map is split.
         """
         meta = {
             "format": "sd2-doppler-map",
@@ -177,6 +209,8 @@ class DopplerMap:
             arrays["present"] = self.present
         if self.uncertainty is not None:
             arrays |= {"expected": self.uncertainty.expected, "sd": self.uncertainty.sd}
+        if self.limbs is not None:
+            arrays |= {"parts": np.array(self.limbs.parts), "limbs": self.limbs.values}
         with atomic_write(Path(path)) as stream:
             np.savez_compressed(stream, **arrays)
 
@@ -231,6 +265,9 @@ class DopplerMap:
                 uncertainty=CellUncertainty(arrays["expected"], arrays["sd"])
                 if {"expected", "sd"} <= arrays.keys()
                 else None,
+                limbs=LimbMaps(tuple(arrays["parts"].tolist()), arrays["limbs"])
+                if {"parts", "limbs"} <= arrays.keys()
+                else None,
             )
         except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
             raise Sd2Error(
@@ -255,12 +292,17 @@ def joined(maps: Sequence[DopplerMap]) -> DopplerMap:
     if len(maps) == 1:
         return maps[0]
     present = [Presence.of(one.present, len(one.timebase)).there for one in maps]
+    limbs = [one.limbs for one in maps if one.limbs is not None]
+    alike = len(limbs) == len(maps) and len({one.parts for one in limbs}) == 1
     return replace(
         maps[0],
         values=np.concatenate([one.values for one in maps], axis=1),
         timebase=Timebase(np.concatenate([one.times_s for one in maps])),
         present=np.concatenate(present),
         uncertainty=None,
+        limbs=LimbMaps(limbs[0].parts, np.concatenate([one.values for one in limbs], axis=2))
+        if alike
+        else None,
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, Literal
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from sd2core.body.rotations import Floats, applied
 from sd2core.files.resources import open_bundled_arrays, resource_path
+from sd2core.mesh.sequence import MeshSequence
 
 FORMAT = "sd2-body"
 VERSION = 2
@@ -204,3 +205,19 @@ def _summed(left: Floats, right: Floats) -> Floats:
 
 def _apply(transform: Floats, point: Floats) -> Floats:
     return applied(transform[..., :3], point) + transform[..., 3]
+
+
+def own_resolution(mesh: MeshSequence) -> Resolution | None:
+    """Resolution of the bundled surface that a mesh is, by its faces; None for any other."""
+    if mesh.faces is None:
+        return None
+    for resolution, faces in _own_faces():
+        if faces.shape == mesh.faces.shape and np.array_equal(faces, mesh.faces):
+            return resolution
+    return None
+
+
+@lru_cache(maxsize=1)
+def _own_faces() -> tuple[tuple[Resolution, NDArray[np.int32]], ...]:
+    names: tuple[Resolution, ...] = ("low", "medium", "high")
+    return tuple((name, Body.load(name).faces) for name in names)

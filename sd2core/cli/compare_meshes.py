@@ -152,8 +152,8 @@ def _labels(options: argparse.Namespace) -> list[str]:
 
 def _load(path: Path, options: argparse.Namespace) -> MeshSequence:
     """Read one mesh; what is said about reading holds for those that are not ours."""
+    from sd2core.body.model import own_resolution
     from sd2core.cli.reading import mesh_reading
-    from sd2core.compare.joints import own_resolution
     from sd2core.io.mesh import load_mesh
     from sd2core.recording.recording import is_recording, open_recording
 

@@ -80,7 +80,8 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             "  sd2 synth walk.npz --out map.npz --preset vid2doppler\n"
             "  sd2 synth walk.npz --out map.npz --tolerance 2%    (as quick as this allows)\n"
             "  sd2 synth walk.npz --out map.npz --model fmcw\n"
-            "  sd2 synth walk.zarr --out map.npz --uncertainty    (of a mesh from sd2 fit)"
+            "  sd2 synth walk.zarr --out map.npz --uncertainty    (of a mesh from sd2 fit)\n"
+            "  sd2 synth walk.zarr --out map.npz --limbs    (each part of the body apart, too)"
         ),
     )
     add_mesh_and_sensor(parser)
@@ -191,6 +192,11 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         help="add to the map how well its values are known (arrays sd and expected), which a mesh"
         " from sd2 fit says",
     )
+    parser.add_argument(
+        "--limbs",
+        action="store_true",
+        help="add to the map its split by the parts of the body (arrays limbs and parts)",
+    )
     add_mesh_reading(parser)
     add_json(parser)
 
@@ -261,8 +267,14 @@ def _as_chosen(
 def _counted(
     options: argparse.Namespace, synthesizer: Synthesizer, sensor: VirtualSensor
 ) -> DopplerMap:
+    from sd2core.body.parts import known_parts
+
     with progress_bar("Synthesising") as progress:
-        doppler = synthesizer.map(sensor, progress=progress)
+        if options.limbs:
+            parts = known_parts(synthesizer.mesh)
+            doppler = synthesizer.limb_maps(sensor, parts, progress=progress)
+        else:
+            doppler = synthesizer.map(sensor, progress=progress)
     if not options.uncertainty:
         return doppler
     with progress_bar("Estimating the uncertainty") as progress:
@@ -272,6 +284,7 @@ def _counted(
 def _check_fmcw(options: argparse.Namespace) -> None:
     unfit = list(given(options, _COUNTING_ONLY))
     unfit += ["preset"] * (options.preset != "paper") + ["uncertainty"] * options.uncertainty
+    unfit += ["limbs"] * options.limbs
     if unfit:
         raise Sd2Error(
             f"{flag(unfit[0])} is given with --model fmcw",

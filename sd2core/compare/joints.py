@@ -102,22 +102,6 @@ class JointPatches:
         return np.concatenate(stretches)
 
 
-def own_resolution(mesh: MeshSequence) -> Resolution | None:
-    """Resolution of the bundled surface that a mesh is, by its faces; None for any other."""
-    if mesh.faces is None:
-        return None
-    for resolution, faces in _own_faces():
-        if faces.shape == mesh.faces.shape and np.array_equal(faces, mesh.faces):
-            return resolution
-    return None
-
-
-@lru_cache(maxsize=1)
-def _own_faces() -> tuple[tuple[Resolution, NDArray[np.int32]], ...]:
-    names: tuple[Resolution, ...] = ("low", "medium", "high")
-    return tuple((name, Body.load(name).faces) for name in names)
-
-
 @lru_cache(maxsize=3)
 def own_patches(resolution: Resolution) -> JointPatches:
     """Patches of one of our surfaces."""

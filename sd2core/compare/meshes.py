@@ -9,13 +9,13 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.body.model import own_resolution
 from sd2core.compare.joints import (
     GROUPS,
     JOINTS,
     JointPatches,
     carry_patches,
     own_patches,
-    own_resolution,
     rows_of,
 )
 from sd2core.compare.measures import (

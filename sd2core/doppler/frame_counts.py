@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -46,11 +48,16 @@ class FrameCounts:
         visibility: Visibility,
         into: Counts,
         totals: NDArray[np.float64],
+        parts: NDArray[np.uint8] | None = None,
     ) -> Quality:
-        """Count some of a block's frames; returns the visibility that was used."""
+        """Count some of a block's frames; returns the visibility that was used.
+
+        Vertices of different ``parts`` (V,) are counted apart.
+        """
         place = self.prepared.sensor(position_m)
         totals[:] = self.totals(block, rows)
         scatterers, quality = self.scatterers(block, rows, position_m, visibility)
+        scatterers = replace(scatterers, parts=parts)
         frames = block.frames.rows(rows)
         if self.options.velocity == "vid2doppler":
             velocity = self.prepared.velocities_vid2doppler(block, rows, place)
@@ -60,7 +67,7 @@ class FrameCounts:
             count = histogram.count if kernels_ready() else histogram.count_plain
             count(frames, place, self.counting, scatterers, into)
         if self.options.range_law == "frame":
-            into.histogram[:] *= self.frame_law(block, rows, position_m)[:, None]
+            into.histogram[:] *= self.frame_law(block, rows, position_m)[:, None, None]
         return quality
 
     def totals(self, block: Block, rows: slice) -> NDArray[np.float64]:

@@ -36,6 +36,8 @@ class Scatterers:
     """Shape (n, 3, V): a vertex counts by the area in m² that it turns towards the sensor."""
     vertex_counts: NDArray[np.float32] | None = None
     """Shape (V,): number of vertices that each stands for; None: itself only."""
+    parts: NDArray[np.uint8] | None = None
+    """Shape (V,): part of the body of each vertex, to count apart; None: all together."""
 
     def seen(
         self, row: int, points: NDArray[Any], sensor: NDArray[np.float64]
@@ -124,19 +126,38 @@ class Counts:
     """Result of counting some frames."""
 
     histogram: NDArray[np.float64]
-    """Vertices, or their weights, per bin, shape (n, bins); the mean over a frame's samples."""
+    """Vertices, or their weights, per part of the body and bin, shape (n, parts, bins); the mean
+    over a frame's samples. One part is the whole body."""
     visible: NDArray[np.float64]
     """Number of visible vertices, shape (n,); a vertex that stands for several counts as many."""
     beyond: NDArray[np.float64]  # those of them beyond the axis
 
     @classmethod
-    def empty(cls, frames: int, bins: int) -> Counts:
+    def empty(cls, frames: int, bins: int, parts: int = 1) -> Counts:
         """Zero counts of some frames."""
-        return cls(np.zeros((frames, bins)), np.zeros(frames), np.zeros(frames))
+        return cls(np.zeros((frames, parts, bins)), np.zeros(frames), np.zeros(frames))
 
     def rows(self, rows: slice) -> Counts:
         """Some of the frames; writing to them writes to the whole."""
         return Counts(self.histogram[rows], self.visible[rows], self.beyond[rows])
+
+    def add(
+        self,
+        row: int,
+        number: NDArray[np.intp],
+        weight: NDArray[np.float64],
+        seen: NDArray[np.bool_],
+        part: NDArray[np.uint8] | None,
+        samples: int,
+    ) -> None:
+        """Add one of ``samples`` samples of a frame: bin, weight, visibility and part, (V,) each.
+
+        The bin is ``bins`` where a vertex is dropped.
+        """
+        _, parts, bins = self.histogram.shape
+        slot = number if part is None else number + (bins + 1) * part.astype(np.intp)
+        total = np.bincount(slot[seen], weight[seen], parts * (bins + 1))
+        self.histogram[row] += total.reshape(parts, bins + 1)[:, :bins] / samples
 
 
 def relative_range(positions: NDArray[Any], sensor: NDArray[np.float64]) -> NDArray[Any]:
@@ -207,8 +228,7 @@ def count_plain(
         measured = max(1, int((frames.duration_s[t] > 0).sum()))
         for sample in np.flatnonzero(frames.duration_s[t] > 0).tolist():
             number, beyond = bins_plain(frames, t, sample, sensor, counting)
-            total = np.bincount(number[seen], weight[seen], counting.bins + 1)
-            into.histogram[t] += total[: counting.bins] / measured
+            into.add(t, number, weight, seen, scatterers.parts, measured)
             into.beyond[t] += heads[beyond & seen].sum() / measured
 
 
@@ -238,6 +258,7 @@ def count(
         areas if areas is not None else _NO_AREAS,
         vectors if vectors is not None else _NO_VECTORS,
         heads if heads is not None else _NO_HEADS,
+        scatterers.parts if scatterers.parts is not None else _NO_PARTS,
         sensor.astype(frames.positions.dtype),
         which,
         weighting,
@@ -256,6 +277,7 @@ _NO_MASK = np.empty((0, 0), np.uint8)
 _NO_AREAS = np.empty((0, 0), np.float32)
 _NO_VECTORS = np.empty((0, 3, 0), np.float32)
 _NO_HEADS = np.empty(0, np.float32)
+_NO_PARTS = np.empty(0, np.uint8)
 
 
 def mark_needed(

@@ -196,14 +196,36 @@ def _tally_weights(slot, weight, sums):  # type: ignore[no-untyped-def]
 
 
 @compiled
+def _tally_parts(slot, base, counts):  # type: ignore[no-untyped-def]
+    """Add 1 per vertex; the slots of its part of the body begin at ``base``."""
+    whole = slot.shape[0] // _TABLES * _TABLES
+    for v in range(0, whole, _TABLES):
+        for table in range(_TABLES):
+            counts[table, base[v + table] + slot[v + table]] += np.int32(1)
+    for v in range(whole, slot.shape[0]):
+        counts[0, base[v] + slot[v]] += np.int32(1)
+
+
+@compiled
+def _tally_weights_of_parts(slot, weight, base, sums):  # type: ignore[no-untyped-def]
+    whole = slot.shape[0] // _TABLES * _TABLES
+    for v in range(0, whole, _TABLES):
+        for table in range(_TABLES):
+            sums[table, base[v + table] + slot[v + table]] += np.float64(weight[v + table])
+    for v in range(whole, slot.shape[0]):
+        sums[0, base[v] + slot[v]] += np.float64(weight[v])
+
+
+@compiled
 def count_kernel(  # type: ignore[no-untyped-def]
-    positions, centre, before, after, scale, normals, mask, areas, vectors, heads, sensor,
+    positions, centre, before, after, scale, normals, mask, areas, vectors, heads, part, sensor,
     which, weighting, bins, beyond, exponent, reference, histogram, visible, outside,
 ):  # fmt: skip
     """Compiled form of :func:`sd2core.doppler.histogram.count`; the last three are written.
 
     ``heads`` (V,) is the number of vertices that each stands for, and is empty if each
-    stands for itself.
+    stands for itself; ``part`` (V,) is empty if the body is not split. The histogram is of
+    shape (n, parts, bins).
     """
     vertices = positions.shape[2]
     samples = before.shape[1]
@@ -215,8 +237,11 @@ def count_kernel(  # type: ignore[no-untyped-def]
     turned = np.empty(_RUN, np.float32)
     seen = np.ones(_RUN, np.uint8)
     slot = np.empty(_RUN, np.uint8)
-    counts = np.zeros((_TABLES, 256), np.int32)
-    sums = np.zeros((_TABLES, 256), np.float64)
+    parts, slots = histogram.shape[1], bins + 2
+    split = part.shape[0] > 0
+    base = part.astype(np.int32) * np.int32(slots)
+    counts = np.zeros((_TABLES, parts * slots), np.int32)
+    sums = np.zeros((_TABLES, parts * slots), np.float64)
     grouped = heads.shape[0] > 0
     weighted = weighting != HEADS or grouped
     weights = weighted or exponent != 0
@@ -225,8 +250,10 @@ def count_kernel(  # type: ignore[no-untyped-def]
     known = before[0, 0]
     for t in range(centre.shape[0]):
         known = _extend(positions, sensor, distance, known, after[t, samples - 1], ring)
-        counts[:, : bins + 2] = 0
-        sums[:, : bins + 2] = 0
+        if weights:
+            sums[:] = 0
+        else:
+            counts[:] = 0
         seen_count = np.int64(0)
         outside_count = np.int64(0)
         measured = 0
@@ -285,15 +312,20 @@ def count_kernel(  # type: ignore[no-untyped-def]
                     _slots(f[:n], sight, bins, beyond, slot[:n])
                 else:
                     outside_count += _slots(f[:n], sight, bins, beyond, slot[:n])
-                if weights:
+                if split and weights:
+                    _tally_weights_of_parts(slot[:n], weight[:n], base[v0:v1], sums)
+                elif split:
+                    _tally_parts(slot[:n], base[v0:v1], counts)
+                elif weights:
                     _tally_weights(slot[:n], weight[:n], sums)
                 else:
                     _tally(slot[:n], counts)
-        for bin_number in range(bins):
-            total = 0.0
-            for table in range(_TABLES):
-                total += sums[table, bin_number] if weights else counts[table, bin_number]
-            histogram[t, bin_number] = total / measured
+        for number in range(parts):
+            for bin_number in range(bins):
+                total, place = 0.0, number * slots + bin_number
+                for table in range(_TABLES):
+                    total += sums[table, place] if weights else counts[table, place]
+                histogram[t, number, bin_number] = total / measured
         visible[t] = seen_count
         outside[t] = outside_count / measured
 
@@ -337,8 +369,8 @@ def compile_kernels() -> None:
         scale = np.ones((1, 1), precision)
         count_kernel(
             positions, knots[0], knots, knots, scale, normals, marks, heads[None],
-            vectors, heads, sensor, ALL, HEADS, 32, DROP, 4.0, np.float32(2.2),
-            np.zeros((1, 32)), np.zeros(1), np.zeros(1),
+            vectors, heads, marks[0], sensor, ALL, HEADS, 32, DROP, 4.0, np.float32(2.2),
+            np.zeros((1, 1, 32)), np.zeros(1), np.zeros(1),
         )  # fmt: skip
         needed_kernel(
             positions, knots, knots, scale, sensor, 32, DROP, np.ones(33, np.uint8), marks

@@ -28,7 +28,7 @@ def smooth(
 ) -> NDArray[np.float64]:
     """Smooth frames ``start`` to ``stop`` of a map along velocity and time.
 
-    ``raw`` (bins, n) holds the frames that :func:`frames_within_reach` names, from frame
+    ``raw`` (..., bins, n) holds the frames that :func:`frames_within_reach` names, from frame
     ``first`` on, with nulled bins emptied. Times and presence are of all frames; nothing is
     smoothed across frames without a person. The options name the widths, and the bins that
     are emptied again afterwards.
@@ -36,7 +36,7 @@ def smooth(
     values = velocity_kernel(options.axis.bins, options.velocity_sigma_bins) @ raw
     values = smooth_time(values, times_s, first, start, stop, options.time_sigma_s, presence)
     if options.null_after_smoothing:
-        values[list(options.null_bins)] = 0
+        values[..., list(options.null_bins), :] = 0
     return values
 
 
@@ -75,30 +75,33 @@ def smooth_time(
 ) -> NDArray[np.float64]:
     """Gaussian mean over real times for frames ``start`` to ``stop``.
 
-    ``values`` (bins, n) holds the frames that :func:`frames_within_reach` names, from frame
+    ``values`` (..., n) holds the frames that :func:`frames_within_reach` names, from frame
     ``first`` on. Times and presence are of all frames, so that the result does not depend
     on how a recording is cut; the mean does not cross frames without a person.
     """
     frames = np.arange(start, stop)
     if sigma_s == 0:
-        return values[:, frames - first]
-    last = first + values.shape[1]
+        return values[..., frames - first]
+    last = first + values.shape[-1]
     centres = times_s[frames]
     reach = _REACH * sigma_s + _SLACK_S
     slack = reach + _SLACK_S
     before = int((frames - np.searchsorted(times_s, centres - slack)).max())
     after = int((np.searchsorted(times_s, centres + slack, side="right") - frames).max())
-    total = np.zeros((values.shape[0], len(frames)))
+    total = np.zeros((*values.shape[:-1], len(frames)))
     weights = np.zeros(len(frames))
+    occupied = values.any(axis=-1)
+    some, sums = values[occupied], total[occupied]
     for offset in range(-before, after):
-        neighbour = frames + offset
-        inside = (neighbour >= first) & (neighbour < last)
-        neighbour = np.clip(neighbour, first, last - 1)
-        distance = times_s[neighbour] - centres
+        inside = slice(max(0, first - start - offset), min(len(frames), last - start - offset))
+        neighbour = frames[inside] + offset
+        distance = times_s[neighbour] - centres[inside]
         bell = np.exp(-0.5 * (distance / sigma_s) ** 2)
-        bell[~inside | (np.abs(distance) > reach)] = 0
+        bell[np.abs(distance) > reach] = 0
         if presence is not None and not presence.whole:
-            bell[presence.first[neighbour] != presence.first[frames]] = 0
-        total += bell * values[:, neighbour - first]
-        weights += bell
-    return total / weights
+            bell[presence.first[neighbour] != presence.first[frames[inside]]] = 0
+        begin = inside.start + start + offset - first
+        sums[..., inside] += bell * some[..., begin : begin + len(bell)]
+        weights[inside] += bell
+    total[occupied] = sums / weights
+    return total

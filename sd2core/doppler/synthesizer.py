@@ -19,9 +19,10 @@ from sd2core.doppler.parallel import Ticket, run_jobs
 from sd2core.doppler.prepared import Block, ByteBudget, PreparedMesh
 from sd2core.doppler.smoothing import frames_within_reach, smooth
 from sd2core.errors import Sd2Error
-from sd2core.maps import CellUncertainty, DopplerMap
+from sd2core.maps import CellUncertainty, DopplerMap, LimbMaps
 from sd2core.mesh.presence import gaps_in_words, runs
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.mesh.vertex_parts import VertexParts
 from sd2core.numerics.compiled import compile_in_background, kernels_ready
 from sd2core.numerics.precision import SHARE_OF_A_BIN, stored_velocity_error_mps
 from sd2core.progress import Progress, silent
@@ -47,6 +48,7 @@ class Stretch:
     quality: Quality
     """The weakest visibility that was used: ``frozen`` falls back to facing where no depth or
     exact visibility is kept."""
+    limbs: NDArray[np.float32] | None = None  # values by part of the body, (parts, bins, n)
     processor_s: float = 0.0
     """Processor time that visibility and counting took, all threads together."""
 
@@ -232,8 +234,64 @@ class Synthesizer:
             is empty. ``present`` is False in frames without a person, and in one
             that stands alone: what moves how fast is not known there.
         """
+        return self._map(sensor, None, visibility, frames, progress)
+
+    def limb_maps(
+        self,
+        sensor: VirtualSensor,
+        parts: VertexParts,
+        *,
+        visibility: Visibility | None = None,
+        frames: tuple[int, int] | None = None,
+        progress: Progress = silent,
+    ) -> DopplerMap:
+        """Doppler map as :meth:`map` makes it, and its split by the parts of the body.
+
+        Vertices are counted once, by the same visibility and weights; the parts add up to the
+        map, to single precision. All arguments but ``parts`` are those of :meth:`map`.
+
+        Parameters
+        ----------
+        parts : VertexParts
+            Parts of the body by vertex, as :func:`sd2core.body.parts.body_parts` finds them.
+
+        Returns
+        -------
+        DopplerMap
+            With ``limbs``.
+
+        Raises
+        ------
+        Sd2Error
+            When ``parts`` is of another number of vertices.
+
+        Examples
+        --------
+        >>> import sd2core as sd2
+        >>> from sd2core.body.parts import body_parts
+        >>> from sd2core.files.resources import resource_path
+        >>> mesh = sd2.load_mesh(resource_path("swipes.sd2") / "mesh.zarr").between(30, 36)
+        >>> found = sd2.Synthesizer(mesh).limb_maps(sd2.VirtualSensor(), body_parts(mesh))
+        >>> found.limbs.values.shape
+        (9, 32, 6)
+        """
+        if len(parts.numbers) != self.mesh.vertex_count:
+            raise Sd2Error(
+                f"The parts of the body are of {len(parts.numbers)} vertices",
+                f"{self.mesh.vertex_count}, as {self.mesh.source or 'the mesh'} has",
+            )
+        return self._map(sensor, parts, visibility, frames, progress)
+
+    def _map(
+        self,
+        sensor: VirtualSensor,
+        parts: VertexParts | None,
+        visibility: Visibility | None,
+        frames: tuple[int, int] | None,
+        progress: Progress,
+    ) -> DopplerMap:
         start, stop = frames or (0, self.mesh.frame_count)
-        stretch = self.stretch(sensor, start, stop, visibility, progress)
+        stretch = self.stretch(sensor, start, stop, visibility, progress, parts)
         options = self.options
         unshared = stretch.quality in ("none", "facing")
         return DopplerMap(
@@ -255,6 +313,9 @@ class Synthesizer:
                 "notes": map_notes(self.prepared, sensor, start, stop),
             },
             present=self.mesh.presence.measured[start:stop],
+            limbs=None
+            if parts is None or stretch.limbs is None
+            else LimbMaps(parts.names, stretch.limbs),
         )
 
     def stretch(
@@ -264,25 +325,29 @@ class Synthesizer:
         stop: int,
         visibility: Visibility | None = None,
         progress: Progress = silent,
+        parts: VertexParts | None = None,
     ) -> Stretch:
         """Doppler values of frames ``start`` to ``stop`` (exclusive).
 
         They equal these columns of the whole map: smoothing over time also uses the frames
-        around them.
+        around them. With ``parts``, also those of each part of the body.
         """
         if not 0 <= start < stop <= self.mesh.frame_count:
             raise IndexError(f"frames {start} to {stop} of {self.mesh.frame_count}")
         options, times_s = self.options, self.mesh.times_s
         first, last = frames_within_reach(times_s, start, stop, options.time_sigma_s)
         counts, totals, quality, processor_s = self._count(
-            sensor, first, last, self._choose(visibility), progress
+            sensor, first, last, self._choose(visibility), progress, parts
         )
 
-        raw = np.divide(
-            counts.histogram.T, totals, out=np.zeros(counts.histogram.T.shape), where=totals > 0
-        )
-        raw[list(options.null_bins)] = 0
-        values = smooth(raw, times_s, first, start, stop, options, self.mesh.presence)
+        def smoothed(counted: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+            """Shares (..., bins, frames) of what was counted, before and after smoothing."""
+            raw = np.divide(counted, totals, out=np.zeros(counted.shape), where=totals > 0)
+            raw[..., list(options.null_bins), :] = 0
+            return raw, smooth(raw, times_s, first, start, stop, options, self.mesh.presence)
+
+        raw, values = smoothed(counts.histogram.sum(axis=1).T)
+        limbs = None if parts is None else smoothed(counts.histogram.transpose(1, 2, 0))[1]
         inside = slice(start - first, stop - first)
         nobody = ~self.mesh.presence.there[first:last]
         counts.visible[nobody] = counts.beyond[nobody] = 0
@@ -293,6 +358,7 @@ class Synthesizer:
             (visible / self.mesh.represented_count).astype(np.float32),
             (beyond / np.maximum(visible, 1)).astype(np.float32),
             quality,
+            None if limbs is None else limbs.astype(np.float32),
             processor_s,
         )
 
@@ -390,11 +456,15 @@ class Synthesizer:
         stop: int,
         visibility: Visibility,
         progress: Progress,
+        parts: VertexParts | None = None,
     ) -> tuple[Counts, NDArray[np.float64], Quality, float]:
         """Counts per frame, their totals, the visibility used, and processor seconds."""
         if not kernels_ready():
             compile_in_background()
-        counts = Counts.empty(stop - start, self.options.axis.bins)
+        counts = Counts.empty(
+            stop - start, self.options.axis.bins, 1 if parts is None else len(parts.names)
+        )
+        numbers = None if parts is None else parts.numbers
         totals = np.empty(stop - start)
         qualities: set[Quality] = set()
         quick = visibility not in ("depth", "exact") and kernels_ready()
@@ -408,9 +478,11 @@ class Synthesizer:
                     last = min(first + step, high)
                     rows = slice(first - block.start, last - block.start)
                     target = slice(first - start, last - start)
-                    part = counts.rows(target), totals[target]
+                    into = counts.rows(target), totals[target]
                     qualities.add(
-                        self._frames.count(block, rows, sensor.position_m, visibility, *part)
+                        self._frames.count(
+                            block, rows, sensor.position_m, visibility, *into, numbers
+                        )
                     )
                     ticket.advance(last - first)
 

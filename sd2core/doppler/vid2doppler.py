@@ -109,6 +109,5 @@ def count(
         into.visible[row] = heads[seen].sum()
         # With one frame there is no velocity, not a velocity of zero.
         if frames.duration_s[row].any():
-            total = np.bincount(numbers[row][seen], weight[seen], counting.bins + 1)
-            into.histogram[row] = total[: counting.bins]
+            into.add(row, numbers[row], weight, seen, scatterers.parts, 1)
             into.beyond[row] = heads[beyond[row] & seen].sum()

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 from timing import best_s
 
+from sd2core.body.parts import known_parts
 from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics.compiled import warm_up, worker_count
@@ -39,6 +40,33 @@ def copy_bytes_per_s(size_bytes: int) -> float:
     source = np.ones(size_bytes, np.uint8)
     target = np.zeros_like(source)
     return size_bytes / best_s(lambda: np.copyto(target, source), 20)
+
+
+@pytest.mark.parametrize("visibility", ["frozen", "facing"])
+def test_limb_maps(
+    benchmark: Any, mesh: MeshSequence, capsys: pytest.CaptureFixture[str], visibility: Any
+) -> None:
+    """What the split by parts of the body costs beside the map alone."""
+    parts = known_parts(mesh)
+    maker = Synthesizer(mesh, PAPER)
+    maker.prepare()
+    maker.map(VirtualSensor(), visibility="exact")
+
+    def both() -> tuple[float, float]:
+        return tuple(
+            best_s(one, 1)
+            for one in (
+                lambda: maker.map(VirtualSensor(), visibility=visibility),
+                lambda: maker.limb_maps(VirtualSensor(), parts, visibility=visibility),
+            )
+        )  # type: ignore[return-value]
+
+    spent = [both() for _ in range(20)]
+    alone_s, split_s = (min(one) for one in zip(*spent, strict=True))
+    with capsys.disabled():
+        print(f"\nlimb maps, {visibility}: {split_s / alone_s:.2f} times the map")
+    assert split_s < 1.5 * alone_s
+    benchmark.pedantic(both, rounds=3)
 
 
 @pytest.mark.parametrize(

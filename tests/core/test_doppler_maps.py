@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from sd2core.errors import Sd2Error
-from sd2core.maps import DopplerMap
+from sd2core.maps import DopplerMap, LimbMaps, joined
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 
@@ -41,6 +42,23 @@ def test_a_saved_map_comes_back_whole(tmp_path_factory, values):
     assert after.axis == before.axis
     for name in ("kind", "unit", "null_bins", "unseen_bins", "meta"):
         assert getattr(after, name) == getattr(before, name)
+
+
+def test_limb_maps_come_back_and_follow_the_frames(tmp_path):
+    values = np.arange(24, dtype=np.float32).reshape(4, 6)
+    limbs = LimbMaps(("arm", "rest"), np.stack([0.25 * values, 0.75 * values]))
+    before = map_of(values, limbs=limbs)
+    before.save(tmp_path / "map.npz")
+    after = DopplerMap.load(tmp_path / "map.npz")
+    assert after.limbs.parts == ("arm", "rest")
+    np.testing.assert_array_equal(after.limbs.values, limbs.values)
+    cut = [before.between(0, 2), before.between(2, 6)]
+    np.testing.assert_array_equal(cut[1].limbs.values, limbs.values[..., 2:])
+    whole = joined([cut[0], cut[1].shifted(1.0)])
+    np.testing.assert_array_equal(whole.limbs.values, limbs.values)
+    assert joined([cut[0], replace(cut[1], limbs=None).shifted(1.0)]).limbs is None
+    with pytest.raises(Sd2Error, match=r"\(4, 6\), its limb maps of \(4, 5\)"):
+        replace(before, limbs=limbs.between(0, 5))
 
 
 def test_mean_and_peak_velocity():

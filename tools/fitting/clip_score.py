@@ -8,9 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.body.model import own_resolution
 from sd2core.body.shaping import overlap, silhouette
 from sd2core.body.track import LandmarkTrack
-from sd2core.compare.joints import JOINTS, JointPatches, own_patches, own_resolution
+from sd2core.compare.joints import JOINTS, JointPatches, own_patches
 from sd2core.compare.measures import (
     common_times,
     correlation,

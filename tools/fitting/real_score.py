@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.fit import fit_body
+from sd2core.body.model import own_resolution
 from sd2core.body.shaping import overlap, silhouette
 from sd2core.body.track import LANDMARKS, LandmarkTrack
-from sd2core.compare.joints import JOINTS, own_patches, own_resolution
+from sd2core.compare.joints import JOINTS, own_patches
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
 

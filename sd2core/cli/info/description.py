@@ -228,6 +228,7 @@ def describe_map(path: Path, doppler: DopplerMap) -> Description:
         **_clock_data(doppler.timebase),
         "frames_without_person": _absent(doppler.present),
         "uncertainty": None if doppler.uncertainty is None else _deviation(doppler),
+        "limbs": None if doppler.limbs is None else list(doppler.limbs.parts),
         "provenance": doppler.meta,
     }
     facts = {
@@ -242,6 +243,7 @@ def describe_map(path: Path, doppler: DopplerMap) -> Description:
         else f"±{_deviation(doppler):.0%} of a value (root mean square; the median of the cells"
         " that are not faint)",
         "unseen bins": bins_in_words(doppler.axis, doppler.unseen_bins),
+        "limbs": "" if doppler.limbs is None else ", ".join(doppler.limbs.parts),
         **_synthesis_facts(doppler.meta),
     }
     notes = tuple(doppler.meta.get("notes", ()))

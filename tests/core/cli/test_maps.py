@@ -15,6 +15,7 @@ from sd2core.cli import build_parser
 from sd2core.cli.synth import synthesis_options
 from sd2core.doppler import PRESETS
 from sd2core.doppler.options import same_velocities
+from sd2core.files.resources import resource_path
 from sd2core.maps import DopplerMap
 from sd2core.sensor import VelocityAxis
 
@@ -146,6 +147,25 @@ def test_a_point_cloud_needs_visibility_none(sd2: Sd2, plate: Path, tmp_path: Pa
     assert "none" in outcome.err
     assert not out.exists()
     assert sd2("synth", points, "--out", out, "--visibility", "none").code == 0
+
+
+def test_limbs_come_with_the_map(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
+    body, out = resource_path("swipes.sd2") / "mesh.zarr", tmp_path / "map.npz"
+    said = sd2("synth", body, "--out", out, "--limbs", "--visibility", "facing")
+    assert said.code == 0
+    assert "forearm.L, forearm.R" in said.out
+    found = DopplerMap.load(out)
+    assert found.limbs is not None
+    np.testing.assert_allclose(found.limbs.values.sum(axis=0), found.values, rtol=1e-5, atol=1e-7)
+    assert json.loads(sd2("info", out, "--json").out)["limbs"] == list(found.limbs.parts)
+    for more, words in (
+        ((plate,), "the parts of the body are not known"),
+        ((body, "--model", "fmcw"), "--limbs is given with --model fmcw"),
+    ):
+        said = sd2("synth", *more, "--out", tmp_path / "other.npz", "--limbs")
+        assert said.code == 1
+        assert words in said.err
+        assert not (tmp_path / "other.npz").exists()
 
 
 @pytest.mark.parametrize("command", ["synth", "radar"])

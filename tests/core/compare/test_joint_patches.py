@@ -3,14 +3,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sd2core.body.model import Body, Resolution
+from sd2core.body.model import Body, Resolution, own_resolution
 from sd2core.body.rotations import about
 from sd2core.compare.joints import (
     GROUPS,
     JOINTS,
     carry_patches,
     own_patches,
-    own_resolution,
     rows_of,
 )
 from sd2core.errors import Sd2Error

@@ -1,0 +1,28 @@
+"""Parts of the body that the vertices of a mesh belong to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.errors import Sd2Error
+
+
+@dataclass(frozen=True, eq=False)
+class VertexParts:
+    """Part of the body of every vertex."""
+
+    names: tuple[str, ...]
+    numbers: NDArray[np.uint8]  # (V,), into names
+
+    def __post_init__(self) -> None:
+        numbers = np.ascontiguousarray(self.numbers, np.uint8)
+        most = int(numbers.max(initial=0))
+        if numbers.ndim != 1 or most >= len(self.names):
+            raise Sd2Error(
+                f"Parts of shape {numbers.shape}, numbers up to {most}",
+                f"one number per vertex, below {len(self.names)}",
+            )
+        object.__setattr__(self, "numbers", numbers)
