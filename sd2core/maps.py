@@ -69,6 +69,26 @@ class LimbMaps:
         object.__setattr__(self, "parts", tuple(str(part) for part in self.parts))
         object.__setattr__(self, "values", values)
 
+    def energies(self, parts: Sequence[str]) -> NDArray[np.float32]:
+        """Energies by frame, part and bin, (frames, len(parts) · bins).
+
+        A part without a side (``forearm``) is the sum of both. Raises Sd2Error if a part is
+        missing.
+        """
+        found = []
+        for part in parts:
+            rows = [
+                number
+                for number, name in enumerate(self.parts)
+                if part in (name, name.partition(".")[0])
+            ]
+            if not rows:
+                raise Sd2Error(
+                    f"The limb maps have no part {part!r}", f"some of {', '.join(self.parts)}"
+                )
+            found.append(self.values[rows].sum(axis=0))
+        return np.ascontiguousarray(np.concatenate(found).T)
+
     def between(self, start: int, stop: int) -> LimbMaps:
         """Limb maps of frames ``start`` to ``stop`` (exclusive)."""
         return LimbMaps(self.parts, self.values[..., start:stop])

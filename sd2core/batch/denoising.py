@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.denoise.resample_to_model import input_of
 from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import Presence
 
@@ -35,7 +36,7 @@ def _denoise_long(trained: TrainedDenoiser, maps: Sequence[Path], outs: Sequence
     from sd2core.denoise.live import denoise_long
     from sd2core.denoise.resample_to_model import check_map, clips, is_regular
 
-    files, rate_hz = _Files(maps), trained.card.frame_rate_hz
+    files, rate_hz = _Files(maps, trained.card.parts), trained.card.frame_rate_hz
     check_map(files.part(0), trained.card)
     runs = clips(files.times_s, files.there, rate_hz)
     regular = all(is_regular(files.times_s[start:stop], rate_hz) for start, stop in runs)
@@ -47,8 +48,8 @@ def _denoise_long(trained: TrainedDenoiser, maps: Sequence[Path], outs: Sequence
 class _Files:
     """Frames from the files of stretches; the last two stay in memory."""
 
-    def __init__(self, maps: Sequence[Path]) -> None:
-        self._maps = maps
+    def __init__(self, maps: Sequence[Path], parts: Sequence[str]) -> None:
+        self._maps, self._parts = maps, parts
         self._loaded: dict[int, DopplerMap] = {}
         times_s, there = [], []
         for number in range(len(maps)):
@@ -72,13 +73,13 @@ class _Files:
         return int(np.searchsorted(self.edges, frame, side="right")) - 1
 
     def read(self, start: int, stop: int) -> NDArray[np.float32]:
-        """Return energies of frames of the whole map, (n, bins)."""
+        """Return energies of frames of the whole map, (n, features)."""
         pieces = []
         for number in range(self.holding(start), self.holding(stop - 1) + 1):
             low, high = self.edges[number], self.edges[number + 1]
-            values = self.part(number).values[:, max(start - low, 0) : min(stop, high) - low]
-            pieces.append(values.T)
-        return np.ascontiguousarray(np.concatenate(pieces))
+            part = self.part(number).between(max(start - low, 0), min(stop, high) - low)
+            pieces.append(input_of(part, self._parts))
+        return np.concatenate(pieces)
 
 
 class _Writer:

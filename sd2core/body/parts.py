@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import permutations
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,22 +23,14 @@ from sd2core.body.limbs import LIMBS, vertex_limbs
 from sd2core.body.model import Body, Resolution, own_resolution
 from sd2core.body.rotations import Floats
 from sd2core.errors import Sd2Error
+from sd2core.maps import DopplerMap
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.mesh.vertex_parts import VertexParts
+from sd2core.mesh.vertex_parts import PARTS, VertexParts
+from sd2core.progress import Progress, silent
+from sd2core.sensor import VirtualSensor
 
-PARTS: tuple[str, ...] = (
-    "trunk",
-    "upper_arm.L",
-    "upper_arm.R",
-    "forearm.L",
-    "forearm.R",
-    "thigh.L",
-    "thigh.R",
-    "lower_leg.L",
-    "lower_leg.R",
-)
-"""Parts in the order of limb maps; L and R are the person's own sides. The trunk has the head,
-forearms have the hands, lower legs the feet."""
+if TYPE_CHECKING:
+    from sd2core.doppler import Synthesizer
 
 _PART_OF = {
     "head": "trunk",
@@ -90,6 +82,15 @@ def known_parts(mesh: MeshSequence) -> VertexParts:
             "Give the faces of the mesh (--faces), or do without limbs",
         )
     return parts
+
+
+def synthetic_map(
+    maker: Synthesizer, sensor: VirtualSensor, *, limbs: bool, progress: Progress = silent
+) -> DopplerMap:
+    """Doppler map of a mesh; with ``limbs`` also its split, as :func:`known_parts` finds them."""
+    if limbs:
+        return maker.limb_maps(sensor, known_parts(maker.mesh), progress=progress)
+    return maker.map(sensor, progress=progress)
 
 
 def parts_by_shape(points_m: Floats, faces: NDArray[np.int32]) -> NDArray[np.uint8] | None:

@@ -72,8 +72,9 @@ class TrainedClassifier:
         """
         matching.check_bins(doppler, self.card)
         found = np.tile(self.card.no_person(), (len(doppler.timebase), 1))
+        energies = matching.input_of(doppler)
         matching.apply_to_stretches(
-            self.probabilities_of, doppler, self.card.frame_rate_hz, found, progress
+            self.probabilities_of, doppler, energies, self.card.frame_rate_hz, found, progress
         )
         return found
 

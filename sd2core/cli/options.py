@@ -174,6 +174,16 @@ def name_list(text: str) -> tuple[str, ...]:
     return tuple(name.strip() for name in text.split(",") if name.strip())
 
 
+def add_limbs(parser: argparse.ArgumentParser) -> None:
+    """Add ``--limbs``."""
+    parser.add_argument(
+        "--limbs",
+        action="store_true",
+        help="also keep the synthetic map of each part of the body (trunk, upper arms, forearms,"
+        " thighs, lower legs)",
+    )
+
+
 def add_people_kept_out(group: argparse._ActionsContainer, validation: str, test: str) -> None:
     """Add ``--validation-subjects`` and ``--test-subjects``; the texts say who else it is."""
     for part, help_text in (("validation", validation), ("test", test)):

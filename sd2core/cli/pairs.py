@@ -3,15 +3,25 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sd2core.cli.options import add_axis, add_command, add_json, bin_list, given
+from sd2core.cli.options import (
+    add_axis,
+    add_command,
+    add_json,
+    add_limbs,
+    bin_list,
+    finite_float,
+    given,
+    position,
+)
 from sd2core.cli.output import print_facts, print_json, progress_bar
 
 if TYPE_CHECKING:
     from sd2core.mocap.mars_pairs import MarsChoices
+    from sd2core.mocap.radar_place import RadarPlace
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
@@ -61,6 +71,7 @@ def _add_pairs(parser: argparse.ArgumentParser, usual_null_bins: str) -> None:
         metavar="LIST",
         help=f"bins to set to zero in input and target, e.g. 14,15,16 (default: {usual_null_bins})",
     )
+    add_limbs(parser)
     add_json(parser)
 
 
@@ -72,8 +83,9 @@ def _add_mars(kinds: argparse._SubParsersAction) -> None:
         handler=_mars,
         description=(
             "A body of the person's size moves as the Kinect saw it; its synthetic Doppler is\n"
-            "the input, the Doppler of the radar's points the target. Person and part make\n"
-            "the subject (1-test), so that training and test can be kept apart.\n\n"
+            "the input, the Doppler of the radar's points the target. Persons are the subjects.\n"
+            "Where the radar stands beside the Kinect, and how its clock lies, is found by what\n"
+            "makes the mean velocities of both agree best, for each person.\n\n"
             "It can be stopped at any moment; the same command resumes it."
         ),
         examples=(
@@ -100,6 +112,20 @@ def _add_mars(kinds: argparse._SubParsersAction) -> None:
         help="weight of a vertex (default: count)",
     )
     parser.add_argument(
+        "--radar-position",
+        type=position,
+        metavar="X,Y,Z",
+        help="place of the radar beside the Kinect in metres, right, down and forward (default:"
+        " estimated; 0,0,0 where only --radar-offset is given)",
+    )
+    parser.add_argument(
+        "--radar-offset",
+        type=finite_float,
+        metavar="S",
+        help="what the radar shows at a time is the motion so many seconds later (default:"
+        " estimated; 0 where only --radar-position is given)",
+    )
+    parser.add_argument(
         "--target",
         choices=("share", "intensity"),
         help="target of each frame: shares that add up to 1, or intensities (default: share)",
@@ -109,12 +135,17 @@ def _add_mars(kinds: argparse._SubParsersAction) -> None:
 def _choices(options: argparse.Namespace) -> MarsChoices:
     from sd2core.cli.reading import chosen_axis
     from sd2core.mocap.mars_pairs import MarsChoices
+    from sd2core.mocap.radar_place import RadarPlace
 
     choices = MarsChoices()
     synthesis = choices.synthesis
     axis = chosen_axis(options, synthesis.axis)
     changes = given(options, ("null_bins", "visibility", "weight"))
     choices = replace(choices, synthesis=replace(synthesis, axis=axis, **changes))
+    place = None
+    if options.radar_position is not None or options.radar_offset is not None:
+        place = RadarPlace(options.radar_position or (0.0, 0.0, 0.0), options.radar_offset or 0.0)
+    choices = replace(choices, limbs=options.limbs, place=place)
     return replace(choices, target=options.target) if options.target else choices
 
 
@@ -132,7 +163,12 @@ def _recordings(options: argparse.Namespace) -> None:
         synthesis = replace(synthesis, null_bins=options.null_bins)
     with progress_bar("Making pairs") as progress:
         made = make_recording_pairs(
-            options.recordings, options.out, synthesis, subjects=options.subjects, progress=progress
+            options.recordings,
+            options.out,
+            synthesis,
+            subjects=options.subjects,
+            limbs=options.limbs,
+            progress=progress,
         )
     if options.json:
         subjects = {
@@ -165,6 +201,7 @@ def _mars(options: argparse.Namespace) -> None:
                         "frames": frames,
                         "stature_m": made.stature_m.get(subject),
                         "residual_m": made.residual_m.get(subject),
+                        "radar": asdict(made.places[subject]) if subject in made.places else None,
                     }
                     for subject, (takes, frames) in made.subjects.items()
                 },
@@ -177,7 +214,23 @@ def _mars(options: argparse.Namespace) -> None:
         if subject in made.stature_m:
             line += (
                 f"; a body of {made.stature_m[subject]:.2f} m, its joints"
-                f" {100 * made.residual_m[subject]:.1f} cm from the skeleton's"
+                f" {100 * made.residual_m[subject]:.1f} cm from the skeleton's;"
+                f" {_place_words(made.places[subject])}"
             )
         facts[subject] = line
     print_facts(str(options.out), facts)
+
+
+def _place_words(place: RadarPlace) -> str:
+    """Where the radar stands, and whether that was found."""
+    right, down, forward = place.position_m
+    words = (
+        f"the radar {right:+.2f} m right, {down:+.2f} m down and {forward:+.2f} m before the"
+        f" Kinect, its clock {1e3 * place.offset_s:+.0f} ms"
+    )
+    if place.correlation is None:
+        return f"{words} (given)"
+    return (
+        f"{words} (estimated: mean velocities correlate with {place.correlation:.2f} instead of"
+        f" {place.correlation_before:.2f})"
+    )

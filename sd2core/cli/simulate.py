@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Literal
 from sd2core.cli.options import (
     add_command,
     add_json,
+    add_limbs,
     add_mesh_and_sensor,
     add_mesh_reading,
     finite_float,
@@ -318,6 +319,7 @@ def _add_campaign(kinds: argparse._SubParsersAction) -> None:
         metavar="P",
         help="worker processes (default: 2)",
     )
+    add_limbs(parser)
     parser.add_argument(
         "--fit-errors",
         type=Path,
@@ -338,7 +340,7 @@ def _campaign(options: argparse.Namespace) -> None:
     from sd2core.simulate.campaign.making import make_campaign
     from sd2core.simulate.campaign.takes import Campaign
 
-    campaign = Campaign(options.seed, options.take_seconds, options.placements)
+    campaign = Campaign(options.seed, options.take_seconds, options.placements, limbs=options.limbs)
     with progress_bar("Simulating", unit="take") as progress:
         made = make_campaign(
             options.out,

@@ -11,6 +11,7 @@ from sd2core.cli.options import (
     add_axis,
     add_command,
     add_json,
+    add_limbs,
     add_map_output,
     add_mesh_and_sensor,
     add_mesh_reading,
@@ -192,11 +193,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         help="add to the map how well its values are known (arrays sd and expected), which a mesh"
         " from sd2 fit says",
     )
-    parser.add_argument(
-        "--limbs",
-        action="store_true",
-        help="add to the map its split by the parts of the body (arrays limbs and parts)",
-    )
+    add_limbs(parser)
     add_mesh_reading(parser)
     add_json(parser)
 
@@ -267,14 +264,10 @@ def _as_chosen(
 def _counted(
     options: argparse.Namespace, synthesizer: Synthesizer, sensor: VirtualSensor
 ) -> DopplerMap:
-    from sd2core.body.parts import known_parts
+    from sd2core.body.parts import synthetic_map
 
     with progress_bar("Synthesising") as progress:
-        if options.limbs:
-            parts = known_parts(synthesizer.mesh)
-            doppler = synthesizer.limb_maps(sensor, parts, progress=progress)
-        else:
-            doppler = synthesizer.map(sensor, progress=progress)
+        doppler = synthetic_map(synthesizer, sensor, limbs=options.limbs, progress=progress)
     if not options.uncertainty:
         return doppler
     with progress_bar("Estimating the uncertainty") as progress:

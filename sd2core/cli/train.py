@@ -39,6 +39,7 @@ _SETTINGS = {
     "segments": ("data", "segments"),
     "range_factor": ("data", "range_factor"),
     "model": ("model", "name"),
+    "model_inputs": ("model", "inputs"),
     "epochs": ("training", "epochs"),
     "minutes": ("training", "minutes"),
     "batch_size": ("training", "batch_size"),
@@ -78,6 +79,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         examples=(
             "  sd2 train campaign.zarr --out runs/s4\n"
             "  sd2 train campaign.zarr --model gru --minutes 30 --out runs/gru\n"
+            "  sd2 train campaign.zarr --inputs limbs --out runs/limbs\n"
             "  sd2 train campaign.zarr mars.zarr --test-subjects s6 --seed 1 --out runs/both\n"
             "  sd2 train settings.toml --epochs 100 --out runs/short\n"
             "  sd2 train --resume runs/s4\n"
@@ -110,6 +112,13 @@ def _add_learning(parser: argparse.ArgumentParser) -> None:
         "--model",
         metavar="NAME",
         help="s4 (the paper's), s4d, s4-serial, gru, unet or swin (default: s4)",
+    )
+    group.add_argument(
+        "--inputs",
+        dest="model_inputs",
+        choices=("map", "limbs"),
+        help="learn from the map, or from that of each part of the body, which the pairs must"
+        " hold (--limbs) (default: map)",
     )
     group.add_argument(
         "--set",

@@ -8,12 +8,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, get_args
 
-from sd2core.denoise.scaling import Scaling
+from sd2core.denoise.scaling import Scaling, null_columns
 from sd2core.errors import Sd2Error
 from sd2core.sensor import VelocityAxis
 
 FORMAT = "sd2-denoiser"
 VERSION = 1
+
+DENOISER_PARTS = ("trunk", "upper_arm", "forearm", "thigh", "lower_leg")
+"""Parts of the body whose limb maps a new model takes. Both sides together: apart they gain
+nothing with real radar (docs/real-pairs.md)."""
 
 TrainedOn = Literal["simulated", "real"]
 """Origin of the training targets: a simulated radar or a real one."""
@@ -31,6 +35,8 @@ class ModelCard:
     frame_rate_hz: float
     trained_on: TrainedOn
     unit: str = "power"  # Meaning of the value 1 in the result.
+    parts: tuple[str, ...] = ()
+    """Parts of the body whose limb maps are the input; none: the input is the map itself."""
     title: str = ""  # Name in lists; the file's name if it is empty.
     # ``data``, ``command``, ``metrics``, ``limits`` and other content for JSON.
     about: Mapping[str, Any] = field(default_factory=dict)
@@ -50,6 +56,21 @@ class ModelCard:
         object.__setattr__(self, "null_bins", bins)
 
     @property
+    def inputs(self) -> Literal["map", "limbs"]:
+        """Kind of input."""
+        return "limbs" if self.parts else "map"
+
+    @property
+    def features(self) -> int:
+        """Numbers per frame of the input: the bins of all its maps, one map after the other."""
+        return self.axis.bins * max(1, len(self.parts))
+
+    @property
+    def null_features(self) -> list[int]:
+        """Numbers of the input that are zero on purpose."""
+        return null_columns(self.null_bins, self.axis.bins, max(1, len(self.parts)))
+
+    @property
     def name(self) -> str:
         """Name of the file, without its suffix; the kind of model before there is a file."""
         return self.path.stem if self.path is not None else self.model
@@ -67,6 +88,7 @@ class ModelCard:
             "frame_rate_hz": self.frame_rate_hz,
             "trained_on": self.trained_on,
             "unit": self.unit,
+            "parts": list(self.parts),
             "title": self.title,
             "about": dict(self.about),
             "parameters": self.parameters,
@@ -99,6 +121,7 @@ class ModelCard:
                 frame_rate_hz=float(content["frame_rate_hz"]),
                 trained_on=content["trained_on"],
                 unit=str(content["unit"]),
+                parts=tuple(str(part) for part in content.get("parts", ())),
                 title=str(content["title"]),
                 about=dict(content["about"]),
                 parameters=int(content["parameters"]),

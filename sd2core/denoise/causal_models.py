@@ -15,6 +15,8 @@ class S4Denoiser(S4Stack, Denoiser):
 
     Parameters
     ----------
+    parts : int
+        Maps in the input.
     channels : int
         Width H of the layers.
     depth : int
@@ -32,6 +34,7 @@ class S4Denoiser(S4Stack, Denoiser):
         self,
         bins: int,
         *,
+        parts: int = 1,
         channels: int = 128,
         depth: int = 4,
         state_size: int = 64,
@@ -41,10 +44,10 @@ class S4Denoiser(S4Stack, Denoiser):
         dt_min: float = DT_MIN,
         dt_max: float = DT_MAX,
     ) -> None:
-        super().__init__(bins)
+        super().__init__(bins, parts)
         self.causal = not bidirectional
         self.window = 72 if bidirectional else None
-        self.lift = nn.Linear(bins, channels)
+        self.lift = nn.Linear(parts * bins, channels)
         self.layers = nn.ModuleList(
             S4Layer(
                 channels,
@@ -70,42 +73,48 @@ class SerialS4Denoiser(S4Denoiser):
 
     longest = 512
 
-    def __init__(self, bins: int, *, channels: int = 128, **layers: Any):
-        super().__init__(bins, channels=channels, **layers)
-        self.lift = nn.Linear(1, channels)
+    def __init__(self, bins: int, *, parts: int = 1, channels: int = 128, **layers: Any):
+        super().__init__(bins, parts=parts, channels=channels, **layers)
+        self.lift = nn.Linear(parts, channels)
         self.head = nn.Linear(channels, 1)
 
     def forward(self, values: Tensor) -> Tensor:
-        """Denoise whole sequences, (batch, frames, bins), as rows of cells."""
-        return super().forward(values.flatten(1)[..., None]).view(values.shape)
+        """Denoise whole sequences, (batch, frames, parts · bins), as rows of cells."""
+        return super().forward(self._cells(values)).view(*values.shape[:2], self.bins)
 
     def chunk(self, values: Tensor, state: State) -> tuple[Tensor, State]:
         """Advance by whole frames, so that the state lies between two frames."""
-        cells, state = super().chunk(values.flatten(1)[..., None], state)
-        return cells.view(values.shape), state
+        cells, state = super().chunk(self._cells(values), state)
+        return cells.view(*values.shape[:2], self.bins), state
 
     def step(self, frame: Tensor, state: State) -> tuple[Tensor, State]:
         """Advance by one frame, a chunk of as many cells as there are bins."""
         answer, state = self.chunk(frame[:, None], state)
         return answer[:, 0], state
 
+    def _cells(self, values: Tensor) -> Tensor:
+        """Values of every cell, (batch, frames · bins, parts)."""
+        return self.pictures(values).flatten(2).transpose(1, 2)
+
 
 class GruDenoiser(Denoiser):
     """Baseline: linear layer, GRU layers (K. Cho et al., EMNLP 2014), linear layer; causal.
 
-    All layers have ``channels`` units; ``dropout`` is between layers, while training.
+    The input has ``parts`` maps. All layers have ``channels`` units; ``dropout`` is between
+    layers, while training.
     """
 
     def __init__(
         self,
         bins: int,
         *,
+        parts: int = 1,
         channels: int = 144,
         depth: int = 2,
         dropout: float = 0.0,
     ) -> None:
-        super().__init__(bins)
-        self.lift = nn.Linear(bins, channels)
+        super().__init__(bins, parts)
+        self.lift = nn.Linear(parts * bins, channels)
         self.recurrent = nn.GRU(
             channels,
             channels,

@@ -76,7 +76,8 @@ def load_model(model: Path | str) -> TrainedDenoiser:
     from sd2core.denoise.registry import build
 
     try:
-        network = build(card.model, card.axis.bins, **card.options)
+        parts = max(1, len(card.parts))
+        network = build(card.model, card.axis.bins, parts, **card.options)
     except Sd2Error as error:
         raise Sd2Error(
             f"{path}: {error.found}", error.expected, "The file may be of another version"

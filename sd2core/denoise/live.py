@@ -29,7 +29,7 @@ _BATCH = 16
 _BLOCK = 16 * CHUNK
 
 Read = Callable[[int, int], NDArray[np.float32]]
-"""Returns the energies of frames from one to another (exclusive), (n, bins)."""
+"""Returns the energies of frames from one to another (exclusive), (n, features)."""
 
 Write = Callable[[int, NDArray[np.float32]], None]
 """Takes the first frame, and its denoised energies and those of the next ones, (n, bins)."""
@@ -42,6 +42,11 @@ class TrainedDenoiser:
         if network.bins != card.axis.bins:
             raise Sd2Error(
                 f"The network has {network.bins} bins, its axis {card.axis.bins}", "the same number"
+            )
+        if network.parts != max(1, len(card.parts)):
+            raise Sd2Error(
+                f"The network takes {network.parts} maps, its card says {len(card.parts)} parts",
+                "the same number, or one map and no parts",
             )
         self.network = network.eval()
         self.card = card
@@ -61,7 +66,8 @@ class TrainedDenoiser:
         Parameters
         ----------
         doppler : DopplerMap
-            Of kind ``synthetic``, on the model's axis, of any length.
+            Of kind ``synthetic``, on the model's axis, of any length; with limb maps where the
+            card says parts.
         progress : callable
             Called with frames; may raise ``Cancelled``.
 
@@ -72,8 +78,9 @@ class TrainedDenoiser:
         """
         matching.check_map(doppler, self.card)
         denoised = np.zeros(doppler.values.shape[::-1], np.float32)  # (frames, bins)
+        energies = matching.input_of(doppler, self.card.parts)
         resampled = matching.apply_to_stretches(
-            self.denoise_values, doppler, self.card.frame_rate_hz, denoised, progress
+            self.denoise_values, doppler, energies, self.card.frame_rate_hz, denoised, progress
         )
         return self.as_denoised(doppler, denoised, resampled)
 
@@ -94,29 +101,31 @@ class TrainedDenoiser:
             null_bins=self.card.null_bins,
             meta=self._provenance(doppler, resampled),
             uncertainty=None,
+            limbs=None,
         )
 
     def denoise_values(
         self, energies: NDArray[np.float32], progress: Progress = silent
     ) -> NDArray[np.float32]:
-        """Denoise one clip at the model's frame rate; energies are (frames, bins), not negative.
+        """Denoise one clip at the model's frame rate, (frames, bins).
 
-        They come in the unit of the synthetic maps of the training, and the result is in that of
-        its radar maps.
+        Energies are (frames, features) as the card counts them, and not negative. They come in
+        the unit of the synthetic maps of the training, and the result is in that of its radar
+        maps.
         """
-        if energies.ndim != 2 or energies.shape[1] != self.card.axis.bins:
+        if energies.ndim != 2 or energies.shape[1] != self.card.features:
             raise Sd2Error(
-                f"The values are of shape {energies.shape}", f"(frames, {self.card.axis.bins})"
+                f"The values are of shape {energies.shape}", f"(frames, {self.card.features})"
             )
         if not len(energies):
-            return np.zeros(energies.shape, np.float32)
+            return np.zeros((0, self.card.axis.bins), np.float32)
         run = self._in_chunks if self.network.window is None else self._in_windows
         return self.expanded(run(self.compressed(energies), progress))
 
     def compressed(self, energies: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Input of the network from energies (…, bins)."""
+        """Input of the network from energies (…, features)."""
         values = np.array(energies, dtype=np.float32)
-        values[..., list(self.card.null_bins)] = 0.0
+        values[..., self.card.null_features] = 0.0
         return self.card.scaling.input.compress(values)
 
     def expanded(self, answer: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -136,7 +145,7 @@ class TrainedDenoiser:
         step = _ROUND if frames <= CHUNK else CHUNK
         padded = np.zeros((-(-frames // step) * step, values.shape[1]), np.float32)
         padded[:frames] = values
-        done = np.empty_like(padded)
+        done = np.empty((len(padded), self.card.axis.bins), np.float32)
         with torch.no_grad():
             if len(padded) <= max(self.network.longest, CHUNK):
                 done[:] = self._answer(self.network, padded)
@@ -157,7 +166,7 @@ class TrainedDenoiser:
         known = np.pad(values, ((0, max(0, window - frames)), (0, 0)), "symmetric")
         starts = segment_starts(len(known), window, OVERLAP)
         windows = cut(known, starts, window)
-        done = np.empty_like(windows)
+        done = np.empty((*windows.shape[:2], self.card.axis.bins), np.float32)
         with torch.no_grad():
             for first in range(0, len(windows), _BATCH):
                 progress(min(int(starts[first]), frames), frames)
@@ -222,27 +231,27 @@ class LiveDenoiser:
             self._state = network.initial_state(1) if self.equals_batch else None
 
     def step(self, energies: NDArray[np.float32], present: bool = True) -> NDArray[np.float32]:
-        """Denoise the next frame, (bins,).
+        """Denoise the next frame, (bins,), of energies (features,).
 
         Without a person (``present`` False) the result is empty, and a new clip begins.
         """
-        bins = self._trained.card.axis.bins
-        if energies.shape != (bins,):
-            raise Sd2Error(f"The frame is of shape {energies.shape}", f"({bins},)")
+        card = self._trained.card
+        if energies.shape != (card.features,):
+            raise Sd2Error(f"The frame is of shape {energies.shape}", f"({card.features},)")
         if not present:
             self.reset()
-            return np.zeros(bins, np.float32)
+            return np.zeros(card.axis.bins, np.float32)
         return self._trained.expanded(self._answer(self._trained.compressed(energies)))
 
     def advance(
         self, energies: NDArray[np.float32], present: NDArray[np.bool_] | None = None
     ) -> NDArray[np.float32]:
-        """Denoise the next frames, (frames, bins), with the result of :meth:`step` at less cost.
+        """Denoise the next frames, (frames, features), as :meth:`step` does, at less cost.
 
         ``present`` is as for :meth:`step`, one per frame; None: a person is in all.
         """
         there = Presence.of(present, len(energies)).there
-        answers = np.zeros(energies.shape, np.float32)
+        answers = np.zeros((len(energies), self._trained.card.axis.bins), np.float32)
         if not self.equals_batch:
             for frame, values in enumerate(energies):
                 answers[frame] = self.step(values, bool(there[frame]))
@@ -261,7 +270,7 @@ class LiveDenoiser:
         """Denoise frames without a gap."""
         trained = self._trained
         compressed = trained.compressed(energies)
-        done = np.empty_like(compressed)
+        done = np.empty((len(compressed), trained.card.axis.bins), np.float32)
         with torch.no_grad():
             for start in range(0, len(compressed), CHUNK):
                 chunk = torch.from_numpy(compressed[start : start + CHUNK])[None]

@@ -102,18 +102,20 @@ def summary(name: str) -> str:
     return _entry(name).summary
 
 
-def build(name: str, bins: int = 32, **given: Any) -> Denoiser:
+def build(name: str, bins: int = 32, parts: int = 1, **given: Any) -> Denoiser:
     """Create a model of :data:`MODELS` or :data:`FILTERS` with fresh weights.
 
-    Options that are not given come from :func:`options`. Raises Sd2Error when there is no such
-    model or option, or an option is not of its kind.
+    ``parts`` is the number of maps in the input; filters take one. Options that are not given
+    come from :func:`options`. Raises Sd2Error when there is no such model or option, or an
+    option is not of its kind.
     """
     entry = _entry(name)
     for option, value in given.items():
         check_option(f"model {name}", option, value, entry.options, _LARGEST)
     module, _, class_name = entry.place.partition(".")
     found = getattr(import_module(f"sd2core.denoise.{module}"), class_name)
-    model: Denoiser = found(bins, **entry.fixed, **{**entry.options, **given})
+    several = {} if name in FILTERS else {"parts": parts}
+    model: Denoiser = found(bins, **several, **entry.fixed, **{**entry.options, **given})
     return model
 
 

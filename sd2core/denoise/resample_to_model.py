@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Protocol
 
@@ -41,6 +41,14 @@ class Card(Protocol):
         """Frames per second."""
 
 
+class DenoiserCard(Card, Protocol):
+    """Properties of the maps that a denoiser turns into a radar's."""
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """Parts of the body whose limb maps are the input; none: the map is."""
+
+
 Stretch = NDArray[np.float32]
 """Energies without a gap, (frames, bins)."""
 
@@ -57,7 +65,7 @@ _BREAK_FRAMES = 5.0
 """Number of missing frames after which a new clip begins."""
 
 
-def check_map(doppler: DopplerMap, card: Card) -> None:
+def check_map(doppler: DopplerMap, card: DenoiserCard) -> None:
     """Raise Sd2Error for a map that is not synthetic or does not fit the model."""
     model = f"the model {card.title or card.name}"
     if doppler.kind != "synthetic":
@@ -66,7 +74,21 @@ def check_map(doppler: DopplerMap, card: Card) -> None:
             f"a synthetic map, which {model} turns into what a radar would show",
             "Make one with `sd2 synth`",
         )
+    if card.parts and doppler.limbs is None:
+        raise Sd2Error(
+            "The map is not split by the parts of the body",
+            f"limb maps, from which {model} learnt",
+            "Make it with `sd2 synth --limbs`, or choose a model that takes the map alone",
+        )
     check_bins(doppler, card)
+
+
+def input_of(doppler: DopplerMap, parts: Sequence[str] = ()) -> Stretch:
+    """Energies that a model takes, (frames, bins), or (frames, parts · bins) of these parts."""
+    if not parts:
+        return np.ascontiguousarray(doppler.values.T)
+    assert doppler.limbs is not None
+    return doppler.limbs.energies(parts)
 
 
 def check_bins(doppler: DopplerMap, card: Card) -> None:
@@ -134,16 +156,17 @@ def is_regular(times_s: NDArray[np.float64], frame_rate_hz: float) -> bool:
 def apply_to_stretches(
     work: Callable[[Stretch, Progress], Stretch],
     doppler: DopplerMap,
+    energies: Stretch,
     frame_rate_hz: float,
     result: Stretch,
     progress: Progress,
 ) -> bool:
     """Apply ``work`` to every stretch of a map, at the model's rate, and write it into ``result``.
 
-    The rows of the result are the map's frames; those between stretches stay as they are.
-    Progress counts frames. True if frames were interpolated to the model's rate and back.
+    ``energies`` are the map's, in the form that ``work`` takes. The rows of the result are the
+    map's frames; those between stretches stay as they are. Progress counts frames. True if
+    frames were interpolated to the model's rate and back.
     """
-    energies = np.ascontiguousarray(doppler.values.T)  # (frames, bins)
     total, resampled = len(energies), False
     for start, stop in stretches(doppler, frame_rate_hz):
 

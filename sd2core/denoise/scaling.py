@@ -23,6 +23,12 @@ EXPONENT = 0.5
 """Amplitude instead of power."""
 
 
+def null_columns(null_bins: Iterable[int], bins: int, parts: int) -> list[int]:
+    """Columns of emptied bins in inputs of ``parts`` maps, one map after the other."""
+    emptied = list(null_bins)
+    return [part * bins + number for part in range(parts) for number in emptied]
+
+
 @dataclass(frozen=True)
 class Compression:
     """Compression of energies, y = (x / reference)^exponent, and its inverse."""
@@ -49,8 +55,8 @@ class Compression:
         amplitude (p = 1/2) is the mean energy. So an error of 1 on compressed values is
         that of an empty result.
 
-        ``stretches`` are energies of the training data, (frames, bins); ``null_bins``, which are
-        always zero, are ignored. Raises Sd2Error when there is no energy at all.
+        ``stretches`` are energies of the training data, (frames, columns); ``null_bins``, columns
+        that are always zero, are ignored. Raises Sd2Error when there is no energy at all.
         """
         total, cells = 0.0, 0
         for values in stretches:
@@ -90,12 +96,15 @@ class Scaling:
         targets: Iterable[NDArray[np.float32]],
         null_bins: Sequence[int] = (),
         *,
+        parts: int = 1,
         input_exponent: float = EXPONENT,
         target_exponent: float = EXPONENT,
     ) -> Scaling:
-        """Fit both on training data, (frames, bins) each."""
+        """Fit both on training data: inputs (frames, parts · bins) and targets (frames, bins)."""
+        inputs = list(inputs)
+        bins = inputs[0].shape[1] // parts if inputs else 0
         return cls(
-            Compression.fitted(inputs, null_bins, input_exponent),
+            Compression.fitted(inputs, null_columns(null_bins, bins, parts), input_exponent),
             Compression.fitted(targets, null_bins, target_exponent),
         )
 

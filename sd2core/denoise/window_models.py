@@ -20,6 +20,8 @@ class UNetDenoiser(Denoiser):
 
     Parameters
     ----------
+    parts : int
+        Maps in the input.
     channels : int
         Width of the first level; each level below is twice as wide.
     depth : int
@@ -35,16 +37,17 @@ class UNetDenoiser(Denoiser):
         self,
         bins: int,
         *,
+        parts: int = 1,
         channels: int = 12,
         depth: int = 3,
         dropout: float = 0.0,
     ) -> None:
-        super().__init__(bins)
+        super().__init__(bins, parts)
         self._step = 2**depth
         widths = [channels * 2**level for level in range(depth + 1)]
         self.down = nn.ModuleList(
             _two_convolutions(before, after)
-            for before, after in zip([1, *widths[:-1]], widths, strict=True)
+            for before, after in zip([parts, *widths[:-1]], widths, strict=True)
         )
         self.shrink = nn.MaxPool2d(2)
         self.dropout = nn.Dropout(dropout)
@@ -57,9 +60,9 @@ class UNetDenoiser(Denoiser):
         self.to(memory_format=torch.channels_last)
 
     def forward(self, values: Tensor) -> Tensor:
-        """Denoise (batch, frames, bins) of any number of frames; it learns from 72."""
-        frames, bins = values.shape[1:]
-        picture = padded(values[:, None], self._step, self._step)  # (B, 1, L', bins')
+        """Denoise (batch, frames, parts · bins) of any number of frames; it learns from 72."""
+        frames, bins = values.shape[1], self.bins
+        picture = padded(self.pictures(values), self._step, self._step)  # (B, parts, L', bins')
         picture = picture.contiguous(memory_format=torch.channels_last)
         bridges = []
         for level, convolutions in enumerate(self.down):
@@ -108,6 +111,8 @@ class SwinDenoiser(Denoiser):
 
     Parameters
     ----------
+    parts : int
+        Maps in the input.
     channels : int
         Width of the fine level, a multiple of 16; the coarse one is twice as wide.
     depth : int
@@ -121,14 +126,15 @@ class SwinDenoiser(Denoiser):
         self,
         bins: int,
         *,
+        parts: int = 1,
         channels: int = 48,
         depth: int = 2,
         dropout: float = 0.0,
     ) -> None:
-        super().__init__(bins)
+        super().__init__(bins, parts)
         self._frames_step, self._bins_step = (2 * PATCH * size for size in WINDOW)
         columns = (bins + -bins % self._bins_step) // PATCH
-        self.embed = nn.Conv2d(1, channels, PATCH, stride=PATCH)
+        self.embed = nn.Conv2d(parts, channels, PATCH, stride=PATCH)
         self.velocity = nn.Parameter(
             nn.init.trunc_normal_(torch.empty(columns, channels), std=0.02)
         )
@@ -143,9 +149,9 @@ class SwinDenoiser(Denoiser):
         self.head = nn.Linear(channels, PATCH * PATCH)
 
     def forward(self, values: Tensor) -> Tensor:
-        """Denoise (batch, frames, bins) of any number of frames; it learns from 72."""
-        frames, bins = values.shape[1:]
-        picture = padded(values[:, None], self._frames_step, self._bins_step)
+        """Denoise (batch, frames, parts · bins) of any number of frames; it learns from 72."""
+        frames, bins = values.shape[1], self.bins
+        picture = padded(self.pictures(values), self._frames_step, self._bins_step)
         tokens = self.embed(picture).permute(0, 2, 3, 1) + self.velocity  # (B, L/2, bins/2, C)
         fine = self.fine(tokens)
         coarse = self.coarse(self.merge(_gathered(fine)))

@@ -9,6 +9,20 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 
+PARTS: tuple[str, ...] = (
+    "trunk",
+    "upper_arm.L",
+    "upper_arm.R",
+    "forearm.L",
+    "forearm.R",
+    "thigh.L",
+    "thigh.R",
+    "lower_leg.L",
+    "lower_leg.R",
+)
+"""Parts of the body in the order of limb maps; L and R are the person's own sides. The trunk has
+the head, forearms have the hands, lower legs the feet."""
+
 
 @dataclass(frozen=True, eq=False)
 class VertexParts:

@@ -1,12 +1,13 @@
 """Pairs of synthetic and real Doppler from MARS recordings.
 
 The body of :mod:`sd2core.mocap.driving` moves as the Kinect saw it and gives the input;
-the target is what the radar's points say, on the same axis and the same frames.
+the target is what the radar's points say, on the same axis and the same frames. Where the radar
+stands and how its clock lies is estimated from the two.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -16,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.model import Resolution
+from sd2core.body.parts import synthetic_map
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.io.radar.mars import (
@@ -26,15 +28,23 @@ from sd2core.io.radar.mars import (
     mars_parts,
     read_mars,
 )
+from sd2core.maps import DopplerMap, LimbMaps
+from sd2core.mesh.vertex_parts import PARTS
 from sd2core.mocap.driving import KINECT_MARKERS, DrivenClip, SkeletonClip, puppet_of
+from sd2core.mocap.radar_place import RadarPlace, Seen, estimate_place
 from sd2core.pairs.store import PairWriter, Take, TakeKey
 from sd2core.progress import Progress, silent
 from sd2core.sensor import VelocityAxis, VirtualSensor
+from sd2core.timebase import Timebase
 from sd2core.version import __version__
 
 Target = Literal["share", "intensity"]
 
+AT_THE_CAMERA = RadarPlace()
+
 _LABELS = ("background",)
+_POINTS_STEP = 16
+"""Of the vertices; the others say the same of where the radar stands."""
 
 _SYNTHESIS = replace(PRESETS["paper"], visibility="facing", null_bins=())
 
@@ -52,6 +62,9 @@ class MarsChoices:
     resolution: Resolution = "low"  # 1,229 vertices; medium 5,000, high 13,348
     moments: int = 1
     """Poses of the body per radar frame; velocities are differences over two of these steps."""
+    limbs: bool = False  # The input is also split by the parts of the body.
+    place: RadarPlace | None = None
+    """Of the radar beside the Kinect, and of its clock; None: estimated for each person."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +74,7 @@ class MadePairs:
     subjects: dict[str, tuple[int, int]]  # takes and frames
     stature_m: dict[str, float]  # height of the body of every subject of this run
     residual_m: dict[str, float]  # mean distance of its joints from the skeleton's
+    places: dict[str, RadarPlace]  # of the radar, for every subject of this run
 
 
 def radar_doppler(
@@ -90,14 +104,24 @@ def skeleton_clip(stretch: MarsStretch) -> SkeletonClip:
 
 
 def body_doppler(
-    driven: DrivenClip, choices: MarsChoices, progress: Progress = silent
-) -> NDArray[np.float32]:
-    """Synthetic Doppler of a driven body from the radar's place, (frames, bins)."""
+    driven: DrivenClip,
+    choices: MarsChoices,
+    place: RadarPlace = AT_THE_CAMERA,
+    progress: Progress = silent,
+) -> DopplerMap:
+    """Synthetic Doppler of a driven body from the radar's place, on the radar's frames."""
     frames = len(driven.clip.times_s)
     times_s = np.arange((frames - 1) * choices.moments + 1) / (FRAMES_PER_S * choices.moments)
-    mesh = driven.mesh(times_s, choices.resolution)
-    found = Synthesizer(mesh, choices.synthesis).map(VirtualSensor(), progress=progress)
-    return np.ascontiguousarray(found.values[:, :: choices.moments].T)
+    mesh = driven.mesh(times_s + place.offset_s, choices.resolution)
+    maker, sensor = Synthesizer(mesh, choices.synthesis), VirtualSensor(place.position_m)
+    found = synthetic_map(maker, sensor, limbs=choices.limbs, progress=progress)
+    every, limbs = choices.moments, found.limbs
+    return replace(
+        found,
+        values=found.values[:, ::every],
+        timebase=Timebase(times_s[::every]),
+        limbs=None if limbs is None else LimbMaps(limbs.parts, limbs.values[..., ::every]),
+    )
 
 
 def make_mars_pairs(
@@ -108,8 +132,8 @@ def make_mars_pairs(
 ) -> MadePairs:
     """Write the pairs of some folders, each with one person's parts; resume a stopped run.
 
-    The subject of a take is person and part (``1-test``), so that both can be kept apart;
-    every stretch is a take. ``out`` is the store; progress counts frames.
+    The subject of a take is the person; every stretch is a take. ``out`` is the store;
+    progress counts frames.
 
     Raises Sd2Error if a folder cannot be used, two hold the same, or the store holds other
     pairs.
@@ -126,68 +150,87 @@ def make_mars_pairs(
         frame_rate_hz=FRAMES_PER_S,
         labels=_LABELS,
         provenance=_provenance(parts, choices),
+        parts=PARTS if choices.limbs else (),
     )
     total = sum(_frames(part) for part in parts)
     done = 0
-    made = MadePairs({}, {}, {})
-    for part in parts:
-        subject = _subject(part)
-        if any(key not in writer.done for key in _keys(part)):
+    made = MadePairs({}, {}, {}, {})
+    for person in dict.fromkeys(part.subject for part in parts):
+        own = [part for part in parts if part.subject == person]
+        stretches = {key: stretch for part in own for key, stretch in _takes_of(part)}
+        frames = sum(stretch.frame_count for stretch in stretches.values())
+        if not stretches.keys() <= writer.done:
 
             def report(inside: int, before: int = done) -> None:
                 progress(before + inside, total)
 
-            _write(writer, part, choices, made, report)
-        made.subjects[subject] = (len(part.stretches), _frames(part))
-        done += _frames(part)
-    progress(total, total)
+            _write(writer, stretches, choices, made, report)
+        made.subjects[person] = (len(stretches), frames)
+        done += frames
+        progress(done, total)
     return made
 
 
 def _write(
     writer: PairWriter,
-    part: MarsPart,
+    stretches: Mapping[TakeKey, MarsStretch],
     choices: MarsChoices,
     made: MadePairs,
     progress: Callable[[int], None],
 ) -> None:
-    """Append those takes of one part that are not there; ``progress`` gets frames done."""
-    subject = _subject(part)
+    """Append those takes of one person that are not there; ``progress`` gets frames done."""
     progress(0)
-    clips = [skeleton_clip(stretch) for stretch in part.stretches]
+    person = next(iter(stretches)).subject
+    clips = [skeleton_clip(stretch) for stretch in stretches.values()]
     puppet = puppet_of(clips, KINECT_MARKERS)
-    done, residuals_m = 0, []
-    for key, stretch, clip in zip(_keys(part), part.stretches, clips, strict=True):
-        if key not in writer.done:
-            driven = puppet.pose(clip, partial(progress, done))
-            radar = radar_doppler(stretch, choices.synthesis.axis, choices.target)
-            radar[:, list(choices.synthesis.null_bins)] = 0.0
-            writer.append(
-                Take(
-                    subject=subject,
-                    name=key.name,
-                    synthetic=body_doppler(driven, choices),
-                    radar=radar,
-                    times_s=clip.times_s,
-                    label=np.zeros(stretch.frame_count, np.int8),
-                    sensor_position_m=np.zeros(3),
-                )
-            )
-            residuals_m.append(driven.residual_m.ravel())
-        done += stretch.frame_count
+    driven: list[DrivenClip] = []
+    done = 0
+    for clip in clips:
+        driven.append(puppet.pose(clip, partial(progress, done)))
+        done += len(clip.times_s) - 1  # the rest when the takes are written
+    place = choices.place or estimate_place(
+        [_seen(one, stretch) for one, stretch in zip(driven, stretches.values(), strict=True)]
+    )
+    synthesis = choices.synthesis
+    for (key, stretch), one in zip(stretches.items(), driven, strict=True):
+        if key in writer.done:
+            continue
         progress(done)
-    made.stature_m[subject] = puppet.shape.stature_m
-    made.residual_m[subject] = float(np.nanmean(np.concatenate(residuals_m)))
+        found = body_doppler(one, choices, place)
+        radar = radar_doppler(stretch, synthesis.axis, choices.target)
+        radar[:, list(synthesis.null_bins)] = 0.0
+        writer.append(
+            Take(
+                subject=key.subject,
+                name=key.name,
+                synthetic=np.ascontiguousarray(found.values.T),
+                radar=radar,
+                times_s=one.clip.times_s,
+                label=np.zeros(stretch.frame_count, np.int8),
+                sensor_position_m=np.array(place.position_m),
+                limbs=found.limbs,
+            )
+        )
+    made.places[person] = place
+    made.stature_m[person] = puppet.shape.stature_m
+    made.residual_m[person] = float(
+        np.nanmean(np.concatenate([one.residual_m.ravel() for one in driven]))
+    )
 
 
-def _subject(part: MarsPart) -> str:
-    return f"{part.subject}-{part.name}"
+def _seen(driven: DrivenClip, stretch: MarsStretch) -> Seen:
+    """Motion and mean Doppler of one stretch."""
+    clip = driven.clip
+    velocity_mps = np.full(stretch.frame_count, np.nan)
+    velocity_mps[stretch.frames] = stretch.mean_velocity_mps()
+    points_m = driven.mesh(clip.times_s, "low").read(0, len(clip.times_s))[:, ::_POINTS_STEP]
+    return Seen(clip.times_s, points_m.astype(np.float64), velocity_mps)
 
 
-def _keys(part: MarsPart) -> list[TakeKey]:
+def _takes_of(part: MarsPart) -> list[tuple[TakeKey, MarsStretch]]:
     return [
-        TakeKey(_subject(part), f"stretch-{number:02d}", 0)
-        for number in range(1, len(part.stretches) + 1)
+        (TakeKey(part.subject, f"{part.name}-stretch-{number:02d}", 0), stretch)
+        for number, stretch in enumerate(part.stretches, start=1)
     ]
 
 
@@ -198,7 +241,7 @@ def _frames(part: MarsPart) -> int:
 def _refuse_twice(parts: Sequence[MarsPart]) -> None:
     seen: dict[str, str] = {}
     for part in parts:
-        subject = _subject(part)
+        subject = f"{part.subject}-{part.name}"
         if subject in seen:
             raise Sd2Error(
                 f"{seen[subject]} and {part.source} both hold part {part.name} of person"
@@ -216,5 +259,5 @@ def _provenance(parts: Sequence[MarsPart], choices: MarsChoices) -> dict[str, An
         "parts": [[Path(part.source).name, part.name] for part in parts],
         "radar": "points of a 77 GHz radar (MARS, MIT licence)",
         "input": "a body driven by a Kinect skeleton",
-        **asdict(choices),
+        **{name: value for name, value in asdict(choices).items() if name != "limbs"},
     }

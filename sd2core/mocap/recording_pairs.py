@@ -11,11 +11,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.body.parts import synthetic_map
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.processing import doppler_map
 from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import Presence, runs
+from sd2core.mesh.vertex_parts import PARTS
 from sd2core.pairs.store import PairWriter, Take, TakeKey
 from sd2core.progress import Progress, part_of, silent
 from sd2core.recording.recording import Recording, open_recording
@@ -45,6 +47,7 @@ def make_recording_pairs(
     synthesis: SynthesisOptions = PRESETS["paper"],
     *,
     subjects: Sequence[str] | None = None,
+    limbs: bool = False,
     progress: Progress = silent,
 ) -> PairsMade:
     """Put recordings into a store of pairs; resume a store that was begun.
@@ -52,7 +55,8 @@ def make_recording_pairs(
     Every recording is seen by its own sensor. The radar's frame that is nearest to a frame
     of the mesh, by the recording's offset, is its target. Axis and nulled bins are those of
     the synthesis, in input and target alike. ``subjects`` are the people in the recordings;
-    by default a different one in each, named like it.
+    by default a different one in each, named like it. With ``limbs`` the input is also split by
+    the parts of the body.
 
     Raises Sd2Error if a recording lacks mesh or radar, two are called alike, or frame rates
     or kinds of radar differ.
@@ -68,7 +72,7 @@ def make_recording_pairs(
     left_out_s = 0.0
     for number, (recording, subject) in enumerate(zip(opened, names, strict=True)):
         synthetic, radar = _maps(
-            recording, synthesis, part_of(progress, number, number + 1, len(opened))
+            recording, synthesis, limbs, part_of(progress, number, number + 1, len(opened))
         )
         rate_hz = synthetic.timebase.frames_per_s
         this = (recording.folder, rate_hz, radar.kind == "simulated")
@@ -87,6 +91,7 @@ def make_recording_pairs(
                     "recordings": [one.folder.name for one in opened],
                     "synthesis": asdict(synthesis),
                 },
+                parts=PARTS if limbs else (),
             )
         takes, without_s = _takes(recording, subject, synthetic, radar, labels)
         left_out_s += without_s
@@ -128,10 +133,11 @@ def _check(recording: Recording) -> None:
 
 
 def _maps(
-    recording: Recording, synthesis: SynthesisOptions, progress: Progress
+    recording: Recording, synthesis: SynthesisOptions, limbs: bool, progress: Progress
 ) -> tuple[DopplerMap, DopplerMap]:
     mesh = recording.load_mesh()
-    made = Synthesizer(mesh, synthesis).map(recording.sensor, progress=part_of(progress, 0.0, 0.9))
+    maker, counting = Synthesizer(mesh, synthesis), part_of(progress, 0.0, 0.9)
+    made = synthetic_map(maker, recording.sensor, limbs=limbs, progress=counting)
     radar = doppler_map(recording.load_capture(), axis=synthesis.axis)
     progress(1, 1)
     return made, radar
@@ -189,6 +195,7 @@ def _takes(
                     times_s=times_s[start:stop] - times_s[start],
                     label=label[start:stop],
                     sensor_position_m=np.asarray(recording.sensor.position_m, np.float64),
+                    limbs=synthetic.between(start, stop).limbs,
                 )
             )
     return takes, float((len(times_s) - kept) / rate_hz)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Sequence, Set
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, get_args
@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
+from sd2core.maps import LimbMaps
 from sd2core.sensor import VelocityAxis
 
 PairKind = Literal["simulated", "real"]
@@ -27,6 +28,7 @@ FORMAT = "sd2-pairs"
 VERSION = 1
 INDEX_NAME = "takes.jsonl"
 
+_ARRAYS = ("synthetic", "radar", "times_s", "label")
 _CHUNK_FRAMES = 2250
 _REMAKE = "Make the pairs again with `sd2 simulate campaign` or `sd2 pairs`"
 
@@ -51,6 +53,7 @@ class Take:
     label: NDArray[np.int8]  # Index into :attr:`PairSet.labels` per frame; 0 is background.
     sensor_position_m: NDArray[np.float64]  # (0, 0, 0) is at the camera.
     placement: int = 0  # 0: the take's own sensor; 1 and up: the same movement from elsewhere.
+    limbs: LimbMaps | None = None  # The input split by the parts of the body.
 
     def __post_init__(self) -> None:
         frames = len(self.times_s)
@@ -66,8 +69,15 @@ class Take:
                 f" {frames} times",
                 "the same number, at least one",
             )
-        for name in ("synthetic", "radar"):
-            values = getattr(self, name)
+        values_of = {"synthetic": self.synthetic, "radar": self.radar}
+        if self.limbs is not None:
+            values_of["limbs"] = self.limbs.values
+            if self.limbs.values.shape[1:] != self.synthetic.shape[::-1]:
+                raise Sd2Error(
+                    f"Take {self.title}: limb maps are of shape {self.limbs.values.shape}",
+                    f"(parts, {self.synthetic.shape[1]} bins, {frames} frames)",
+                )
+        for name, values in values_of.items():
             if not (np.isfinite(values).all() and (values >= 0).all()):
                 raise Sd2Error(
                     f"Take {self.title}: {name} holds values that are negative or not finite",
@@ -78,6 +88,21 @@ class Take:
     def key(self) -> TakeKey:
         """Key of the take."""
         return TakeKey(self.subject, self.name, self.placement)
+
+    def inputs(self, parts: Sequence[str] = ()) -> NDArray[np.float32]:
+        """Input of a model, (frames, bins), or (frames, parts · bins) of limb maps.
+
+        Raises Sd2Error if there are no limb maps, or not of these parts.
+        """
+        if not parts:
+            return self.synthetic
+        if self.limbs is None:
+            raise Sd2Error(
+                f"Take {self.title} is not split by the parts of the body",
+                "pairs with limb maps",
+                "Make the pairs again with --limbs, or let the model take the map (inputs = map)",
+            )
+        return self.limbs.energies(parts)
 
     @property
     def title(self) -> str:
@@ -96,6 +121,11 @@ class PairSet:
     labels: tuple[str, ...]  # The first is the background.
     takes: tuple[Take, ...]
     provenance: dict[str, Any] = field(default_factory=dict)  # Origin of the set; kept as JSON.
+
+    @property
+    def has_limbs(self) -> bool:
+        """True if every take has limb maps."""
+        return all(take.limbs is not None for take in self.takes)
 
     @property
     def subjects(self) -> tuple[str, ...]:
@@ -131,7 +161,8 @@ class PairWriter:
     """Writer that appends takes to a new store or to one that was begun.
 
     ``path`` is the folder of the Zarr store, made when it is not there; what is there already must
-    agree with the other arguments, which are those of :class:`PairSet`. Raises Sd2Error when the
+    agree with the other arguments, which are those of :class:`PairSet`. With ``parts``, every take
+    has limb maps of them. Raises Sd2Error when the
     path holds something else, or pairs of another kind.
     """
 
@@ -145,6 +176,7 @@ class PairWriter:
         frame_rate_hz: float,
         labels: Sequence[str],
         provenance: dict[str, Any],
+        parts: Sequence[str] = (),
     ) -> None:
         self._path = Path(path)
         header = {
@@ -157,12 +189,13 @@ class PairWriter:
             "frame_rate_hz": float(frame_rate_hz),
             "labels": list(labels),
             "provenance": json.loads(json.dumps(provenance)),
+            "parts": list(parts),
         }
         if (self._path / "zarr.json").exists():
             self._group = _reopened(self._path, header)
         else:
             self._group = _begun(self._path, header)
-        index = _read_takes(self._path)
+        index = _read_takes(self._path, provenance)
         _drop_torn_line(self._path, len(index))
         self._done = {_key(entry) for entry in index}
         self._frames = max((entry["stop"] for entry in index), default=0)
@@ -190,13 +223,22 @@ class PairWriter:
                 f"Take {take.title} has labels from {take.label.min()} to {take.label.max()}",
                 f"0 to {len(header['labels']) - 1}",
             )
+        parts = () if take.limbs is None else take.limbs.parts
+        if list(parts) != header.get("parts", []):
+            raise Sd2Error(
+                f"Take {take.title} is split into the parts {list(parts)}",
+                f"{header.get('parts', [])}, as {self._path} has",
+            )
         start, stop = self._frames, self._frames + len(take.times_s)
-        for name in ("synthetic", "radar", "times_s", "label"):
+        written = {name: getattr(take, name) for name in _ARRAYS}
+        if take.limbs is not None:
+            written["limbs"] = take.limbs.values.transpose(2, 0, 1)
+        for name, values in written.items():
             array: Any = self._group[name]
             # What a killed writer left beyond the last line is written over.
             if array.shape[0] < stop:
                 array.resize((stop, *array.shape[1:]))
-            array[start:stop] = getattr(take, name)
+            array[start:stop] = values
         entry = {
             "subject": take.subject,
             "name": take.name,
@@ -234,12 +276,18 @@ def read_pairs(path: Path) -> PairSet:
     header, index, lazily = open_takes(path)
     frames = max(entry["stop"] for entry in index)
     arrays = {name: array[:frames] for name, array in lazily.items()}
+    limbs, parts = arrays.pop("limbs", None), tuple(header.get("parts", ()))
+
+    def split(start: int, stop: int) -> LimbMaps | None:
+        return None if limbs is None else LimbMaps(parts, limbs[start:stop].transpose(1, 2, 0))
+
     takes = tuple(
         Take(
             subject=entry["subject"],
             name=entry["name"],
             placement=entry["placement"],
             sensor_position_m=np.array(entry["sensor_position_m"], np.float64),
+            limbs=split(entry["start"], entry["stop"]),
             **{name: array[entry["start"] : entry["stop"]] for name, array in arrays.items()},
         )
         for entry in index
@@ -272,7 +320,7 @@ def open_takes(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]], dict[s
     group = zarr.open_group(str(path), mode="r")
     arrays: dict[str, Any] = {}
     frames = max(entry["stop"] for entry in index)
-    for name in ("synthetic", "radar", "times_s", "label"):
+    for name in (*_ARRAYS, *(["limbs"] if header.get("parts") else [])):
         if name not in group or group[name].shape[0] < frames:
             raise Sd2Error(
                 f"{path}: the array {name} is missing or shorter than {INDEX_NAME} says",
@@ -302,7 +350,7 @@ def read_description(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
         raise Sd2Error(
             f"{path}: its kind is {header.get('kind')!r}", f"one of {get_args(PairKind)}", _REMAKE
         )
-    takes = _read_takes(path)
+    takes = _read_takes(path, header.get("provenance"))
     if not takes:
         raise Sd2Error(
             f"{path} holds no take yet",
@@ -318,12 +366,13 @@ def _begun(path: Path, header: dict[str, Any]) -> Any:
     if path.exists() and (not path.is_dir() or any(path.iterdir())):
         raise Sd2Error(f"{path} is there and holds no pairs", "a new or empty folder")
     group = zarr.open_group(str(path), mode="w", attributes=header)
-    bins = header["bins"]
+    bins, parts = header["bins"], len(header["parts"])
     for name, shape, kind in (
         ("synthetic", (0, bins), "float32"),
         ("radar", (0, bins), "float32"),
         ("times_s", (0,), "float64"),
         ("label", (0,), "int8"),
+        *([("limbs", (0, parts, bins), "float32")] if parts else []),
     ):
         group.create_array(
             name, shape=shape, dtype=kind, chunks=(_CHUNK_FRAMES, *shape[1:]), fill_value=0
@@ -339,7 +388,7 @@ def _reopened(path: Path, header: dict[str, Any]) -> Any:
     group = zarr.open_group(str(path), mode="r+")
     there = dict(group.attrs)
     for name, value in header.items():
-        if there.get(name) != value:
+        if there.get(name, []) != value:
             raise Sd2Error(
                 f"{path} was begun with {name} {there.get(name)}",
                 f"{value}, as it is asked for now",
@@ -348,8 +397,9 @@ def _reopened(path: Path, header: dict[str, Any]) -> Any:
     return group
 
 
-def _read_takes(path: Path) -> list[dict[str, Any]]:
+def _read_takes(path: Path, provenance: Any) -> list[dict[str, Any]]:
     """Read the lines of takes; an incomplete last line is left out."""
+    by_part = isinstance(provenance, Mapping) and provenance.get("made_by") == "sd2 pairs mars"
     index = path / INDEX_NAME
     if not index.exists():
         return []
@@ -365,6 +415,10 @@ def _read_takes(path: Path) -> list[dict[str, Any]]:
                 "one take, as JSON",
                 "Delete the line to lose that take alone",
             ) from None
+        if by_part and entry["name"].startswith("stretch-"):
+            # Written when the parts of one person were subjects of their own: "1-test".
+            entry["subject"], _, part = entry["subject"].rpartition("-")
+            entry["name"] = f"{part}-{entry['name']}"
         entries.append(entry)
     return entries
 

@@ -37,7 +37,7 @@ class Split:
 class Segments:
     """Windows of equal length."""
 
-    inputs: NDArray[np.float32]  # synthetic, (segments, length, bins)
+    inputs: NDArray[np.float32]  # synthetic, (segments, length, features)
     targets: NDArray[np.float32]  # of the radar
     moving: NDArray[np.bool_]  # (segments, length); the radar shows more than noise
 
@@ -49,8 +49,8 @@ class Segments:
 class Windows:
     """Segments that are cut while learning, so that they may lie elsewhere in every epoch."""
 
-    inputs: NDArray[np.float32]  # (frames, bins), all takes one after another
-    targets: NDArray[np.float32]
+    inputs: NDArray[np.float32]  # (frames, features), all takes one after another
+    targets: NDArray[np.float32]  # (frames, bins)
     earliest: NDArray[np.int64]
     """Bounds, shape (segments,), of the first frame of every segment: within half a step of its
     own place, and within its take."""
@@ -76,6 +76,7 @@ class TrainingData:
     training: Windows
     validation: Segments
     learnt_takes: tuple[Take, ...]  # sources of the training segments
+    parts: tuple[str, ...] = ()  # of the body, whose limb maps are the input; none: the map is
 
     @property
     def digest(self) -> str:
@@ -92,9 +93,10 @@ class TrainingData:
 def read_mixed(paths: Sequence[Path]) -> PairSet:
     """Read one or several stores of pairs as one.
 
-    Subjects of the same name in different stores are different people: they are then called
-    ``STORE:NAME``. Labels are those of all stores. What holds anything simulated is called
-    simulated. Raises Sd2Error if axes, frame rates or null bins differ.
+    Subjects of the same name in different stores are different people, but for stores of the same
+    recordings (MARS): they are then called ``STORE:NAME``. Labels are those of all stores. What
+    holds anything simulated is called simulated. Raises Sd2Error if axes, frame rates or null
+    bins differ.
     """
     sets = [read_pairs(path) for path in paths]
     first = sets[0]
@@ -114,15 +116,24 @@ def read_mixed(paths: Sequence[Path]) -> PairSet:
                     "Make one of them again with the settings of the other",
                 )
     labels = tuple(dict.fromkeys(label for one in sets for label in one.labels))
-    names = [subject for one in sets for subject in one.subjects]
-    shared = {name for name in names if names.count(name) > 1}
+    # One recording's people are the same in all stores that are made of it.
+    origins = [
+        "MARS" if one.provenance.get("made_by") == "sd2 pairs mars" else path.stem
+        for path, one in zip(paths, sets, strict=True)
+    ]
+    people = {
+        (origin if origin == "MARS" else number, subject)
+        for number, (origin, one) in enumerate(zip(origins, sets, strict=True))
+        for subject in one.subjects
+    }
+    names = [subject for _, subject in people]
     takes = tuple(
         replace(
             take,
-            subject=f"{path.stem}:{take.subject}" if take.subject in shared else take.subject,
+            subject=take.subject if names.count(take.subject) == 1 else f"{origin}:{take.subject}",
             label=_relabelled(take.label, one.labels, labels),
         )
-        for path, one in zip(paths, sets, strict=True)
+        for origin, one in zip(origins, sets, strict=True)
         for take in one.takes
     )
     simulated = any(one.kind == "simulated" for one in sets)
@@ -178,12 +189,14 @@ def split_subjects(
     return Split(tuple(free), tuple(validation), tuple(test), by_take=not validation)
 
 
-def prepare(pairs: PairSet, config: DataConfig) -> TrainingData:
+def prepare(pairs: PairSet, config: DataConfig, parts: tuple[str, ...] = ()) -> TrainingData:
     """Cut pairs into segments to learn from and to choose by.
+
+    With ``parts`` of the body the input is their limb maps, otherwise the map.
 
     Segments to choose by overlap only where a take's length makes them, so that every frame
     counts about once, and are of the takes' own sensors. Raises Sd2Error if the subjects
-    cannot be split, or no take is as long as a segment.
+    cannot be split, no take is as long as a segment, or there are no limb maps.
     """
     split = split_subjects(pairs.subjects, config.validation_subjects, config.test_subjects)
     learnt = pairs.of(split.training).takes
@@ -196,13 +209,14 @@ def prepare(pairs: PairSet, config: DataConfig) -> TrainingData:
     return TrainingData(
         pairs,
         split,
-        windows_of(learnt, config),
-        segments_of(own, config.segment_frames, 0, pairs.null_bins),
+        windows_of(learnt, config, parts),
+        segments_of(own, config.segment_frames, 0, pairs.null_bins, parts),
         learnt,
+        parts,
     )
 
 
-def windows_of(takes: Sequence[Take], config: DataConfig) -> Windows:
+def windows_of(takes: Sequence[Take], config: DataConfig, parts: Sequence[str] = ()) -> Windows:
     """All segments to learn from, in the order of their takes. Raises Sd2Error without any."""
     length, overlap = config.segment_frames, config.overlap_frames
     reach = (length - overlap) // 2 if config.segments == "shifted" else 0
@@ -217,7 +231,7 @@ def windows_of(takes: Sequence[Take], config: DataConfig) -> Windows:
     if not sum(map(len, earliest)):
         raise _too_short(takes, length)
     return Windows(
-        inputs=np.concatenate([take.synthetic for take in takes]),
+        inputs=np.concatenate([take.inputs(parts) for take in takes]),
         targets=np.concatenate([take.radar for take in takes]),
         earliest=np.concatenate(earliest),
         latest=np.concatenate(latest),
@@ -226,13 +240,17 @@ def windows_of(takes: Sequence[Take], config: DataConfig) -> Windows:
 
 
 def segments_of(
-    takes: Sequence[Take], length: int, overlap: int, null_bins: Sequence[int] = ()
+    takes: Sequence[Take],
+    length: int,
+    overlap: int,
+    null_bins: Sequence[int] = (),
+    parts: Sequence[str] = (),
 ) -> Segments:
     """All segments of some takes, in their order. Raises Sd2Error without any."""
     inputs, targets, moving = [], [], []
     for take in takes:
         starts = segment_starts(len(take.times_s), length, overlap)
-        inputs.append(cut(take.synthetic, starts, length))
+        inputs.append(cut(take.inputs(parts), starts, length))
         targets.append(cut(take.radar, starts, length))
         moves = stands_out(take.radar, tuple(null_bins))
         moving.append(moves[starts[:, None] + np.arange(length)])

@@ -220,7 +220,7 @@ def _estimated(
     found = []
     for number, take in enumerate(pairs.takes):
         progress(done + number, total)
-        found.append(model.denoise_values(take.synthetic))
+        found.append(model.denoise_values(take.inputs(model.card.parts)))
     return np.concatenate(found)
 
 
@@ -292,6 +292,7 @@ def _architecture(card: ModelCard) -> str:
     """The model's name, with the options that are not its defaults."""
     usual = options(card.model)
     other = [f"{name}={value}" for name, value in card.options.items() if usual.get(name) != value]
+    other += ["limbs"] * bool(card.parts)
     return card.model + (f" ({', '.join(other)})" if other else "")
 
 
@@ -312,8 +313,12 @@ def _judged_subjects(
 
 
 def _learnt(card: ModelCard, part: str) -> list[str]:
-    subjects = card.about.get("subjects")
-    return list(subjects.get(part, ())) if isinstance(subjects, Mapping) else []
+    subjects, provenance = card.about.get("subjects"), card.about.get("provenance")
+    names = list(subjects.get(part, ())) if isinstance(subjects, Mapping) else []
+    if isinstance(provenance, Mapping) and provenance.get("made_by") == "sd2 pairs mars":
+        # Older models name persons with their parts, "1-test".
+        names = list(dict.fromkeys(name.partition("-")[0] for name in names))
+    return names
 
 
 def _notes(

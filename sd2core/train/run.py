@@ -13,7 +13,7 @@ import torch
 from lightning.pytorch import Trainer
 from lightning.pytorch.strategies import DDPStrategy
 
-from sd2core.denoise.card import ModelCard
+from sd2core.denoise.card import DENOISER_PARTS, ModelCard
 from sd2core.denoise.files import save_model
 from sd2core.denoise.live import TrainedDenoiser
 from sd2core.denoise.model import Denoiser, parameter_count
@@ -55,7 +55,8 @@ def carry_out(
     if checkpoint is not None:
         # Sums over other numbers of threads differ in their last digits.
         threads = config.machine.threads or int(checkpoint.about["threads"])
-    data = prepare(read_mixed(config.data.pairs), config.data)
+    parts = DENOISER_PARTS if config.model.inputs == "limbs" else ()
+    data = prepare(read_mixed(config.data.pairs), config.data, parts)
     digest = data.digest
     if checkpoint is not None and checkpoint.about["data_digest"] != digest:
         raise Sd2Error(
@@ -68,9 +69,10 @@ def carry_out(
     with settled(config.machine, threads), signals_kept():
         network = _network(config, data, checkpoint)
         scaling = Scaling.fitted(
-            [take.synthetic for take in data.learnt_takes],
-            [take.radar for take in data.learnt_takes],
+            (take.inputs(parts) for take in data.learnt_takes),
+            (take.radar for take in data.learnt_takes),
             data.pairs.null_bins,
+            parts=max(1, len(parts)),
         )
         about = _About(config, data, scaling, command, machine_words(device, precision, threads))
         callbacks = TrainingCallbacks(
@@ -126,7 +128,12 @@ def local_rank() -> int:
 
 def _network(config: TrainConfig, data: TrainingData, checkpoint: Checkpoint | None) -> Denoiser:
     torch.manual_seed(config.training.seed)
-    network = build(config.model.name, data.pairs.axis.bins, **config.model.options)
+    network = build(
+        config.model.name,
+        data.pairs.axis.bins,
+        max(1, len(data.parts)),
+        **config.model.options,
+    )
     length = config.data.segment_frames
     if network.window not in (None, length):
         raise Sd2Error(
@@ -208,6 +215,7 @@ class _About:
             null_bins=pairs.null_bins,
             frame_rate_hz=pairs.frame_rate_hz,
             trained_on=pairs.kind,
+            parts=self.data.parts,
             about={
                 "data": self._data_words(),
                 "command": self.command,

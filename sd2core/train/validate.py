@@ -34,8 +34,8 @@ class Validation:
 class Exam:
     """Segments that a model is validated on."""
 
-    inputs: torch.Tensor  # compressed, (segments, length, bins)
-    targets: torch.Tensor  # likewise
+    inputs: torch.Tensor  # compressed, (segments, length, features)
+    targets: torch.Tensor  # compressed, (segments, length, bins)
     peaks_mps: NDArray[np.float64]
     """Of the targets, (segments · length,); NaN in frames in which nothing moves."""
     scaling: Scaling

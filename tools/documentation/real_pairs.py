@@ -123,7 +123,7 @@ def inputs(folders: list[Path]) -> None:
         print(row(part, "25 joints", cloud_maps(part), radar), flush=True)
         driven = drive(part)
         for name, choices in WAYS.items():
-            maps = [body_doppler(clip, choices) for clip in driven]
+            maps = [body_doppler(clip, choices).values.T for clip in driven]
             print(row(part, name, maps, radar), flush=True)
         empty = 1.0 - float((np.concatenate(radar).sum(axis=1) > 0).mean())
         notes.append(

@@ -16,6 +16,7 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 
 from sd2core.errors import Sd2Error
+from sd2core.mesh.vertex_parts import PARTS
 from sd2core.pairs.store import PairWriter, Take, TakeKey
 from sd2core.processes import ONE_THREAD, end_with_parent
 from sd2core.progress import Progress, silent
@@ -68,6 +69,7 @@ def make_campaign(
             "fit_errors": {**known.provenance, "sha256": digest(known)},
             "version": __version__,
         },
+        parts=PARTS if campaign.limbs else (),
     )
     numbers = take_numbers(campaign, subjects, minutes)
     missing = [number for number in numbers if not _written(writer, campaign, *number)]

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from sd2core.body.model import Body, Resolution
+from sd2core.body.parts import synthetic_map
 from sd2core.body.rotations import Floats
 from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.body.skinning import pose_vertices
@@ -44,6 +45,7 @@ class Campaign:
     placements: int = 1  # Sensors that see every take.
     radar: RadarConfig = PAPER_RADAR
     target: TargetOptions = field(default_factory=TargetOptions)
+    limbs: bool = False  # The input is also split by the parts of the body.
 
     def __post_init__(self) -> None:
         if self.seed < 0:
@@ -130,16 +132,18 @@ class TakeMaker:
                 options=campaign.target,
                 on_frame=on_frame,
             )
+            synthetic = synthetic_map(synthesizer, sensor, limbs=campaign.limbs)
             takes.append(
                 Take(
                     subject.name,
                     take_name(number),
-                    np.ascontiguousarray(synthesizer.map(sensor).values.T),
+                    np.ascontiguousarray(synthetic.values.T),
                     radar,
                     times_s,
                     performed.label,
                     np.array(sensor.position_m),
                     placement,
+                    synthetic.limbs,
                 )
             )
         return takes

@@ -9,12 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sd2core.body.model import Body
-from sd2core.body.parts import PARTS, body_parts, parts_by_shape
+from sd2core.body.parts import body_parts, parts_by_shape
 from sd2core.body.rotations import about
 from sd2core.files.resources import resource_path
 from sd2core.io.mesh import load_mesh
 from sd2core.mesh.decimation import decimate
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.mesh.vertex_parts import PARTS
 from sd2core.timebase import Timebase
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 from cli_outcome import Sd2
 
 from sd2core.pairs.store import read_pairs
@@ -28,8 +29,10 @@ def test_a_real_recording_in_part(sd2: Sd2, shared_data: Path, tmp_path: Path) -
     told = json.loads(made.out)
     pairs = read_pairs(out)
     assert told["kind"] == pairs.kind == "real"
-    assert told["subjects"]["4-validate"]["frames"] == pairs.frames >= 50
-    assert 0.0 < told["subjects"]["4-validate"]["residual_m"] < 0.03
+    assert told["subjects"]["4"]["frames"] == pairs.frames >= 50
+    assert 0.0 < told["subjects"]["4"]["residual_m"] < 0.03
+    radar = told["subjects"]["4"]["radar"]
+    np.testing.assert_array_equal(pairs.takes[0].sensor_position_m, radar["position_m"])
     assert (pairs.axis.bins, pairs.axis.v_max_mps) == (16, 1.5)
 
     again = sd2("pairs", "mars", folder, "--out", out, "--bins", "16", "--v-max", "1.5")

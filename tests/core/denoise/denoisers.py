@@ -36,7 +36,7 @@ WINDOWED = ("unet", "swin")
 def trained(name: str, seed: int = 0, bins: int = 32, **card: Any) -> TrainedDenoiser:
     """A model with random weights, none of them zero, and answers that are mostly positive."""
     torch.manual_seed(seed)
-    network = build(name, bins, **SMALL[name])
+    network = build(name, bins, max(1, len(card.get("parts", ()))), **SMALL[name])
     with torch.no_grad():
         for parameter in network.parameters():
             parameter += 0.3 * torch.randn_like(parameter)

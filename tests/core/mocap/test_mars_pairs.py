@@ -13,6 +13,7 @@ from sd2core.errors import Sd2Error
 from sd2core.io.radar.mars import MarsStretch, read_mars
 from sd2core.mocap.driving import KINECT_MARKERS, puppet_of
 from sd2core.mocap.mars_pairs import MarsChoices, make_mars_pairs, radar_doppler, skeleton_clip
+from sd2core.mocap.radar_place import RadarPlace
 from sd2core.pairs.store import PairSet, read_pairs
 from sd2core.progress import Cancelled
 from sd2core.sensor import VelocityAxis
@@ -78,9 +79,9 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
 @pytest.fixture(scope="module")
 def pairs(folders: list[Path], tmp_path_factory: pytest.TempPathFactory) -> PairSet:
     out = tmp_path_factory.mktemp("pairs") / "pairs.zarr"
-    made = make_mars_pairs(folders, out)
-    assert made.subjects == {"7-test": (1, 25), "8-test": (1, 25)}
-    assert made.stature_m["7-test"] == pytest.approx(1.75, abs=0.03)
+    made = make_mars_pairs(folders, out, MarsChoices(limbs=True))
+    assert made.subjects == {"7": (1, 25), "8": (1, 25)}
+    assert made.stature_m["7"] == pytest.approx(1.75, abs=0.03)
     return read_pairs(out)
 
 
@@ -91,7 +92,7 @@ def _mean_mps(values: np.ndarray) -> np.ndarray:
 
 def test_pairs_say_what_they_are(pairs: PairSet) -> None:
     assert pairs.kind == "real"
-    assert pairs.subjects == ("7-test", "8-test")
+    assert pairs.subjects == ("7", "8")
     assert pairs.null_bins == ()
     assert pairs.frame_rate_hz == 10.0
     assert pairs.provenance["parts"] == [["mars_subject7", "test"], ["mars_subject8", "test"]]
@@ -100,7 +101,7 @@ def test_pairs_say_what_they_are(pairs: PairSet) -> None:
         assert not take.label.any()
 
 
-@pytest.mark.parametrize(("subject", "speed_mps"), [("7-test", SPEED_MPS), ("8-test", -SPEED_MPS)])
+@pytest.mark.parametrize(("subject", "speed_mps"), [("7", SPEED_MPS), ("8", -SPEED_MPS)])
 def test_input_and_target_show_the_same_motion(
     pairs: PairSet, subject: str, speed_mps: float
 ) -> None:
@@ -111,6 +112,23 @@ def test_input_and_target_show_the_same_motion(
     # The radar saw nothing in the frame that is left out; the body was there.
     assert np.flatnonzero(take.radar.sum(axis=1) == 0).tolist() == [10]
     assert (take.synthetic.sum(axis=1) > 0).all()
+
+
+def test_limb_maps_add_up(pairs: PairSet) -> None:
+    for take in pairs.takes:
+        assert take.limbs is not None
+        total = take.limbs.values.sum(axis=0).T
+        np.testing.assert_allclose(total, take.synthetic, rtol=1e-4, atol=1e-6)
+
+
+def test_a_given_place_is_used(folders: list[Path], tmp_path: Path) -> None:
+    """From below, who approaches is slower along the line of sight."""
+    place = RadarPlace((0.0, 1.5, 0.0), 0.1)
+    made = make_mars_pairs(folders[:1], tmp_path / "low.zarr", MarsChoices(place=place))
+    assert made.places == {"7": place}
+    (take,) = read_pairs(tmp_path / "low.zarr").takes
+    np.testing.assert_array_equal(take.sensor_position_m, place.position_m)
+    assert (_mean_mps(take.synthetic)[2:-3] < 0.95 * SPEED_MPS).all()
 
 
 def test_nulled_bins_are_empty_in_both(folders: list[Path], tmp_path: Path) -> None:
@@ -136,11 +154,11 @@ def test_a_stopped_run_goes_on(folders: list[Path], pairs: PairSet, tmp_path: Pa
             raise Cancelled
 
     with pytest.raises(Cancelled):
-        make_mars_pairs(folders, out, progress=stop)
+        make_mars_pairs(folders, out, MarsChoices(limbs=True), progress=stop)
     assert all(total == 50 for _, total in seen)
     assert [done for done, _ in seen] == sorted(done for done, _ in seen)
-    assert read_pairs(out).subjects == ("7-test",)
-    make_mars_pairs(folders, out)
+    assert read_pairs(out).subjects == ("7",)
+    make_mars_pairs(folders, out, MarsChoices(limbs=True))
     again = read_pairs(out)
     for take, whole in zip(again.takes, pairs.takes, strict=True):
         assert take.key == whole.key

@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sd2core.errors import Sd2Error
+from sd2core.maps import LimbMaps
 from sd2core.pairs.segments import cut, join, segment_starts
 from sd2core.pairs.store import INDEX_NAME, PairWriter, Take, TakeKey, is_pair_store, read_pairs
 from sd2core.sensor import VelocityAxis
@@ -61,6 +62,59 @@ def test_what_is_written_is_read(tmp_path: Path) -> None:
     assert pairs.provenance == {"seed": 3}
     assert [each.title for each in pairs.of(["s2"]).takes] == ["s2/b", "s2/b@1"]
     assert len(pairs.placements(first_only=True).takes) == 3
+
+
+def test_limb_maps_come_along(tmp_path: Path) -> None:
+    path, parts = tmp_path / "pairs.zarr", ("trunk", "forearm.L", "forearm.R")
+    writer = PairWriter(path, **HEADER, parts=parts)
+    rng = np.random.default_rng(1)
+    takes = []
+    for name, frames in (("a", 20), ("b", 7)):
+        limbs = LimbMaps(parts, rng.random((3, 8, frames), np.float32))
+        takes.append(replace(take(name, frames), limbs=limbs))
+        writer.append(takes[-1])
+    with pytest.raises(Sd2Error, match=r"split into the parts \[\]"):
+        writer.append(take("c"))
+    again = read_pairs(path)
+    assert again.has_limbs
+    for found, wanted in zip(again.takes, takes, strict=True):
+        assert found.limbs is not None
+        assert wanted.limbs is not None
+        assert found.limbs.parts == parts
+        np.testing.assert_array_equal(found.limbs.values, wanted.limbs.values)
+        values = wanted.limbs.values
+        columns = np.concatenate([values[0], values[1] + values[2]]).T
+        np.testing.assert_array_equal(found.inputs(("trunk", "forearm")), columns)
+        np.testing.assert_array_equal(found.inputs(), found.synthetic)
+    with pytest.raises(Sd2Error, match="no part 'tail'"):
+        again.takes[0].inputs(("tail",))
+    with pytest.raises(Sd2Error, match="begun with parts"):
+        PairWriter(path, **HEADER)
+    with pytest.raises(Sd2Error, match=r"limb maps are of shape \(3, 8, 19\)"):
+        replace(takes[0], limbs=takes[0].limbs.between(0, 19))  # type: ignore[union-attr]
+
+
+def test_what_is_not_split_says_so() -> None:
+    with pytest.raises(Sd2Error, match=r"s1/a is not split.*--limbs"):
+        take("a").inputs(("trunk",))
+
+
+def test_parts_of_one_person_become_one_subject(tmp_path: Path) -> None:
+    """Stores of MARS recordings once had a subject for each part."""
+    path = tmp_path / "mars.zarr"
+    header = {**HEADER, "provenance": {"made_by": "sd2 pairs mars"}}
+    writer = PairWriter(path, **header)
+    for subject in ("1-test", "1-validate", "4-test"):
+        writer.append(take("stretch-01", 20, subject))
+    pairs = read_pairs(path)
+    assert pairs.subjects == ("1", "4")
+    assert [each.title for each in pairs.of(["1"]).takes] == [
+        "1/test-stretch-01",
+        "1/validate-stretch-01",
+    ]
+    assert TakeKey("1", "test-stretch-01", 0) in PairWriter(path, **header).done
+    PairWriter(path, **header).append(take("test-stretch-02", 20, "1"))
+    assert len(read_pairs(path).of(["1"]).takes) == 3
 
 
 def test_a_killed_writer_loses_only_the_take_it_was_at(tmp_path: Path) -> None:

@@ -41,6 +41,7 @@ def configs(draw: st.DrawFn) -> TrainConfig:
         ),
         ModelConfig(
             draw(NAMES),
+            draw(st.sampled_from(["map", "limbs"])),
             draw(st.dictionaries(NAMES, st.booleans() | st.integers() | SHARES | NAMES)),
         ),
         TrainingConfig(
