@@ -23,6 +23,8 @@ _CODE: dict[Step, tuple[str, ...]] = {
     "fit": ("batch/fitting.py", "body", "io", "mesh", "timebase.py"),
     "synthesise": (
         "batch/synthesis.py",
+        "body/limbs.py",
+        "body/parts.py",
         "doppler",
         "io",
         "accuracy",
@@ -56,7 +58,10 @@ _CODE: dict[Step, tuple[str, ...]] = {
 }
 """Modules that a step's results depend on, within sd2core."""
 
-_RESOURCES: dict[Step, tuple[str, ...]] = {"fit": ("body.npz", "lifter.npz", "sides.npz")}
+_RESOURCES: dict[Step, tuple[str, ...]] = {
+    "fit": ("body.npz", "lifter.npz", "sides.npz"),
+    "synthesise": ("body.npz",),
+}
 
 
 def key_of(step: Step, content: dict[str, Any]) -> str:

@@ -105,6 +105,7 @@ class Synthesise(_Section):
     oversampling: PositiveInt | None = None
     velocity_sigma_bins: NotNegative | None = None
     time_sigma_s: NotNegative | None = None
+    limbs: bool = False  # also the map of each part of the body, which some models want
 
     @model_validator(mode="after")
     def _consistent(self) -> Synthesise:

@@ -75,10 +75,12 @@ def synthesise(
     It equals these columns of the map of the whole clip: smoothing and the reuse of masks
     look beyond the stretch. ``choosing`` is for a section with a tolerance.
     """
+    from sd2core.body.parts import synthetic_map
+
     refuse_inside(mesh, sensor)
     plan = None if choosing is None else chosen_plan(mesh, section, choosing)
     synthesizer = _synthesizer(mesh, section, plan)
-    doppler = synthesizer.map(sensor, frames=stretch)
+    doppler = synthetic_map(synthesizer, sensor, limbs=section.limbs, frames=stretch)
     if plan is not None:
         doppler = replace(doppler, meta=doppler.meta | plan["provenance"])
     out.parent.mkdir(parents=True, exist_ok=True)

@@ -85,12 +85,18 @@ def known_parts(mesh: MeshSequence) -> VertexParts:
 
 
 def synthetic_map(
-    maker: Synthesizer, sensor: VirtualSensor, *, limbs: bool, progress: Progress = silent
+    maker: Synthesizer,
+    sensor: VirtualSensor,
+    *,
+    limbs: bool,
+    frames: tuple[int, int] | None = None,
+    progress: Progress = silent,
 ) -> DopplerMap:
     """Doppler map of a mesh; with ``limbs`` also its split, as :func:`known_parts` finds them."""
     if limbs:
-        return maker.limb_maps(sensor, known_parts(maker.mesh), progress=progress)
-    return maker.map(sensor, progress=progress)
+        parts = known_parts(maker.mesh)
+        return maker.limb_maps(sensor, parts, frames=frames, progress=progress)
+    return maker.map(sensor, frames=frames, progress=progress)
 
 
 def parts_by_shape(points_m: Floats, faces: NDArray[np.int32]) -> NDArray[np.uint8] | None:

@@ -10,6 +10,7 @@ from sd2core.cli.output import progress_bar
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
+    from sd2core.denoise.card import ModelCard
     from sd2core.maps import DopplerMap
     from sd2core.mesh.sequence import MeshSequence
     from sd2core.recording.recording import Recording
@@ -64,29 +65,31 @@ def maps_of(
     """
     made: dict[MapName, DopplerMap] = {}
     if {"synthetic", "denoised"} & {*names}:
-        synthetic = _synthetic(recording, mesh)
+        model = _model_of(recording) if "denoised" in names else None
+        synthetic = _synthetic(recording, mesh, limbs=model is not None and bool(model.parts))
         if "synthetic" in names:
             made["synthetic"] = synthetic
-        if "denoised" in names:
-            made["denoised"] = _denoised(recording, synthetic)
+        if model is not None:
+            made["denoised"] = _denoised(model, synthetic)
     if "radar" in names:
         made["radar"] = _radar(recording, axis)
     return made
 
 
-def _synthetic(recording: Recording, mesh: MeshSequence | None) -> DopplerMap:
+def _synthetic(recording: Recording, mesh: MeshSequence | None, *, limbs: bool) -> DopplerMap:
+    from sd2core.body.parts import synthetic_map
     from sd2core.doppler import Synthesizer
 
     if mesh is None:
         with progress_bar("Reading the mesh") as progress:
             mesh = recording.load_mesh(progress)
     with progress_bar("Synthesising") as progress:
-        return Synthesizer(mesh, preset="paper").map(recording.sensor, progress=progress)
+        maker = Synthesizer(mesh, preset="paper")
+        return synthetic_map(maker, recording.sensor, limbs=limbs, progress=progress)
 
 
-def _denoised(recording: Recording, synthetic: DopplerMap) -> DopplerMap:
-    from sd2core.denoise.files import DEFAULT_NAME, describe_model, find_model, load_model
-    from sd2core.denoise.resample_to_model import check_map
+def _model_of(recording: Recording) -> ModelCard:
+    from sd2core.denoise.files import DEFAULT_NAME, describe_model, find_model
 
     if recording.denoiser is None and recording.bundled_denoiser == "":
         raise Sd2Error(
@@ -95,9 +98,17 @@ def _denoised(recording: Recording, synthetic: DopplerMap) -> DopplerMap:
             "Choose one in the window, or leave the denoised map out",
         )
     path = recording.denoiser or find_model(recording.bundled_denoiser or DEFAULT_NAME)
-    check_map(synthetic, describe_model(path))
+    return describe_model(path)
+
+
+def _denoised(model: ModelCard, synthetic: DopplerMap) -> DopplerMap:
+    from sd2core.denoise.files import load_model
+    from sd2core.denoise.resample_to_model import check_map
+
+    assert model.path is not None
+    check_map(synthetic, model)
     with progress_bar("Denoising") as progress:
-        return load_model(path).denoise(synthetic, progress)
+        return load_model(model.path).denoise(synthetic, progress)
 
 
 def _radar(recording: Recording, axis: VelocityAxis | None) -> DopplerMap:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from sd2core.accuracy.places import choose_for_places, spread
 from sd2core.accuracy.trial import synthesizer_for
+from sd2core.body.parts import synthetic_map
 from sd2core.datasets.simulating import CLUTTER, Simulation, simulated_map
 from sd2core.datasets.source import (
     BACKGROUND,
@@ -206,10 +207,12 @@ class _Opened:
         sensor = self._sensor(key.placement)
         counted_share = _COUNTED_SHARE if self._simulates else 1.0
         if self._mesh is not None and {"synthetic", "denoised"} & {*wanted}:
-            synthetic = self._counted(sensor, part_of(progress, 0.0, counted_share))
+            model = _model_of(self.recording, self._making) if "denoised" in wanted else None
+            limbs = model is not None and bool(describe_model(model).parts)
+            counting = part_of(progress, 0.0, counted_share)
+            synthetic = self._counted(sensor, counting, limbs=limbs)
             maps["synthetic"] = synthetic
-            model = _model_of(self.recording, self._making)
-            if "denoised" in wanted and model is not None:
+            if model is not None:
                 maps["denoised"] = self._denoising.denoised(synthetic, model)
         if key.placement == 0 and self.recording.radar is not None and {
             "simulated", "real"
@@ -285,14 +288,14 @@ class _Opened:
             self._target_m = BodyExtent.of(self._mesh).target_m
         return self._target_m
 
-    def _counted(self, sensor: VirtualSensor, progress: Progress) -> DopplerMap:
+    def _counted(self, sensor: VirtualSensor, progress: Progress, *, limbs: bool) -> DopplerMap:
         if self._synthesizer is None:
             assert self._mesh is not None
             places = range(1 + len(places_of(self.recording, self._making)))
             self._synthesizer, self._plan = _synthesizer(
                 self._mesh, [self._sensor(place) for place in places], self._making
             )
-        return self._synthesizer.map(sensor, progress=progress)
+        return synthetic_map(self._synthesizer, sensor, limbs=limbs, progress=progress)
 
     def _of_radar(self) -> DopplerMap:
         if self._radar is None:

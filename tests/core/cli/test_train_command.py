@@ -102,9 +102,12 @@ class TestTrain:
         content = shown(sd2, toml, "--epochs", "7", "--set", "depth=3")
         assert content["training"] | {"epochs": 7, "seed": 4} == content["training"]
         assert "minutes" not in content["training"]
-        assert content["model"] == {"name": "gru", "options": {"channels": 8, "depth": 3}}
+        assert content["model"] | {"name": "gru", "options": {"channels": 8, "depth": 3}} == (
+            content["model"]
+        )
         # What one architecture was told says nothing to another.
-        assert shown(sd2, toml, "--model", "s4")["model"] == {"name": "s4", "options": {}}
+        other = shown(sd2, toml, "--model", "s4", "--inputs", "limbs")["model"]
+        assert other == {"name": "s4", "inputs": "limbs", "options": {}}
 
     def test_the_settings_shown_are_the_settings(
         self, sd2: Sd2, pairs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
