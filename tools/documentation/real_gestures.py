@@ -135,12 +135,13 @@ def main() -> None:
     known = clips_of(sources, None)
     judged = []  # (splits, files)
     for number in range(SPLITS):
-        names = {movement for _, movement in movements(fold(known, number).test)}
-        judged.append(np.array([path.stem in names for path in paths]))
+        test = {movement for _, movement in movements(fold(known, number).test)}
+        judged.append(np.array([path.stem in test for path in paths]))
     usual = Found.of(recorded, SuggestOptions())
     split, f1 = _splits([Found.of(recorded, one) for one in GRID], usual, judged)
     how = ("--seeds", SPLITS, "--shares", "100%")
     sd2("classify", "table", *options.data, "--out", options.folder, *how)
+    names = " ".join(folder.name for folder in options.data)
     told = json.loads((options.folder / "table.json").read_text("utf-8"))
     page = PAGE.format(
         files=len(paths),
@@ -153,7 +154,7 @@ def main() -> None:
         split="\n".join(markdown_table(split)),
         chosen=_spread(f1[:, 0], 2),
         default=_spread(f1[:, 1], 2),
-        command=" ".join(map(str, ("sd2 classify table", *(f.name for f in options.data), *how))),
+        command=f"sd2 classify table {names} --out tables {' '.join(map(str, how))}",
         classified=(options.folder / "table.md").read_text("utf-8"),
         classes="\n".join(markdown_table(_by_class(told))),
     )
