@@ -12,7 +12,7 @@ COMPILED := .venv/.compiled
 # Among them every module in KERNEL_MODULES of sd2core/numerics/compiled.py.
 KERNELS := $(wildcard sd2core/numerics/*.py sd2core/body/*.py sd2core/scattering/*.py sd2core/doppler/*.py sd2core/fmcw/*.py)
 
-.PHONY: help setup demo test test-slow lint format bench wheel screenshots accuracy fitting denoiser denoiser-comparison range-synthesis scale classifier whole-loop clean
+.PHONY: help setup demo test test-slow lint format bench wheel screenshots accuracy fitting denoiser denoiser-comparison range-synthesis scale classifier real-gestures whole-loop clean
 
 help:
 	@echo "make demo         set up, and open the sample recording in the window"
@@ -30,6 +30,7 @@ help:
 	@echo "make denoiser-comparison  docs/denoiser-comparison.md, trained and measured (hours)"
 	@echo "make range-synthesis  docs/range-synthesis.md, trained (half an hour)"
 	@echo "make classifier   docs/classifier.md, trained (an hour)"
+	@echo "make real-gestures  docs/real-gestures.md: real radar, suggestions and classifiers (five minutes)"
 	@echo "make whole-loop   docs/whole-loop.md: from a recording to a classifier (20 minutes)"
 	@echo "make scale        docs/scale.md, measured (some ten minutes)"
 	@echo "make clean        remove what the above made, .venv included"
@@ -102,6 +103,9 @@ range-synthesis: setup
 
 classifier: setup
 	$(BIN)/python -m tools.documentation.classifier
+
+real-gestures: setup
+	$(BIN)/python -m tools.documentation.real_gestures
 
 whole-loop: setup
 	$(BIN)/python -m tools.documentation.whole_loop

@@ -37,7 +37,7 @@ from sd2core.files.atomic import atomic_write_text
 from sd2core.progress import Progress, silent
 
 FORMAT = "sd2-classifier-run"
-VERSION = 2
+VERSION = 3
 
 SHARES = (0.01, 0.02, 0.05, 0.1, 0.25, 0.5, 1.0)
 """Of the real data, for the learning curve."""

@@ -70,7 +70,8 @@ def fold(known: ClipSet, number: int) -> Parts:
 
     With three subjects or more the list of subjects is turned by ``number``, and split as
     by default. With two, one is learnt from and one judged. With one, every class gives
-    every second of its movements to the test, or the others in the next fold.
+    half of its movements to the test, in the next fold the others: halves that every pair
+    of folds draws anew.
     """
     subjects = list(known.subjects)
     turned = number % len(subjects)
@@ -82,7 +83,9 @@ def fold(known: ClipSet, number: int) -> Parts:
         )
     if len(subjects) > 1:
         return Parts(known.of(subjects[:1]), (), known.of(subjects[1:]), False)
-    training, test = _apart(known.clips, _kept_movements(known, known.clips, number, share=0.5))
+    order = np.random.default_rng(number // 2).permutation(len(known.clips))
+    drawn = [known.clips[at] for at in order]
+    training, test = _apart(known.clips, _kept_movements(known, drawn, number % 2, share=0.5))
     return Parts(training, (), test, True)
 
 

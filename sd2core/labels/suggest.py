@@ -1,15 +1,16 @@
 """Candidate spans of motion, from the energy of a Doppler map.
 
-Every bin is measured against its own quiet level, so that what stands still, and the
-sidelobes that it leaves in other bins, count as quiet. Two thresholds (hysteresis, as for
-the edges of J. Canny, "A computational approach to edge detection", IEEE TPAMI 8(6),
-1986) separate motion from it. For the choice of values see docs/decisions/0032.
+Every bin is measured against its own quiet level and against the sidelobe of what is at
+zero velocity, so that what stands still counts as quiet in all bins, also while its
+strength changes. Two thresholds (hysteresis, as for the edges of J. Canny, "A computational
+approach to edge detection", IEEE TPAMI 8(6), 1986) separate motion from it. For the choice
+of values see docs/decisions/0032 and 0051.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -32,6 +33,8 @@ _QUIET_SHARE = 0.25
 """Share of the frames in which a bin does not exceed its quiet level."""
 _FLOOR = 1e-3
 """Share of the strongest frame below which nothing is told apart from nothing."""
+_HIGHEST_SIDELOBE = 0.0472
+"""Of the main lobe's power: the rectangular window's, sinc²(1.43); other windows' are lower."""
 _SMOOTHING_S = 0.1
 _PAUSE_FRAMES, _PAUSE_S = 3.0, 0.2
 """A step of more typical frame durations and of more time is a pause in the recording."""
@@ -55,17 +58,19 @@ class SuggestOptions:
     margin_s : float
         Added on both sides, but no more than a third of the quiet up to a neighbour: a
         gesture begins and ends more slowly than energy shows.
+    hold_s : float
+        Added to the margin at the end: a hand is held still before it is let go.
     """
 
-    high_db: float = 8.0
+    high_db: float = 7.0
     low_db: float = 5.0
     min_duration_s: float = 0.2
     merge_gap_s: float = 0.1
-    margin_s: float = 0.3
+    margin_s: float = 0.2
+    hold_s: float = 0.2
 
     def __post_init__(self) -> None:
-        for name in ("high_db", "low_db", "min_duration_s", "merge_gap_s", "margin_s"):
-            value = getattr(self, name)
+        for name, value in asdict(self).items():
             if not (math.isfinite(value) and value >= 0):
                 raise Sd2Error(f"{name} is {value}", "a finite number from 0 on")
         if not 0 < self.low_db <= self.high_db:
@@ -79,11 +84,11 @@ def motion_energy_db(doppler: DopplerMap) -> NDArray[np.float64]:
     """Compute the energy of every frame over the map's own quiet level, in dB, (frames,).
 
     A bin's quiet level is what it does not exceed in a quarter of the frames, but at
-    least 30 dB below the strongest frame. A frame's energy is the mean of its bins in
-    units of their quiet levels; its own quiet level, the same quarter, is 0 dB, and so
-    is what lies below. Emptied and unseen bins, and those that are always zero, are left
-    out. Energy is averaged over a tenth of a second, never across a pause or a gap
-    without a person.
+    least 30 dB below the strongest frame, and in each frame no less than the sidelobe of
+    what is at zero velocity then. A frame's energy is the mean of its bins in units of
+    their quiet levels; its own quiet level, the same quarter, is 0 dB, and so is what lies
+    below. Emptied and unseen bins, and those that are always zero, are left out. Energy is
+    averaged over a tenth of a second, never across a pause or a gap without a person.
 
     From 0 on; NaN in frames without a person. Raises Sd2Error when the map holds NaN, infinity or
     negative values.
@@ -98,17 +103,34 @@ def motion_energy_db(doppler: DopplerMap) -> NDArray[np.float64]:
         )
     there = Presence.of(doppler.present, values.shape[1]).there
     energy_db = np.where(there, 0.0, np.nan)
-    told = np.asarray((values[:, there] > 0).any(axis=1))  # (bins,)
+    seen = _smoothed(values, doppler.timebase, there)[:, there]
+    told = np.asarray(seen.any(axis=1))  # (bins,)
     told[[*doppler.null_bins, *doppler.unseen_bins]] = False
     if not told.any():
         return energy_db
-    seen = _smoothed(values[told], doppler.timebase, there)[:, there]
-    seen /= seen.sum(axis=0).max()
+    seen = seen[told] / seen[told].sum(axis=0).max()
     quiet = np.maximum(np.quantile(seen, _QUIET_SHARE, axis=1), _FLOOR / len(seen))
-    energy = (seen / quiet[:, None]).mean(axis=0)
+    # Zero velocity is in the middle of a bin, or between two.
+    still = np.abs(doppler.axis.centres_mps[told]) < 0.75 * doppler.axis.bin_width_mps
+    energy = (seen / np.maximum(quiet[:, None], _leaked(seen, still))).mean(axis=0)
     energy /= max(float(np.quantile(energy, _QUIET_SHARE)), 1.0)
     energy_db[there] = 10.0 * np.log10(np.maximum(energy, 1.0))
     return energy_db
+
+
+def _leaked(seen: NDArray[np.float64], still: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Sidelobes of what is in the bins at zero velocity, (bins, T)."""
+    if not seen[still].any():
+        return np.zeros_like(seen)
+    echo = seen[still].mean(axis=0)
+    # The strongest frames, with three quarters of the energy: where an echo is weak, noise
+    # hides its sidelobes.
+    falling = np.sort(echo)[::-1]
+    held = np.cumsum(falling)
+    strong = echo >= falling[np.searchsorted(held, (1.0 - _QUIET_SHARE) * held[-1])]
+    shares = np.quantile(seen[:, strong] / echo[strong], _QUIET_SHARE, axis=1)
+    # More than any sidelobe holds is the main lobe, in which slow motion is as well.
+    return np.asarray(np.minimum(shares, _HIGHEST_SIDELOBE)[:, None] * echo)
 
 
 def suggest_spans(
@@ -159,7 +181,7 @@ def suggest_spans(
         and ends_s[frames[1] - 1] - starts_s[frames[0]] >= options.min_duration_s - _ROUNDING_S
     ]
     wider = _with_margins(
-        [frames for frames, _ in kept], doppler.timebase, ends_s, first, last, options.margin_s
+        [frames for frames, _ in kept], doppler.timebase, ends_s, first, last, options
     )
     return tuple(
         Span(
@@ -239,7 +261,7 @@ def _with_margins(
     ends_s: NDArray[np.float64],
     first: NDArray[np.int64],
     last: NDArray[np.int64],
-    margin_s: float,
+    options: SuggestOptions,
 ) -> list[tuple[int, int]]:
     """The same runs of frames, wider, with a third of the quiet between neighbours kept."""
     if not spans:
@@ -249,8 +271,8 @@ def _with_margins(
     room_s = [math.inf, *(gap_s / 3 for gap_s in gaps_s), math.inf]
     wider = []
     for (start, stop), before_s, after_s in zip(spans, room_s[:-1], room_s[1:], strict=True):
-        from_s = times_s[start] - min(margin_s, before_s) - _ROUNDING_S
-        to_s = ends_s[stop - 1] + min(margin_s, after_s) + _ROUNDING_S
+        from_s = times_s[start] - min(options.margin_s, before_s) - _ROUNDING_S
+        to_s = ends_s[stop - 1] + min(options.margin_s + options.hold_s, after_s) + _ROUNDING_S
         begin = max(int(np.searchsorted(times_s, from_s)), int(first[start]))
         end = min(int(np.searchsorted(ends_s, to_s, side="right")), int(last[stop - 1]) + 1)
         wider.append((begin, end))

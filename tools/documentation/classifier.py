@@ -3,7 +3,6 @@
 ::
 
     python -m tools.documentation.classifier [--campaign gestures.zarr] [--large campaign.zarr]
-        [--real FOLDER]
 
 Without ``--campaign`` one is made: six people, 36 minutes, three places of the sensor, of
 another seed than the bundled denoiser's, so of other people. ``--large`` is the denoiser's
@@ -15,7 +14,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import shutil
 import subprocess
 import sys
@@ -72,7 +70,8 @@ that the bundled denoiser learnt from; here only its simulated radar is used: `{
 REAL = """\
 ## On real radar
 
-`{command}`, {what}. There is no video of them, so nothing synthetic to add.
+Trained on recordings of a real radar and evaluated on others:
+[real-gestures.md](real-gestures.md).
 
 """
 SAMPLE_HEAD = """\
@@ -105,8 +104,7 @@ def main() -> None:
     page.append(CURVE)
     page.append(_findings(told))
     page.append(_large(options, folder))
-    if options.real is not None:
-        page.append(_real(options.real, folder))
+    page.append(REAL)
     page.append(_sample(campaign, folder))
     (DOCS / "classifier.md").write_text("".join(page).rstrip() + "\n", "utf-8")
 
@@ -121,13 +119,6 @@ def _options() -> argparse.Namespace:
     )
     parser.add_argument("--seeds", type=int, default=5, help="default: 5")
     parser.add_argument("--shares", help="of the real data, as `sd2 classify table` has them")
-    shared = os.environ.get("SD2_SHARED_DATA")
-    parser.add_argument(
-        "--real",
-        type=Path,
-        default=Path(shared) / "radar" / "kkt_gestures" if shared else None,
-        help="a folder of labelled radar files (default: that of SD2_SHARED_DATA)",
-    )
     parser.add_argument("--out", type=Path, default=Path("work/classifier"), help="of all runs")
     return parser.parse_args()
 
@@ -197,17 +188,6 @@ def _findings(told: dict) -> str:
         " less by what is added: [decision 37](decisions/0037-gesture-classifiers.md)."
     )
     return "\n".join([*lines, "", ""])
-
-
-def _real(folder: Path, out: Path) -> str:
-    arguments = ("classify", "table", folder, "--out", out / "real", "--seeds", "4")
-    sd2(*arguments, "--shares", "100%")
-    facts = json.loads((out / "real" / "table.json").read_text("utf-8"))
-    words = REAL.format(
-        command=f"sd2 classify table {folder.name} --out tables --seeds 4 --shares 100%",
-        what=f"recordings of a KaiKuTek sensor with the classes {', '.join(facts['classes'])}",
-    )
-    return words + (out / "real" / "table.md").read_text("utf-8") + "\n"
 
 
 def _large(options: argparse.Namespace, out: Path) -> str:

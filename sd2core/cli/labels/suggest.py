@@ -27,11 +27,12 @@ if TYPE_CHECKING:
     from sd2core.timebase import Timebase
 
 _HELP = {
-    "high_db": ("DB", "energy over the quiet level that the peak of a span reaches (default: 8)"),
+    "high_db": ("DB", "energy over the quiet level that the peak of a span reaches (default: 7)"),
     "low_db": ("DB", "energy that a span never falls below (default: 5)"),
     "min_duration_s": ("S", "least duration, without margins (default: 0.2)"),
     "merge_gap_s": ("S", "quiet stretches up to this do not end a span (default: 0.1)"),
-    "margin_s": ("S", "added on both sides (default: 0.3)"),
+    "margin_s": ("S", "added on both sides (default: 0.2)"),
+    "hold_s": ("S", "added to the margin at the end (default: 0.2)"),
 }
 
 

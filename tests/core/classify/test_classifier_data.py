@@ -195,6 +195,15 @@ def test_of_one_person_movements_are_kept_apart(each: int, number: int) -> None:
         assert (frame_counts(group, 3) > 0).all()
 
 
+def test_of_one_person_all_movements_are_judged_in_two_folds_and_halves_are_drawn_anew() -> None:
+    known = clip_set(1, 3 * 6, frames=6, one_class=True)
+    judged = [set(movements(fold(known, number).test)) for number in range(6)]
+    for one, other in zip(judged[::2], judged[1::2], strict=True):
+        assert one | other == set(movements(known.clips))
+        assert not one & other
+    assert len({frozenset(one) for one in judged}) == 6
+
+
 def test_one_movement_of_each_class_cannot_be_split() -> None:
     with pytest.raises(Sd2Error, match="one subject"):
         fold(clip_set(1, 3, frames=6, one_class=True), 0)

@@ -42,9 +42,9 @@ def ben(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def moving(tmp_path: Path) -> Path:
-    """Ten seconds at 20 frames/s; something moves from 4 to 5 s."""
+    """Ten seconds at 20 frames/s; something approaches from 4 to 5 s."""
     values = np.ones((16, 200), np.float32)
-    values[:, 80:100] = 100.0
+    values[12:, 80:100] = 397.0
     doppler = DopplerMap(values, VelocityAxis(16, 2.0), Timebase.regular(200, 20.0), "real")
     doppler.save(tmp_path / "map.npz")
     return tmp_path / "map.npz"
@@ -193,17 +193,17 @@ def test_a_rate_that_cannot_be_is_a_sentence(sd2: Sd2, anna: Path) -> None:
 
 
 def test_suggest_writes_what_it_finds_and_says_why(sd2: Sd2, moving: Path, tmp_path: Path) -> None:
-    out = tmp_path / "found.json"
-    done = sd2("labels", "suggest", moving, "--out", out, "--margin-s", 0, "--label", "wave")
+    out, exact = tmp_path / "found.json", ("--margin-s", 0, "--hold-s", 0)
+    done = sd2("labels", "suggest", moving, "--out", out, *exact, "--label", "wave")
     assert done.code == 0, done.err
-    assert "1 span in which something moves, in the real map: 8 dB" in done.out
+    assert "1 span in which something moves, in the real map: 7 dB" in done.out
     assert "up to 20 dB over the quiet level" in done.out
     (span,) = files.read_labels(out).labels.spans
     assert (span.origin, span.label, span.confidence) == ("suggestion", "wave", 1.0)
     assert (span.start_s, span.end_s) == pytest.approx((3.95, 5.05))
     data = json.loads(sd2("labels", "suggest", moving, "--json").out)
     assert data["loudest_db"] == pytest.approx(20.0)
-    assert data["options"]["margin_s"] == 0.3
+    assert data["options"]["margin_s"] == 0.2
     assert data["path"] is None
 
 
@@ -227,7 +227,7 @@ def test_what_cannot_be_suggested_from_is_refused(sd2: Sd2, plate: Path, moving:
     for arguments, words in (
         ((plate,), "plate.npz is a mesh"),
         ((moving, "--of", "radar"), "--of is given"),
-        ((moving, "--low-db", 9), "low_db is 9 and high_db 8"),
+        ((moving, "--low-db", 9), "low_db is 9 and high_db 7"),
         ((moving, "--out", moving), "map.npz exists"),
     ):
         refused = sd2("labels", "suggest", *arguments)

@@ -31,7 +31,9 @@ from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 
 BINS, RATE = 16, 20.0
-PLAIN = SuggestOptions(margin_s=0.0)
+STILL = slice(7, 9)
+"""Bins beside zero velocity."""
+PLAIN = SuggestOptions(margin_s=0.0, hold_s=0.0)
 
 
 def doppler_map(
@@ -44,11 +46,22 @@ def doppler_map(
 
 
 def pulses(frames: int, *moving: tuple[int, int], gain: float = 100.0) -> NDArray[np.float32]:
-    """A quiet level of 1 in every bin, `gain` in frames that move."""
+    """A quiet level of 1 in every bin, `gain` in frames that move, but at zero velocity."""
     values = np.ones((BINS, frames), np.float32)
     for start, stop in moving:
         values[:, start:stop] = gain
+    values[STILL] = 1.0
     return values
+
+
+def mean_db(gain: float) -> float:
+    """Energy of `pulses` where all that moves has this gain."""
+    return 10 * np.log10(((BINS - 2) * gain + 2) / BINS)
+
+
+def kkt_files(shared_data: Path) -> list[Path]:
+    folders = [shared_data / "radar" / name for name in ("kkt_gestures", "kkt_gestures_more")]
+    return [path for folder in folders for path in sorted(folder.glob("*.h5"))]
 
 
 def frames_of(spans: tuple[Span, ...], timebase: Timebase) -> list[tuple[int, int]]:
@@ -68,18 +81,42 @@ def overlap(a: Span, b: tuple[float, float]) -> float:
 def test_energy_is_the_ratio_to_the_quiet_level_in_db() -> None:
     energy_db = motion_energy_db(doppler_map(pulses(100, (40, 50), gain=100.0)))
     # Averaged over three frames: the edges are lower, the middle is exact.
-    np.testing.assert_allclose(energy_db[41:49], 20.0, atol=1e-6)
+    np.testing.assert_allclose(energy_db[41:49], mean_db(100.0), atol=1e-6)
     np.testing.assert_allclose(np.delete(energy_db, np.arange(39, 51)), 0.0, atol=1e-6)
-    np.testing.assert_allclose(energy_db[39], 10 * np.log10((1 + 1 + 100) / 3), atol=1e-6)
+    np.testing.assert_allclose(energy_db[39], mean_db((1 + 1 + 100) / 3), atol=1e-6)
 
 
 def test_bins_are_measured_against_their_own_quiet_level() -> None:
     """What stands still hides nothing, however strong it is."""
     values = pulses(100, (40, 50))
-    values *= np.logspace(-2, 6, BINS, dtype=np.float32)[:, None]
     # All bins are above the floor, which is 30 dB below the strongest frame.
-    strong = doppler_map(values[-4:])
-    assert found(strong) == found(doppler_map(pulses(100, (40, 50)))) == [(39, 51)]
+    values *= np.logspace(-0.5, 0.5, BINS, dtype=np.float32)[:, None]
+    values[STILL] *= 1e3
+    assert found(doppler_map(values)) == found(doppler_map(pulses(100, (40, 50)))) == [(39, 51)]
+
+
+echoes = hnp.arrays(np.float64, 100, elements=st.floats(0.01, 1.0))
+sidelobes = hnp.arrays(np.float64, 32, elements=st.floats(1e-4, 0.047))
+
+
+@given(echo=echoes, shares=sidelobes)
+@settings(max_examples=60)
+def test_what_stands_still_is_quiet_however_its_echo_changes(echo, shares) -> None:
+    """It leaks into every bin in proportion; of the 32, two at zero velocity change."""
+    values = shares[:, None] * echo
+    values[15:17] = echo
+    assert suggest_spans(doppler_map(values), replace(PLAIN, high_db=PLAIN.low_db)) == ()
+    values[20:26, 40:60] += 10.0
+    assert found(doppler_map(values)) == [(39, 61)]
+
+
+@pytest.mark.parametrize(("gain", "over"), [(20.0, 20.0), (1e4, 1 / 0.0472)])
+def test_no_more_than_the_highest_sidelobe_is_taken_for_one(gain: float, over: float) -> None:
+    """What is as strong in all bins is in the main lobe of none: 13.3 dB above a sidelobe."""
+    values = np.ones((BINS, 100))
+    values[:, 40:50] = gain
+    energy_db = motion_energy_db(doppler_map(values))
+    np.testing.assert_allclose(energy_db[41:49], 10 * np.log10(over), atol=1e-6)
 
 
 def test_spans_are_suggestions_with_a_reason() -> None:
@@ -88,7 +125,7 @@ def test_spans_are_suggestions_with_a_reason() -> None:
     assert [span.id for span in spans] == [7, 8]
     for span in spans:
         assert (span.origin, span.label, span.track) == ("suggestion", "swipe", "Found")
-        assert span.note == "up to 13 dB over the quiet level"
+        assert span.note == "up to 12 dB over the quiet level"
     assert {span.track for span in suggest_spans(doppler)} == {TRACK}
     Labels((LabelTrack("Found"),), spans)
 
@@ -113,9 +150,9 @@ def test_a_threshold_beyond_certainty_is_certain() -> None:
 
 
 def test_two_thresholds_keep_a_span_whole() -> None:
-    values = pulses(100, (30, 60), gain=5.0)  # 7 dB: over the low one only
+    values = pulses(100, (30, 60), gain=5.0)  # 6.5 dB: over the low one only
     assert found(doppler_map(values)) == []
-    values[:, 40:44] = 50.0
+    values[9:, 40:44] = 50.0
     assert found(doppler_map(values)) == [(30, 60)]
 
 
@@ -135,8 +172,9 @@ def test_short_gaps_are_merged_and_long_ones_are_not() -> None:
 def test_margins_end_at_the_ends_and_leave_a_third_of_the_quiet_between_neighbours() -> None:
     doppler = doppler_map(pulses(100, (2, 20), (30, 60)))
     assert found(doppler) == [(1, 21), (29, 61)]
-    assert found(doppler, SuggestOptions(margin_s=0.1)) == [(0, 23), (27, 63)]
-    assert found(doppler, SuggestOptions(margin_s=9.0)) == [(0, 23), (27, 100)]
+    assert found(doppler, replace(PLAIN, margin_s=0.1)) == [(0, 23), (27, 63)]
+    assert found(doppler, replace(PLAIN, margin_s=9.0)) == [(0, 23), (27, 100)]
+    assert found(doppler, replace(PLAIN, margin_s=0.05, hold_s=0.2)) == [(0, 23), (28, 66)]
 
 
 @given(
@@ -172,7 +210,10 @@ def test_neither_scale_nor_order_of_bins_nor_clock_matters(gain, seed, offset_s)
     rng = np.random.default_rng(seed)
     values = rng.exponential(size=(BINS, 120)) * pulses(120, (30, 60), (80, 100))
     energy_db = motion_energy_db(doppler_map(values))
-    for other in (gain * values, values[rng.permutation(BINS)]):
+    away = np.delete(np.arange(BINS), STILL)
+    shuffled = values.copy()
+    shuffled[away] = values[rng.permutation(away)]
+    for other in (gain * values, shuffled):
         np.testing.assert_allclose(motion_energy_db(doppler_map(other)), energy_db, atol=1e-3)
     doppler = doppler_map(values)
     moved = suggest_spans(doppler.shifted(offset_s))
@@ -199,6 +240,14 @@ def test_an_empty_map_has_no_energy() -> None:
     assert suggest_spans(doppler) == ()
 
 
+def test_what_is_lost_in_rounding_has_no_energy() -> None:
+    values = np.full((2, 10), 3e-41, np.float32)
+    values[:, 0] = 1.0
+    present = np.arange(10) == 1
+    energy_db = motion_energy_db(doppler_map(values, present=present))
+    np.testing.assert_array_equal(energy_db[present], 0.0)
+
+
 @pytest.mark.parametrize("value", [0.0, 1.0])
 def test_one_frame_is_its_own_quiet_level(value: float) -> None:
     doppler = doppler_map(np.full((BINS, 1), value))
@@ -213,14 +262,14 @@ def test_what_never_rests_is_quiet() -> None:
 def test_emptied_and_unseen_bins_change_nothing() -> None:
     rng = np.random.default_rng(3)
     values = rng.exponential(size=(BINS, 120)) * pulses(120, (30, 60))
-    kept = motion_energy_db(doppler_map(values[4:]))
+    kept = motion_energy_db(doppler_map(values[2:-2]))
     emptied = values.copy()
-    emptied[:4] = 0.0
+    emptied[[0, 1, -2, -1]] = 0.0
     loud = values.copy()
-    loud[:4, 90:] = 1e6
+    loud[[0, 1, -2, -1], 90:] = 1e6
     for doppler in (
         doppler_map(emptied),
-        doppler_map(loud, null_bins=(0, 1), unseen_bins=(2, 3)),
+        doppler_map(loud, null_bins=(0, 1), unseen_bins=(BINS - 2, BINS - 1)),
     ):
         np.testing.assert_allclose(motion_energy_db(doppler), kept, atol=1e-6)
     all_left_out = doppler_map(values, null_bins=tuple(range(BINS)))
@@ -268,10 +317,11 @@ def test_values_that_are_no_energy_are_refused(value: float) -> None:
 @pytest.mark.parametrize(
     ("fields", "words"),
     [
-        ({"low_db": 9.0}, "low_db is 9 and high_db 8"),
+        ({"low_db": 9.0}, "low_db is 9 and high_db 7"),
         ({"low_db": 0.0}, "low_db is 0"),
         ({"high_db": float("nan")}, "high_db is nan"),
         ({"margin_s": -0.1}, "margin_s is -0.1"),
+        ({"hold_s": -0.1}, "hold_s is -0.1"),
         ({"min_duration_s": float("inf")}, "min_duration_s is inf"),
     ],
 )
@@ -297,18 +347,37 @@ def test_the_eight_swipes_of_the_sample_are_found() -> None:
     assert min(span.confidence or 0.0 for span in best) == 1.0
 
 
-def test_real_gestures_are_met_and_backgrounds_left_alone(shared_data: Path) -> None:
-    """Intersection over union with the label of every file, to what docs/decisions/0032 says."""
-    paths = sorted((shared_data / "radar" / "kkt_gestures").glob("*.h5"))
-    met = []
-    for path in paths:
+def test_real_gestures_are_met_and_backgrounds_mostly_left_alone(shared_data: Path) -> None:
+    """A suggestion holds the middle of every label; docs/real-gestures.md says how well it fits."""
+    backgrounds = []
+    for path in kkt_files(shared_data):
         recorded = load_kkt(path)
         spans = suggest_spans(recorded.doppler)
         if recorded.gesture == "Background":
-            assert spans == ()
-            continue
-        (label,) = recorded.labels.spans
-        met.append(max(overlap(span, (label.start_s, label.end_s)) for span in spans))
-        assert len(spans) <= 2
-    np.testing.assert_allclose(met, [0.61, 0.62, 0.69, 0.69, 0.92, 0.71], atol=0.006)
-    assert min(met) >= 0.6
+            backgrounds.append(bool(spans))
+        for label in recorded.labels.spans:
+            middle_s = (label.start_s + label.end_s) / 2
+            assert any(span.start_s <= middle_s < span.end_s for span in spans), path.name
+    assert 2 * sum(backgrounds) < len(backgrounds)
+
+
+def test_a_real_still_echo_leaks_as_through_a_rectangular_window(shared_data: Path) -> None:
+    """Four bins are one of the sensor's: bin 6 is in the middle of the highest sidelobe."""
+    shares = []
+    for path in kkt_files(shared_data):
+        values = load_kkt(path).doppler.values.astype(np.float64)
+        shares.append(np.median(values / values[15], axis=1))
+    for offset in (1, 2, 6):
+        leaked = np.median([(one[15 - offset] + one[15 + offset]) / 2 for one in shares])
+        assert 10 * np.log10(leaked / np.sinc(offset / 4) ** 2) == pytest.approx(0.0, abs=0.6)
+
+
+def test_a_real_echo_that_grows_and_fades_is_hardly_motion(shared_data: Path) -> None:
+    """A hundredfold echo lifts the seven bins of its main lobe, not the other 24."""
+    for path in kkt_files(shared_data):
+        doppler = load_kkt(path).doppler
+        if "Background" in path.name:
+            values = doppler.values.copy()
+            values[:, 20:45] *= 100.0
+            louder_db = motion_energy_db(replace(doppler, values=values))
+            assert (louder_db - motion_energy_db(doppler)).max() < 8.0, path.name
