@@ -189,7 +189,7 @@ def _write(
         driven.append(puppet.pose(clip, partial(progress, done)))
         done += len(clip.times_s) - 1  # the rest when the takes are written
     place = choices.place or estimate_place(
-        [_seen(one, stretch) for one, stretch in zip(driven, stretches.values(), strict=True)]
+        [seen_of(one, stretch) for one, stretch in zip(driven, stretches.values(), strict=True)]
     )
     synthesis = choices.synthesis
     for (key, stretch), one in zip(stretches.items(), driven, strict=True):
@@ -218,8 +218,8 @@ def _write(
     )
 
 
-def _seen(driven: DrivenClip, stretch: MarsStretch) -> Seen:
-    """Motion and mean Doppler of one stretch."""
+def seen_of(driven: DrivenClip, stretch: MarsStretch) -> Seen:
+    """What body and radar say of one stretch, to find the radar's place by."""
     clip = driven.clip
     velocity_mps = np.full(stretch.frame_count, np.nan)
     velocity_mps[stretch.frames] = stretch.mean_velocity_mps()

@@ -61,8 +61,8 @@ This page is made by
 make denoiser-comparison
 ```
 
-here with `--campaign-minutes {campaign_minutes:g} --minutes {minutes:g} --seeds {seeds}
---real-minutes {real_minutes:g}`, on {machine}.
+here with `--campaign-minutes {campaign_minutes:g} --minutes {minutes:g} --seeds {seeds}`, on
+{machine}.
 The people that are judged were seen neither in training nor in choosing the best epoch. What the
 errors are is written in `sd2core/denoise/metrics.py`.
 
@@ -109,15 +109,26 @@ What learning from moved sensors gives (`--placements all`) is in
 {range_tables}
 """
 
+REAL_MODELS = {
+    # At 10 frames/s the S4's steps are longer.
+    "s4": ("s4", *settings({"dt_min": 0.2, "dt_max": 2.0})),
+    "gru": ("gru",),
+    "unet": ("unet",),
+}
+
+REAL_HEAD = "## Real pairs\n"
 REAL = """\
-## Real pairs
 
 MARS: a body driven by a Kinect's skeleton, and what a real 77 GHz radar saw of the same person at
 10 frames/s ([decision 27](decisions/0027-real-pairs.md); what the pairs are worth before denoising:
-[real-pairs.md](real-pairs.md)). Each part is judged by models that have seen neither its person nor
-its part; the last fifth of the takes they learn from chooses their best epoch. As there are 3 to 8
-minutes to learn from, batches are of 16 segments and the dropout is 0.3; at 10 frames/s the S4's
-steps are longer. These settings were found on 4-validate; the other parts were not looked at.
+[real-pairs.md](real-pairs.md)). Every person is judged by models that have seen nothing of them:
+they learn from the other person, whose last fifth of the takes chooses the best epoch. Each learns
+from the map, as in the paper, and from the maps of five parts of the body (`limbs`: trunk, upper
+arms, forearms, thighs, lower legs; [decision 52](decisions/0052-limb-maps.md)). As there are 3 to 8
+minutes to learn from, batches are of 16 segments and the dropout is 0.3; the S4's steps are longer.
+
+This section alone is made by `python -m tools.documentation.denoiser_comparison --only-real`, here
+with `--seeds {seeds} --real-minutes {real_minutes:g}`, on {machine}.
 
 {tables}
 """
@@ -127,15 +138,18 @@ def main() -> None:
     """Make what is missing, measure everything and write the page."""
     options = _options()
     folder: Path = options.folder
+    path = DOCS / "denoiser-comparison.md"
+    if options.only_real:
+        before = path.read_text("utf-8").partition(REAL_HEAD)[0]
+        atomic_write_text(path, before + _real(folder, options))
+        return
     campaign = campaign_of(folder, options.campaign_minutes, "--seed", 1)
     jobs = {name: _timed(folder, campaign, name, options) for name in ALL}
     compared = [jobs[name].seeded(seed) for seed in range(options.seeds) for name in COMPARED]
     alone = {name: jobs[name].seeded(0) for name in ALL if name not in COMPARED}
     # A pilot of several epochs would take longer than all runs of another model.
     alone[SERIAL] = TimedJob(_job(campaign, SERIAL, (SERIAL,)), math.nan, epochs=1).seeded(0)
-    mars = _mars(folder)
-    real = _real_jobs(folder, mars, options) if mars is not None else {}
-    train(folder, [*compared, *alone.values(), *(job for part in real.values() for job in part)])
+    train(folder, [*compared, *alone.values()])
     _curves(folder, jobs, options.seeds)
     s4 = folder / jobs["s4"].seeded(0).name
 
@@ -148,7 +162,6 @@ def main() -> None:
         campaign_minutes=options.campaign_minutes,
         seeds=options.seeds,
         minutes=options.minutes,
-        real_minutes=options.real_minutes,
         dropout=DROPOUT,
         pilot=PILOT_EPOCHS,
         epochs=_epochs(jobs),
@@ -160,9 +173,9 @@ def main() -> None:
             # Alone: beside the other one it would count as a second seed of it.
             range_tables=tables(folder, [folder / alone["s4-range"].name], campaign),
         ),
-        real="" if mars is None else REAL.format(tables=_real_tables(folder, mars, real)),
+        real=_real(folder, options),
     )
-    atomic_write_text(DOCS / "denoiser-comparison.md", page)
+    atomic_write_text(path, page)
 
 
 def _timed(folder: Path, campaign: Path, name: str, options: argparse.Namespace) -> TimedJob:
@@ -186,47 +199,42 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--minutes", type=float, default=10.0, help="of training, each run")
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--real-minutes", type=float, default=1.5, help="of training, each run")
+    parser.add_argument(
+        "--only-real", action="store_true", help="renew the section on real pairs alone"
+    )
     return parser.parse_args()
 
 
-def _mars(folder: Path) -> Path | None:
+def _real(folder: Path, options: argparse.Namespace) -> str:
+    """Section on real pairs; empty where the recordings are not there."""
     if not all(part.exists() for part in MARS):
-        return None
-    path = folder / "mars.zarr"
-    if not path.exists():
-        sd2("pairs", "mars", *MARS, "--out", path)
-    return path
-
-
-def _real_jobs(folder: Path, mars: Path, options: argparse.Namespace) -> dict[str, list[Job]]:
-    """For every part the runs that have seen neither its person nor its part."""
-    jobs: dict[str, list[Job]] = {}
+        return ""
+    mars = folder / "mars.zarr"
+    sd2("pairs", "mars", *MARS, "--limbs", "--out", mars)
     people = read_pairs(mars).subjects
+    runs: dict[str, list[Job]] = {}
     for judged in people:
-        others = [name for name in people if _strange(name, judged)]
-        if not others:
-            continue
-        kept_out = [name for name in people if name not in others]
-        for model, given in (("s4", {"dt_min": 0.2, "dt_max": 2.0}), ("gru", {})):
-            how = (
-                *("--model", model, *settings({"dropout": 0.3, **given}), "--batch-size", "16"),
-                *("--validation-subjects", "none", "--test-subjects", ",".join(kept_out)),
-            )
-            job = timed(folder, Job(f"mars-{judged}-{model}", mars, how), options.real_minutes)
-            jobs.setdefault(judged, []).extend(map(job.seeded, range(options.seeds)))
-    return jobs
-
-
-def _strange(name: str, judged: str) -> bool:
-    """True if two parts share neither person nor part, e.g. ``1-test`` and ``4-validate``."""
-    return not set(name.split("-")) & set(judged.split("-"))
-
-
-def _real_tables(folder: Path, mars: Path, jobs: dict[str, list[Job]]) -> str:
-    return "\n".join(
-        f"### {judged}\n\n"
-        + tables(folder, [folder / job.name for job in parts], mars, "--subjects", judged)
-        for judged, parts in jobs.items()
+        for name, model in REAL_MODELS.items():
+            for inputs in ("map", "limbs"):
+                how = (
+                    *("--model", *model, *settings({"dropout": 0.3}), "--inputs", inputs),
+                    *("--batch-size", "16", "--validation-subjects", "none"),
+                    *("--test-subjects", judged),
+                )
+                job = Job(f"mars-{judged}-{name}-{inputs}", mars, how)
+                seeded = timed(folder, job, options.real_minutes).seeded
+                runs.setdefault(judged, []).extend(map(seeded, range(options.seeds)))
+    train(folder, [job for own in runs.values() for job in own])
+    shown = [
+        f"### Person {judged}\n\n"
+        + tables(folder, [folder / job.name for job in own], mars, "--subjects", judged)
+        for judged, own in runs.items()
+    ]
+    return REAL_HEAD + REAL.format(
+        seeds=options.seeds,
+        real_minutes=options.real_minutes,
+        machine=this_machine(),
+        tables="\n".join(shown),
     )
 
 

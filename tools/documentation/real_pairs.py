@@ -7,7 +7,8 @@
 
 The first compares ways to turn the Kinect's skeleton into synthetic Doppler: its mean
 velocity per frame with that of the radar's points, before any denoising. The second
-shows what the least denoiser makes of the pairs: a linear map of five frames.
+shows what the least denoiser makes of the pairs (made with ``--limbs``): a linear map of
+five frames, of the whole body or of its parts.
 """
 
 from __future__ import annotations
@@ -20,16 +21,21 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.denoise.card import DENOISER_PARTS
 from sd2core.doppler import Synthesizer
 from sd2core.io.radar.mars import MarsPart, mars_parts, read_mars
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.mesh.vertex_parts import PARTS
 from sd2core.mocap.driving import KINECT_MARKERS, DrivenClip, SkeletonClip, puppet_of
 from sd2core.mocap.mars_pairs import (
+    AT_THE_CAMERA,
     MarsChoices,
     body_doppler,
     radar_doppler,
+    seen_of,
     skeleton_clip,
 )
+from sd2core.mocap.radar_place import RadarPlace, estimate_place
 from sd2core.pairs.store import PairSet, read_pairs
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
@@ -37,7 +43,7 @@ from sd2core.timebase import Timebase
 Maps = list[NDArray[np.float32]]
 
 DEFAULT = MarsChoices()
-RIDGE = 10.0
+RIDGES = (10.0, 100.0)
 
 
 def skeleton_cloud(clip: SkeletonClip) -> MeshSequence:
@@ -54,6 +60,7 @@ def changed(**options: object) -> MarsChoices:
 
 WAYS = {
     "body, facing, count (default)": DEFAULT,
+    "body, parts alike": replace(DEFAULT, limbs=True),
     "body, all vertices, count": changed(visibility="none"),
     "body, exact, count": changed(visibility="exact"),
     "body, facing, area": changed(weight="area"),
@@ -71,6 +78,18 @@ def cloud_maps(part: MarsPart) -> Maps:
         Synthesizer(skeleton_cloud(skeleton_clip(stretch)), options).map(VirtualSensor()).values.T
         for stretch in part.stretches
     ]
+
+
+def body_maps(driven: list[DrivenClip], choices: MarsChoices, place: RadarPlace) -> Maps:
+    """Synthetic Doppler of a body; with limbs the mean of its parts, each adding up to 1."""
+    maps = []
+    for one in (body_doppler(clip, choices, place) for clip in driven):
+        if one.limbs is None:
+            maps.append(one.values.T)
+        else:
+            total = one.limbs.values.sum(axis=1, keepdims=True)
+            maps.append((one.limbs.values / np.maximum(total, 1e-9)).mean(axis=0).T)
+    return maps
 
 
 def mean_mps(maps: Iterable[NDArray[np.float32]]) -> NDArray[np.float64]:
@@ -112,25 +131,43 @@ def drive(part: MarsPart) -> list[DrivenClip]:
 
 
 def inputs(folders: list[Path]) -> None:
-    """Print the first table, then how well the bodies fit."""
+    """Print the first table, then where the radar stands and how well the bodies fit."""
     print("| part | input | correlation | MAE, m/s | MAE after one gain, m/s |")
     print("|---|---|---|---|---|")
     notes = []
-    for part in (read_mars(folder, name) for folder in folders for name in mars_parts(folder)):
-        axis = DEFAULT.synthesis.axis
-        radar = [radar_doppler(stretch, axis) for stretch in part.stretches]
-        print(row(part, "nothing moves", [0.0 * values for values in radar], radar))
-        print(row(part, "25 joints", cloud_maps(part), radar), flush=True)
-        driven = drive(part)
-        for name, choices in WAYS.items():
-            maps = [body_doppler(clip, choices).values.T for clip in driven]
-            print(row(part, name, maps, radar), flush=True)
-        empty = 1.0 - float((np.concatenate(radar).sum(axis=1) > 0).mean())
-        notes.append(
-            f"{part.subject}-{part.name}: {residuals(driven)}; {empty:.1%} of the frames without"
-            " points"
-        )
+    for folder in folders:
+        parts = [read_mars(folder, name) for name in mars_parts(folder)]
+        driven = [drive(part) for part in parts]
+        each = [
+            [seen_of(*one) for one in zip(clips, part.stretches, strict=True)]
+            for clips, part in zip(driven, parts, strict=True)
+        ]
+        place = estimate_place([one for part in each for one in part])
+        notes.append(f"person {parts[0].subject}, all parts: {place_words(place)}")
+        for part, clips, seen in zip(parts, driven, each, strict=True):
+            axis = DEFAULT.synthesis.axis
+            radar = [radar_doppler(stretch, axis) for stretch in part.stretches]
+            print(row(part, "nothing moves", [0.0 * values for values in radar], radar))
+            print(row(part, "25 joints, from the Kinect", cloud_maps(part), radar), flush=True)
+            at_kinect = body_maps(clips, DEFAULT, AT_THE_CAMERA)
+            print(row(part, "body, facing, count, from the Kinect", at_kinect, radar), flush=True)
+            for name, choices in WAYS.items():
+                print(row(part, name, body_maps(clips, choices, place), radar), flush=True)
+            empty = 1.0 - float((np.concatenate(radar).sum(axis=1) > 0).mean())
+            notes.append(
+                f"{part.subject}-{part.name}: {residuals(clips)}; {empty:.1%} of the frames"
+                f" without points; by this part alone {place_words(estimate_place(seen))}"
+            )
     print("\n" + "\n".join(f"- {note}" for note in notes))
+
+
+def place_words(place: RadarPlace) -> str:
+    """Place and clock of a radar that was found."""
+    right, down, _ = place.position_m
+    return (
+        f"the radar {right:+.2f} m right and {down:+.2f} m below the Kinect, its clock"
+        f" {1e3 * place.offset_s:+.0f} ms"
+    )
 
 
 def features(values: NDArray[np.float32]) -> NDArray[np.float64]:
@@ -140,12 +177,12 @@ def features(values: NDArray[np.float32]) -> NDArray[np.float64]:
     return np.hstack([padded[shift : shift + len(shares)] for shift in range(5)])
 
 
-def examples(pairs: PairSet) -> tuple[NDArray[np.float64], ...]:
+def examples(pairs: PairSet, parts: tuple[str, ...]) -> tuple[NDArray[np.float64], ...]:
     """Features, mean velocity of the radar and of the input, in frames with points."""
     seen = [take.radar.sum(axis=1) > 0 for take in pairs.takes]
     each = list(zip(pairs.takes, seen, strict=True))
     return (
-        np.concatenate([features(take.synthetic)[rows] for take, rows in each]),
+        np.concatenate([features(take.inputs(parts))[rows] for take, rows in each]),
         mean_mps(take.radar[rows] for take, rows in each),
         mean_mps(take.synthetic[rows] for take, rows in each),
     )
@@ -154,22 +191,35 @@ def examples(pairs: PairSet) -> tuple[NDArray[np.float64], ...]:
 def linear(path: Path) -> None:
     """Print the second table."""
     pairs = read_pairs(path)
-    print("| trained on | tested on | no denoising | linear map | no denoising | linear map |")
+    ways: dict[str, tuple[str, ...]] = {
+        "map": (),
+        "limbs, sides together": DENOISER_PARTS,
+        "limbs, sides apart": PARTS,
+    }
+    print("| person | input | ridge | MAE, m/s | to no denoising | correlation |")
     print("|---|---|---|---|---|---|")
     for test in pairs.subjects:
-        person = test.partition("-")[0]
-        others = [name for name in pairs.subjects if name.partition("-")[0] != person]
-        x, y, _ = examples(pairs.of(others))
-        middle = x.mean(axis=0)
-        slope = np.linalg.solve(
-            (x - middle).T @ (x - middle) + RIDGE * np.eye(x.shape[1]),
-            (x - middle).T @ (y - y.mean()),
-        )
-        x, truth, before = examples(pairs.of([test]))
-        after = (x - middle) @ slope + y.mean()
-        errors = [f"{np.abs(found - truth).mean():.3f}" for found in (before, after)]
-        alike = [f"{np.corrcoef(found, truth)[0, 1]:.3f}" for found in (before, after)]
-        print(f"| {', '.join(others)} | {test} | {' | '.join(errors + alike)} |")
+        others = [name for name in pairs.subjects if name != test]
+        for name, parts in ways.items():
+            x, y, _ = examples(pairs.of(others), parts)
+            unseen, truth, before = examples(pairs.of([test]), parts)
+            plain = np.abs(before - truth).mean()
+            if not parts:
+                alike = np.corrcoef(before, truth)[0, 1]
+                print(f"| {test} | no denoising | | {plain:.3f} | | {alike:.3f} |")
+            middle = x.mean(axis=0)
+            for ridge in RIDGES:
+                slope = np.linalg.solve(
+                    (x - middle).T @ (x - middle) + ridge * np.eye(x.shape[1]),
+                    (x - middle).T @ (y - y.mean()),
+                )
+                after = (unseen - middle) @ slope + y.mean()
+                error = np.abs(after - truth).mean()
+                alike = np.corrcoef(after, truth)[0, 1]
+                print(
+                    f"| {test} | {name} | {ridge:g} | {error:.3f} | {error / plain - 1:+.0%} |"
+                    f" {alike:.3f} |"
+                )
 
 
 def main() -> None:

@@ -102,8 +102,9 @@ class TestTrain:
         content = shown(sd2, toml, "--epochs", "7", "--set", "depth=3")
         assert content["training"] | {"epochs": 7, "seed": 4} == content["training"]
         assert "minutes" not in content["training"]
-        assert content["model"] | {"name": "gru", "options": {"channels": 8, "depth": 3}} == (
-            content["model"]
+        assert (
+            content["model"] | {"name": "gru", "options": {"channels": 8, "depth": 3}}
+            == (content["model"])
         )
         # What one architecture was told says nothing to another.
         other = shown(sd2, toml, "--model", "s4", "--inputs", "limbs")["model"]
