@@ -95,6 +95,7 @@ def _named(session: Session, features: Features, **others: object) -> SimpleName
         trade=f.accuracy.model,
         synthesis=f.maps.synthesis,
         uncertainty=f.maps.uncertainty,
+        limbs=f.maps.limbs,
         placements=f.sensor.placements,
         denoise=f.denoise.model,
         live=f.denoise.live,

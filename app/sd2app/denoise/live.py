@@ -14,7 +14,7 @@ from sd2app.background.model_worker.client import RemoteDenoiser, RemoteLive
 from sd2app.denoise.map import presence
 from sd2app.denoise.model import DenoiseModel
 from sd2app.session.session import Session
-from sd2core.denoise.resample_to_model import is_regular
+from sd2core.denoise.resample_to_model import input_of, is_regular
 
 _WANTED = "denoise_live"
 _JUMP_S = 1.0
@@ -113,9 +113,11 @@ class LiveDenoiseModel(QObject):
         if late < -1 or late > _JUMP_S * source.timebase.frames_per_s * self._playback.speed:
             self._begin_at(frame)
         covered, start, stop = self._synthetic.covered, self._next, frame + 1
+        if denoiser.parts and source.limbs is None:
+            return
         if stop <= start or (covered is not None and not covered[start:stop].all()):
             return
-        values, session = source.values[:, start:stop].copy(), self._session
+        energies, session = input_of(source.between(start, stop), denoiser.parts), self._session
         present = presence(source, start, stop)
 
         def work(emit: object) -> _Stepped:
@@ -123,7 +125,7 @@ class LiveDenoiseModel(QObject):
             began = time.perf_counter()
             answers = [
                 live.step(frame, bool(there))
-                for frame, there in zip(values.T, present, strict=True)
+                for frame, there in zip(energies, present, strict=True)
             ]
             cost_s = (time.perf_counter() - began) / len(answers)
             return _Stepped(live, start, np.stack(answers, axis=1), cost_s)

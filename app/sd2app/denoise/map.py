@@ -19,9 +19,11 @@ from sd2app.maps.quality import Companion
 from sd2app.session.content import reference_of
 from sd2app.session.maps import MapModel
 from sd2app.session.tasks import Job, TaskList
-from sd2core.denoise.resample_to_model import is_regular
+from sd2core.denoise.resample_to_model import input_of, is_regular
+from sd2core.doppler.synthesizer import Stretch
 from sd2core.errors import Sd2Error
-from sd2core.maps import DopplerMap
+from sd2core.maps import DopplerMap, LimbMaps
+from sd2core.mesh.vertex_parts import PARTS
 from sd2core.pairs.segments import LENGTH, OVERLAP
 from sd2core.timebase import Timebase
 
@@ -120,7 +122,15 @@ class DenoisedMap(QObject):
     @property
     def busy(self) -> bool:
         """True while something is being denoised or about to be."""
-        return self._runner.busy or self._again.isActive()
+        return self._runner.busy or self._again.isActive() or self._lacks_limbs
+
+    @property
+    def _lacks_limbs(self) -> bool:
+        """True while the model takes limb maps, and the synthetic map is not split yet."""
+        source, denoiser = self._source, self.denoiser
+        if source is None or denoiser is None:
+            return False
+        return bool(denoiser.parts) and source.limbs is None
 
     @property
     def shows_source(self) -> bool:
@@ -183,11 +193,13 @@ class DenoisedMap(QObject):
         denoiser, source = self.denoiser, self._source
         if denoiser is None or source is None or self._held or not self.keeps_up:
             return None
+        if self._lacks_limbs:
+            return None
 
-        def denoised(start: int, values: NDArray[np.float32]) -> Swept | None:
+        def denoised(start: int, stretch: Stretch) -> Swept | None:
             began = time.perf_counter()
             try:
-                made = denoiser.denoise(cut_out(source, start, values))
+                made = denoiser.denoise(cut_out(source, start, stretch.values, stretch.limbs))
             except Sd2Error as error:
                 self._stumbled.emit(str(error))
                 return None
@@ -239,7 +251,7 @@ class DenoisedMap(QObject):
             return
         if fresh:
             self._shown[:] = False
-        like = replace(self._source, kind="denoised", meta={}, uncertainty=None)
+        like = replace(self._source, kind="denoised", meta={}, uncertainty=None, limbs=None)
         self._paint(values, (start, start + values.shape[1]), like)
         self._publish()
 
@@ -265,6 +277,8 @@ class DenoisedMap(QObject):
     def _go_on(self) -> None:
         if self._source is None or self.denoiser is None or self._held or self._runner.busy:
             return
+        if self._lacks_limbs:
+            return  # they are on their way
         wanted = self._known & (self._done_at < self._changed_at)
         piece = next_piece(wanted, self._view())
         if piece is None:
@@ -277,7 +291,8 @@ class DenoisedMap(QObject):
         begin, end = with_context(self._known, piece)
         source, denoiser, revision = self._source, self.denoiser, self._revision
         # Copied: the values go on changing while the model works.
-        doppler = cut_out(source, begin, source.values[:, begin:end].copy())
+        limbs = None if source.limbs is None else source.limbs.values[..., begin:end].copy()
+        doppler = cut_out(source, begin, source.values[:, begin:end].copy(), limbs)
 
         def work(emit: object) -> _Answer:
             denoised = denoiser.denoise(doppler)
@@ -299,12 +314,14 @@ class DenoisedMap(QObject):
         self._report(frames - self._in_order)
         start, session = self._in_order, self._session
         stop = min(start + AT_ONCE, frames)
-        values, present = source.values[:, start:stop].T.copy(), presence(source, start, stop)
+        energies = input_of(source.between(start, stop), denoiser.parts).copy()
+        present = presence(source, start, stop)
         revision = self._revision
 
         def work(emit: object) -> _Answer:
             live = session or denoiser.live()
-            return _Answer((start, stop), live.advance(values, present).T, source, revision, live)
+            answers = live.advance(energies, present)
+            return _Answer((start, stop), answers.T, source, revision, live)
 
         self._runner.submit(work)
         return True
@@ -343,6 +360,7 @@ class DenoisedMap(QObject):
                 values=np.zeros_like(self._source.values),
                 timebase=self._source.timebase,
                 present=self._source.present,
+                limbs=None,
             )
         inside = slice(*piece)
         self._made.values[:, inside] = values
@@ -432,8 +450,13 @@ def touched(piece: View, frames: int) -> slice:
     return slice(max(piece[0] - CONTEXT, 0), min(piece[1] + CONTEXT, frames))
 
 
-def cut_out(doppler: DopplerMap, start: int, values: NDArray[np.float32]) -> DopplerMap:
-    """Part of a map, with other values (bins, frames)."""
+def cut_out(
+    doppler: DopplerMap,
+    start: int,
+    values: NDArray[np.float32],
+    limbs: NDArray[np.float32] | None = None,
+) -> DopplerMap:
+    """Part of a map, with other values (bins, frames), and (parts, bins, frames) of its limbs."""
     stop = start + values.shape[1]
     whole = (start, stop) == (0, len(doppler.timebase))
     return replace(
@@ -442,6 +465,7 @@ def cut_out(doppler: DopplerMap, start: int, values: NDArray[np.float32]) -> Dop
         timebase=doppler.timebase if whole else Timebase(doppler.times_s[start:stop]),
         present=None if doppler.present is None else doppler.present[start:stop],
         uncertainty=None,
+        limbs=None if limbs is None else LimbMaps(PARTS, limbs),
     )
 
 

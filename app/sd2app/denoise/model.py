@@ -232,6 +232,7 @@ class DenoiseModel(QObject):
         if self._loaded is not None and loaded is not self._loaded:
             self._before = self._loaded
         self._loaded = loaded
+        self._synthesis.want_limbs("denoiser", loaded is not None and bool(loaded.card.parts))
         # The model's name stands beside the title, on the button that chooses it.
         if loaded is None:
             self.map.use(None)
@@ -242,6 +243,8 @@ class DenoiseModel(QObject):
 
     def _show_before(self) -> None:
         shown = self._before if self._comparing else None
+        wanting = shown is not None and bool(shown.card.parts)
+        self._synthesis.want_limbs("the denoiser before", wanting)
         if shown is None:
             self.before_map.use(None)
         else:
@@ -262,6 +265,12 @@ class DenoiseModel(QObject):
 
     def _finish(self) -> None:
         if self._synthesis.complete:
+            if self.card is not None and self.card.parts and not self._synthesis.split:
+                self.map.use(None)
+                self._say_problem(
+                    f"{track_words(self.card)} takes the Doppler of the parts of the body, which"
+                    " are not known of this mesh. Choose another under Model."
+                )
             for one in (self.map, self.before_map):
                 one.finish()
 
@@ -272,7 +281,7 @@ class DenoiseModel(QObject):
         parts = [one.companion() for one in (self.map, self.before_map)]
         if not any(parts):
             return None
-        return lambda start, values: [part and part(start, values) for part in parts]
+        return lambda start, stretch: [part and part(start, stretch) for part in parts]
 
     def _take(self, part: Part) -> None:
         source = self._synthetic.map

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from PySide6.QtCore import QObject
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QMenu, QWidget
 
 from sd2app.accuracy.model import AccuracyModel
 from sd2app.feature import Action, Feature, Shell
 from sd2app.maps.difference import DifferenceModel
 from sd2app.maps.heatmap import HeatmapView
 from sd2app.maps.level_bar import LevelBar
+from sd2app.maps.limbs import LimbMenu, LimbsModel
 from sd2app.maps.model import SynthesisModel
 from sd2app.maps.spectrum import SpectrumView
 from sd2app.maps.stack import MapStack
@@ -33,9 +34,11 @@ class MapsFeature(Feature):
         self.synthesis = SynthesisModel(session, accuracy, parent)
         self.uncertainty = UncertaintyModel(session, self.synthesis, accuracy, parent)
         self.difference = DifferenceModel(session, parent)
+        self.limbs = LimbsModel(session, self.synthesis, parent)
         session.document.changed.connect(session.follow_capture)
         self.synthesis.failed.connect(shell.warn)
         self.uncertainty.failed.connect(shell.warn)
+        self.limbs.failed.connect(shell.warn)
         self.changing = (
             self.synthesis.completed,
             self.uncertainty.changed,
@@ -75,6 +78,10 @@ class MapsFeature(Feature):
                 why_not=lambda: difference.why_not,
             ),
         )  # fmt: skip
+
+    def menus(self) -> Mapping[str, Callable[[QMenu], object]]:
+        """The parts of the body to choose from."""
+        return {"limbs": lambda menu: menu.addMenu(LimbMenu(self.limbs, menu))}
 
     def _export(self) -> None:
         if path := ask_map(self._shell.dialog_parent, "Export synthetic map", "synthetic.npz"):

@@ -10,6 +10,7 @@ from PySide6.QtGui import QBrush, QColor, QMouseEvent, QPainter, QPen, QWheelEve
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from sd2app.maps.heatmap_image import MapWidget
+from sd2app.maps.limbs import part_words
 from sd2app.session.maps import UNCERTAIN_SHARE, MapModel, Reading
 from sd2app.session.session import Session
 from sd2app.widgets.canvas import AT_LEFT, AT_RIGHT, Overlay, clipped
@@ -70,8 +71,9 @@ class HeatmapView(MapWidget):
         self.redraw()
 
     def title(self) -> str:
-        """Title of the map."""
-        return self._track.title
+        """Title of the map, with the part of the body that is shown alone."""
+        part = self._track.part
+        return f"{self._track.title} · {part_words(part)}" if part else self._track.title
 
     def null_colour(self) -> QColor:
         """Colour of zero."""

@@ -98,7 +98,7 @@ def uncertain_columns(
         return None
     found = np.zeros((track.map.axis.bins, columns), bool)
     if view.filled.any():
-        values = track.map.values[:, view.begin : view.end]
+        values = track.values[:, view.begin : view.end]
         known = view.strongest(np.where(uncertain, np.float32(-1.0), values))
         unknown = view.strongest(np.where(uncertain, values, np.float32(-1.0)))
         found[:, view.filled] = unknown >= np.maximum(known, 0.0)
@@ -156,7 +156,7 @@ def _strongest_columns(
     values = np.zeros((track.map.axis.bins, columns), np.float32)
     filled = view.filled.copy()
     if filled.any():
-        values[:, filled] = view.strongest(track.map.values[:, view.begin : view.end])
+        values[:, filled] = view.strongest(track.values[:, view.begin : view.end])
         if track.covered is not None:
             filled[filled] = track.covered[view.starts + view.begin]
     return values, filled

@@ -65,6 +65,7 @@ class SynthesisModel(QObject):
         self._track = session.maps.synthetic
         self._shown_map = ShownMap(self._track)
         self._companion: Callable[[], Companion | None] = lambda: None
+        self._wanting_limbs: set[str] = set()
         self._reader = FrameReader(session)
         self._synthesizers: SynthesizerCache | None = None
         self._prefetcher = MaskPrefetcher(self)
@@ -105,6 +106,11 @@ class SynthesisModel(QObject):
         """True once every frame has its final quality for the current sensor."""
         partial = self._shown_map.partial
         return partial.final and partial.sensor == self._sensor
+
+    @property
+    def split(self) -> bool:
+        """True if the map is split by the parts of the body."""
+        return self._shown_map.partial.limbs is not None
 
     @property
     def shows_sensor(self) -> bool:
@@ -153,6 +159,7 @@ class SynthesisModel(QObject):
             return
         try:
             self._synthesizers = SynthesizerCache(mesh, options, self._accuracy.library)
+            self._synthesizers.limbs = bool(self._wanting_limbs)
         except Sd2Error as error:
             self.failed.emit(str(error))
             return
@@ -175,6 +182,16 @@ class SynthesisModel(QObject):
         """Ask ``companion`` before each sweep what is to be made of it, in step with it."""
         self._companion = companion
 
+    def want_limbs(self, who: str, wanted: bool) -> None:
+        """Split the map by the parts of the body while somebody wants it."""
+        before = bool(self._wanting_limbs)
+        (self._wanting_limbs.add if wanted else self._wanting_limbs.discard)(who)
+        if bool(self._wanting_limbs) != before and self._synthesizers is not None:
+            self._synthesizers.limbs = not before
+            if not before:
+                self._shown_map.partial.quality[:] = 0
+                self._settle()
+
     def export(self, path: Path) -> None:
         """Write the map that is shown with its provenance."""
         self.whole_map().save(path)
@@ -186,7 +203,9 @@ class SynthesisModel(QObject):
         """
         if self._synthesizers is None or not self.complete:
             raise Sd2Error("The synthetic map is not complete yet", "a final map", "Wait for it")
-        made = self._synthesizers.of(self._plan).map(self._sensor)
+        maker = self._synthesizers.of(self._plan)
+        parts = self._synthesizers.parts_of(maker)
+        made = maker.map(self._sensor) if parts is None else maker.limb_maps(self._sensor, parts)
         in_use = self._accuracy.in_use
         if in_use is not None:
             made = replace(made, meta=made.meta | in_use.plan.provenance(in_use.error))

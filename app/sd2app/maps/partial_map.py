@@ -13,8 +13,9 @@ from sd2app.session.content import reference_of
 from sd2app.session.maps import MapModel
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.doppler.synthesizer import Stretch
-from sd2core.maps import DopplerMap
+from sd2core.maps import DopplerMap, LimbMaps
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.mesh.vertex_parts import PARTS
 from sd2core.sensor import VirtualSensor
 
 ROUGH, PREVIEW, FINAL = 1, 2, 3
@@ -29,6 +30,7 @@ class PartialMap:
 
     def __init__(self, bins: int, frames: int) -> None:
         self.values = np.zeros((bins, frames), np.float32)
+        self.limbs: NDArray[np.float32] | None = None  # (parts, bins, frames), where wanted
         self.quality = np.zeros(frames, np.uint8)  # see FINAL
         self.sensor: VirtualSensor | None = None  # placement that all of it is for
 
@@ -54,6 +56,12 @@ class PartialMap:
             self.quality[:] = 0
         inside = slice(start, start + stretch.values.shape[1])
         self.values[:, inside] = stretch.values
+        if stretch.limbs is None:
+            self.limbs = None
+        else:
+            if self.limbs is None:
+                self.limbs = np.zeros((len(stretch.limbs), *self.values.shape), np.float32)
+            self.limbs[..., inside] = stretch.limbs
         self.quality[inside] = quality
 
     def mark_stale(self) -> None:
@@ -124,6 +132,7 @@ class ShownMap:
             unit=part.unit,
             null_bins=options.null_bins,
             present=mesh.presence.measured,
+            limbs=None if self.partial.limbs is None else LimbMaps(PARTS, self.partial.limbs),
         )
         self._track.set_map(painted, None if self.partial.full else self.partial.quality > 0)
 

@@ -16,9 +16,11 @@ from sd2app.accuracy.library import AccuracyLibrary
 from sd2app.accuracy.text import InUse
 from sd2app.background.latest import Emit
 from sd2app.maps.partial_map import FINAL, PREVIEW, ROUGH, Part, View, pieces
+from sd2core.body.parts import body_parts
 from sd2core.doppler.options import SynthesisOptions
-from sd2core.doppler.synthesizer import Synthesizer, Visibility
+from sd2core.doppler.synthesizer import Stretch, Synthesizer, Visibility
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.mesh.vertex_parts import VertexParts
 from sd2core.sensor import VirtualSensor
 
 if TYPE_CHECKING:
@@ -36,9 +38,8 @@ _KEPT = 3
 
 _ROUGH_WORDS = "preview: vertices facing the sensor"
 _ALL_WORDS = "all vertices of the point cloud"
-Companion = Callable[[int, NDArray[np.float32]], Any]
-"""Makes something more of a stretch, given its first frame and its values (bins, frames), in
-the same background task."""
+Companion = Callable[[int, Stretch], Any]
+"""Makes something more of a stretch, given its first frame, in the same background task."""
 
 
 class SynthesizerCache:
@@ -56,6 +57,8 @@ class SynthesizerCache:
         self.mesh = mesh
         self.options = options
         self.full = Synthesizer(mesh, options)
+        self.limbs = False  # True: maps are also split by the parts of the body
+        self._parts: dict[int, tuple[MeshSequence, VertexParts | None]] = {}
         self._library = library
         self._made: OrderedDict[AccuracyPlan, Synthesizer] = OrderedDict()
         self._lock = threading.Lock()
@@ -76,6 +79,16 @@ class SynthesizerCache:
             while len(self._made) > _KEPT:
                 self._made.popitem(last=False)
         return synthesizer
+
+    def parts_of(self, synthesizer: Synthesizer) -> VertexParts | None:
+        """Parts of the body, where they are wanted and known; the first time takes a moment."""
+        if not self.limbs:
+            return None
+        mesh = synthesizer.mesh
+        with self._lock:
+            if id(mesh) not in self._parts:
+                self._parts[id(mesh)] = mesh, body_parts(mesh)
+            return self._parts[id(mesh)][1]
 
     def ready(self, plan: AccuracyPlan | None) -> Synthesizer | None:
         """The synthesizer of a plan if there is one already; never waits."""
@@ -101,6 +114,8 @@ class QualityLevel:
     quality: int  # rank of the computed frames
     words: str  # the same for people
     visibility: Visibility | None = None  # None: that of the synthesizer's options
+    parts_of: Callable[[Synthesizer], VertexParts | None] = lambda _: None
+    """Parts of the body by which the map is split, too."""
 
 
 def budget_ms(frames: int) -> float:
@@ -122,27 +137,28 @@ def preview_quality(
     dragging were made for ``masks_of``.
     """
     synthesizer = synthesizers.ready(dragging.plan) if dragging is not None else None
+    parts_of = synthesizers.parts_of
     if dragging is not None and synthesizer is not None:
         words, reuse_m = f"while dragging: {dragging.brief}", dragging.plan.mask_reuse_m
         if reuse_m == 0:
-            return QualityLevel(lambda: synthesizer, PREVIEW, words)
+            return QualityLevel(lambda: synthesizer, PREVIEW, words, None, parts_of)
         if masks_of is not None and math.dist(masks_of.position_m, sensor.position_m) <= reuse_m:
-            return QualityLevel(lambda: synthesizer, PREVIEW, words, "frozen")
+            return QualityLevel(lambda: synthesizer, PREVIEW, words, "frozen", parts_of)
     newest = synthesizers.ready(plan) or synthesizers.full
     if synthesizers.options.visibility == "none":
-        return QualityLevel(lambda: newest, PREVIEW, _ALL_WORDS, "none")
+        return QualityLevel(lambda: newest, PREVIEW, _ALL_WORDS, "none", parts_of)
     if dragging is not None:
-        return QualityLevel(lambda: newest, PREVIEW, _ROUGH_WORDS, "facing")
-    return QualityLevel(
-        lambda: newest, PREVIEW, "preview: visibility of the nearest place", "frozen"
-    )
+        return QualityLevel(lambda: newest, PREVIEW, _ROUGH_WORDS, "facing", parts_of)
+    words = "preview: visibility of the nearest place"
+    return QualityLevel(lambda: newest, PREVIEW, words, "frozen", parts_of)
 
 
 def final_quality(
     synthesizers: SynthesizerCache, plan: AccuracyPlan | None, in_use: InUse | None
 ) -> QualityLevel:
     """Quality of the plan in use; exact without a plan."""
-    return QualityLevel(lambda: synthesizers.of(plan), FINAL, final_words(synthesizers, in_use))
+    words = final_words(synthesizers, in_use)
+    return QualityLevel(lambda: synthesizers.of(plan), FINAL, words, parts_of=synthesizers.parts_of)
 
 
 def final_words(synthesizers: SynthesizerCache, in_use: InUse | None) -> str:
@@ -162,12 +178,14 @@ def compute_part(
 ) -> Part:
     """Compute frames ``start`` to ``stop``; ``proceed`` is called in between and may raise."""
     synthesizer = level.synthesizer()
-    stretch = synthesizer.stretch(sensor, start, stop, level.visibility, lambda *_: proceed())
+    stretch = synthesizer.stretch(
+        sensor, start, stop, level.visibility, lambda *_: proceed(), level.parts_of(synthesizer)
+    )
     quality, words = level.quality, level.words
     if level.visibility == "frozen" and stretch.quality == "facing":
         # No mask is kept.
         quality, words = ROUGH, _ROUGH_WORDS
-    more = companion(start, stretch.values) if companion is not None else None
+    more = companion(start, stretch) if companion is not None else None
     return Part(sensor, start, stretch, quality, words, synthesizer.unit, more)
 
 

@@ -68,9 +68,19 @@ class MapModel(QObject):
         self.uncertainty: CellUncertainty | None = None  # None: unknown or switched off
         self.offset_s = 0.0  # start of the map's clock on the recording's clock
         self.reference = 1.0  # value shown as 0 dB
+        self.part = ""  # part of the body that is shown alone, where its map is known
         self.status = ""  # quality of the map in a few words, e.g. "exact"
         self._gaps: tuple[tuple[int, int], ...] = ()
         self._strongest: float | None = None
+
+    @property
+    def values(self) -> NDArray[np.float32]:
+        """Values on screen, (bins, frames): the map's, or those of one part of the body."""
+        assert self.map is not None
+        limbs = self.map.limbs
+        if limbs is None or self.part not in limbs.parts:
+            return self.map.values
+        return limbs.values[limbs.parts.index(self.part)]
 
     @property
     def known(self) -> NDArray[np.bool_]:
@@ -105,7 +115,7 @@ class MapModel(QObject):
     def strongest_db(self) -> float:
         """Level of the strongest bin of the map, minus infinity for an empty one."""
         if self._strongest is None:
-            self._strongest = float(self.map.values.max()) if self.map is not None else 0.0
+            self._strongest = float(self.values.max()) if self.map is not None else 0.0
         return float(self.levels_db(np.array(self._strongest, np.float32)))
 
     def set_map(
@@ -125,6 +135,13 @@ class MapModel(QObject):
         """Set the uncertainty of the map's cells."""
         if uncertainty is not self.uncertainty:
             self.uncertainty = uncertainty
+            self.changed.emit()
+
+    def set_part(self, part: str) -> None:
+        """Show one part of the body alone, or (empty) all of it."""
+        if part != self.part:
+            self.part = part
+            self._strongest = None
             self.changed.emit()
 
     def set_offset(self, offset_s: float) -> None:
@@ -165,7 +182,7 @@ class MapModel(QObject):
         return np.clip(shade, 0.0, 1.0).astype(np.float32)
 
     def _deviation(self, index: int, frame: int) -> float | None:
-        if self.map is None or self.uncertainty is None:
+        if self.map is None or self.uncertainty is None or self.part:
             return None
         column = self.map.values[:, frame : frame + 1]
         return float(self.uncertainty.between(frame, frame + 1).deviation(column)[index, 0])
@@ -178,7 +195,7 @@ class MapModel(QObject):
         Deviations are those of :meth:`CellUncertainty.deviation`. The shape is
         (bins, stop - start); None if no uncertainty is known.
         """
-        if self.map is None or self.uncertainty is None:
+        if self.map is None or self.uncertainty is None or self.part:
             return None
         values = self.map.values[:, start:stop]
         highest = self.reference * 10.0 ** (levels.high_db / 10.0)
@@ -198,7 +215,7 @@ class MapModel(QObject):
         index = self.map.axis.bin_of(velocity_mps)
         if index is None or (self.covered is not None and not self.covered[frame]):
             return None
-        value = self.map.values[index, frame]
+        value = self.values[index, frame]
         note = ""
         if self.map.present is not None and not self.map.present[frame]:
             note = "no person"

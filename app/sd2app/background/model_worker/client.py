@@ -152,7 +152,9 @@ class RemoteDenoiser(_Remote):
         return RemoteLive(self._process, self._ready(), self.equals_batch)
 
     def _load(self) -> int:
-        number, self.equals_batch, self.frame_rate_hz = self._process.ask("load", self._path)
+        number, *known = self._process.ask("load", self._path)
+        # Frame by frame it gives the whole map; its frame rate; parts of the body that it takes.
+        self.equals_batch, self.frame_rate_hz, self.parts = known
         return int(number)
 
 
@@ -209,11 +211,11 @@ class RemoteLive(_RemoteSession):
         self.equals_batch = equals_batch
 
     def step(self, energies: NDArray[np.float32], present: bool = True) -> NDArray[np.float32]:
-        """Answer to the next frame (bins,)."""
+        """Answer to the next frame (features,)."""
         return self._ask("step", energies, present)
 
     def advance(
         self, energies: NDArray[np.float32], present: NDArray[np.bool_]
     ) -> NDArray[np.float32]:
-        """Answers to the next frames (frames, bins), one row for each."""
+        """Answers to the next frames (frames, features), one row for each."""
         return self._ask("advance", energies, present)

@@ -36,13 +36,13 @@ class Worker:
         self._live: dict[int, Any] = {}
         self._next = 0
 
-    def load(self, path: Path) -> tuple[int, bool, float]:
-        """Number of a denoiser, whether frame by frame it gives the whole map, its frame rate."""
+    def load(self, path: Path) -> tuple[int, bool, float, tuple[str, ...]]:
+        """Number of a denoiser, and what a ``RemoteDenoiser`` knows of it."""
         from sd2core.denoise.files import load_model
 
         model = load_model(path)
         number = self._keep(self._models, model)
-        return number, model.live().equals_batch, model.card.frame_rate_hz
+        return number, model.live().equals_batch, model.card.frame_rate_hz, model.card.parts
 
     def load_classifier(self, path: Path) -> int:
         """Number of a classifier."""
@@ -63,11 +63,11 @@ class Worker:
         return self._keep(self._live, _newest(self._models, model).live())
 
     def step(self, clip: int, energies: NDArray[np.float32], present: bool) -> NDArray[np.float32]:
-        """Answer to the next frame (bins,) of a denoiser's clip."""
+        """Answer to the next frame (features,) of a denoiser's clip."""
         return _newest(self._live, clip).step(energies, present)
 
     def advance(self, clip: int, *frames: NDArray[Any]) -> NDArray[np.float32]:
-        """Answers to the next frames (frames, bins) of a clip, with a mask for a denoiser."""
+        """Answers to the next frames (frames, features) of a clip, with a mask for a denoiser."""
         return _newest(self._live, clip).advance(*frames)
 
     def finish(self, clip: int) -> NDArray[np.float32]:
