@@ -123,9 +123,9 @@ class ModelConfig:
     """Model to train."""
 
     name: str = _setting(text, "s4")  # Architecture, see `sd2 train --help`.
+    options: Mapping[str, Any] = _setting(table, factory=dict)  # Of the architecture.
     # The map, as in the paper, or that of each part of the body.
     inputs: str = _setting(choice("map", "limbs"), "map")
-    options: Mapping[str, Any] = _setting(table, factory=dict)  # Of the architecture.
 
     def __post_init__(self) -> None:
         _check(self, "model")

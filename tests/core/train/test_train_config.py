@@ -41,8 +41,8 @@ def configs(draw: st.DrawFn) -> TrainConfig:
         ),
         ModelConfig(
             draw(NAMES),
-            draw(st.sampled_from(["map", "limbs"])),
             draw(st.dictionaries(NAMES, st.booleans() | st.integers() | SHARES | NAMES)),
+            draw(st.sampled_from(["map", "limbs"])),
         ),
         TrainingConfig(
             minutes=draw(st.none() | st.floats(0.01, 1000.0)),
