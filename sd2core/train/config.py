@@ -188,7 +188,7 @@ class TrainConfig:
         options = ",".join(f"{name}={value}" for name, value in sorted(model.options.items()))
         threads = machine.threads or "all"
         return (
-            "train", model.name, options, self.training.batch_size,
+            "train", model.name, model.inputs, options, self.training.batch_size,
             machine.device, machine.devices, machine.precision, f"{threads} threads",
         )  # fmt: skip
 

@@ -109,11 +109,13 @@ What learning from moved sensors gives (`--placements all`) is in
 {range_tables}
 """
 
+# At 10 frames/s the S4's steps are longer.
+_REAL_S4 = ("s4", *settings({"dt_min": 0.2, "dt_max": 2.0}))
 REAL_MODELS = {
-    # At 10 frames/s the S4's steps are longer.
-    "s4": ("s4", *settings({"dt_min": 0.2, "dt_max": 2.0})),
-    "gru": ("gru",),
-    "unet": ("unet",),
+    "s4-map": (*_REAL_S4, "--inputs", "map"),
+    "s4-limbs": (*_REAL_S4, "--inputs", "limbs"),
+    "gru-limbs": ("gru", "--inputs", "limbs"),
+    "unet-limbs": ("unet", "--inputs", "limbs"),
 }
 
 REAL_HEAD = "## Real pairs\n"
@@ -122,9 +124,9 @@ REAL = """\
 MARS: a body driven by a Kinect's skeleton, and what a real 77 GHz radar saw of the same person at
 10 frames/s ([decision 27](decisions/0027-real-pairs.md); what the pairs are worth before denoising:
 [real-pairs.md](real-pairs.md)). Every person is judged by models that have seen nothing of them:
-they learn from the other person, whose last fifth of the takes chooses the best epoch. Each learns
-from the map, as in the paper, and from the maps of five parts of the body (`limbs`: trunk, upper
-arms, forearms, thighs, lower legs; [decision 52](decisions/0052-limb-maps.md)). As there are 3 to 8
+they learn from the other person, whose last fifth of the takes chooses the best epoch. One learns
+from the map, as in the paper, the others from the maps of five parts of the body (`limbs`: trunk,
+upper arms, forearms, thighs, lower legs; [decision 52](decisions/0052-limb-maps.md)). As there are 3 to 8
 minutes to learn from, batches are of 16 segments and the dropout is 0.3; the S4's steps are longer.
 
 This section alone is made by `python -m tools.documentation.denoiser_comparison --only-real`, here
@@ -215,15 +217,12 @@ def _real(folder: Path, options: argparse.Namespace) -> str:
     runs: dict[str, list[Job]] = {}
     for judged in people:
         for name, model in REAL_MODELS.items():
-            for inputs in ("map", "limbs"):
-                how = (
-                    *("--model", *model, *settings({"dropout": 0.3}), "--inputs", inputs),
-                    *("--batch-size", "16", "--validation-subjects", "none"),
-                    *("--test-subjects", judged),
-                )
-                job = Job(f"mars-{judged}-{name}-{inputs}", mars, how)
-                seeded = timed(folder, job, options.real_minutes).seeded
-                runs.setdefault(judged, []).extend(map(seeded, range(options.seeds)))
+            how = (
+                *("--model", *model, *settings({"dropout": 0.3}), "--batch-size", "16"),
+                *("--validation-subjects", "none", "--test-subjects", judged),
+            )
+            job = timed(folder, Job(f"mars-{judged}-{name}", mars, how), options.real_minutes)
+            runs.setdefault(judged, []).extend(map(job.seeded, range(options.seeds)))
     train(folder, [job for own in runs.values() for job in own])
     shown = [
         f"### Person {judged}\n\n"

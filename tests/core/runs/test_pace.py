@@ -69,9 +69,11 @@ def test_a_cache_that_cannot_be_written_is_no_matter(
 def test_what_the_time_of_a_training_step_depends_on_is_in_its_kind() -> None:
     data = DataConfig((Path(),))
     kinds = {
-        TrainConfig(data, ModelConfig(name, options), machine=MachineConfig(threads=threads))
-        .pace_kind
+        TrainConfig(
+            data, ModelConfig(name, options, inputs), machine=MachineConfig(threads=threads)
+        ).pace_kind
         for name, options in (("s4", {}), ("s4", {"channels": 64}), ("gru", {}))
+        for inputs in ("map", "limbs")
         for threads in (None, 1)
-    }  # fmt: skip
-    assert len(kinds) == 6
+    }
+    assert len(kinds) == 12
