@@ -20,6 +20,7 @@ from torch import Tensor
 
 from sd2core.denoise.s4_functions import (
     damping_circle,
+    held_exponential,
     nplr_terms,
     vandermonde_product,
     woodbury_quotient,
@@ -227,19 +228,6 @@ def diagonal_kernel(A: Tensor, B: Tensor, C: Tensor, dt: Tensor | float, length:
     states = weights.shape[-1]
     kernel = vandermonde_product(poles.reshape(-1, states), weights.reshape(-1, 1, states), length)
     return kernel.to(precision).reshape(*weights.shape[:-1], length)
-
-
-def held_exponential(exponent: Tensor) -> tuple[Tensor, Tensor]:
-    """Compute exp(x), and (exp(x) − 1) / x, which is 1 at x = 0; complex128.
-
-    Below 0.01 the quotient cancels and its series takes over; above, two digits are lost at most.
-    """
-    grown = torch.exp(exponent)
-    small = exponent.abs() < 1e-2
-    x = torch.where(small, exponent, torch.zeros_like(exponent))
-    series = 1.0 + x / 2 * (1.0 + x / 3 * (1.0 + x / 4 * (1.0 + x / 5 * (1.0 + x / 6))))
-    ratio = (grown - 1.0) / torch.where(small, torch.ones_like(exponent), exponent)
-    return grown, torch.where(small, series, ratio)
 
 
 def check_length(length: int) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Literal, TypeAlias
 
 import torch
@@ -129,7 +129,7 @@ class StateSpace(nn.Module):
 
     def kernel(self, length: int) -> Tensor:
         """Convolution kernel, (H, length), D included, of the parameters' type."""
-        kernel: Tensor = self._keep(length, lambda: self._made_kernel(length))
+        kernel: Tensor = self._keep(length, lambda: self(length))
         return kernel
 
     def recurrence(self) -> Recurrence:
@@ -142,7 +142,8 @@ class StateSpace(nn.Module):
         block: Block = self._keep("block", lambda: block_of(self.recurrence()))
         return block
 
-    def _made_kernel(self, length: int) -> Tensor:
+    def forward(self, length: int) -> Tensor:
+        """Work out the kernel anew: `kernel` without what is kept."""
         if self.kernel_name == "legs":
             kernel = legs_kernel(self.outputs, self.dt(), length, self.matrix())
         else:
@@ -159,8 +160,12 @@ class StateSpace(nn.Module):
         ones = torch.ones_like(outputs)
         return diagonal_recurrence(self.poles(), ones, outputs, self.dt(), self.skip)
 
+    def learning(self) -> bool:
+        """Whether the parameters may be about to change, so that nothing is kept."""
+        return self.training or torch.is_grad_enabled()
+
     def _keep(self, key: int | str, make: Callable[[], Any]) -> Any:
-        if self.training or torch.is_grad_enabled():
+        if self.learning():
             return make()
         # Parameters count what is done to them in place; all else that can change them goes
         # through the methods below.
@@ -200,6 +205,23 @@ def _per_channel(values: Tensor, channels: int) -> nn.Parameter:
     return nn.Parameter(values.float().expand(channels, *values.shape).clone())
 
 
+def joint_kernels(spaces: Sequence[StateSpace], length: int) -> Sequence[Tensor]:
+    """Kernels of spaces that are alike, each (H, length).
+
+    While learning they are worked out as one space with the channels of all: a kernel is some
+    hundred small operations, and most of a small operation is calling it.
+    """
+    first = spaces[0]
+    if not first.learning():
+        return [space.kernel(length) for space in spaces]
+    joined = {
+        name: torch.cat([getattr(space, name) for space in spaces])
+        for name, _ in first.named_parameters()
+    }
+    kernels: Tensor = torch.func.functional_call(first, joined, (length,))
+    return kernels.chunk(len(spaces))
+
+
 class S4Layer(nn.Module):
     """Residual S4 layer x + mix(gelu(k ∗ norm(x) + D norm(x))), one state space per channel.
 
@@ -232,12 +254,17 @@ class S4Layer(nn.Module):
 
     def ssm_parameters(self) -> Iterator[nn.Parameter]:
         """Parameters that get no weight decay and a lower learning rate of their own."""
-        for part in (self.past, self.future):
-            if part is not None:
-                yield from part.ssm_parameters()
+        for space in self.spaces():
+            yield from space.ssm_parameters()
 
-    def forward(self, x: Tensor) -> Tensor:
+    def spaces(self) -> list[StateSpace]:
+        """State spaces: of the past, and if `bidirectional` of the future."""
+        return [self.past] if self.future is None else [self.past, self.future]
+
+    def forward(self, x: Tensor, kernels: Sequence[Tensor] | None = None) -> Tensor:
         """Apply the layer to whole sequences by convolution, (B, L, H) → (B, L, H).
+
+        ``kernels`` are those of `spaces`, where a stack has worked them out for all its layers.
 
         Channels come first in memory, as convolution and mixing need them: the result is a view
         of an (H, B, L) array, and a stack of layers copies nothing.
@@ -245,14 +272,15 @@ class S4Layer(nn.Module):
         if torch.is_autocast_enabled(x.device.type):
             # Half precision would cost the kernel its tail and save little: products are small.
             with torch.autocast(x.device.type, enabled=False):
-                return self(x.to(self.mixing.weight.dtype))
+                return self(x.to(self.mixing.weight.dtype), kernels)
         batch, length, channels = x.shape
+        if kernels is None:
+            kernels = joint_kernels(self.spaces(), length)
         signal = x.permute(2, 0, 1).contiguous()  # (H, B, L)
-        normed = normalise(signal)
-        mixed = causal_convolution(normed, self.past.kernel(length))
+        normed, signal = normalise(signal)
+        mixed = causal_convolution(normed, kernels[0])
         if self.future is not None:
-            ahead = causal_convolution(normed.flip(-1), self.future.kernel(length))
-            mixed = mixed + ahead.flip(-1)
+            mixed = mixed + causal_convolution(normed.flip(-1), kernels[1]).flip(-1)
         share = None
         if self.training and self.dropout > 0.0:
             share = functional.dropout(mixed.new_ones(channels, batch, 1), self.dropout)
@@ -273,7 +301,7 @@ class S4Layer(nn.Module):
         """Advance by any number of frames (B, l, H), as so many steps would."""
         signal = x.permute(2, 0, 1).contiguous()
         length = signal.shape[-1]
-        normed = normalise(signal).double()
+        normed = normalise(signal)[0].double()
         recurrence = self._live().recurrence()
         whole = length - length % BLOCK
         parts = []
@@ -318,8 +346,10 @@ class S4Stack(nn.Module):
     def forward(self, values: Tensor) -> Tensor:
         """Process whole sequences (B, L, …) by convolution."""
         hidden = self.lift(values)
-        for layer in self.layers:
-            hidden = layer(hidden)
+        spaces = [layer.spaces() for layer in self.layers]
+        kernels = iter(joint_kernels([space for each in spaces for space in each], hidden.shape[1]))
+        for layer, each in zip(self.layers, spaces, strict=True):
+            hidden = layer(hidden, [next(kernels) for _ in each])
         return self.head(hidden)
 
     def chunk(self, values: Tensor, state: list[State]) -> tuple[Tensor, list[State]]:

@@ -13,7 +13,8 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from sd2core.denoise.s4_kernel import StateMatrix, held_exponential
+from sd2core.denoise.s4_functions import held_exponential
+from sd2core.denoise.s4_kernel import StateMatrix
 
 BLOCK = 64
 

@@ -41,6 +41,23 @@ def test_derivatives_of_the_convolution(way: Way, length: int) -> None:
     assert torch.autograd.gradcheck(way, (signal.requires_grad_(), kernel.requires_grad_()))
 
 
+@pytest.mark.parametrize("way", [by_product, by_transform])
+@pytest.mark.parametrize("length", [1, 2, 72, 143, 1000])
+def test_derivatives_are_those_of_a_plain_convolution(way: Way, length: int) -> None:
+    signal, kernel = random(3, 4, length).requires_grad_(), random(3, length, seed=2)
+    kernel.requires_grad_()
+    gradient = random(3, 4, length, seed=3)
+    padded = torch.nn.functional.pad(signal.transpose(0, 1), (length - 1, 0))
+    plain = torch.nn.functional.conv1d(padded, kernel.flip(1)[:, None], groups=3).transpose(0, 1)
+    found = way(signal, kernel)
+    torch.testing.assert_close(found, plain)
+    wanted = torch.autograd.grad(plain, (signal, kernel), gradient)
+    for one, true in zip(
+        torch.autograd.grad(found, (signal, kernel), gradient), wanted, strict=True
+    ):
+        torch.testing.assert_close(one, true, rtol=1e-10, atol=1e-10)
+
+
 def test_an_error_in_one_channel_stays_there() -> None:
     # Rows of neighbouring channels touch in memory where diagonals are summed.
     signal, kernel = random(3, 16, 5), random(3, 5, seed=2).requires_grad_()
@@ -54,7 +71,9 @@ def test_norm_is_that_of_layer_norm() -> None:
     signal = random(6, 4, 5).requires_grad_()
     last = signal.permute(1, 2, 0)
     true = torch.nn.functional.layer_norm(last, (6,)).permute(2, 0, 1)
-    torch.testing.assert_close(normalise(signal), true)
+    normed, passed = normalise(signal)
+    torch.testing.assert_close(normed, true)
+    assert torch.equal(passed, signal)
     assert torch.autograd.gradcheck(normalise, (signal,))
 
 

@@ -9,9 +9,16 @@ import pytest
 import torch
 from torch import Tensor
 
+from sd2core.denoise.causal_models import S4Denoiser
 from sd2core.denoise.s4_functions import causal_convolution
 from sd2core.denoise.s4_kernel import legs_kernel
-from sd2core.denoise.s4_layer import SLOWEST_DECAY, Kernel, S4Layer, StateSpace
+from sd2core.denoise.s4_layer import (
+    SLOWEST_DECAY,
+    Kernel,
+    S4Layer,
+    StateSpace,
+    joint_kernels,
+)
 from sd2core.errors import Sd2Error
 
 KERNELS = ("legs", "diagonal")
@@ -192,6 +199,34 @@ def test_derivatives_of_the_layer(kernel: str, bidirectional: bool) -> None:
     assert torch.autograd.gradcheck(made, (x, *values))
 
 
+@pytest.mark.parametrize("kernel", KERNELS)
+def test_kernels_worked_out_together_are_those_of_each(kernel: Kernel) -> None:
+    spaces = [StateSpace(3, 16, kernel) for _ in range(4)]
+    gradients = torch.randn(4, 3, 40)
+    apart = [space.kernel(40) for space in spaces]
+    with torch.autocast("cpu", dtype=torch.bfloat16):
+        together = joint_kernels(spaces, 40)
+    for true, found, gradient, space in zip(apart, together, gradients, spaces, strict=True):
+        assert largest(found - true) <= 1e-6 * largest(true)
+        wanted = torch.autograd.grad(true, list(space.parameters()), gradient)
+        given = torch.autograd.grad(found, list(space.parameters()), gradient, retain_graph=True)
+        for one, other in zip(given, wanted, strict=True):
+            assert largest(one - other) <= 1e-6 * largest(other)
+
+
+@pytest.mark.parametrize("bidirectional", [False, True])
+def test_a_stack_is_its_layers_one_after_another(bidirectional: bool) -> None:
+    stack = S4Denoiser(3, channels=6, depth=3, state_size=8, bidirectional=bidirectional)
+    x = torch.randn(17, 30, 3)
+    hidden = stack.lift(x)
+    for layer in stack.layers:
+        hidden = layer(hidden)
+    true = stack.head(hidden)
+    assert largest(stack(x) - true) <= 1e-6 * largest(true)
+    with torch.no_grad():
+        assert largest(stack.eval()(x) - true) <= 1e-6 * largest(true)
+
+
 def test_mixed_precision_leaves_the_layer_in_single() -> None:
     layer, x = layer_of("legs"), torch.randn(20, 30, 6)
     true = layer(x)
@@ -237,13 +272,13 @@ class TestKept:
     @pytest.fixture
     def made(self, monkeypatch: pytest.MonkeyPatch) -> list[int]:
         lengths: list[int] = []
-        true = StateSpace._made_kernel
+        true = StateSpace.forward
 
         def counted(self: StateSpace, length: int) -> Tensor:
             lengths.append(length)
             return true(self, length)
 
-        monkeypatch.setattr(StateSpace, "_made_kernel", counted)
+        monkeypatch.setattr(StateSpace, "forward", counted)
         return lengths
 
     def test_made_once(self, made: list[int]) -> None:

@@ -9,6 +9,7 @@ from dense_kernels import dense_diagonal_kernel, dense_legs_kernel, hippo_legs
 from numpy.typing import NDArray
 from torch import Tensor
 
+from sd2core.denoise.s4_functions import held_exponential
 from sd2core.denoise.s4_kernel import (
     StateMatrix,
     diagonal_kernel,
@@ -180,6 +181,15 @@ def test_derivatives_of_the_diagonal_kernel(length: int) -> None:
     dt = torch.tensor([0.03, 1.3], dtype=torch.float64)
     inputs = [values.clone().requires_grad_() for values in (A, B, C, dt)]
     assert torch.autograd.gradcheck(lambda *given: diagonal_kernel(*given, length), inputs)
+
+
+@pytest.mark.parametrize("size", [0.0099, 0.0101, 1.0])  # by series, by quotient
+def test_the_held_exponential_has_its_derivative(size: float) -> None:
+    x = size * torch.exp(1j * torch.linspace(0, 2 * torch.pi, 9, dtype=torch.float64))
+    (found,) = torch.autograd.grad(held_exponential(x.requires_grad_())[1], x, torch.ones_like(x))
+    wide = x.detach().numpy().astype(np.clongdouble)
+    true = ((wide - 1) * np.exp(wide) + 1) / wide**2
+    np.testing.assert_allclose(found.resolve_conj().numpy().conj(), true, rtol=1e-11)
 
 
 def test_a_pole_that_forgets_at_once_has_derivatives() -> None:
