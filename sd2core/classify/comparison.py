@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -60,6 +60,8 @@ class TableOptions:
     )
     training: TrainOptions = field(default_factory=TrainOptions)
     """Equal for all; its network and its seed are ignored."""
+    same_people: bool = False
+    """Whether other movements of the people trained on are judged, instead of other people's."""
 
     def __post_init__(self) -> None:
         if self.seeds < 1:
@@ -124,7 +126,7 @@ class Table:
     kind: str  # "simulated" or "real": the radar
     options: TableOptions
     runs: tuple[Run, ...]
-    by_movement: bool  # True with one subject only: nothing is said about other people
+    by_movement: bool  # True with one subject or the same people: nothing is said about others
 
     def of(self, condition: Condition) -> tuple[Run, ...]:
         """Return the runs of one condition, by seed."""
@@ -160,25 +162,27 @@ def make_table(
     options: TableOptions,
     denoiser: TrainedDenoiser | None = None,
     progress: Progress = silent,
+    conditions: Sequence[Condition] = (),
 ) -> Table:
     """Train the missing runs and read the others from ``folder``, one small file per run.
 
     Files of other data or settings are ignored. ``known`` holds the radar's and the
-    synthetic maps; progress counts runs.
+    synthetic maps; progress counts runs. The conditions are those of :func:`conditions_of` by
+    default.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    conditions = conditions_of(known, options, denoiser is not None)
+    conditions = conditions or conditions_of(known, options, denoiser is not None)
     wanted = [(one, seed) for seed in range(options.seeds) for one in conditions]
     data = digest(known)
     denoise = _denoising(known, denoiser)
     runs: list[Run] = []
-    by_movement = len(known.subjects) < 2
+    by_movement = options.same_people or len(known.subjects) < 2
     for done, (condition, seed) in enumerate(wanted):
         progress(done, len(wanted))
         path = folder / f"{_key(data, denoiser, condition, seed, options)}.json"
         run = _read(path)
         if run is None:
-            run = run_one(known, condition, seed, options.training, denoise)
+            run = run_one(known, condition, seed, options, denoise)
             atomic_write_text(path, json.dumps(run.to_json()) + "\n")
         runs.append(run)
     progress(len(wanted), len(wanted))
@@ -193,11 +197,11 @@ def make_table(
 
 
 def run_one(
-    known: ClipSet, condition: Condition, seed: int, training: TrainOptions, denoise: Denoise
+    known: ClipSet, condition: Condition, seed: int, table: TableOptions, denoise: Denoise
 ) -> Run:
     """Train once and score the result."""
-    chosen = choose(known, condition, seed, denoise)
-    options = condition.network.of(training, seed)
+    chosen = choose(known, condition, seed, denoise, same_people=table.same_people)
+    options = condition.network.of(table.training, seed)
     begun_s = time.process_time()
     made = train([*chosen.real, *chosen.added], chosen.validation, known, options)
     if made.interrupted:
@@ -265,6 +269,7 @@ def _key(
         model = sums.hexdigest()
     training = condition.network.of(options.training, seed)
     told = [VERSION, data, model, asdict(condition), seed, training.to_json()]
+    told += ["same people"] if options.same_people else []
     return hashlib.blake2b(json.dumps(told).encode(), digest_size=12).hexdigest()
 
 

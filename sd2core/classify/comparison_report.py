@@ -155,7 +155,8 @@ def moved_recall(run: Run) -> float:
 def _lines(table: Table, lines_of: Callable[[Rows], list[str]]) -> list[str]:
     subjects = dict.fromkeys(name for run in table.runs for name in run.subjects)
     who = (
-        "one person; movements are kept apart, which says nothing about other people"
+        f"{'the same people' if table.options.same_people else 'one person'}; movements are kept"
+        " apart, which says nothing about other people"
         if table.by_movement
         else f"people not trained on: {', '.join(subjects)}"
     )

@@ -103,13 +103,15 @@ class Chosen:
     by_movement: bool  # see sd2core.classify.splitting.Parts
 
 
-def choose(known: ClipSet, condition: Condition, seed: int, denoise: Denoise) -> Chosen:
+def choose(
+    known: ClipSet, condition: Condition, seed: int, denoise: Denoise, *, same_people: bool = False
+) -> Chosen:
     """Choose the clips of one run, reproducibly; a larger share includes a smaller one.
 
     ``known`` holds the radar's and the synthetic maps of the same movements. The seed
-    determines the test subjects as well.
+    determines the test subjects as well, or with ``same_people`` the test movements.
     """
-    parts = fold(known, seed)
+    parts = fold(known, seed, same_people=same_people)
     real_pool, added_pool = _pools(known, parts, seed)
     first = seen_first(known.clips)
     seen = [clip for clip in parts.training if clip.kind in RADAR and first(clip)]

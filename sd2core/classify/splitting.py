@@ -27,8 +27,8 @@ class Parts:
     validation: tuple[Clip, ...]
     test: tuple[Clip, ...]
     by_movement: bool
-    """True with one subject: movements are kept apart, not people, and the score says nothing
-    about other people."""
+    """True with one subject or the same people: movements are kept apart, not people, and the
+    score says nothing about other people."""
 
     def to_json(self) -> dict[str, Any]:
         """Return the subjects of each part."""
@@ -65,14 +65,21 @@ def split_clips(
     return Parts(**parts, by_movement=split.by_take)
 
 
-def fold(known: ClipSet, number: int) -> Parts:
+def fold(known: ClipSet, number: int, *, same_people: bool = False) -> Parts:
     """Split for one fold of a cross-validation, so that everyone is tested in turn.
 
     With three subjects or more the list of subjects is turned by ``number``, and split as
     by default. With two, one is learnt from and one judged. With one, every class gives
     half of its movements to the test, in the next fold the others: halves that every pair
-    of folds draws anew.
+    of folds draws anew. With ``same_people`` every class gives a sixth of its movements to
+    validation and as many to the test, as six people would, drawn anew by every fold.
     """
+    if same_people:
+        drawn = _shuffled(known.clips, number)
+        rest, test = _apart(known.clips, _kept_movements(known, drawn, 0, share=1 / 6))
+        kept = {clip.key for clip in rest}
+        drawn = [clip for clip in drawn if clip.key in kept]
+        return Parts(*_apart(rest, _kept_movements(known, drawn, 0, share=1 / 5)), test, True)
     subjects = list(known.subjects)
     turned = number % len(subjects)
     subjects = [*subjects[turned:], *subjects[:turned]]
@@ -83,8 +90,7 @@ def fold(known: ClipSet, number: int) -> Parts:
         )
     if len(subjects) > 1:
         return Parts(known.of(subjects[:1]), (), known.of(subjects[1:]), False)
-    order = np.random.default_rng(number // 2).permutation(len(known.clips))
-    drawn = [known.clips[at] for at in order]
+    drawn = _shuffled(known.clips, number // 2)
     training, test = _apart(known.clips, _kept_movements(known, drawn, number % 2, share=0.5))
     return Parts(training, (), test, True)
 
@@ -92,6 +98,10 @@ def fold(known: ClipSet, number: int) -> Parts:
 def movements(clips: Sequence[Clip]) -> list[Movement]:
     """Return the movements of clips, each once, in order."""
     return list(dict.fromkeys(clip.key for clip in clips))
+
+
+def _shuffled(clips: Sequence[Clip], seed: int) -> list[Clip]:
+    return [clips[at] for at in np.random.default_rng(seed).permutation(len(clips))]
 
 
 def _apart(clips: Sequence[Clip], kept: set[Movement]) -> tuple[tuple[Clip, ...], tuple[Clip, ...]]:

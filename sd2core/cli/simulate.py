@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from sd2core.mesh.sequence import MeshSequence
     from sd2core.radar_config import RadarConfig
     from sd2core.sensor import VirtualSensor
+    from sd2core.simulate.campaign.protocol import Protocol
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
@@ -267,16 +268,20 @@ def _add_campaign(kinds: argparse._SubParsersAction) -> None:
         "make pairs of synthetic Doppler and simulated radar to train a denoiser on",
         handler=_campaign,
         description=(
-            "People of random shape swipe to the right, left, down and up in random order,\n"
-            "rest, and do other things. Of every take there is the Doppler map that a simulated\n"
-            "radar shows of the true motion, and the synthetic one of a body that errs as fits\n"
-            "of videos err. Stopped and started again it goes on where it was, and a longer\n"
-            "campaign goes on with a shorter one; the same seed makes the same takes."
+            "People of random shape swipe to the right, left, down and up. Varied, they stand\n"
+            "anywhere, turned a little, swipe in random order, rest, and do other things. As in\n"
+            "the paper, they face a radar and a camera 2.2 m ahead, and swipe to and fro in one\n"
+            "take, up and down in another, and rest in a third. Of every take there is the\n"
+            "Doppler map that a simulated radar shows of the true motion, and the synthetic one\n"
+            "of a body that errs as fits of videos err. Stopped and started again it goes on\n"
+            "where it was, and a longer campaign goes on with a shorter one; the same seed makes\n"
+            "the same takes."
         ),
         examples=(
             "  sd2 simulate campaign campaign.zarr\n"
             "  sd2 simulate campaign small.zarr --subjects 3 --minutes 5 --seed 1\n"
-            "  sd2 simulate campaign ranges.zarr --placements 3"
+            "  sd2 simulate campaign ranges.zarr --placements 3\n"
+            "  sd2 simulate campaign as-in-the-paper.zarr --protocol paper"
         ),
     )
     parser.add_argument("out", type=Path, metavar="OUT", help="folder of the pairs")
@@ -293,6 +298,17 @@ def _add_campaign(kinds: argparse._SubParsersAction) -> None:
         default=90.0,
         metavar="M",
         help="minutes of all people together (default: 90)",
+    )
+    parser.add_argument(
+        "--protocol",
+        choices=("paper", "varied"),
+        default="varied",
+        help="what varies from take to take (default: varied)",
+    )
+    parser.add_argument(
+        "--order",
+        choices=("to-and-fro", "random"),
+        help="of the paper's swipes: one kind in a take, or all four (default: to-and-fro)",
     )
     parser.add_argument(
         "--seed", type=_seed, default=0, metavar="S", help="seed of all random numbers (default: 0)"
@@ -335,12 +351,32 @@ def _seed(text: str) -> int:
     return int(text)
 
 
+def _protocol(options: argparse.Namespace) -> Protocol:
+    from sd2core.simulate.campaign.protocol import PAPER, VARIED
+
+    if options.protocol == "paper":
+        return replace(PAPER, order=options.order or PAPER.order)
+    if options.order == PAPER.order:
+        raise Sd2Error(
+            "--order to-and-fro with the protocol varied, whose order is random",
+            "another order or protocol",
+            "Add --protocol paper",
+        )
+    return VARIED
+
+
 def _campaign(options: argparse.Namespace) -> None:
     from sd2core.pairs.store import read_pairs
     from sd2core.simulate.campaign.making import make_campaign
     from sd2core.simulate.campaign.takes import Campaign
 
-    campaign = Campaign(options.seed, options.take_seconds, options.placements, limbs=options.limbs)
+    campaign = Campaign(
+        options.seed,
+        options.take_seconds,
+        options.placements,
+        limbs=options.limbs,
+        protocol=_protocol(options),
+    )
     with progress_bar("Simulating", unit="take") as progress:
         made = make_campaign(
             options.out,
@@ -358,6 +394,7 @@ def _campaign(options: argparse.Namespace) -> None:
             {
                 "path": str(options.out),
                 "simulated": True,
+                "protocol": campaign.protocol.name,
                 "subjects": list(pairs.subjects),
                 "takes": len(pairs.takes),
                 "made": made,

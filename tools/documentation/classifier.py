@@ -7,7 +7,8 @@
 Without ``--campaign`` one is made: six people, 36 minutes, three places of the sensor, of
 another seed than the bundled denoiser's, so of other people. ``--large`` is the denoiser's
 (``make denoiser`` leaves it in ``build/denoiser``); only its radar is used. What was trained
-before is not trained again: the folder ``--out`` keeps every run.
+before is not trained again: the folder ``--out`` keeps every run. ``--protocols-only`` measures
+the section on the paper's experiment alone, and puts it into the page that is there.
 """
 
 from __future__ import annotations
@@ -20,11 +21,13 @@ import sys
 from pathlib import Path
 
 from sd2core.accuracy.cache import this_machine
+from tools.documentation.classifier_protocols import HEADING, protocols_section
 from tools.documentation.places import DOCS, IMAGES
 from tools.documentation.runs import campaign_of, sd2
 
 SEED = 2
 SAMPLE = "resources/swipes.sd2"
+PAGE = DOCS / "classifier.md"
 
 HEAD = """\
 # The gesture classifier
@@ -67,8 +70,9 @@ LARGE = """\
 that the bundled denoiser learnt from; here only its simulated radar is used: `{command}`.
 
 """
-REAL = """\
-## On real radar
+REAL_HEADING = "## On real radar"
+REAL = f"""\
+{REAL_HEADING}
 
 Trained on recordings of a real radar and evaluated on others:
 [real-gestures.md](real-gestures.md).
@@ -86,6 +90,15 @@ Its simulated radar has noise in every cell, which a campaign's targets do not h
 def main() -> None:
     """Measure and write."""
     options = _options()
+    page = PAGE.read_text("utf-8") if options.protocols_only else _page(options)
+    section = protocols_section(options.out / "protocols", options.protocol_minutes, options.seeds)
+    before, _, after = page.partition(REAL_HEADING)
+    before = before.partition(HEADING)[0]
+    PAGE.write_text(f"{before}{section}{REAL_HEADING}{after.rstrip()}\n", "utf-8")
+
+
+def _page(options: argparse.Namespace) -> str:
+    """All but the paper's experiment."""
     folder: Path = options.out
     campaign = options.campaign
     made = f"sd2 simulate campaign gestures.zarr --subjects 6 --minutes {options.minutes:g}"
@@ -106,7 +119,7 @@ def main() -> None:
     page.append(_large(options, folder))
     page.append(REAL)
     page.append(_sample(campaign, folder))
-    (DOCS / "classifier.md").write_text("".join(page).rstrip() + "\n", "utf-8")
+    return "".join(page)
 
 
 def _options() -> argparse.Namespace:
@@ -116,6 +129,10 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--large", type=Path, help="the denoiser's campaign, where it is there")
     parser.add_argument(
         "--large-minutes", type=float, default=168.0, help="of that one (default: 168)"
+    )
+    parser.add_argument("--protocols-only", action="store_true", help="the paper's experiment")
+    parser.add_argument(
+        "--protocol-minutes", type=float, default=36.0, help="of its campaigns (default: 36)"
     )
     parser.add_argument("--seeds", type=int, default=5, help="default: 5")
     parser.add_argument("--shares", help="of the real data, as `sd2 classify table` has them")

@@ -71,10 +71,12 @@ def describe_pairs(path: Path, pairs: PairSet) -> Description:
         "bins": pairs.axis.bins,
         "v_max_mps": pairs.axis.v_max_mps,
         "null_bins": list(pairs.null_bins),
+        "protocol": _protocol_in_words(pairs),
         "provenance": pairs.provenance,
     }
     facts = {
         "targets": "a simulated radar" if pairs.kind == "simulated" else "a real radar",
+        "protocol": _protocol_in_words(pairs),
         "takes": f"{len(pairs.takes)} of {pairs.frames} frames, {pairs.frame_rate_hz:g} frames/s",
         "subjects": ", ".join(f"{name} {value:.1f} min" for name, value in minutes.items()),
         "labels": ", ".join(
@@ -85,3 +87,10 @@ def describe_pairs(path: Path, pairs: PairSet) -> Description:
         "nulled bins": bins_in_words(pairs.axis, pairs.null_bins),
     }
     return Description(f"Pairs {path}", data, facts)
+
+
+def _protocol_in_words(pairs: PairSet) -> str:
+    if pairs.provenance.get("made_by") != "sd2 simulate campaign":
+        return ""
+    protocol = pairs.provenance.get("protocol", {"name": "varied", "order": "random"})
+    return f"{protocol['name']}, swipes {protocol['order'].replace('random', 'in random order')}"

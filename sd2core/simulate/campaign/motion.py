@@ -4,11 +4,13 @@ Gestures are strokes of an arm between two sides of the body, or between above a
 as in :mod:`~sd2core.simulate.limbs`, but none like another: poses, speed, path, evenness
 of speed, hand and pauses are drawn for each. Between them hands rest, sink, or do
 something else. Other takes hold no gesture at all: people stand and move their arms
-and trunk at random, or step to and fro.
+and trunk at random, or step to and fro. Other protocols leave these other movements out,
+and have one hand swipe to and fro through a take.
 """
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import astuple, dataclass
 from typing import Literal, NamedTuple
 
@@ -17,6 +19,7 @@ from numpy.typing import NDArray
 
 from sd2core.body.model import Skeleton
 from sd2core.body.rotations import Floats, about, applied, product
+from sd2core.simulate.campaign.protocol import VARIED, Protocol
 from sd2core.simulate.campaign.scene import Subject
 from sd2core.simulate.gait import Path, gait
 from sd2core.simulate.limbs import (
@@ -37,9 +40,13 @@ from sd2core.simulate.people.walking import Mode
 LABELS = ("background", "left-to-right", "right-to-left", "up-to-down", "down-to-up")
 """Directions as the camera sees them; its left is the body's right."""
 
-Kind = Literal["gestures", "moving", "pacing"]
+Kind = Literal["gestures", "moving", "pacing", "resting"]
 KINDS: dict[Kind, float] = {"gestures": 0.74, "moving": 0.18, "pacing": 0.08}
 """Contents of a take, each with its probability."""
+_IN_TURN: tuple[Kind, ...] = ("gestures", "gestures", "resting")
+"""Contents of takes without other movements, so that classes have equally many."""
+_TO_AND_FRO = ((1, 2), (3, 4))
+"""Labels of the two kinds of swipes, in turn."""
 
 # Written for the right arm of the bundled body; see ArmPose.
 _ENDS: dict[str, tuple[ArmPose, ArmPose]] = {
@@ -101,22 +108,26 @@ def perform(
     base: Skeleton,
     times_s: Floats,
     kind: Kind | None = None,
+    *,
+    protocol: Protocol = VARIED,
+    number: int = 0,
 ) -> Performance:
     """Motion of one person in one take, on the floor's origin, facing -z.
 
     ``skeleton`` is the person's, ``base`` that of the bundled body. The times are multiples of
-    1/240 s. The kind is drawn where it is not given.
+    1/240 s. The kind, where it is not given, is drawn, or without other movements follows from the
+    take's ``number``, as does the one kind of swipe of a take to and fro.
     """
     drawn: Kind = rng.choice(list(KINDS), p=list(KINDS.values()))
-    kind = kind or drawn
+    kind = kind or (drawn if protocol.others else _IN_TURN[number % len(_IN_TURN)])
     label = np.zeros(len(times_s), np.int8)
     scale = arm_length_m(skeleton) / arm_length_m(base)
-    if kind == "moving":
-        motion = _moving(rng, subject, skeleton, times_s)
+    if kind in ("moving", "resting"):
+        motion = _moving(rng, subject, skeleton, times_s, rests=kind == "resting")
     elif kind == "pacing":
         motion = gait(skeleton, times_s, _to_and_fro(rng, float(times_s[-1])), scale)
     else:
-        arms = plan_arms(rng, subject, float(times_s[-1]))
+        arms = plan_arms(rng, subject, float(times_s[-1]), protocol, number)
         motion = _gesturing(rng, subject, skeleton, times_s, arms, scale)
         for move in (*arms["L"], *arms["R"]):
             if move.label:
@@ -125,9 +136,16 @@ def perform(
 
 
 def plan_arms(
-    rng: np.random.Generator, subject: Subject, duration_s: float
+    rng: np.random.Generator,
+    subject: Subject,
+    duration_s: float,
+    protocol: Protocol = VARIED,
+    number: int = 0,
 ) -> dict[str, list[Move]]:
     """Moves of both arms until there is no time for another; one arm moves at a time."""
+    to_and_fro = protocol.order == "to-and-fro"
+    swipe = _SWIPE if protocol.others else _SWIPE + _ELSE
+    alternating = itertools.cycle(_TO_AND_FRO[number % len(_IN_TURN) % len(_TO_AND_FRO)])
     arms: dict[str, list[Move]] = {"L": [], "R": []}
     at: dict[str, Floats] = {"L": _HANGS, "R": _HANGS}
     now_s = float(rng.uniform(0.1, 1.0))
@@ -142,11 +160,11 @@ def plan_arms(
 
     while now_s < duration_s - 1.0:
         hand = subject.hand
-        if rng.random() < subject.other_hand:
+        if rng.random() < subject.other_hand and not to_and_fro:
             hand = "L" if hand == "R" else "R"
         drawn = rng.random()
-        if drawn < _SWIPE:
-            label = int(rng.integers(1, len(LABELS)))
+        if drawn < swipe:
+            label = next(alternating) if to_and_fro else int(rng.integers(1, len(LABELS)))
             start, end = _stroke(rng, subject, hand, label)
             if np.abs(at[hand] - start)[:2].max() > 25.0:
                 move(hand, start, _length_s(rng, _MOVES_S, subject))
@@ -244,10 +262,10 @@ def about_the_floor(skeleton: Skeleton, turns: Floats) -> Floats:
 
 
 def _moving(
-    rng: np.random.Generator, subject: Subject, skeleton: Skeleton, times_s: Floats
+    rng: np.random.Generator, subject: Subject, skeleton: Skeleton, times_s: Floats, *, rests: bool
 ) -> Motion:
     legs: Mode = "shift" if rng.random() < 0.4 else "stand"
-    if rng.random() < 0.25:
+    if rng.random() < 0.25 or rests:
         deed = _SMALL
     else:
         one, other = (STYLES[name] for name in rng.choice(_ARMS, 2))

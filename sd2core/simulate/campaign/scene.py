@@ -12,11 +12,16 @@ from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.fmcw.options import Reflector
 from sd2core.radar_config import RadarConfig
 from sd2core.sensor import Vector, VirtualSensor, aimed_at, position_from_spherical
+from sd2core.simulate.campaign.protocol import VARIED, Protocol
 
 RANGES_M = (1.5, 4.0)
 """Distances of the person from the camera, and of the chest from the other sensors."""
 
+FIXED_M = 2.2
+"""Distance of the person from camera and sensor where places do not vary."""
+
 _CAMERA_M = (0.8, 1.6)
+_FIXED_CAMERA_M = 1.2
 _BESIDE_M = 0.25
 _HEADING_DEG = (12.0, 30.0)  # spread, most
 _AZIMUTH_DEG, _ELEVATION_DEG = 45.0, (-10.0, 25.0)
@@ -88,7 +93,11 @@ class Setting:
 
 
 def random_setting(
-    rng: np.random.Generator, stature_m: float, placements: int, config: RadarConfig
+    rng: np.random.Generator,
+    stature_m: float,
+    placements: int,
+    config: RadarConfig,
+    protocol: Protocol = VARIED,
 ) -> Setting:
     """A setting; the first sensor does not depend on how many there are."""
     distance_m = float(rng.uniform(RANGES_M[0] + _BESIDE_M, RANGES_M[1]))
@@ -96,6 +105,10 @@ def random_setting(
     across_m = float(rng.uniform(-0.1, 0.1)) * distance_m
     heading = float(np.clip(rng.normal(0.0, _HEADING_DEG[0]), -_HEADING_DEG[1], _HEADING_DEG[1]))
     x, y = rng.uniform(-_BESIDE_M, _BESIDE_M, 2)
+    if not protocol.place:
+        distance_m, camera_m, across_m, x, y = FIXED_M, _FIXED_CAMERA_M, 0.0, 0.0, 0.0
+    if not protocol.heading:
+        heading = 0.0
     chest = (across_m, camera_m - _CHEST * stature_m, distance_m)
     reflectors = tuple(
         _reflector(rng, distance_m, camera_m, config) for _ in range(rng.integers(*_REFLECTORS))

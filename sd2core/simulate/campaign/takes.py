@@ -20,6 +20,7 @@ from sd2core.pairs.store import Take
 from sd2core.radar_config import PAPER_RADAR, RadarConfig
 from sd2core.simulate.campaign.fit_errors import FitErrors
 from sd2core.simulate.campaign.motion import perform
+from sd2core.simulate.campaign.protocol import VARIED, Protocol
 from sd2core.simulate.campaign.radar import TargetOptions, radar_target
 from sd2core.simulate.campaign.scene import random_setting, random_subject
 from sd2core.timebase import Timebase
@@ -46,6 +47,7 @@ class Campaign:
     radar: RadarConfig = PAPER_RADAR
     target: TargetOptions = field(default_factory=TargetOptions)
     limbs: bool = False  # The input is also split by the parts of the body.
+    protocol: Protocol = VARIED
 
     def __post_init__(self) -> None:
         if self.seed < 0:
@@ -71,6 +73,7 @@ class Campaign:
             "target": asdict(self.target),
             "surfaces": {"synthetic": FITTED, "radar": TRUE},
             "synthesis": asdict(OPTIONS),
+            **self.protocol.provenance(),
         }
 
 
@@ -110,9 +113,21 @@ class TakeMaker:
         subject = random_subject(self._space, campaign.seed, subject_number)
         skeleton = self._space.skeleton(subject.shape)
         times_s = campaign.radar.frame_repetition_s * np.arange(campaign.frames, dtype=np.float64)
-        performed = perform(rngs[_MOTION], subject, skeleton, self._space.base_skeleton, times_s)
+        performed = perform(
+            rngs[_MOTION],
+            subject,
+            skeleton,
+            self._space.base_skeleton,
+            times_s,
+            protocol=campaign.protocol,
+            number=number,
+        )
         setting = random_setting(
-            rngs[_SETTING], subject.shape.stature_m, campaign.placements, campaign.radar
+            rngs[_SETTING],
+            subject.shape.stature_m,
+            campaign.placements,
+            campaign.radar,
+            campaign.protocol,
         )
         transforms = setting.place(skeleton.transforms(*performed.motion))
         true = self._mesh(TRUE, subject.shape, transforms, times_s)

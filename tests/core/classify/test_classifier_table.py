@@ -39,6 +39,7 @@ OPTIONS = TableOptions(
     training=TrainOptions(steps=2, batch=4, check_steps=2),
 )
 ONCE = replace(OPTIONS, seeds=1, shares=(1.0,))
+ONE = Condition(network=SMALL)
 
 
 def halved(clip):
@@ -68,6 +69,22 @@ def test_what_is_judged_was_never_learnt_from(
     wanted = {"radar": "simulated", "nothing": None}.get(added, added)
     assert {clip.kind for clip in chosen.added} == ({wanted} if wanted else set())
     assert {clip.placement for clip in chosen.added} <= ({0, 1} if moved else {0})
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_other_movements_of_the_same_people_are_judged(seed: int) -> None:
+    known = clip_set(4, 9, kinds=BOTH, one_class=True)
+    chosen = choose(known, Condition(added="synthetic"), seed, halved, same_people=True)
+    parts = [chosen.real, chosen.added, chosen.validation, chosen.test]
+    keys = [set(movements(clips)) for clips in parts]
+    assert len(set().union(*keys)) == sum(map(len, keys)) == 4 * 9
+    assert chosen.by_movement
+    # Of every class two of twelve movements are judged, of anybody who is learnt from.
+    assert sorted(clip.label[0] for clip in chosen.test) == [0, 0, 1, 1, 2, 2]
+    learnt = {clip.subject for clip in (*chosen.real, *chosen.added)}
+    assert {clip.subject for clip in chosen.test} <= learnt
+    other = choose(known, Condition(), seed + 1, halved, same_people=True)
+    assert {clip.key for clip in other.test} != keys[3]
 
 
 def test_how_much_is_learnt_from() -> None:
@@ -199,6 +216,11 @@ def test_of_one_person_it_is_said(tmp_path: Path) -> None:
     table = make_table(tmp_path, known, ONCE)
     assert table.by_movement
     assert "says nothing about other people" in as_text(table)
+    same = make_table(tmp_path, KNOWN, replace(ONCE, same_people=True), conditions=[ONE])
+    other = make_table(tmp_path, KNOWN, ONCE, conditions=[ONE])
+    assert "of the same people; movements are kept apart" in as_text(same)
+    # Neither is taken for the other.
+    assert len(same.runs[0].subjects) > len(other.runs[0].subjects) == 1
 
 
 @pytest.mark.parametrize(

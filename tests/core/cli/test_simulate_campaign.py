@@ -20,6 +20,7 @@ def test_a_campaign_is_made_and_told(sd2: Sd2, tmp_path: Path) -> None:
     assert (said["takes"], said["made"], said["frames"]) == (1, 1, 60)
     assert said["simulated"] is True
     assert said["labels"] == list(read_pairs(out).labels)
+    assert json.loads(sd2("info", out, "--json").out)["protocol"].startswith("varied")
     again = sd2("simulate", "campaign", out, *options)
     assert again.code == 0
     assert "Made 0 takes" in again.out
@@ -39,3 +40,24 @@ def test_other_things_are_not_written_over(sd2: Sd2, tmp_path: Path) -> None:
     outcome = sd2("simulate", "campaign", tmp_path, "--minutes", 0.03, "--take-seconds", 2)
     assert outcome.code == 1
     assert "holds no pairs" in outcome.err
+
+
+def test_info_says_the_protocol_and_no_other_goes_on(sd2: Sd2, tmp_path: Path) -> None:
+    out = tmp_path / "one.zarr"
+    short = ["--subjects", 1, "--minutes", 0.03, "--take-seconds", 2, "--processes", 1]
+    made = sd2("simulate", "campaign", out, *short, "--protocol", "paper", "--json")
+    assert json.loads(made.out)["protocol"] == "paper"
+    words = "paper, swipes to-and-fro"
+    assert json.loads(sd2("info", out, "--json").out)["protocol"] == words
+    assert words in sd2("info", out).out
+    for other in (["--protocol", "paper", "--order", "random"], []):
+        outcome = sd2("simulate", "campaign", out, *short, *other)
+        assert outcome.code == 1
+        assert "same settings" in outcome.err
+
+
+def test_varied_takes_have_no_order(sd2: Sd2, tmp_path: Path) -> None:
+    outcome = sd2("simulate", "campaign", tmp_path / "x.zarr", "--order", "to-and-fro")
+    assert outcome.code == 1
+    assert "Add --protocol paper" in outcome.err
+    assert not (tmp_path / "x.zarr").exists()
