@@ -28,8 +28,7 @@ def powers(base: Tensor, count: int) -> Tensor:
     return out
 
 
-# Batched products of small matrices are up to three times as fast with whole tiles of a processor's
-# registers; measured in tests/benchmarks/test_state_space_speed.py.
+# Products of small matrices are faster in whole tiles of a processor's registers.
 _TILE = 12
 
 

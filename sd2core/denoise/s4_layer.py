@@ -40,6 +40,8 @@ LARGEST_LOG = 100.0
 STEP_RANGE = (1e-7, 1e2)
 DT_MIN, DT_MAX = 0.02, 1.0
 MOST_KEPT = 8
+# Of longer kernels all layers' intermediate results together would leave the processor's cache.
+LONGEST_JOINED = 400
 
 
 class StateSpace(nn.Module):
@@ -208,11 +210,11 @@ def _per_channel(values: Tensor, channels: int) -> nn.Parameter:
 def joint_kernels(spaces: Sequence[StateSpace], length: int) -> Sequence[Tensor]:
     """Kernels of spaces that are alike, each (H, length).
 
-    While learning they are worked out as one space with the channels of all: a kernel is some
-    hundred small operations, and most of a small operation is calling it.
+    While learning, short ones are worked out as one space with the channels of all: a kernel is
+    some hundred small operations, and most of a small operation is calling it.
     """
     first = spaces[0]
-    if not first.learning():
+    if length > LONGEST_JOINED or not first.learning():
         return [space.kernel(length) for space in spaces]
     joined = {
         name: torch.cat([getattr(space, name) for space in spaces])

@@ -200,12 +200,13 @@ def test_derivatives_of_the_layer(kernel: str, bidirectional: bool) -> None:
 
 
 @pytest.mark.parametrize("kernel", KERNELS)
-def test_kernels_worked_out_together_are_those_of_each(kernel: Kernel) -> None:
+@pytest.mark.parametrize("length", [1, 40, 500])
+def test_kernels_worked_out_together_are_those_of_each(kernel: Kernel, length: int) -> None:
     spaces = [StateSpace(3, 16, kernel) for _ in range(4)]
-    gradients = torch.randn(4, 3, 40)
-    apart = [space.kernel(40) for space in spaces]
+    gradients = torch.randn(4, 3, length)
+    apart = [space.kernel(length) for space in spaces]
     with torch.autocast("cpu", dtype=torch.bfloat16):
-        together = joint_kernels(spaces, 40)
+        together = joint_kernels(spaces, length)
     for true, found, gradient, space in zip(apart, together, gradients, spaces, strict=True):
         assert largest(found - true) <= 1e-6 * largest(true)
         wanted = torch.autograd.grad(true, list(space.parameters()), gradient)
