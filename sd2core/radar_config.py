@@ -5,10 +5,17 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Literal
 
 from sd2core.errors import Sd2Error
 
 SPEED_OF_LIGHT_MPS = 299_792_458.0
+
+Clutter = Literal["none", "mean", "regression", "moving"]
+"""Ways of taking out static echoes, see :class:`~sd2core.fmcw.ProcessingOptions`."""
+
+CLUTTER: Clutter = "regression"
+"""Filter of the maps of recordings and campaigns, where nobody chooses another."""
 
 _LOWEST_HZ, _HIGHEST_HZ = 1e8, 1e12
 """Limits of radar frequencies; values outside were probably meant in MHz or GHz."""

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 from sd2core.cli.options import add_axis, add_command, add_json, add_map_output, span_m
 from sd2core.cli.output import progress_bar
 from sd2core.errors import Sd2Error
+from sd2core.radar_config import Clutter
 
 if TYPE_CHECKING:
     from sd2core.io.radar import RecordedMap
@@ -42,10 +43,11 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     add_axis(parser)
     parser.add_argument(
         "--clutter",
-        choices=("none", "mean", "moving"),
+        choices=get_args(Clutter),
         default="none",
-        help="what to subtract as static: nothing; each frame's mean over its chirps; or that"
-        " mean averaged over frames, which keeps slow movers (default: none)",
+        help="what to subtract as static: nothing; each frame's mean over its chirps; the"
+        " parabola that fits its chirps best, which swaying leaves no trace in; or the mean"
+        " averaged over frames, which keeps slow movers (default: none)",
     )
     parser.add_argument(
         "--range",

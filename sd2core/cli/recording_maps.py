@@ -113,11 +113,12 @@ def _denoised(model: ModelCard, synthetic: DopplerMap) -> DopplerMap:
 
 def _radar(recording: Recording, axis: VelocityAxis | None) -> DopplerMap:
     from sd2core.fmcw import doppler_map
+    from sd2core.radar_config import CLUTTER
 
     if recording.holds_radar_map:
         doppler = recording.load_radar_map().doppler
     else:
         capture = recording.load_capture()
         with progress_bar("Processing") as progress:
-            doppler = doppler_map(capture, axis=axis, clutter="mean", progress=progress)
+            doppler = doppler_map(capture, axis=axis, clutter=CLUTTER, progress=progress)
     return doppler.shifted(recording.radar_offset_s)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from sd2core.accuracy.places import choose_for_places, spread
 from sd2core.accuracy.trial import synthesizer_for
 from sd2core.body.parts import synthetic_map
-from sd2core.datasets.simulating import CLUTTER, Simulation, simulated_map
+from sd2core.datasets.simulating import Simulation, simulated_map
 from sd2core.datasets.source import (
     BACKGROUND,
     KINDS,
@@ -41,6 +41,7 @@ from sd2core.mocap.recording_pairs import on_clock
 from sd2core.placements.body_extent import BodyExtent
 from sd2core.placements.placements import Place, Placements
 from sd2core.progress import Progress, part_of
+from sd2core.radar_config import CLUTTER
 from sd2core.recording.recording import Recording, open_recording
 from sd2core.runs.pace import Kind
 from sd2core.sensor import Vector, VelocityAxis, VirtualSensor

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from sd2core.fmcw.chain import Clutter
 from sd2core.fmcw.link import LinkBudget
 from sd2core.fmcw.options import SignalOptions, WaveOptions
 from sd2core.fmcw.processing import doppler_map
@@ -19,12 +18,9 @@ from sd2core.maps import DopplerMap, joined
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mocap.recording_pairs import on_clock
 from sd2core.progress import Progress, part_of, silent
-from sd2core.radar_config import PAPER_RADAR, RadarConfig
+from sd2core.radar_config import CLUTTER, PAPER_RADAR, RadarConfig
 from sd2core.sensor import VelocityAxis, VirtualSensor
 from sd2core.timebase import Timebase
-
-CLUTTER: Clutter = "mean"
-"""Filter that takes the static room out of a capture's map, computed or recorded."""
 
 _BLOCK_FRAMES = 256
 _BLOCK_BYTES = 64 << 20

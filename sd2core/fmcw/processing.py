@@ -22,12 +22,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
-from sd2core.fmcw.chain import Chain, Clutter, ProcessingOptions, Window
+from sd2core.fmcw.chain import Chain, ProcessingOptions, Window
 from sd2core.io.radar.capture import RadarCapture
 from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import gaps_in_words, runs
 from sd2core.progress import Progress, silent
-from sd2core.radar_config import RadarConfig
+from sd2core.radar_config import Clutter, RadarConfig
 from sd2core.sensor import VelocityAxis
 from sd2core.version import __version__
 

@@ -9,7 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sd2core.errors import Sd2Error
-from sd2core.fmcw.chain import FrameChain, ProcessingOptions, own_clutter_removed, taper
+from sd2core.fmcw.chain import (
+    FrameChain,
+    ProcessingOptions,
+    clutter_courses,
+    own_clutter_removed,
+    taper,
+)
 from sd2core.fmcw.options import WaveOptions
 from sd2core.fmcw.processing import rebinning
 from sd2core.fmcw.wave import WaveScene
@@ -103,8 +109,8 @@ def velocity_response(
     doppler_bins = FrameChain(config, options).doppler_bins
     turns = -2.0 / config.wavelength_m * np.asarray(velocity_mps, dtype=np.float64)
     signal = np.exp(2j * np.pi * config.chirp_repetition_s * np.outer(turns, np.arange(chirps)))
-    if options.clutter == "mean":
-        signal -= signal.mean(axis=1, keepdims=True)
+    if (courses := clutter_courses(options.clutter, chirps)) is not None:
+        signal -= (signal @ courses) @ courses.T
     window = taper(options.window, chirps).astype(np.float64)
     power = np.abs(np.fft.fft(signal * window, n=doppler_bins, axis=1)) ** 2
     power /= doppler_bins * (window**2).sum()
@@ -116,7 +122,7 @@ def _refuse_moving(options: ProcessingOptions) -> None:
     if options.clutter == "moving":
         raise Sd2Error(
             "A moving average of the clutter is asked for single frames",
-            "clutter 'none' or 'mean', which a frame knows by itself",
+            "clutter 'none', 'mean' or 'regression', which a frame knows by itself",
             "Simulate the whole clip with simulate_radar",
         )
 

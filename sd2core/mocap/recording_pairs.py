@@ -20,6 +20,7 @@ from sd2core.mesh.presence import Presence, runs
 from sd2core.mesh.vertex_parts import PARTS
 from sd2core.pairs.store import PairWriter, Take, TakeKey
 from sd2core.progress import Progress, part_of, silent
+from sd2core.radar_config import CLUTTER
 from sd2core.recording.recording import Recording, open_recording
 from sd2core.timebase import Timebase
 from sd2core.version import __version__
@@ -90,6 +91,7 @@ def make_recording_pairs(
                     "made_by": f"SD² Studio {__version__}",
                     "recordings": [one.folder.name for one in opened],
                     "synthesis": asdict(synthesis),
+                    "clutter": CLUTTER,
                 },
                 parts=PARTS if limbs else (),
             )
@@ -138,7 +140,7 @@ def _maps(
     mesh = recording.load_mesh()
     maker, counting = Synthesizer(mesh, synthesis), part_of(progress, 0.0, 0.9)
     made = synthetic_map(maker, recording.sensor, limbs=limbs, progress=counting)
-    radar = doppler_map(recording.load_capture(), axis=synthesis.axis)
+    radar = doppler_map(recording.load_capture(), axis=synthesis.axis, clutter=CLUTTER)
     progress(1, 1)
     return made, radar
 

@@ -124,12 +124,8 @@ def group_errors(samples: Sequence[Sample]) -> GroupErrors:
     gain = _regression(samples)
     left = [sample.errors - sample.features @ gain[:, 1:].T - gain[:, 0] for sample in samples]
     means = np.array([one.mean(axis=0) for one in left])
-    within = np.mean([np.cov(one.T, bias=True) for one in left], axis=0)
-    length, mixing, changes = _kernel(samples, left, np.diag(within))
     total = np.mean([(one**2).mean(axis=0) for one in left], axis=0)
-    # A variogram tells little of its sill where clips show little of all poses.
-    size = np.sqrt(np.minimum(1.0, total / np.maximum(np.diag(changes), 1e-30)))
-    spread = changes * np.outer(size, size)
+    length, mixing, spread = _kernel(samples, left, total)
     # What the process explains of the clips' own means is no bias.
     rest = max(float(total.sum() - np.trace(spread)), 0.0)
     between = means.T @ means / len(means)
@@ -154,16 +150,18 @@ def _regression(samples: Sequence[Sample]) -> Floats:
 
 
 def _kernel(
-    samples: Sequence[Sample], left: Sequence[Floats], variance: Floats
+    samples: Sequence[Sample], left: Sequence[Floats], total: Floats
 ) -> tuple[float, float, Floats]:
     """Length and exponent of the kernel, and the covariance of the process.
 
     The variogram over frames apart is matched, as the motion of the clips makes it from
-    distances of poses: a kernel is right when errors change as fast as they do. The
-    covariance is that of changes over the shortest lags, which velocities are taken from:
-    a fit that keeps the hand's velocity has an elbow and a wrist whose changes cancel.
+    distances of poses: a kernel is right when errors change as fast as they do, and are as
+    large as they are (their mean squares ``total`` are the variogram's sill, of which clips
+    that show few poses tell little). The covariance is that of changes over the shortest
+    lags, which velocities are taken from: a fit that keeps the hand's velocity has an elbow
+    and a wrist whose changes cancel.
     """
-    scale = np.sqrt(np.maximum(variance, 1e-12 * variance.max()))
+    sill = np.maximum(total, 1e-12 * total.max())
     seen, far = [], []
     for lag in _LAGS:
         pairs = [
@@ -174,13 +172,13 @@ def _kernel(
         changed = np.concatenate([one for one, _ in pairs])
         seen.append(0.5 * changed.T @ changed / len(changed))
         far.append((np.concatenate([moved for _, moved in pairs]) ** 2).sum(axis=1))
-    apart = np.array([np.diag(one) for one in seen]) / scale**2  # (lags, n)
+    apart = np.array([np.diag(one) for one in seen]) / sill  # (lags, n)
     best: tuple[float, float, float, Floats] = (np.inf, 0.0, 0.0, np.zeros_like(seen[0]))
     for length, mixing in itertools.product(_LENGTHS, _MIXINGS):
         shown = np.array(
             [1.0 - ((1.0 + h2 / (2.0 * mixing * length**2)) ** -mixing).mean() for h2 in far]
         )
-        misfit = float(np.log(apart.mean(axis=1) / shown).var())
+        misfit = float((np.log(apart.mean(axis=1) / shown) ** 2).mean())
         if misfit < best[0]:
             changes = np.mean(seen[_VELOCITY_LAGS], axis=0) / shown[_VELOCITY_LAGS].mean()
             best = (misfit, float(length), float(mixing), changes)

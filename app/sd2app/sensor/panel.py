@@ -19,6 +19,7 @@ from sd2core.radar_config import RadarConfig
 from sd2core.sensor import aimed_at, position_from_spherical, spherical_from_position
 
 _CLUTTER_TEXT = {
+    "regression": "regression over chirps",
     "mean": "mean over chirps",
     "moving": "moving average over frames",
     "none": "keep",

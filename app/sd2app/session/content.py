@@ -21,9 +21,9 @@ from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 
 if TYPE_CHECKING:
-    from sd2core.fmcw.processing import Clutter
     from sd2core.io.radar import RadarCapture
     from sd2core.io.video import VideoReader
+    from sd2core.radar_config import Clutter
 
 UNTITLED = Path()
 """Folder of a recording that was not saved yet."""

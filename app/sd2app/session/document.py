@@ -17,12 +17,12 @@ from sd2core.body.camera import PinholeCamera
 from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.radar_config import CLUTTER, Clutter
 from sd2core.recording.recording import Recording
 from sd2core.recording.relinking import Relinked
 from sd2core.sensor import VelocityAxis
 
 if TYPE_CHECKING:
-    from sd2core.fmcw.processing import Clutter
     from sd2core.io.radar import RadarCapture
     from sd2core.io.video import VideoReader
 
@@ -40,7 +40,7 @@ class DocumentModel(QObject):
         super().__init__(parent)
         self.undo_stack = QUndoStack(self)
         self.content: Content | None = None  # all parts; None while nothing is open
-        self.clutter: Clutter = "mean"  # method that removes static echoes from the capture
+        self.clutter: Clutter = CLUTTER  # method that removes static echoes from the capture
         self.goes_on = False  # the recording is the one that was open before, with other files
         self._base: Recording | None = None
         self._runner = ListedRunner("open", jobs, self, self._receive)

@@ -15,7 +15,7 @@ from sd2core.placements.placements import Placements
 from sd2core.sensor import Vector, VirtualSensor, aimed_at
 
 if TYPE_CHECKING:
-    from sd2core.fmcw.processing import Clutter
+    from sd2core.radar_config import Clutter
     from sd2core.recording.recording import Recording
 
 

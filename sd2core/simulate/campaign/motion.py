@@ -5,7 +5,7 @@ as in :mod:`~sd2core.simulate.limbs`, but none like another: poses, speed, path,
 of speed, hand and pauses are drawn for each. Between them hands rest, sink, or do
 something else. Other takes hold no gesture at all: people stand and move their arms
 and trunk at random, or step to and fro. Other protocols leave these other movements out,
-and have one hand swipe to and fro through a take.
+have one hand swipe to and fro through a take, or both hang through another.
 """
 
 from __future__ import annotations
@@ -122,12 +122,14 @@ def perform(
     kind = kind or (drawn if protocol.others else _IN_TURN[number % len(_IN_TURN)])
     label = np.zeros(len(times_s), np.int8)
     scale = arm_length_m(skeleton) / arm_length_m(base)
-    if kind in ("moving", "resting"):
-        motion = _moving(rng, subject, skeleton, times_s, rests=kind == "resting")
+    if kind == "moving":
+        motion = _moving(rng, subject, skeleton, times_s)
     elif kind == "pacing":
         motion = gait(skeleton, times_s, _to_and_fro(rng, float(times_s[-1])), scale)
     else:
-        arms = plan_arms(rng, subject, float(times_s[-1]), protocol, number)
+        arms: dict[str, list[Move]] = {"L": [], "R": []}
+        if kind == "gestures":
+            arms = plan_arms(rng, subject, float(times_s[-1]), protocol, number)
         motion = _gesturing(rng, subject, skeleton, times_s, arms, scale)
         for move in (*arms["L"], *arms["R"]):
             if move.label:
@@ -262,10 +264,10 @@ def about_the_floor(skeleton: Skeleton, turns: Floats) -> Floats:
 
 
 def _moving(
-    rng: np.random.Generator, subject: Subject, skeleton: Skeleton, times_s: Floats, *, rests: bool
+    rng: np.random.Generator, subject: Subject, skeleton: Skeleton, times_s: Floats
 ) -> Motion:
     legs: Mode = "shift" if rng.random() < 0.4 else "stand"
-    if rng.random() < 0.25 or rests:
+    if rng.random() < 0.25:
         deed = _SMALL
     else:
         one, other = (STYLES[name] for name in rng.choice(_ARMS, 2))

@@ -28,7 +28,7 @@ from sd2core.fmcw.scene import MeshScene
 from sd2core.fmcw.sums import Echoes, turns_of
 from sd2core.fmcw.wave import WaveScene
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.radar_config import RadarConfig
+from sd2core.radar_config import CLUTTER, RadarConfig
 from sd2core.scattering.facets import visible_facets
 from sd2core.sensor import VelocityAxis, VirtualSensor
 
@@ -36,7 +36,7 @@ REFERENCE_RANGE_M = 2.2
 """A map's value of 1 is the echo of 1 m² of rough surface seen square on at this range:
 the range at which the paper's preset counts vertices fully."""
 
-PROCESSING = ProcessingOptions(clutter="mean")
+PROCESSING = ProcessingOptions(clutter=CLUTTER)
 
 _NO_PLANE = np.array([0.0, 0.0, 0.0, 1.0])
 _BLOCK_FRAMES = 16

@@ -18,10 +18,10 @@ RANGES_M = (1.5, 4.0)
 """Distances of the person from the camera, and of the chest from the other sensors."""
 
 FIXED_M = 2.2
-"""Distance of the person from camera and sensor where places do not vary."""
+"""Distance of the person from camera and sensor where places do not vary, as in the sample."""
 
 _CAMERA_M = (0.8, 1.6)
-_FIXED_CAMERA_M = 1.2
+_FIXED_CAMERA_M = 1.1
 _BESIDE_M = 0.25
 _HEADING_DEG = (12.0, 30.0)  # spread, most
 _AZIMUTH_DEG, _ELEVATION_DEG = 45.0, (-10.0, 25.0)

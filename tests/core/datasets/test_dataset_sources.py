@@ -32,6 +32,7 @@ from sd2core.pairs.store import read_pairs
 from sd2core.placements.body_extent import BodyExtent
 from sd2core.placements.placements import PlacementGrid
 from sd2core.progress import silent
+from sd2core.radar_config import CLUTTER
 
 GRID = PlacementGrid((1.0, 2.5), (0.0, 30.0))
 SWINGS = LabelSet("Swings", (Label("swing", "#0072b2", "1", "vertical"),))
@@ -52,7 +53,7 @@ def test_a_recording_is_its_own_maps_on_the_clock_of_its_mesh(tmp_path: Path) ->
     denoised = load_model("denoiser").denoise(synthetic)
     assert np.array_equal(source.maps["denoised"].values, denoised.values)
     # The radar is there from 1 s to 3 s of the mesh.
-    radar = doppler_map(one.load_capture(), axis=synthetic.axis, clutter="mean")
+    radar = doppler_map(one.load_capture(), axis=synthetic.axis, clutter=CLUTTER)
     real = source.maps["real"]
     assert np.array_equal(real.values[:, 30:90], radar.values)
     assert real.present is not None

@@ -4,19 +4,22 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
 from sd2core.errors import Sd2Error
 from sd2core.fmcw import chain
-from sd2core.fmcw.chain import taper
+from sd2core.fmcw.chain import ProcessingOptions, own_clutter_removed, taper
 from sd2core.fmcw.processing import doppler_map, range_doppler, rebinning
+from sd2core.fmcw.spectra import velocity_response
 from sd2core.io.radar import RadarCapture, load_capture
 from sd2core.progress import Cancelled
-from sd2core.radar_config import PAPER_RADAR, SPEED_OF_LIGHT_MPS, RadarConfig
+from sd2core.radar_config import PAPER_RADAR, SPEED_OF_LIGHT_MPS, Clutter, RadarConfig
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 
@@ -164,19 +167,54 @@ def test_receivers_add_up() -> None:
     np.testing.assert_allclose(two.values, 1.25 * one.values, rtol=1e-2, atol=1e-8)
 
 
-def test_a_static_target_goes_and_a_moving_one_stays() -> None:
+@pytest.mark.parametrize("clutter", ["mean", "regression"])
+def test_a_static_target_goes_and_a_moving_one_stays(clutter: Clutter) -> None:
     static, moving = 0.5 * tone(FINE, 3.6, 0.0), 0.2 * tone(FINE, 2.2, 1.3)
     both = capture_of(FINE, static + moving)
     kept = doppler_map(capture_of(FINE, moving), bins=32, v_max_mps=2.0)
     np.testing.assert_allclose(
-        doppler_map(both, bins=32, v_max_mps=2.0, clutter="mean").values,
+        doppler_map(both, bins=32, v_max_mps=2.0, clutter=clutter).values,
         kept.values,
         atol=1e-3 * float(kept.values.max()),
     )
     alone = capture_of(FINE, static)
     before = doppler_map(alone).values.sum()
-    after = doppler_map(alone, clutter="mean").values.sum()
+    after = doppler_map(alone, clutter=clutter).values.sum()
     assert after < 1e-9 * before
+
+
+@given(amplitudes=arrays(np.float64, (3, 8), elements=st.floats(-0.2, 0.2)))
+def test_a_course_over_the_chirps_that_is_a_parabola_goes(amplitudes: np.ndarray) -> None:
+    chirps, samples = np.linspace(-1.0, 1.0, 24), np.arange(8)
+    tones = np.sin(2.0 * np.pi * (samples + 0.3) * np.arange(1, 9)[:, None] / 8.0)  # (8, samples)
+    signal = np.vander(chirps, 3) @ amplitudes @ tones
+    left = own_clutter_removed(signal[None, None].astype(np.float32), "regression")
+    assert np.abs(left).max() < 1e-5
+
+
+@given(speed_mps=st.floats(-0.02, 0.02))
+def test_swaying_leaves_nothing_beside_zero(speed_mps: float) -> None:
+    """A body's trunk sways by some 1 cm/s, and echoes a hundred times as strongly as a hand."""
+    power = {
+        clutter: velocity_response(
+            PAPER_RADAR, [speed_mps], processing=ProcessingOptions(clutter=clutter)
+        ).sum()
+        for clutter in ("none", "mean", "regression")
+    }
+    assert power["none"] == pytest.approx(1.0, abs=1e-3)
+    assert power["regression"] < 1e-4
+    assert power["regression"] <= 0.01 * power["mean"] + 1e-12
+
+
+@pytest.mark.parametrize(("speed_mps", "db"), [(0.05, -20.0), (0.125, -2.5), (-0.25, 3.0)])
+def test_what_moves_within_the_nulled_bins_is_weakened_and_what_moves_faster_is_not(
+    speed_mps: float, db: float
+) -> None:
+    processing = ProcessingOptions(clutter="regression")
+    shown = velocity_response(PAPER_RADAR, [speed_mps], processing=processing).sum()
+    assert 10.0 * np.log10(shown) < db
+    faster = velocity_response(PAPER_RADAR, np.linspace(0.19, 1.5, 50), processing=processing)
+    np.testing.assert_allclose(10.0 * np.log10(faster.sum(axis=0)), 0.0, atol=1.0)
 
 
 def test_the_moving_average_keeps_what_is_slower_than_a_doppler_bin() -> None:
@@ -249,9 +287,9 @@ def test_the_transmitters_leakage_does_not_count() -> None:
     assert cells.values.sum() < 0.05 * 2 * np.mean(drift**2)
 
 
-@pytest.mark.parametrize("clutter", ["none", "mean", "moving"])
+@pytest.mark.parametrize("clutter", get_args(Clutter))
 def test_blocks_and_single_frames_give_the_same(
-    monkeypatch: pytest.MonkeyPatch, clutter: str
+    monkeypatch: pytest.MonkeyPatch, clutter: Clutter
 ) -> None:
     capture = noise_capture(replace(FINE, receivers=2), 90)
     options = {"clutter": clutter, "clutter_window_s": 0.5}
@@ -280,6 +318,13 @@ def test_it_stops_when_told() -> None:
         doppler_map(noise_capture(FINE, 3), progress=stop)
 
 
+@pytest.mark.parametrize("chirps", [1, 2, 3])
+def test_a_filter_needs_no_more_chirps_than_there_are(chirps: int) -> None:
+    signal = np.random.default_rng(0).standard_normal((2, 1, chirps, 8)).astype(np.float32)
+    left = own_clutter_removed(signal, "regression")
+    assert np.abs(left).max() < 1e-5
+
+
 @pytest.mark.parametrize(("chirps", "samples", "window"), [(2, 3, "none"), (3, 7, "hann")])
 def test_the_smallest_radars_work(chirps: int, samples: int, window: str) -> None:
     config = replace(FINE, chirps_per_frame=chirps, samples_per_chirp=samples)
@@ -290,8 +335,8 @@ def test_the_smallest_radars_work(chirps: int, samples: int, window: str) -> Non
 
 def test_a_silent_capture_gives_an_empty_map() -> None:
     capture = capture_of(FINE, np.zeros((2, 1, 64, 32)))
-    for clutter in ("none", "mean", "moving"):
-        columns = doppler_map(capture, clutter=clutter)  # type: ignore[arg-type]
+    for clutter in get_args(Clutter):
+        columns = doppler_map(capture, clutter=clutter)
         assert not columns.values.any()
         assert columns.meta["beyond_share"] == 0.0
 

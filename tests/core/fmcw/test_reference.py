@@ -154,7 +154,7 @@ def test_a_moving_average_needs_the_frames_between() -> None:
         )
 
 
-@pytest.mark.parametrize("clutter", ["none", "mean"])
+@pytest.mark.parametrize("clutter", ["none", "mean", "regression"])
 @pytest.mark.parametrize("speed_mps", [-0.9, -0.1, 0.05, 0.6])
 def test_the_response_to_a_velocity_is_the_column_of_a_point(
     clutter: str, speed_mps: float

@@ -14,8 +14,9 @@ import pytest
 from sd2core.body.rotations import applied
 from sd2core.body.shape import ShapeSpace
 from sd2core.errors import Sd2Error
+from sd2core.fmcw import ProcessingOptions
 from sd2core.radar_config import PAPER_RADAR
-from sd2core.simulate.campaign.fit_errors import FitErrors
+from sd2core.simulate.campaign import radar
 from sd2core.simulate.campaign.making import make_campaign
 from sd2core.simulate.campaign.motion import LABELS, Performance, perform, plan_arms
 from sd2core.simulate.campaign.protocol import PAPER, VARIED, Protocol
@@ -118,19 +119,22 @@ def test_every_third_take_of_the_paper_is_background(space: ShapeSpace, protocol
     for one in found:
         assert one.label.any() == (one.kind == "gestures")
     skeleton = space.skeleton(random_subject(space, 7, 0).shape)
-    feet = skeleton.transforms(*found[2].motion)[:, skeleton.index["foot.R"]]
-    place_m = applied(feet[..., :3], skeleton.heads_m[skeleton.index["foot.R"]]) + feet[..., 3]
-    assert np.ptp(place_m, axis=0).max() < 0.05
+    for bone in ("foot.R", "wrist.L", "wrist.R"):
+        index = skeleton.index[bone]
+        held = skeleton.transforms(*found[2].motion)[:, index]
+        place_m = applied(held[..., :3], skeleton.heads_m[index]) + held[..., 3]
+        assert np.ptp(place_m, axis=0).max() < 0.08
 
 
-def test_varied_takes_are_as_before_there_were_protocols() -> None:
-    """Figures of the program that knew no other."""
+def test_varied_takes_are_as_before_there_were_protocols(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures of the program that knew no other, and took off the mean over chirps."""
+    monkeypatch.setattr(radar, "PROCESSING", ProcessingOptions(clutter="mean"))
     campaign = Campaign(seed=3, take_seconds=2.0, target=TargetOptions(looks=1))
-    (take,) = TakeMaker(campaign, FitErrors.load()).make(0, 0)
+    (take,) = TakeMaker(campaign).make(0, 0)
     assert hashlib.sha256(take.label.tobytes()).hexdigest()[:12] == "0bd3183ac156"
     np.testing.assert_allclose(take.sensor_position_m, [0.14405738, 0.00489047, 0.0], atol=1e-8)
     # Matrix products differ in their last bits from machine to machine.
-    assert take.synthetic.sum() == pytest.approx(4.1119384765625, rel=1e-3)
+    assert take.synthetic.sum() == pytest.approx(4.453373908996582, rel=1e-3)
     assert take.radar.sum() == pytest.approx(2.1527886390686035, rel=1e-3)
 
 
