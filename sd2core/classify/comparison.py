@@ -227,10 +227,11 @@ def gains(table: Table, condition: Condition, of: Callable[[Run], float]) -> NDA
 
 
 def fits(known: ClipSet, denoiser: TrainedDenoiser) -> bool:
-    """Tell if a denoiser is made for such maps."""
+    """Tell if a denoiser is made for such maps, which are not split by the parts of the body."""
     card = denoiser.card
     return (
-        card.axis == known.axis
+        not card.parts
+        and card.axis == known.axis
         and set(known.null_bins) <= set(card.null_bins)
         and abs(known.frame_rate_hz / card.frame_rate_hz - 1.0) <= matching.SAME_RATE
     )

@@ -138,9 +138,10 @@ def clips_of_pairs(
     table = np.array([classes.index(name) for name in names], np.int8)
     clips = []
     for take in pairs.takes:
-        energies = take.synthetic if kind in ("synthetic", "denoised") else take.radar
         if denoiser is not None and kind == "denoised":
-            energies = denoiser.denoise_values(energies)
+            energies = denoiser.denoise_values(take.inputs(denoiser.card.parts))
+        else:
+            energies = take.synthetic if kind == "synthetic" else take.radar
         clips.append(
             Clip(take.subject, take.name, kind, energies, table[take.label], take.placement)
         )

@@ -33,8 +33,8 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--model",
         metavar="FILE|NAME",
-        help="a model file from `sd2 train`, or the name of one that is installed (default: the"
-        " one that comes with SD² Studio)",
+        help="a model file from `sd2 train`, or the name of one that is installed (default: of"
+        " those that come with SD² Studio the one for limb maps, where there are such)",
     )
     add_json(parser)
 
@@ -43,7 +43,7 @@ def _denoise(options: argparse.Namespace) -> None:
     from sd2core.cli.info.description import describe_map, show
     from sd2core.cli.info.model import model_words
     from sd2core.cli.reading import check_map_output
-    from sd2core.denoise.files import DEFAULT_NAME, describe_model, find_model, load_model
+    from sd2core.denoise.files import default_name, describe_model, find_model, load_model
     from sd2core.denoise.resample_to_model import check_map
     from sd2core.io.kinds import kind_of
     from sd2core.maps import DopplerMap
@@ -57,8 +57,8 @@ def _denoise(options: argparse.Namespace) -> None:
             "a map from `sd2 synth`",
             makes_one if kind in ("mesh", "recording") else "",
         )
-    path = find_model(options.model or DEFAULT_NAME)
     doppler = DopplerMap.load(options.map)
+    path = find_model(options.model or default_name(limbs=doppler.limbs is not None))
     # Before torch is loaded, which takes seconds.
     card = describe_model(path)
     check_map(doppler, card)

@@ -65,7 +65,10 @@ def maps_of(
     """
     made: dict[MapName, DopplerMap] = {}
     if {"synthetic", "denoised"} & {*names}:
-        model = _model_of(recording) if "denoised" in names else None
+        if mesh is None:
+            with progress_bar("Reading the mesh") as progress:
+                mesh = recording.load_mesh(progress)
+        model = _model_of(recording, mesh) if "denoised" in names else None
         synthetic = _synthetic(recording, mesh, limbs=model is not None and bool(model.parts))
         if "synthetic" in names:
             made["synthetic"] = synthetic
@@ -76,20 +79,18 @@ def maps_of(
     return made
 
 
-def _synthetic(recording: Recording, mesh: MeshSequence | None, *, limbs: bool) -> DopplerMap:
+def _synthetic(recording: Recording, mesh: MeshSequence, *, limbs: bool) -> DopplerMap:
     from sd2core.body.parts import synthetic_map
     from sd2core.doppler import Synthesizer
 
-    if mesh is None:
-        with progress_bar("Reading the mesh") as progress:
-            mesh = recording.load_mesh(progress)
     with progress_bar("Synthesising") as progress:
         maker = Synthesizer(mesh, preset="paper")
         return synthetic_map(maker, recording.sensor, limbs=limbs, progress=progress)
 
 
-def _model_of(recording: Recording) -> ModelCard:
-    from sd2core.denoise.files import DEFAULT_NAME, describe_model, find_model
+def _model_of(recording: Recording, mesh: MeshSequence) -> ModelCard:
+    from sd2core.body.parts import body_parts
+    from sd2core.denoise.files import default_name, describe_model, find_model
 
     if recording.denoiser is None and recording.bundled_denoiser == "":
         raise Sd2Error(
@@ -97,7 +98,10 @@ def _model_of(recording: Recording) -> ModelCard:
             "a model, for its denoised map",
             "Choose one in the window, or leave the denoised map out",
         )
-    path = recording.denoiser or find_model(recording.bundled_denoiser or DEFAULT_NAME)
+    path = recording.denoiser
+    if path is None:
+        name = recording.bundled_denoiser or default_name(limbs=body_parts(mesh) is not None)
+        path = find_model(name)
     return describe_model(path)
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from sd2core.accuracy.places import choose_for_places, spread
 from sd2core.accuracy.trial import synthesizer_for
-from sd2core.body.parts import synthetic_map
+from sd2core.body.parts import body_parts, synthetic_map
 from sd2core.datasets.simulating import Simulation, simulated_map
 from sd2core.datasets.source import (
     BACKGROUND,
@@ -27,7 +27,7 @@ from sd2core.datasets.source import (
     label_per_frame,
     plain_name,
 )
-from sd2core.denoise.files import DEFAULT_NAME, describe_model, find_model
+from sd2core.denoise.files import LIMBS_MODEL, MAP_MODEL, default_name, describe_model, find_model
 from sd2core.denoise.resample_to_model import check_map
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
 from sd2core.errors import Sd2Error
@@ -190,7 +190,7 @@ class _Opened:
         kinds: list[MapKind] = []
         if self._mesh is not None:
             kinds += ["synthetic"]
-            kinds += ["denoised"] if _model_of(self.recording, self._making) is not None else []
+            kinds += ["denoised"] if _models_of(self.recording, self._making) else []
             kinds += ["simulated"] if self._simulates else []
         if radar_kind is not None and placement == 0 and radar_kind not in kinds:
             kinds.append(radar_kind)
@@ -208,7 +208,7 @@ class _Opened:
         sensor = self._sensor(key.placement)
         counted_share = _COUNTED_SHARE if self._simulates else 1.0
         if self._mesh is not None and {"synthetic", "denoised"} & {*wanted}:
-            model = _model_of(self.recording, self._making) if "denoised" in wanted else None
+            model = self._model if "denoised" in wanted else None
             limbs = model is not None and bool(describe_model(model).parts)
             counting = part_of(progress, 0.0, counted_share)
             synthetic = self._counted(sensor, counting, limbs=limbs)
@@ -247,6 +247,15 @@ class _Opened:
                 **self._plan,
             },
         )
+
+    @cached_property
+    def _model(self) -> Path | None:
+        """The denoiser's file, of the bundled ones that for what is known of the mesh."""
+        models = _models_of(self.recording, self._making)
+        if len(models) < 2:
+            return models[0] if models else None
+        assert self._mesh is not None
+        return find_model(default_name(limbs=body_parts(self._mesh) is not None))
 
     @cached_property
     def _clock(self) -> tuple[Timebase, NDArray[np.bool_] | None, MapKind | None]:
@@ -326,7 +335,7 @@ def _synthesizer(
 
 def _fingerprint(recording: Recording, key: SourceKey, making: Making) -> str:
     """Hash of all that a source is made of: labels, settings and contents of files."""
-    model = _model_of(recording, making) if "denoised" in making.kinds else None
+    models = _models_of(recording, making) if "denoised" in making.kinds else []
     place = None
     if key.placement:
         place = asdict(places_of(recording, making)[key.placement - 1])
@@ -346,7 +355,7 @@ def _fingerprint(recording: Recording, key: SourceKey, making: Making) -> str:
         "kinds": making.kinds,
         "files": [
             [cached_digest(file) for file in files_at(path)]
-            for path in (recording.mesh, recording.faces, recording.radar, model)
+            for path in (recording.mesh, recording.faces, recording.radar, *models)
             if path is not None
         ],
     }
@@ -354,15 +363,12 @@ def _fingerprint(recording: Recording, key: SourceKey, making: Making) -> str:
     return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
 
 
-def _model_of(recording: Recording, making: Making) -> Path | None:
-    """Return the denoiser's file; None where the recording is set to have none."""
-    if making.model is not None:
-        return find_model(making.model)
-    if recording.denoiser is not None:
-        return find_model(recording.denoiser)
-    if recording.bundled_denoiser == "":
-        return None
-    return find_model(recording.bundled_denoiser or DEFAULT_NAME)
+def _models_of(recording: Recording, making: Making) -> list[Path]:
+    """Return files of which one is the denoiser; none where the recording is set to have none."""
+    chosen = making.model or recording.denoiser or recording.bundled_denoiser
+    if chosen == "":
+        return []
+    return [find_model(name) for name in ([chosen] if chosen else [MAP_MODEL, LIMBS_MODEL])]
 
 
 class Denoising:

@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ from sd2core.datasets.recording_sources import (
     recording_sources,
 )
 from sd2core.datasets.source import KINDS, LazySource, Outline, Source, SourceKey, label_per_frame
-from sd2core.denoise.files import DEFAULT_NAME, find_model
+from sd2core.denoise.files import default_name, find_model
 from sd2core.errors import Sd2Error
 from sd2core.files.digests import cached_digest
 from sd2core.io.kinds import kind_of
@@ -28,7 +28,7 @@ from sd2core.labels.files import read_labels as read_own
 from sd2core.labels.formats import read_labels
 from sd2core.labels.label_set import GESTURES
 from sd2core.labels.spans import Labels
-from sd2core.maps import DopplerMap, MapKind
+from sd2core.maps import DopplerMap, LimbMaps, MapKind
 from sd2core.pairs.store import open_takes
 from sd2core.progress import Progress
 from sd2core.recording.recording import SUFFIX, is_recording
@@ -197,7 +197,10 @@ class _PairStore:
         self._axis = VelocityAxis(int(self._header["bins"]), float(self._header["v_max_mps"]))
         self._null_bins = tuple(self._header["null_bins"])
         self._labels = tuple(self._header["labels"])
-        self._model = find_model(model or DEFAULT_NAME) if "denoised" in self._kinds else None
+        self._parts = tuple(self._header.get("parts", ()))
+        self._model: Path | None = None
+        if "denoised" in self._kinds:
+            self._model = find_model(model or default_name(limbs=bool(self._parts)))
         self._denoising = Denoising()
 
     def lazy(self, number: int, subject: str) -> LazySource:
@@ -217,7 +220,7 @@ class _PairStore:
         sums = hashlib.blake2b(
             json.dumps([about, self._header["kind"], self._kinds, model]).encode(), digest_size=16
         )
-        for name in _PAIR_ARRAYS:
+        for name in (*_PAIR_ARRAYS, *(["limbs"] if self._parts else [])):
             sums.update(np.ascontiguousarray(self._part(name, take)).data)
         return sums.hexdigest()
 
@@ -237,9 +240,15 @@ class _PairStore:
             values = self._part(name, take).T
             return DopplerMap(values, self._axis, clock, kind, unit, self._null_bins, meta=meta)
 
+        def limbs() -> LimbMaps | None:
+            if not self._parts:
+                return None
+            return LimbMaps(self._parts, self._part("limbs", take).transpose(1, 2, 0))
+
         maps: dict[MapKind, DopplerMap] = {}
         if {"synthetic", "denoised"} & {*self._kinds}:
-            maps["synthetic"] = as_map("synthetic", "synthetic", "share of vertices")
+            counted = as_map("synthetic", "synthetic", "share of vertices")
+            maps["synthetic"] = replace(counted, limbs=limbs())
         if self._model is not None:
             maps["denoised"] = self._denoising.denoised(maps["synthetic"], self._model)
         if self._radar in self._kinds:

@@ -18,10 +18,18 @@ if TYPE_CHECKING:
 
 Card = TypeVar("Card")
 
-DEFAULT_NAME = "denoiser"
-"""Name of the model that is used when none is named."""
+MAP_MODEL, LIMBS_MODEL = "denoiser", "denoiser-limbs"
+"""Names of the bundled models, of which :func:`default_name` chooses."""
 
 _EXPECTED = "a model file (.safetensors) written by `sd2 train`"
+
+
+def default_name(*, limbs: bool) -> str:
+    """Name of the model that is used when none is named, of what there is to denoise.
+
+    The parts of the body tell more than the map alone, where they are known.
+    """
+    return LIMBS_MODEL if limbs else MAP_MODEL
 
 
 def save_model(path: Path, trained: TrainedDenoiser) -> ModelCard:

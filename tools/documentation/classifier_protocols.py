@@ -20,7 +20,7 @@ from sd2core.classify.experiment import PAPER as PAPER_NETWORK
 from sd2core.classify.experiment import Added, Condition, Network
 from sd2core.classify.metrics import shares
 from sd2core.cli.output import progress_bar
-from sd2core.denoise.files import DEFAULT_NAME, load_model
+from sd2core.denoise.files import MAP_MODEL, load_model
 from sd2core.files.tables import markdown_table
 from sd2core.pairs.store import read_pairs
 from sd2core.simulate.campaign.making import make_campaign
@@ -143,7 +143,7 @@ def _table(
     out: Path, known: ClipSet, conditions: Sequence[Condition], options: TableOptions
 ) -> Table:
     with progress_bar("Training", "run") as progress:
-        denoiser = load_model(DEFAULT_NAME)
+        denoiser = load_model(MAP_MODEL)
         return make_table(out / "runs", known, options, denoiser, progress, conditions)
 
 

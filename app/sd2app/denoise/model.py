@@ -19,7 +19,7 @@ from sd2app.maps.partial_map import Part, View
 from sd2app.maps.quality import Companion
 from sd2app.session.denoiser_choice import NO_MODEL, UNSAID, DenoiserChoice
 from sd2app.session.session import Session
-from sd2core.denoise.files import DEFAULT_NAME
+from sd2core.denoise.files import default_name
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
@@ -59,6 +59,7 @@ class DenoiseModel(QObject):
         self._before: Loaded | None = None
         self._comparing = False
         self._awake = False
+        self._splits = True  # False once it is known that the mesh's parts are not
         self._runner = LatestRunner("denoiser", self, self._set_model, self._fail)
         self._patience = delayed(self._wake, _PATIENCE_MS, self)
         self.map.failed.connect(self._say_problem)
@@ -159,6 +160,7 @@ class DenoiseModel(QObject):
         # What was in use for another recording is nothing to compare with here.
         previous, self._loaded, self._before = self._loaded, None, None
         self._comparing = False
+        self._splits = True
         self._show_before()
         self._follow(fresh=True)
         if previous is not None and previous.card.path == self.path:
@@ -186,7 +188,7 @@ class DenoiseModel(QObject):
             there = choice.path.is_file()
             self.problem = "" if there else f"The model {choice.path} is not there"
             return choice.path if there else None
-        card = self._library.named(choice.bundled or DEFAULT_NAME)
+        card = self._library.named(choice.bundled or default_name(limbs=self._splits))
         if card is None and choice.bundled:
             self._say_problem(
                 f"This recording was denoised with the model {choice.bundled}, which does not"
@@ -266,13 +268,22 @@ class DenoiseModel(QObject):
     def _finish(self) -> None:
         if self._synthesis.complete:
             if self.card is not None and self.card.parts and not self._synthesis.split:
-                self.map.use(None)
-                self._say_problem(
-                    f"{track_words(self.card)} takes the Doppler of the parts of the body, which"
-                    " are not known of this mesh. Choose another under Model."
-                )
+                self._miss_parts(self.card)
             for one in (self.map, self.before_map):
                 one.finish()
+
+    def _miss_parts(self, card: ModelCard) -> None:
+        """Take the model for the map alone, or say why the chosen one cannot be used."""
+        self.map.use(None)
+        self._loaded = None
+        if self._choice == UNSAID:
+            self._splits = False
+            self._follow(fresh=True)
+        else:
+            self._say_problem(
+                f"{track_words(card)} takes the Doppler of the parts of the body, which are not"
+                " known of this mesh. Choose another under Model."
+            )
 
     # --- following the synthetic map ------------------------------------------------------
 

@@ -126,18 +126,18 @@ def _denoiser(options: argparse.Namespace, known: ClipSet) -> TrainedDenoiser | 
     """Load the denoiser named, or the bundled one where it is made for such maps."""
     from sd2core.classify.comparison import fits
     from sd2core.classify.experiment import has_synthetic
-    from sd2core.denoise.files import DEFAULT_NAME, load_model
+    from sd2core.denoise.files import MAP_MODEL, load_model
     from sd2core.errors import Sd2Error
 
     if not has_synthetic(known):
         return None
-    denoiser = load_model(options.denoiser or DEFAULT_NAME)
+    denoiser = load_model(options.denoiser or MAP_MODEL)
     if fits(known, denoiser):
         return denoiser
     if options.denoiser is not None:
         raise Sd2Error(
             f"The denoiser {options.denoiser} does not know maps of {known.axis.bins} bins up to"
-            f" ±{known.axis.v_max_mps:g} m/s at {known.frame_rate_hz:.4g} frames/s",
+            f" ±{known.axis.v_max_mps:g} m/s at {known.frame_rate_hz:.4g} frames/s alone",
             "a denoiser for such maps",
         )
     return None

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from sd2core.datasets.labelled import LabelledSource
     from sd2core.denoise.live import TrainedDenoiser
     from sd2core.maps import MapKind
+    from sd2core.pairs.store import PairSet
 
 DATA_HELP = (
     "DATA is one or several of: a data set (`sd2 export`), a store of pairs (`sd2 simulate\n"
@@ -66,12 +67,12 @@ def add_sources(parser: argparse.ArgumentParser) -> None:
 def clips_of(
     sources: Sequence[LabelledSource],
     maps: Sequence[MapName] | None,
-    denoiser: TrainedDenoiser | None = None,
+    denoiser: str | None = None,
 ) -> ClipSet:
     """Return all clips of the sources as one set.
 
-    ``maps`` None: the radar's and, where there are some, synthetic ones. The denoiser makes the
-    denoised maps of pairs.
+    ``maps`` None: the radar's and, where there are some, synthetic ones. The denoiser, given by
+    file or name, makes the denoised maps of pairs.
     """
     from sd2core.classify.data import clips_of_pairs, merged
     from sd2core.datasets.labelled import unfolded
@@ -97,15 +98,18 @@ def clips_of(
     if stores:
         pairs = read_mixed(stores)
         for name in maps or ("synthetic", "radar"):
-            sets.append(clips_of_pairs(pairs, pairs.kind if name == "radar" else name, denoiser))
+            wanted: MapKind = pairs.kind if name == "radar" else name
+            sets.append(clips_of_pairs(pairs, wanted, _denoiser_of(pairs, wanted, denoiser)))
     return merged(sets)
 
 
-def denoiser_for(maps: Sequence[MapName], name: str | None) -> TrainedDenoiser | None:
-    """Load the denoiser where one of the maps needs it."""
-    from sd2core.denoise.files import DEFAULT_NAME, load_model
+def _denoiser_of(pairs: PairSet, kind: MapKind, given: str | None) -> TrainedDenoiser | None:
+    """Load the denoiser where the maps need it: by default the bundled one for what is there."""
+    from sd2core.denoise.files import default_name, load_model
 
-    return load_model(name or DEFAULT_NAME) if "denoised" in maps else None
+    if kind != "denoised":
+        return None
+    return load_model(given or default_name(limbs=pairs.has_limbs))
 
 
 def asked_maps(options: argparse.Namespace) -> tuple[MapName, ...]:

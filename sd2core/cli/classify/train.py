@@ -17,7 +17,6 @@ from sd2core.cli.classify.data import (
     add_data,
     asked_maps,
     clips_of,
-    denoiser_for,
     split_of,
 )
 from sd2core.cli.options import (
@@ -138,7 +137,7 @@ def _train(options: argparse.Namespace) -> int:
     from sd2core.files.atomic import atomic_write_text
     from sd2core.runs.pace import Pace
 
-    known = clips_of(options.data, maps, denoiser_for(maps, options.denoiser))
+    known = clips_of(options.data, maps, options.denoiser)
     parts = split_clips(
         known,
         _kept_out(options, "validation"),

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sd2core.cli.classify.data import DATA_HELP, add_data, asked_maps, clips_of, denoiser_for
+from sd2core.cli.classify.data import DATA_HELP, add_data, asked_maps, clips_of
 from sd2core.cli.eval import add_judging, check_result_files, named_subjects, print_or_write
 from sd2core.cli.labels.reading import check_label_output, print_lost
 from sd2core.cli.labels.suggest import (
@@ -71,7 +71,7 @@ def _eval(options: argparse.Namespace) -> None:
     check_result_files(options)
     classifier = load_classifier(options.model)
     maps = asked_maps(options)
-    known = clips_of(options.data, maps, denoiser_for(maps, options.denoiser))
+    known = clips_of(options.data, maps, options.denoiser)
     clips = _judged(known, classifier.card, options)
     found = judge(classifier, clips, known)
     subjects = list(dict.fromkeys(clip.subject for clip in clips))
