@@ -7,23 +7,37 @@ Every figure is measured when this runs. The campaign stays in ``build/denoiser`
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from sd2core.accuracy.cache import this_machine
-from sd2core.denoise.files import load_model
+from sd2core.body.parts import synthetic_map
+from sd2core.denoise.files import LIMBS_MODEL, MAP_MODEL, load_model
+from sd2core.denoise.live import TrainedDenoiser
 from sd2core.denoise.metrics import mean_velocity_error, peak_error, stands_out
+from sd2core.doppler import Synthesizer
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.figure_files import save_figure
 from sd2core.files.resources import resource_path
-from sd2core.pairs.store import PairSet, read_pairs
-from sd2core.simulate.campaign.takes import Campaign, TakeMaker, take_name
+from sd2core.files.tables import markdown_table
+from sd2core.fmcw import doppler_map
+from sd2core.io.mesh import load_mesh
+from sd2core.maps import DopplerMap
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.pairs.store import PairSet, Take, read_pairs
+from sd2core.radar_config import CLUTTER, Clutter
+from sd2core.recording.recording import open_recording
+from sd2core.sensor import VirtualSensor
+from sd2core.simulate.campaign.takes import OPTIONS, Campaign, TakeMaker, take_name
 from tools.documentation.places import BUILD, DOCS, IMAGES
-from tools.documentation.runs import campaign_of, tables
+from tools.documentation.runs import campaign_of, sd2, tables
 
 SHOWN_FRAMES = 450
+_FILTERS: tuple[Clutter, ...] = ("mean", CLUTTER)
 LIMIT_TAKES = 16
 
 PAGE = """\
@@ -44,14 +58,14 @@ training [decision 25](decisions/0025-training-runs.md).
 
 ## The simulated campaign
 
-`sd2 simulate campaign OUT --subjects 6 --minutes 90 --seed N` makes pairs without a radar: what a
-**simulated** 60 GHz radar shows of people's true motion (the target), and the synthetic Doppler of
-bodies that err as fits of videos were measured to err (the input). People of random shape swipe to
-the right, left, down and up in random order, rest, do other things, or step to and fro, in takes of
-15 s; each take has its own distance (1.5 to 4 m), heading, height of the camera, and errors of its
-fit. With `--placements N` each take is also seen from N - 1 other ranges and angles (range
-synthesis). Takes depend on seed, subject and number alone: a campaign that was stopped goes on and
-comes out the same, and `--minutes` may be raised later. Split it by subject.
+`sd2 simulate campaign OUT --subjects 6 --minutes 90 --seed N --limbs` makes pairs without a radar:
+what a **simulated** 60 GHz radar shows of people's true motion (the target), and the synthetic
+Doppler of bodies that err as fits of videos were measured to err (the input). People of random
+shape swipe to the right, left, down and up in random order, rest, do other things, or step to and
+fro, in takes of 15 s; each take has its own distance (1.5 to 4 m), heading, height of the camera,
+and errors of its fit. With `--placements N` each take is also seen from N - 1 other ranges and
+angles (range synthesis). Takes depend on seed, subject and number alone: a campaign that was
+stopped goes on and comes out the same, and `--minutes` may be raised later. Split it by subject.
 
 The input: a true motion with drawn errors of a fit, 5,000 vertices, counted as the paper's preset
 counts them (exact visibility, smoothed), as a share of vertices × (2.2 m / R)⁴. The target: FMCW
@@ -61,22 +75,21 @@ square on at 2.2 m; the mean noise is taken off, and what does not rise above it
 16 are empty in both.
 
 The errors are not invented: `python -m tools.fitting errors` measured them on the sixteen clips of
-[fitting.md](fitting.md). Bodies that are disturbed by them, scored as those fits are, give: hands
-along the line of sight 0.31 m/s RMS (fits 0.22), correlation 0.91 (0.96), Doppler maps of gestures
-L1 0.50 (0.48). What is simulated and what is not (reflections in the room, glints, clothes, other
-people, fits that lose the person) is [decision 26](decisions/0026-the-simulated-campaign.md).
+[fitting.md](fitting.md) that show gestures and simple walks. How like those fits bodies are that
+are disturbed by them, and what is simulated and what is not (reflections in the room, glints,
+clothes, other people, fits that lose the person), is
+[decision 26](decisions/0026-the-simulated-campaign.md).
 
-## The bundled model
+## The bundled models
 
-`resources/denoiser.safetensors`, an S4; its card (`sd2 info`) has command, data and limits. Judged
-on the last person of {minutes} minutes of the campaign (seed 1), whom it has not seen:
+`resources/denoiser.safetensors` takes the map, `resources/denoiser-limbs.safetensors` the maps of
+five parts of the body ([decision 52](decisions/0052-limb-maps.md)); it is taken where no model is
+named and the parts are known. Both are an S4; their cards (`sd2 info`) have command, data and
+limits. Judged on the last person of {minutes} minutes of the campaign (seed 1), whom they have not
+seen:
 
 {bundled}
-Much of the error without denoising is that of frames in which the body merely sways: the radar's
-strongest bin is then next to the emptied ones, and the synthetic map is empty. The rows per gesture
-are free of that.
-
-One take of that person; the radar is simulated:
+One take of that person, denoised from the maps of its parts; the radar is simulated:
 
 ![Synthetic, denoised and radar's map of one take](images/denoiser-triple.png)
 
@@ -85,6 +98,19 @@ other noise and another rough surface: nothing that knows only the motion can be
 better. *True motion* is the synthetic map of a body without the errors of a fit:
 
 {limits}
+
+## On the sample
+
+The bundled recording's radar, **simulated** as well, saw the finest surface at one look, with other
+noise, and its person is none of the campaign's. Peak velocity in the frames in which its map stands
+out of the noise, mean absolute error in m/s. *Own mesh* is the true one; *fit of the video* is what
+`sd2 fit` makes of the sample's video. Static echoes are taken off by the mean over the chirps, as
+the program did before [decision 53](decisions/0053-what-stands-still.md), or by regression, as it
+does now:
+
+{sample}
+
+{quiet}
 """
 
 
@@ -94,37 +120,39 @@ def main() -> None:
     parser.add_argument("--folder", type=Path, default=BUILD / "denoiser")
     parser.add_argument("--minutes", type=float, default=168, help="of all people")
     options = parser.parse_args()
-    campaign = campaign_of(options.folder, options.minutes, "--seed", 1)
+    campaign = campaign_of(options.folder, options.minutes, "--seed", 1, "--limbs")
     pairs = read_pairs(campaign)
-    bundled = resource_path("denoiser.safetensors")
-    _triple(bundled, pairs)
+    models = [resource_path(f"{name}.safetensors") for name in (MAP_MODEL, LIMBS_MODEL)]
+    _triple(models[-1], pairs)
+    sample, quiet = _on_the_sample(options.folder, models)
     page = PAGE.format(
-        limits=_limits(bundled, pairs),
+        limits=_limits(models, pairs),
+        sample=sample,
+        quiet=quiet,
         limit_takes=LIMIT_TAKES,
         machine=this_machine(),
         minutes=f"{options.minutes:g}",
-        bundled=tables(options.folder, [bundled], campaign),
+        bundled=tables(options.folder, models, campaign),
     )
     atomic_write_text(DOCS / "denoiser.md", page)
 
 
-def _limits(path: Path, pairs: PairSet) -> str:
+def _limits(paths: Sequence[Path], pairs: PairSet) -> str:
     """Errors of what a denoiser could know, as a table."""
-    model = load_model(path)
-    campaign = Campaign(pairs.provenance["seed"], pairs.provenance["take_seconds"])
+    models = [load_model(path) for path in paths]
+    campaign = Campaign(pairs.provenance["seed"], pairs.provenance["take_seconds"], limbs=True)
     maker = TakeMaker(campaign)
     by_name = {take.name: take for take in pairs.of(pairs.subjects[-1:]).takes}
     judged = [by_name[take_name(number)] for number in range(LIMIT_TAKES)]
     maps: dict[str, list[np.ndarray]] = {}
     for number, take in enumerate(judged):
         again = maker.make(len(pairs.subjects) - 1, number, look=1)[0]
-        for name, values in (
-            ("synthetic", take.synthetic),
-            ("synthetic, denoised", model.denoise_values(take.synthetic)),
-            ("synthetic of the true motion", again.synthetic),
-            ("the same, denoised", model.denoise_values(again.synthetic)),
-            ("the radar again", again.radar),
-        ):
+        shown = {"synthetic": take.synthetic, "synthetic of the true motion": again.synthetic}
+        for model in models:
+            by = f"denoised ({model.card.inputs})"
+            shown[f"synthetic, {by}"] = _denoised(model, take)
+            shown[f"synthetic of the true motion, {by}"] = _denoised(model, again)
+        for name, values in (*shown.items(), ("the radar again", again.radar)):
             maps.setdefault(name, []).append(values)
     radar = np.concatenate([take.radar for take in judged])
     moving = np.concatenate([stands_out(take.radar, pairs.null_bins) for take in judged])
@@ -144,13 +172,70 @@ def _limits(path: Path, pairs: PairSet) -> str:
     return "\n".join(lines)
 
 
+def _denoised(model: TrainedDenoiser, take: Take) -> NDArray[np.float32]:
+    """What a model makes of a take, (frames, bins)."""
+    return model.denoise_values(take.inputs(model.card.parts))
+
+
+def _on_the_sample(folder: Path, paths: Sequence[Path]) -> tuple[str, str]:
+    """Errors on the bundled recording, as a table, and what is shown where nothing moves."""
+    recording = open_recording(resource_path("swipes.sd2"))
+    fitted = folder / "sample-fit.zarr"
+    if not fitted.exists():
+        assert recording.video is not None
+        sd2("fit", recording.video, "--out", fitted)
+    meshes = {"own mesh": recording.load_mesh(), "fit of the video": load_mesh(fitted)}
+    models = [load_model(path) for path in paths]
+    found = {name: _maps_of(mesh, recording.sensor, models) for name, mesh in meshes.items()}
+    rows = [["radar's filter", "mesh", "frames", *next(iter(found.values()))]]
+    for clutter in _FILTERS:
+        radar = doppler_map(recording.load_capture(), axis=OPTIONS.axis, clutter=clutter)
+        seen = radar.values.T.copy()
+        seen[:, list(OPTIONS.null_bins)] = 0.0
+        moving = stands_out(seen, OPTIONS.null_bins)
+        for name, maps in found.items():
+            errors = [
+                peak_error(one.values.T[moving], seen[moving], OPTIONS.axis).mae_mps
+                for one in maps.values()
+            ]
+            shares = ["", *(f" ({one / errors[0] - 1.0:+.0%})" for one in errors[1:])]
+            cells = [f"{one:.3f}{share}" for one, share in zip(errors, shares, strict=True)]
+            rows.append([clutter, name, str(int(moving.sum())), *cells])
+    quiet = [_quiet_words(name, maps) for name, maps in found.items()]
+    return "\n".join(markdown_table(rows)), "\n".join(quiet)
+
+
+def _maps_of(
+    mesh: MeshSequence, sensor: VirtualSensor, models: Sequence[TrainedDenoiser]
+) -> dict[str, DopplerMap]:
+    """The synthetic map and what models make of it, by what these take."""
+    synthetic = synthetic_map(Synthesizer(mesh, OPTIONS), sensor, limbs=True)
+    return {"none": synthetic} | {one.card.inputs: one.denoise(synthetic) for one in models}
+
+
+def _quiet_words(mesh: str, maps: Mapping[str, DopplerMap]) -> str:
+    """What models show where the synthetic map is empty."""
+    empty = ~maps["none"].values.any(axis=0)
+    said = []
+    for name, one in maps.items():
+        strongest = one.values.max(axis=0)
+        shown = strongest[empty]
+        level = 10.0 * np.log10(max(float(shown.max(initial=0.0)), 1e-12) / strongest.max())
+        if name != "none":
+            said.append(f"{int((shown > 0).sum())} ({name}; at most {level:.0f} dB)")
+    return (
+        f"- {mesh}: of {int(empty.sum())} frames whose synthetic map is empty, denoised are not:"
+        f" {', '.join(said)}. Levels are relative to the map's strongest cell."
+    )
+
+
 def _triple(path: Path, pairs: PairSet) -> None:
     """The liveliest take of the last person, whom the model has not seen: in, out, target."""
     model = load_model(path)
     take = max(pairs.of(pairs.subjects[-1:]).takes, key=lambda take: int((take.label > 0).sum()))
     maps = {
         "synthetic": take.synthetic,
-        f"denoised ({model.card.model})": model.denoise_values(take.synthetic),
+        f"denoised ({model.card.model})": _denoised(model, take),
         f"radar ({pairs.kind})": take.radar,
     }
     figure = Figure(figsize=(9.6, 5.2), dpi=110, layout="constrained")

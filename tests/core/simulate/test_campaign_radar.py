@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from sd2core.fmcw import ProcessingOptions
 from sd2core.fmcw.options import Reflector
 from sd2core.fmcw.scene import MeshScene
 from sd2core.fmcw.sums import Echoes, nufft
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.radar_config import PAPER_RADAR
+from sd2core.radar_config import CLUTTER, PAPER_RADAR, Clutter
 from sd2core.sensor import VelocityAxis, VirtualSensor
 from sd2core.simulate.campaign import radar
 from sd2core.simulate.campaign.radar import LinkBudget, TargetOptions, radar_target
@@ -75,6 +76,18 @@ def test_nulled_bins_are_empty_and_noise_alone_leaves_nothing() -> None:
     # What is left out is the noise: without the threshold it is everywhere.
     noisy = target(plate(0.0, 2.0), TargetOptions(above_noise=-math.inf))
     assert np.mean(np.delete(noisy, NULLED, axis=1) != 0.0) > 0.9
+
+
+@pytest.mark.parametrize(("clutter", "shown"), [("mean", True), (CLUTTER, False)])
+def test_a_trunk_that_sways_leaves_no_ridge_beside_the_nulled_bins(
+    monkeypatch: pytest.MonkeyPatch, clutter: Clutter, shown: bool
+) -> None:
+    """Half a square metre at 1.5 cm/s, as of a person who stands."""
+    monkeypatch.setattr(radar, "PROCESSING", ProcessingOptions(clutter=clutter))
+    swaying = target(plate(0.015, 2.2, side_m=0.7), TargetOptions())
+    assert swaying.any() == shown
+    hand = target(plate(0.6, 2.2, side_m=0.15), TargetOptions())
+    assert hand.any(axis=1).all()
 
 
 def test_clutter_goes_away_but_for_the_converter() -> None:
