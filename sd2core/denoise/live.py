@@ -129,8 +129,9 @@ class TrainedDenoiser:
         return self.card.scaling.input.compress(values)
 
     def expanded(self, answer: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Energies (…, bins) from output of the network."""
+        """Energies (…, bins) from output of the network; none weaker than the floor."""
         energies = self.card.scaling.target.expand(answer)
+        energies[energies < self.card.scaling.floor] = 0.0
         energies[..., list(self.card.null_bins)] = 0.0
         return energies
 

@@ -88,6 +88,8 @@ class Scaling:
 
     input: Compression
     target: Compression
+    # Weakest energy above zero in the radar's maps of the training: less, no such radar shows.
+    floor: float = 0.0
 
     @classmethod
     def fitted(
@@ -101,17 +103,19 @@ class Scaling:
         target_exponent: float = EXPONENT,
     ) -> Scaling:
         """Fit both on training data: inputs (frames, parts · bins) and targets (frames, bins)."""
-        inputs = list(inputs)
+        inputs, targets = list(inputs), list(targets)
         bins = inputs[0].shape[1] // parts if inputs else 0
         return cls(
             Compression.fitted(inputs, null_columns(null_bins, bins, parts), input_exponent),
             Compression.fitted(targets, null_bins, target_exponent),
+            min(float(values[values > 0].min(initial=np.inf)) for values in targets),
         )
 
     def to_json(self) -> dict[str, Any]:
         """Content of a model file."""
         return {
             "law": "power",
+            "target_floor": self.floor,
             **{
                 f"{name}_{part}": getattr(getattr(self, name), part)
                 for name in ("input", "target")
@@ -130,4 +134,6 @@ class Scaling:
         return cls(
             Compression(float(content["input_reference"]), float(content["input_exponent"])),
             Compression(float(content["target_reference"]), float(content["target_exponent"])),
+            # Files of before there was a floor have none.
+            float(content.get("target_floor", 0.0)),
         )

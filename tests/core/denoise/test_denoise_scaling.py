@@ -75,8 +75,21 @@ def test_torch_and_numpy_agree_in_single_precision() -> None:
 
 
 def test_it_survives_json() -> None:
-    scaling = Scaling(Compression(0.1, 0.5), Compression(1 / 3, 0.25))
+    scaling = Scaling(Compression(0.1, 0.5), Compression(1 / 3, 0.25), 1e-4)
     assert Scaling.from_json(json.loads(json.dumps(scaling.to_json()))) == scaling
+
+
+def test_models_of_before_there_was_a_floor_have_none() -> None:
+    told = Scaling(Compression(0.1), Compression(0.2), 1e-4).to_json()
+    del told["target_floor"]
+    assert Scaling.from_json(told).floor == 0.0
+
+
+def test_the_floor_is_the_weakest_that_the_radar_shows() -> None:
+    inputs = [np.ones((2, 3), np.float32), np.ones((1, 3), np.float32)]
+    targets = [np.array([[0, 2.0, 5.0], [0, 0, 0.3]]), np.array([[0, 0, 0.0]])]
+    found = Scaling.fitted(inputs, [one.astype(np.float32) for one in targets])
+    assert found.floor == pytest.approx(0.3)
 
 
 def test_silence_has_no_scale() -> None:

@@ -32,6 +32,19 @@ def short_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(model, "longest", 64)
 
 
+@pytest.mark.parametrize("name", ["s4", "unet"])
+def test_what_is_weaker_than_the_floor_is_empty(name: str) -> None:
+    doppler = synthetic_map(energies(90))
+    without = trained(name)
+    answers = without.denoise(doppler).values
+    floor = float(np.median(answers[answers > 0]))
+    with_floor = trained(name, scaling=replace(without.card.scaling, floor=floor))
+    found = with_floor.denoise(doppler).values
+    np.testing.assert_array_equal(found, np.where(answers < floor, 0.0, answers))
+    live_frames = with_floor.live().advance(matching.input_of(doppler))
+    assert not ((live_frames > 0) & (live_frames < floor)).any()
+
+
 @pytest.mark.parametrize("name", SMALL)
 def test_the_map_says_what_it_is(name: str) -> None:
     doppler = synthetic_map(energies(90), meta={"sensor": {"position_m": [0, 0, 1]}, "a": 1})
