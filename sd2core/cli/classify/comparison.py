@@ -66,6 +66,11 @@ def add_table(kinds: argparse._SubParsersAction) -> None:
         action="store_true",
         help="add no synthetic maps: compare networks and amounts of radar data only",
     )
+    parser.add_argument(
+        "--same-people",
+        action="store_true",
+        help="judge other movements of the people trained on, instead of other people",
+    )
     add_network(parser)
     parser.add_argument("--steps", type=positive_int, metavar="N", help="batches per training")
     add_json_and_progress(parser)
@@ -115,6 +120,7 @@ def _options(options: argparse.Namespace) -> TableOptions:
 
     training = TrainOptions() if options.steps is None else TrainOptions(steps=options.steps)
     return TableOptions(
+        same_people=options.same_people,
         seeds=options.seeds or (2 if options.quick else 5),
         shares=options.shares or (QUICK_SHARES if options.quick else SHARES),
         network=network_of(options),

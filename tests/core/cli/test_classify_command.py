@@ -213,6 +213,9 @@ def test_networks_are_compared_on_the_radar_alone(sd2: Sd2, store: Path, tmp_pat
     assert told["network"]["width"] == 4
     # Nothing may be added, so all of the two people's takes are there as the radar saw them.
     assert {sum(run["real"].values()) for c in told["conditions"] for run in c["runs"]} == {360}
+    assert not told["by_movement"]
+    same = sd2("classify", "table", store, "--out", tmp_path, *how, "--same-people", "--json")
+    assert json.loads(same.out)["by_movement"]
 
 
 def test_real_radar_files_have_classes_of_their_own(
