@@ -120,7 +120,8 @@ class TrainedDenoiser:
         if not len(energies):
             return np.zeros((0, self.card.axis.bins), np.float32)
         run = self._in_chunks if self.network.window is None else self._in_windows
-        return self.expanded(run(self.compressed(energies), progress))
+        given = self.compressed(energies)
+        return self.expanded(run(given, progress), given)
 
     def compressed(self, energies: NDArray[np.float32]) -> NDArray[np.float32]:
         """Input of the network from energies (…, features)."""
@@ -128,9 +129,15 @@ class TrainedDenoiser:
         values[..., self.card.null_features] = 0.0
         return self.card.scaling.input.compress(values)
 
-    def expanded(self, answer: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Energies (…, bins) from output of the network; none weaker than the floor."""
+    def expanded(
+        self, answer: NDArray[np.float32], given: NDArray[np.float32]
+    ) -> NDArray[np.float32]:
+        """Energies (…, bins) from output of the network, of its input (…, features).
+
+        Where nothing moves there is nothing, and nowhere less than the floor (decision 53).
+        """
         energies = self.card.scaling.target.expand(answer)
+        energies[~given.any(axis=-1)] = 0.0
         energies[energies < self.card.scaling.floor] = 0.0
         energies[..., list(self.card.null_bins)] = 0.0
         return energies
@@ -242,7 +249,8 @@ class LiveDenoiser:
         if not present:
             self.reset()
             return np.zeros(card.axis.bins, np.float32)
-        return self._trained.expanded(self._answer(self._trained.compressed(energies)))
+        given = self._trained.compressed(energies)
+        return self._trained.expanded(self._answer(given), given)
 
     def advance(
         self, energies: NDArray[np.float32], present: NDArray[np.bool_] | None = None
@@ -277,7 +285,7 @@ class LiveDenoiser:
                 chunk = torch.from_numpy(compressed[start : start + CHUNK])[None]
                 answer, self._state = trained.network.chunk(chunk.to(trained.device), self._state)
                 done[start : start + CHUNK] = answer[0].cpu().numpy()
-        return trained.expanded(done)
+        return trained.expanded(done, compressed)
 
     def _answer(self, compressed: NDArray[np.float32]) -> NDArray[np.float32]:
         network, device = self._trained.network, self._trained.device

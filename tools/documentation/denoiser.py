@@ -128,7 +128,7 @@ def main() -> None:
     page = PAGE.format(
         limits=_limits(models, pairs),
         sample=sample,
-        quiet=quiet,
+        quiet=f"{quiet}\n{_campaign_quiet(pairs)}",
         limit_takes=LIMIT_TAKES,
         machine=this_machine(),
         minutes=f"{options.minutes:g}",
@@ -203,6 +203,18 @@ def _on_the_sample(folder: Path, paths: Sequence[Path]) -> tuple[str, str]:
             rows.append([clutter, name, str(int(moving.sum())), *cells])
     quiet = [_quiet_words(name, maps) for name, maps in found.items()]
     return "\n".join(markdown_table(rows)), "\n".join(quiet)
+
+
+def _campaign_quiet(pairs: PairSet) -> str:
+    """What the radar shows where the synthetic map is empty, of the last person."""
+    takes = pairs.of(pairs.subjects[-1:]).takes
+    radar = np.concatenate([take.radar.sum(axis=1) for take in takes])
+    empty = ~np.concatenate([take.synthetic.any(axis=1) for take in takes])
+    return (
+        f"- campaign: of {int(empty.sum())} frames whose synthetic map is empty, the radar's is not"
+        f" in {np.count_nonzero(radar[empty]) / empty.sum():.1%}; they hold"
+        f" {radar[empty].sum() / radar.sum():.2%} of its energy."
+    )
 
 
 def _maps_of(

@@ -46,6 +46,19 @@ def test_what_is_weaker_than_the_floor_is_empty(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", SMALL)
+def test_where_nothing_moves_there_is_nothing(name: str) -> None:
+    values = energies(90)
+    values[40:60, [0, *range(17, 32)]] = 0.0
+    values[45:60] = 0.0
+    values[50, 15] = 0.5  # in an emptied bin
+    doppler = synthetic_map(values)
+    model = trained(name)
+    for found in (model.denoise(doppler).values.T, model.live().advance(values)):
+        assert not found[45:60].any()
+        assert found[40:45].any(axis=1).all()
+
+
+@pytest.mark.parametrize("name", SMALL)
 def test_the_map_says_what_it_is(name: str) -> None:
     doppler = synthetic_map(energies(90), meta={"sensor": {"position_m": [0, 0, 1]}, "a": 1})
     denoised = trained(name, about={"data": "here"}, title="T").denoise(doppler)
