@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from sd2core.maps import LimbMaps
+from sd2core.mesh.vertex_parts import PARTS
 from sd2core.pairs.store import PairWriter, Take
 from sd2core.sensor import VelocityAxis
 
@@ -40,6 +43,13 @@ def take(subject: str, name: str, frames: int, seed: int, placement: int = 0) ->
     )
 
 
+def split(whole: Take) -> Take:
+    """Return the take with limb maps: every part has a share of the map."""
+    shares = np.random.default_rng(len(whole.times_s)).dirichlet(np.ones(len(PARTS)))
+    values = shares[:, None, None] * whole.synthetic.T
+    return replace(whole, limbs=LimbMaps(PARTS, values))
+
+
 def write_pairs(
     path: Path,
     subjects: tuple[str, ...] = ("s1", "s2", "s3"),
@@ -52,6 +62,7 @@ def write_pairs(
     axis: VelocityAxis = AXIS,
     labels: tuple[str, ...] = LABELS,
     placements: int = 1,
+    limbs: bool = False,
 ) -> Path:
     writer = PairWriter(
         path,
@@ -61,11 +72,13 @@ def write_pairs(
         frame_rate_hz=rate_hz,
         labels=labels,
         provenance={"made_for": "a test"},
+        parts=PARTS if limbs else (),
     )
     seed = 0
     for subject in subjects:
         for number in range(takes):
             for placement in range(placements):
-                writer.append(take(subject, f"t{number}", frames, seed, placement))
+                one = take(subject, f"t{number}", frames, seed, placement)
+                writer.append(split(one) if limbs else one)
                 seed += 1
     return path

@@ -24,6 +24,7 @@ from sd2core.batch.plan import BatchPlan, Step
 from sd2core.batch.task_graph import TaskGraph
 from sd2core.batch.tasks import Task
 from sd2core.errors import Sd2Error
+from sd2core.mesh.vertex_parts import PARTS
 from sd2core.progress import Progress, silent
 from sd2core.runs.pace import Kind, fit_kind, known_pace_s
 
@@ -181,4 +182,6 @@ def _add_costs(plan: BatchPlan, step: Step, steps: dict[str, StepEstimate]) -> N
     elif plan.synthesise is not None and step != "inspect":
         kinds = [name for name in ("synthesise", "denoise", "simulate") if name in steps]
         frames = sum(steps[name].frames for name in kinds) if step == "export" else one.frames
+        if getattr(getattr(plan, step), "limbs", False):  # a map of each part besides
+            frames += len(PARTS) * steps["synthesise"].frames
         one.bytes = 4 * plan.synthesise.options().axis.bins * frames

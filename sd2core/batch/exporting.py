@@ -70,6 +70,7 @@ def export_dataset(folder: BatchFolder, export: Export) -> None:
         frame_rate_hz=export.frame_rate_hz,
         validation=export.validation_subjects,
         test=export.test_subjects,
+        limbs=export.limbs,
         title=export.title,
     )
     settings = key_of("export", {"settings": export.model_dump(mode="json")})

@@ -167,12 +167,15 @@ class Export(_Section):
     validation_subjects: tuple[Text, ...] | None = None
     """Chosen automatically if not given, like the test subjects."""
     test_subjects: tuple[Text, ...] | None = None
+    limbs: bool = False  # also the limb maps, which [synthesise] limbs makes
     title: str = ""
 
     @model_validator(mode="after")
     def _ordered(self) -> Export:
         if self.overlap_frames >= self.segment_frames:
             raise ValueError("overlap_frames must be less than segment_frames")
+        if self.limbs and "synthetic" not in self.kinds:
+            raise ValueError("limbs goes with the kind synthetic")
         return self
 
 
@@ -209,6 +212,9 @@ class BatchPlan(_Section):
                 raise ValueError(
                     f"[{name}] goes with synthetic maps: give a section [synthesise] as well"
                 )
+        split = self.synthesise is not None and self.synthesise.limbs
+        if self.export is not None and self.export.limbs and not split:
+            raise ValueError("[export] limbs needs limbs = true in [synthesise] as well")
         return self
 
     @property

@@ -13,6 +13,7 @@ from sd2core.cli.options import (
     add_axis,
     add_command,
     add_json_and_progress,
+    add_limbs,
     add_people_kept_out,
     bin_list,
     name_list,
@@ -82,6 +83,7 @@ def _add_content(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--kinds", default=_KINDS, metavar="LIST", help=f"some of {_KINDS} (default: all)"
     )
+    add_limbs(group)
     group.add_argument(
         "--length", type=positive_int, default=72, metavar="N", help="frames (default: 72)"
     )
@@ -231,6 +233,7 @@ def _dataset_options(options: argparse.Namespace) -> DatasetOptions:
         min_share=options.min_share,
         validation=options.validation_subjects,
         test=options.test_subjects,
+        limbs=options.limbs,
         title=options.title,
         provenance={"command": shlex.join(["sd2", *sys.argv[1:]])},
     )
@@ -253,6 +256,7 @@ def _making(options: argparse.Namespace) -> Making:
         else read_placements(Path(options.placements)),
         simulation=None if options.simulate is None else Simulation(named_radar(options.simulate)),
         model=options.model,
+        limbs=options.limbs,
     )
 
 

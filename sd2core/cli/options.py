@@ -174,7 +174,7 @@ def name_list(text: str) -> tuple[str, ...]:
     return tuple(name.strip() for name in text.split(",") if name.strip())
 
 
-def add_limbs(parser: argparse.ArgumentParser) -> None:
+def add_limbs(parser: argparse._ActionsContainer) -> None:
     """Add ``--limbs``."""
     parser.add_argument(
         "--limbs",

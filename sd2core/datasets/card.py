@@ -214,7 +214,7 @@ def card_text(card: dict[str, Any]) -> str:
             (kind, f"{count:,}", "; ".join(card["units"].get(kind, [])) or "not stated",
              _WHAT[kind])
             for kind, count in card["segments_of_kind"].items()
-        )),
+        )) + _limbs(card),
         "## Labels\n\n" + _labels(card),
         "## Splits\n\n" + _splits(card),
         "## Axes and sensors\n\n" + _axes(card),
@@ -310,6 +310,13 @@ def _simulated(card: dict[str, Any]) -> str:
             " there either."
         )
     return " ".join(said)
+
+
+def _limbs(card: dict[str, Any]) -> str:
+    if not card["parts"]:
+        return ""
+    parts = ", ".join(card["parts"])
+    return f"\n\nThe array `limbs` holds the synthetic map split by the parts of the body: {parts}."
 
 
 def _labels(card: dict[str, Any]) -> str:

@@ -90,9 +90,9 @@ def cut_source(
     """Yield the rows of a data set in blocks of bounded size.
 
     ``null_bins`` are set to zero. ``label_numbers`` holds the data set's number of each label of
-    the source. A block has, per segment (first axis), the kinds that the source has and
-    ``available``, ``label``, ``segment_label``, ``purity``, ``start_s``, ``start_frame``,
-    ``resampled``.
+    the source. A block has, per segment (first axis), the kinds that the source has, ``limbs``
+    if they are wanted and its synthetic map has them, and ``available``, ``label``,
+    ``segment_label``, ``purity``, ``start_s``, ``start_frame``, ``resampled``.
     """
     known = source.known
     kinds = [kind for kind in options.kinds if kind in source.maps]
@@ -104,6 +104,9 @@ def cut_source(
             kind: _values(source.maps[kind].values, source.times_s, clip, null_bins)
             for kind in kinds
         }
+        limbs = source.maps["synthetic"].limbs if options.limbs and "synthetic" in kinds else None
+        if limbs is not None:
+            split = _values(limbs.values, source.times_s, clip, null_bins)
         for begun in range(0, len(clip.starts), _BLOCK):
             starts = clip.starts[begun : begun + _BLOCK]
             places = starts[:, None] + np.arange(length)  # (segments, length)
@@ -112,6 +115,8 @@ def cut_source(
                 whole = there[kind][places].all(axis=1)
                 # A map that is partly unknown says nothing, rather than something false.
                 arrays[kind] = cut(values[kind], starts, length) * whole[:, None, None]
+                if kind == "synthetic" and limbs is not None:
+                    arrays["limbs"] = cut(split, starts, length) * whole[:, None, None, None]
                 arrays["available"][:, KINDS.index(kind)] = whole
             arrays["label"] = label[places]
             arrays["segment_label"], arrays["purity"] = label_of_segments(
@@ -153,11 +158,13 @@ def _values(
     clip: Clip,
     null_bins: Sequence[int],
 ) -> NDArray[np.float32]:
-    """Return energies of a clip at its own times, (frames, bins)."""
-    own = values.T[clip.start : clip.stop].copy()
+    """Return energies of a clip at its own times: (…, bins, frames) → (frames, …, bins)."""
+    own = np.moveaxis(values, -1, 0)[clip.start : clip.stop].copy()
     if clip.resampled:
-        own = interpolated(own, times_s[clip.start : clip.stop], clip.times_s)
-    own[:, list(null_bins)] = 0.0
+        rows = own.reshape(len(own), -1)
+        rows = interpolated(rows, times_s[clip.start : clip.stop], clip.times_s)
+        own = rows.reshape(-1, *own.shape[1:])
+    own[..., list(null_bins)] = 0.0
     return own
 
 

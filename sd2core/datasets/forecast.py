@@ -90,6 +90,7 @@ class Counting:
         split = Split((), (), ())
         if segments:
             split = split_people(list(of_subject), options.validation, options.test)
+        maps = len(of_kind) + len(options.parts)
         return Forecast(
             sources=len(self.outlines),
             segments=segments,
@@ -98,6 +99,6 @@ class Counting:
             of_kind={kind: of_kind[kind] for kind in KINDS if kind in of_kind},
             split=split,
             frame_rate_hz=rate_hz,
-            total_bytes=segments * bytes_per_segment(options.length, bins, len(of_kind)),
+            total_bytes=segments * bytes_per_segment(options.length, bins, maps),
             failed=tuple(self.failed),
         )

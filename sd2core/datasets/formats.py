@@ -32,7 +32,8 @@ META, SOURCES = "meta", "sources"
 
 def refuse_large_npz(out: Path, segments: int, header: Header) -> None:
     """Refuse an NPZ too large to be opened."""
-    size = segments * bytes_per_segment(header.length, header.axis.bins, len(header.kinds))
+    maps = len(header.kinds) + len(header.parts)
+    size = segments * bytes_per_segment(header.length, header.axis.bins, maps)
     if size > NPZ_LIMIT_BYTES:
         raise Sd2Error(
             f"{out} would hold {segments:,} segments, {size / 1e9:.1f} GB",

@@ -60,6 +60,7 @@ def header_of(source: Source, options: DatasetOptions) -> Header:
         label_rule=options.label_rule,
         min_share=options.min_share,
         kinds_wanted=options.kinds,
+        parts=options.parts,
         title=options.title,
         made_by=f"SD² Studio {__version__}",
         provenance=options.provenance,
@@ -67,13 +68,22 @@ def header_of(source: Source, options: DatasetOptions) -> Header:
 
 
 def check_fits(source: Source, header: Header) -> None:
-    """Refuse a source of another axis, frame rate, emptied bins, or without a wanted map."""
+    """Refuse a source of another axis, frame rate, emptied bins, or without what is wanted."""
     title = source.key.title
     if not {*source.maps} & {*header.kinds_wanted}:
         raise Sd2Error(
             f"{title} has maps of kind {', '.join(source.maps)}",
             f"one of {', '.join(header.kinds_wanted)}",
         )
+    if header.parts and "synthetic" in source.maps:
+        limbs = source.maps["synthetic"].limbs
+        if limbs is None or limbs.parts != header.parts:
+            raise Sd2Error(
+                f"The synthetic map of {title} is "
+                + ("not split" if limbs is None else f"split into {', '.join(limbs.parts)}"),
+                f"limb maps of {', '.join(header.parts)}",
+                "Make it with `sd2 synth --limbs`, or export without limbs",
+            )
     for one in source.maps.values():
         if one.axis != header.axis:
             raise Sd2Error(
@@ -125,6 +135,7 @@ def refuse_other_settings(out: Path, there: Header, options: DatasetOptions) -> 
         ("segments of", there.length, options.length),
         ("an overlap of", there.overlap, options.overlap),
         ("kinds", list(there.kinds_wanted), list(options.kinds)),
+        ("parts", list(there.parts), list(options.parts)),
         ("frames/s", there.frame_rate_hz, options.frame_rate_hz),
         ("null bins", there.null_bins, options.null_bins),
         ("the label rule", there.label_rule, options.label_rule),

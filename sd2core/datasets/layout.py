@@ -41,7 +41,7 @@ COLUMNS: dict[str, tuple[str, tuple[int, ...]]] = {
     "elevation_deg": ("float32", ()),
     "available": ("bool", (len(KINDS),)),
 }
-"""One row per segment: type, and shape of a row. ``label`` and the maps are besides."""
+"""One row per segment: type, and shape of a row. ``label``, maps and limb maps are besides."""
 
 CHUNK_SEGMENTS = 32
 CHUNK_ROWS = 8192
@@ -69,6 +69,7 @@ class Header:
     classes: dict[str, str] = field(default_factory=dict)
     subjects: tuple[str, ...] = ()  # Numbers in ``subject`` are places in it.
     splits: dict[str, tuple[str, ...]] = field(default_factory=dict)  # Subjects of each split.
+    parts: tuple[str, ...] = ()  # Parts of the body in ``limbs``; none: there are no limb maps.
     # Meaning of the value 1 in each kind; several where sources differ.
     units: dict[str, tuple[str, ...]] = field(default_factory=dict)
     title: str = ""
@@ -93,7 +94,8 @@ class Header:
         try:
             axis = VelocityAxis(int(entry["bins"]), float(entry["v_max_mps"]))
             names = (one.name for one in fields(cls) if one.name != "axis")
-            content = {name: entry[name] for name in names}
+            # Before there were limb maps, headers did not have parts.
+            content = {name: ({"parts": ()} | entry)[name] for name in names}
             return _HEADER.validate_python({**content, "axis": axis})
         except (KeyError, TypeError, ValueError) as error:
             raise Sd2Error(
@@ -128,20 +130,24 @@ def format_of(path: Path) -> FileFormat:
 
 def row_shapes(header: Header) -> dict[str, tuple[str, tuple[int, ...]]]:
     """Return type and shape of a row of every array that the header implies."""
-    maps = dict.fromkeys(header.kinds, ("float32", (header.length, header.axis.bins)))
+    maps: dict[str, tuple[str, tuple[int, ...]]] = dict.fromkeys(
+        header.kinds, ("float32", (header.length, header.axis.bins))
+    )
+    if header.parts:
+        maps["limbs"] = ("float32", (header.length, len(header.parts), header.axis.bins))
     return maps | {"label": ("int16", (header.length,))} | COLUMNS
 
 
 def chunk_of(row: tuple[int, ...]) -> tuple[int, ...]:
     """Return the shape of a chunk of rows of this shape."""
-    return (CHUNK_SEGMENTS if len(row) == 2 else CHUNK_ROWS, *row)
+    return (CHUNK_SEGMENTS if len(row) >= 2 else CHUNK_ROWS, *row)
 
 
-def bytes_per_segment(header_length: int, bins: int, kinds: int) -> int:
-    """Size of a segment in bytes before compression."""
+def bytes_per_segment(header_length: int, bins: int, maps: int) -> int:
+    """Size of a segment in bytes before compression; limb maps are as many maps as parts."""
     import numpy as np
 
     columns = sum(
         np.dtype(kind).itemsize * int(np.prod(row, dtype=int)) for kind, row in COLUMNS.values()
     )
-    return 4 * header_length * bins * kinds + 2 * header_length + columns
+    return 4 * header_length * bins * maps + 2 * header_length + columns

@@ -9,6 +9,7 @@ from typing import Any, Literal, get_args
 from sd2core.datasets.source import KINDS
 from sd2core.errors import Sd2Error
 from sd2core.maps import MapKind
+from sd2core.mesh.vertex_parts import PARTS
 from sd2core.pairs.segments import LENGTH, OVERLAP, segment_starts
 
 LabelRule = Literal["foreground", "majority"]
@@ -26,6 +27,8 @@ class DatasetOptions:
     ----------
     kinds : tuple of str
         Maps to take, where a source has them.
+    limbs : bool
+        Also take the split of synthetic maps by the parts of the body; one without it is refused.
     length, overlap : int
         Frames of a segment, and how many it shares with the next one.
     frame_rate_hz : float, optional
@@ -61,6 +64,7 @@ class DatasetOptions:
     min_share: float = MIN_SHARE
     validation: tuple[str, ...] | None = None
     test: tuple[str, ...] | None = None
+    limbs: bool = False
     title: str = ""
     provenance: dict[str, Any] = field(default_factory=dict)
 
@@ -71,6 +75,10 @@ class DatasetOptions:
                 f"some of {', '.join(KINDS)}",
             )
         object.__setattr__(self, "kinds", tuple(kind for kind in KINDS if kind in self.kinds))
+        if self.limbs and "synthetic" not in self.kinds:
+            raise Sd2Error(
+                f"Limb maps of {', '.join(self.kinds)} maps", "the kind synthetic, which they split"
+            )
         if self.length < 1:
             raise Sd2Error(f"Segments are {self.length} frames long", "1 or more")
         segment_starts(0, self.length, self.overlap)  # refuses an overlap that cannot be
@@ -82,3 +90,8 @@ class DatasetOptions:
             )
         if not 0 <= self.min_share <= 1:
             raise Sd2Error(f"The least share of a label is {self.min_share}", "0 to 1")
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """Parts of the body by which synthetic maps are split; none without ``limbs``."""
+        return PARTS if self.limbs else ()

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from sd2core.accuracy.places import choose_for_places, spread
 from sd2core.accuracy.trial import synthesizer_for
-from sd2core.body.parts import body_parts, synthetic_map
+from sd2core.body.parts import body_parts, known_parts, synthetic_map
 from sd2core.datasets.simulating import Simulation, simulated_map
 from sd2core.datasets.source import (
     BACKGROUND,
@@ -78,6 +78,9 @@ class Making:
     model : str, optional
         Denoiser, by file or name; None: that of the recording, or the bundled one where
         none is chosen. A recording that is set to have no denoiser has no denoised map.
+    limbs : bool
+        Split the synthetic map by the parts of the body; a recording where they are not known
+        fails.
     """
 
     kinds: tuple[MapKind, ...] = KINDS
@@ -86,12 +89,13 @@ class Making:
     placements: Placements | Literal["planned"] | None = None
     simulation: Simulation | None = None
     model: str | None = None
+    limbs: bool = False
 
     @property
     def pace_kind(self) -> Kind:
         """Kind of work whose items are segments of recordings, see :mod:`sd2core.runs.pace`."""
         told = (self.synthesis.visibility, self.tolerance, self.model, self.simulation is not None)
-        return ("export", *self.kinds, *map(str, told))
+        return ("export", *self.kinds, *map(str, told), *(["limbs"] if self.limbs else []))
 
 
 def recording_sources(
@@ -190,7 +194,10 @@ class _Opened:
         kinds: list[MapKind] = []
         if self._mesh is not None:
             kinds += ["synthetic"]
-            kinds += ["denoised"] if _models_of(self.recording, self._making) else []
+            if self._making.limbs:
+                known_parts(self._mesh)  # or fail, as the source would
+            if "denoised" in self._making.kinds and _models_of(self.recording, self._making):
+                kinds.append("denoised")
             kinds += ["simulated"] if self._simulates else []
         if radar_kind is not None and placement == 0 and radar_kind not in kinds:
             kinds.append(radar_kind)
@@ -209,7 +216,7 @@ class _Opened:
         counted_share = _COUNTED_SHARE if self._simulates else 1.0
         if self._mesh is not None and {"synthetic", "denoised"} & {*wanted}:
             model = self._model if "denoised" in wanted else None
-            limbs = model is not None and bool(describe_model(model).parts)
+            limbs = self._making.limbs or (model is not None and bool(describe_model(model).parts))
             counting = part_of(progress, 0.0, counted_share)
             synthetic = self._counted(sensor, counting, limbs=limbs)
             maps["synthetic"] = synthetic

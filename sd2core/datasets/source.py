@@ -178,6 +178,8 @@ class Source:
             if kind in self.maps:
                 sums.update(kind.encode())
                 sums.update(self.maps[kind].values.data)
+                limbs = self.maps[kind].limbs
+                sums.update(b"" if limbs is None else limbs.values.data)
                 sums.update(self.known[kind].tobytes())
         return sums.hexdigest()
 

@@ -78,7 +78,7 @@ def gather(
             f"{len(label_files)} label files are given for {len(maps)} maps", "one for each map"
         )
     labelled = dict(zip(maps, label_files, strict=False))
-    found = pair_sources(pairs, making.kinds, making.model) if pairs else []
+    found = pair_sources(pairs, making.kinds, making.model, limbs=making.limbs) if pairs else []
     recordings = {path: name for path, name in zip(single, names, strict=True) if path not in maps}
     found += recording_sources(list(recordings), list(recordings.values()), making)
     for path, name in zip(single, names, strict=True):
@@ -170,15 +170,27 @@ def _sensor(meta: dict[str, Any]) -> VirtualSensor:
 
 
 def pair_sources(
-    paths: Sequence[Path], kinds: tuple[MapKind, ...] = KINDS, model: str | None = None
+    paths: Sequence[Path],
+    kinds: tuple[MapKind, ...] = KINDS,
+    model: str | None = None,
+    *,
+    limbs: bool = False,
 ) -> list[LazySource]:
     """Return one source per take of the stores of pairs.
 
     Subjects of the same name in different stores are different people: they are then called
     ``STORE:NAME``. Denoised maps are made from the synthetic ones, with a ``model`` given by file
-    or name; None: the bundled one.
+    or name; None: the bundled one. With ``limbs``, stores without limb maps raise Sd2Error.
     """
     stores = [_PairStore(path, kinds, model) for path in paths]
+    unsplit = [str(one.path) for one in stores if not one.parts]
+    if limbs and unsplit:
+        raise Sd2Error(
+            f"{', '.join(unsplit)}: pairs without limb maps",
+            "pairs that are split by the parts of the body",
+            "Make them again with `sd2 simulate campaign --limbs` or `sd2 pairs … --limbs`, or"
+            " export without limbs",
+        )
     people = Counter(name for one in stores for name in {take["subject"] for take in one.takes})
     return [
         one.lazy(number, f"{one.path.stem}:{name}" if people[name] > 1 else name)
@@ -197,10 +209,10 @@ class _PairStore:
         self._axis = VelocityAxis(int(self._header["bins"]), float(self._header["v_max_mps"]))
         self._null_bins = tuple(self._header["null_bins"])
         self._labels = tuple(self._header["labels"])
-        self._parts = tuple(self._header.get("parts", ()))
+        self.parts = tuple(self._header.get("parts", ()))
         self._model: Path | None = None
         if "denoised" in self._kinds:
-            self._model = find_model(model or default_name(limbs=bool(self._parts)))
+            self._model = find_model(model or default_name(limbs=bool(self.parts)))
         self._denoising = Denoising()
 
     def lazy(self, number: int, subject: str) -> LazySource:
@@ -220,7 +232,7 @@ class _PairStore:
         sums = hashlib.blake2b(
             json.dumps([about, self._header["kind"], self._kinds, model]).encode(), digest_size=16
         )
-        for name in (*_PAIR_ARRAYS, *(["limbs"] if self._parts else [])):
+        for name in (*_PAIR_ARRAYS, *(["limbs"] if self.parts else [])):
             sums.update(np.ascontiguousarray(self._part(name, take)).data)
         return sums.hexdigest()
 
@@ -241,9 +253,9 @@ class _PairStore:
             return DopplerMap(values, self._axis, clock, kind, unit, self._null_bins, meta=meta)
 
         def limbs() -> LimbMaps | None:
-            if not self._parts:
+            if not self.parts:
                 return None
-            return LimbMaps(self._parts, self._part("limbs", take).transpose(1, 2, 0))
+            return LimbMaps(self.parts, self._part("limbs", take).transpose(1, 2, 0))
 
         maps: dict[MapKind, DopplerMap] = {}
         if {"synthetic", "denoised"} & {*self._kinds}:

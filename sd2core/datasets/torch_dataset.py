@@ -34,6 +34,9 @@ LABEL_TARGETS: tuple[LabelTarget, ...] = get_args(LabelTarget)
 NOT_LEARNT = -100
 """Frames whose label has no class: what torch's losses leave out."""
 
+MapArray = MapKind | Literal["limbs"]
+"""Array of energies: a kind of map, or the synthetic map split by the parts of the body."""
+
 _CHUNKS_KEPT = 8
 
 Item = tuple[torch.Tensor, torch.Tensor]
@@ -50,9 +53,10 @@ class SegmentDataset(TorchDataset[Item]):
     path : Path or str
         Data set in any format.
     inputs : str
-        Kind of map: an item's first tensor, float32 of shape (length, bins).
+        Kind of map: an item's first tensor, float32 of shape (length, bins); or ``"limbs"``, of
+        shape (length, parts, bins), where the data set has them (``header.parts``).
     target : str
-        Its second: another kind of map; ``"class"`` or ``"label"`` of the segment, an int64
+        Its second: another of these; ``"class"`` or ``"label"`` of the segment, an int64
         number; or ``"frame class"`` or ``"frame label"``, int64 of shape (length,). Segments
         whose label has no class are left out of ``"class"``; such frames are
         :data:`NOT_LEARNT`.
@@ -78,8 +82,8 @@ class SegmentDataset(TorchDataset[Item]):
     def __init__(
         self,
         path: Path | str,
-        inputs: MapKind = "denoised",
-        target: MapKind | LabelTarget = "class",
+        inputs: MapArray = "denoised",
+        target: MapArray | LabelTarget = "class",
         split: str | None = None,
         *,
         gain_db: float = 0.0,
@@ -92,9 +96,10 @@ class SegmentDataset(TorchDataset[Item]):
         self._kept: OrderedDict[tuple[str, int], NDArray] = OrderedDict()
         with open_dataset(self.path) as dataset:
             self.header = dataset.header
+            there = (*self.header.kinds, *(["limbs"] if self.header.parts else []))
             for what in (inputs, *([target] if target not in LABEL_TARGETS else [])):
-                if what not in self.header.kinds:
-                    targets = ", ".join((*self.header.kinds, *LABEL_TARGETS))
+                if what not in there:
+                    targets = ", ".join((*there, *LABEL_TARGETS))
                     raise Sd2Error(f"{self.path} has no {what} maps", f"one of {targets}")
             self.names, self._numbers = self._names()
             self.indices = self._chosen(dataset, split)
@@ -114,7 +119,7 @@ class SegmentDataset(TorchDataset[Item]):
         """Return several items, as a ``DataLoader`` asks for; each chunk is read once."""
         rows = self.indices[np.asarray(indices, np.int64)]
         energies = self._rows(self.inputs, rows)
-        if self.target in KINDS:
+        if self.target not in LABEL_TARGETS:
             targets = self._rows(self.target, rows)
         else:
             array = "label" if self.target.startswith("frame") else "segment_label"
@@ -122,7 +127,7 @@ class SegmentDataset(TorchDataset[Item]):
         items = []
         for row, one, other in zip(rows.tolist(), energies, targets, strict=True):
             gain = self._gain(row)
-            goal = other * gain if self.target in KINDS else other
+            goal = other if self.target in LABEL_TARGETS else other * gain
             items.append((torch.from_numpy(one * gain), torch.as_tensor(goal)))
         return items
 
@@ -149,9 +154,9 @@ class SegmentDataset(TorchDataset[Item]):
     def _chosen(self, dataset: Dataset, split: str | None) -> NDArray[np.int64]:
         rows = np.arange(len(dataset)) if split is None else dataset.of_split(split)
         available = np.asarray(dataset["available"][:])[rows]
-        wanted = available[:, KINDS.index(self.inputs)]
-        if self.target in KINDS:
-            wanted &= available[:, KINDS.index(self.target)]
+        wanted = available[:, _kind_of(self.inputs)]
+        if self.target not in LABEL_TARGETS:
+            wanted &= available[:, _kind_of(self.target)]
         elif self.target == "class":
             wanted &= self._numbers[np.asarray(dataset["segment_label"][:])[rows]] != NOT_LEARNT
         return rows[wanted]
@@ -187,3 +192,9 @@ class SegmentDataset(TorchDataset[Item]):
         if self._open is None or self._open[0] != os.getpid():
             self._open = (os.getpid(), open_dataset(self.path))
         return self._open[1]
+
+
+def _kind_of(array: str) -> int:
+    """Place of an array's kind in ``available``; limb maps are where the synthetic map is."""
+    names: tuple[str, ...] = KINDS
+    return names.index("synthetic" if array == "limbs" else array)

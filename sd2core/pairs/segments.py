@@ -33,7 +33,7 @@ def segment_starts(frames: int, length: int = LENGTH, overlap: int = OVERLAP) ->
 def cut(
     values: NDArray[np.float32], starts: NDArray[np.int64], length: int = LENGTH
 ) -> NDArray[np.float32]:
-    """Cut a clip into windows: (frames, bins) → (windows, length, bins)."""
+    """Cut a clip into windows: (frames, …, bins) → (windows, length, …, bins)."""
     cut_out: NDArray[np.float32] = values[starts[:, None] + np.arange(length)]
     return cut_out
 

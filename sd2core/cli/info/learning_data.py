@@ -26,6 +26,7 @@ def describe_dataset_at(path: Path) -> Description:
         "segments": f"{card['segments']:,} of {card['length']} frames"
         f" ({card['segment_s']:.2f} s at {card['frame_rate_hz']:g} frames/s)",
         "kinds": _listed(card["segments_of_kind"]),
+        "limb maps": ", ".join(card["parts"]),
         "labels": _listed(card["segments_of_label"]),
         "classes": _listed(card["segments_of_class"]),
         "splits": _listed(card["segments_of_split"]),

@@ -71,6 +71,16 @@ def test_the_work_of_a_map_grows_with_frames_and_vertices(tmp_path: Path) -> Non
     assert Task("inspect", "", None, {}).work == 1
 
 
+def test_limb_maps_take_as_much_as_a_map_for_each_part(tmp_path: Path) -> None:
+    save_spheres(tmp_path / "inputs", 1, frames=40)
+    whole = estimate(plan_in(tmp_path), 1).steps
+    split = PLAN.replace("[synthesise]", "[synthesise]\nlimbs = true")
+    for text, exported in ((split, 1), (split + "limbs = true\n", 10)):
+        steps = estimate(plan_from_text(text, tmp_path), 1).steps
+        assert steps["synthesise"].bytes == 10 * whole["synthesise"].bytes
+        assert steps["export"].bytes == exported * whole["export"].bytes
+
+
 def test_options_are_part_of_the_kind_and_names_are_not(tmp_path: Path) -> None:
     plan = plan_in(tmp_path)
     assert plan.synthesise is not None

@@ -85,6 +85,8 @@ def test_paths_are_relative_to_the_plan_s_folder(tmp_path: Path) -> None:
         (LEAST + "tolerance = 0.02\nvisibility = 'none'\n", 4, ("tolerance", "visibility")),
         (LEAST + "[denoise]\nmodel = ' '\n", 6, ("denoise.model",)),
         (LEAST + "[export]\nsegment_frames = 8\n", 5, ("overlap_frames",)),
+        (LEAST + "[export]\nlimbs = true\n", None, ("[synthesise]", "limbs = true")),
+        (LEAST + "[export]\nlimbs = true\nkinds = ['real']\n", 5, ("synthetic",)),
         (LEAST + "[placements]\nkind = 'ring'\n", 5, ("placements", "ring")),
         (LEAST + "[placements]\nkind = 'positions'\npositions_m = [[1, 2]]\n", 7, ("positions_m",)),
         (LEAST + "[placements]\nkind = 'grid'\nranges_m = []\n", 5, ("ranges",)),

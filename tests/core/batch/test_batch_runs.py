@@ -24,6 +24,7 @@ from sd2core.batch.tasks import Task
 from sd2core.denoise.files import find_model
 from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.errors import Sd2Error
+from sd2core.files.resources import resource_path
 from sd2core.io.mesh import load_mesh, save_mesh
 from sd2core.maps import DopplerMap
 from sd2core.recording.recording import Recording
@@ -348,6 +349,27 @@ def test_recordings_become_a_data_set(run: Runs) -> None:
     recording.write_text(recording.read_text().replace('"title": "take3"', '"title": "other"'))
     run(text)
     assert run.pool.submitted == {"inspect": 1, "export": 1}
+
+
+def test_limb_maps_are_exported_where_the_plan_says_so(run: Runs) -> None:
+    from sd2core.datasets.reading import open_dataset
+
+    (run.folder / "meshes").mkdir()
+    mesh = load_mesh(resource_path("swipes.sd2") / "mesh.zarr").between(30, 50)
+    save_mesh(mesh, run.folder / "meshes" / "anna.npz")
+    split = MAPS + "limbs = true\nvisibility = 'none'\n[export]\nsegment_frames = 20\n"
+    whole = run(split)
+    with open_dataset(Path(whole.facts["dataset"])) as dataset:
+        assert dataset.header.parts == ()
+    end = run(split + "limbs = true\n")
+    assert run.pool.submitted == {"export": 1}
+    rows = [json.loads(line) for line in BatchFolder(run.out).results.read_text().splitlines()]
+    with open_dataset(Path(end.facts["dataset"])) as dataset:
+        assert len(dataset) == len(rows) == 2
+        for row, found in zip(rows, dataset["limbs"][:], strict=True):
+            known = DopplerMap.load(run.out / row["synthetic"]).limbs
+            assert known is not None
+            np.testing.assert_array_equal(found, known.values.transpose(2, 0, 1))
 
 
 def test_what_would_be_done_is_what_is_done(run: Runs) -> None:

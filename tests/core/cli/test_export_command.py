@@ -12,7 +12,10 @@ from matplotlib.image import imread
 from swinging_recordings import recording
 
 from sd2core.datasets.reading import open_dataset
+from sd2core.files.resources import resource_path
+from sd2core.io.mesh import load_mesh, save_mesh
 from sd2core.placements.placements import PlacementGrid, write_placements
+from sd2core.recording.recording import Recording
 
 SMALL = ("--kinds", "synthetic,simulated", "--length", 30, "--overlap", 5)
 
@@ -58,6 +61,30 @@ def test_a_folder_of_recordings_becomes_a_data_set_with_card_and_sheet(
     assert info.out.startswith(f"Data set {out}")
     assert "note: It has no maps of a real radar" in info.out
     assert json.loads(sd2("info", out, "--json").out)["segments"] == 15
+
+
+def test_limb_maps_are_exported_on_request(sd2: Sd2, tmp_path: Path) -> None:
+    octahedron = recording(tmp_path / "anna.sd2", radar=False).folder
+    mesh = load_mesh(resource_path("swipes.sd2") / "mesh.zarr").between(30, 50)
+    save_mesh(mesh, tmp_path / "mesh.npz")
+    body = Recording.create(tmp_path / "ben.sd2", mesh=tmp_path / "mesh.npz").folder
+    out = tmp_path / "set.h5"
+    asked = ("export", octahedron, body, "--out", out, "--kinds", "synthetic", "--length", 20)
+    sizes = []
+    for more in ((), ("--limbs",)):
+        told = sd2(*asked[:1], *asked[2:], *more, "--dry-run", "--json")
+        sizes.append(json.loads(told.out)["total_bytes"])
+    assert sizes[1] - sizes[0] == 9 * 20 * 32 * 4
+    told = sd2(*asked, "--limbs")
+    assert told.code == 1
+    assert "left out anna" in told.err
+    assert "the parts of the body are not known" in told.err
+    with open_dataset(out) as dataset:
+        assert dataset["limbs"].shape == (1, 20, 9, 32)
+    assert "trunk, upper_arm.L" in sd2("info", out).out
+    refused = sd2(*asked)
+    assert refused.code == 1
+    assert "begun with parts" in refused.err
 
 
 @pytest.mark.slow

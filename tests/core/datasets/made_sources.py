@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from sd2core.datasets.source import Source
-from sd2core.maps import DopplerMap, MapKind
+from sd2core.maps import DopplerMap, LimbMaps, MapKind
+from sd2core.mesh.vertex_parts import PARTS
 from sd2core.sensor import VelocityAxis, VirtualSensor
 from sd2core.timebase import Timebase
 
@@ -28,8 +30,9 @@ def source(
     present: np.ndarray | None = None,
     label: np.ndarray | None = None,
     null_bins: tuple[int, ...] = (),
+    limbs: bool = False,
 ) -> Source:
-    """Random maps; the same arguments give the same values."""
+    """Random maps; the same arguments give the same values. Limb maps are of whole numbers."""
     rng = np.random.default_rng([*recording.encode(), *subject.encode(), placement, frames])
     clock = Timebase.regular(frames, rate_hz) if times_s is None else Timebase(times_s)
     maps = {
@@ -45,6 +48,11 @@ def source(
         )
         for kind in kinds
     }
+    if limbs:
+        split = rng.integers(0, 100, (len(PARTS), AXIS.bins, frames)).astype(np.float32)
+        maps["synthetic"] = replace(
+            maps["synthetic"], values=split.sum(axis=0), limbs=LimbMaps(PARTS, split)
+        )
     if label is None:
         label = rng.integers(0, 3, frames).astype(np.int16)
     return Source(

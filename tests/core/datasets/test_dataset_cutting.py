@@ -119,6 +119,29 @@ def test_uneven_frames_are_evened_and_lost_time_parts_clips() -> None:
     ]
 
 
+def test_limb_maps_are_cut_as_maps_of_their_parts() -> None:
+    """At another rate, around a gap, with a nulled bin: each like a map of its own."""
+    present = np.arange(100) != 40
+    one = source(limbs=True, rate_hz=25.0, present=present, kinds=("synthetic",))
+    options = DatasetOptions(length=20, overlap=5)
+
+    def cut_at_30_hz(of: Source, limbs: bool, name: str) -> np.ndarray:
+        blocks = cut_source(of, 30.0, (2,), NUMBERS, replace(options, limbs=limbs))
+        return np.concatenate([block[name] for block in blocks])
+
+    whole = one.maps["synthetic"]
+    assert whole.limbs is not None
+    limbs = cut_at_30_hz(one, True, "limbs")
+    assert cut_at_30_hz(one, True, "resampled").all()
+    assert not limbs[..., 2].any()
+    for number, values in enumerate(whole.limbs.values):
+        part = replace(one, maps={"synthetic": replace(whole, values=values)})
+        expected = cut_at_30_hz(part, False, "synthetic")
+        np.testing.assert_array_equal(limbs[:, :, number], expected)
+    # In between frames they add up as well as single precision can.
+    np.testing.assert_allclose(limbs.sum(axis=2), cut_at_30_hz(one, True, "synthetic"), rtol=1e-6)
+
+
 def test_how_a_segment_is_named() -> None:
     windows = np.array([[0] * 8 + [1] * 2, [0] * 9 + [1], [1] * 4 + [2] * 6, [0] * 5 + [2] * 5])
     named, purity = label_of_segments(windows, 3, DatasetOptions(min_share=0.2))

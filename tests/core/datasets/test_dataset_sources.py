@@ -14,6 +14,7 @@ from swinging_recordings import FRAMES, RATE_HZ, recording
 from sd2core.accuracy.places import PlacedPlan
 from sd2core.accuracy.plans import AccuracyPlan
 from sd2core.accuracy.trial import synthesizer_for
+from sd2core.body.parts import synthetic_map
 from sd2core.datasets.forecast import Counting
 from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.reading import open_dataset
@@ -24,7 +25,9 @@ from sd2core.datasets.writing import write_dataset
 from sd2core.denoise.files import find_model, load_model
 from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.errors import Sd2Error
+from sd2core.files.resources import resource_path
 from sd2core.fmcw.processing import doppler_map
+from sd2core.io.mesh import load_mesh, save_mesh
 from sd2core.labels.files import write_labels
 from sd2core.labels.label_set import Label, LabelSet
 from sd2core.labels.spans import Labels, LabelTrack, Span
@@ -33,6 +36,7 @@ from sd2core.placements.body_extent import BodyExtent
 from sd2core.placements.placements import PlacementGrid
 from sd2core.progress import silent
 from sd2core.radar_config import CLUTTER
+from sd2core.recording.recording import Recording
 
 GRID = PlacementGrid((1.0, 2.5), (0.0, 30.0))
 SWINGS = LabelSet("Swings", (Label("swing", "#0072b2", "1", "vertical"),))
@@ -158,6 +162,47 @@ def test_pairs_are_taken_take_by_take(tmp_path: Path, kind: str) -> None:
         assert np.array_equal(source.maps[kind].values.T, take.radar)  # type: ignore[index]
         assert np.array_equal(source.label, take.label)
         assert source.sensor.position_m == tuple(take.sensor_position_m)
+
+
+def test_limb_maps_of_pairs_are_those_of_their_store(tmp_path: Path) -> None:
+    making = Making(kinds=("synthetic", "simulated"), limbs=True)
+    path = write_pairs(tmp_path / "p.zarr", ("s1", "s2"), takes=1, limbs=True)
+    out = tmp_path / "set.zarr"
+    options = DatasetOptions(kinds=making.kinds, length=30, overlap=0, limbs=True)
+    forecast = Counting.of(gather([path], making)).forecast(options, 8)
+    write_dataset(out, gather([path], making), options)
+    with open_dataset(out) as dataset:
+        found = dataset["limbs"][:].reshape(2, 150, 9, 8)
+        written = sum(array.size * array.dtype.itemsize for array in dataset.arrays.values())
+    for values, take in zip(found, read_pairs(path).takes, strict=True):
+        assert take.limbs is not None
+        assert np.array_equal(values, take.limbs.values.transpose(2, 0, 1))
+    assert forecast.total_bytes == written
+    unsplit = write_pairs(tmp_path / "unsplit.zarr", ("s1",))
+    with pytest.raises(Sd2Error, match=r"unsplit.zarr: pairs without.*sd2 simulate campaign --l"):
+        gather([path, unsplit], making)
+
+
+def test_recordings_whose_limbs_are_not_known_are_left_out(tmp_path: Path) -> None:
+    octahedron = recording(tmp_path / "anna.sd2", radar=False)
+    mesh = load_mesh(resource_path("swipes.sd2") / "mesh.zarr").between(30, 50)
+    save_mesh(mesh, tmp_path / "mesh.npz")
+    body = Recording.create(tmp_path / "ben.sd2", mesh=tmp_path / "mesh.npz")
+    making = Making(kinds=("synthetic",), limbs=True)
+    sources = gather([octahedron.folder, body.folder], making)
+    options = DatasetOptions(kinds=("synthetic",), length=10, overlap=0, limbs=True)
+    forecast = Counting.of(sources).forecast(options, 32)
+    written = write_dataset(tmp_path / "set.zarr", sources, options)
+    assert forecast.segments == written.segments == 2
+    for reason in (*forecast.failed, *(one.reason for one in written.failed)):
+        assert "the parts of the body are not known" in reason
+    assert len(forecast.failed) == len(written.failed) == 1
+    known = synthetic_map(Synthesizer(mesh, PRESETS["paper"]), body.sensor, limbs=True)
+    assert known.limbs is not None
+    with open_dataset(tmp_path / "set.zarr") as dataset:
+        found, whole = dataset["limbs"][:].reshape(20, 9, 32), dataset["synthetic"][:]
+    np.testing.assert_array_equal(found, known.limbs.values.transpose(2, 0, 1))
+    np.testing.assert_allclose(found.sum(axis=1), whole.reshape(20, 32), rtol=1e-6)
 
 
 def test_people_of_two_stores_are_different_people(tmp_path: Path) -> None:

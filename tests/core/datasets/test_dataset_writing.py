@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -11,6 +12,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from made_sources import AXIS, CLASSES, LABELS, source
@@ -23,6 +25,8 @@ from sd2core.datasets.source import KINDS, LazySource, Source, SourceKey
 from sd2core.datasets.writing import write_dataset
 from sd2core.errors import Sd2Error
 from sd2core.io.kinds import kind_of
+from sd2core.maps import LimbMaps
+from sd2core.mesh.vertex_parts import PARTS
 from sd2core.progress import Cancelled, Progress
 
 OPTIONS = DatasetOptions(length=24, overlap=4)
@@ -286,6 +290,98 @@ def test_labels_of_all_sources_are_one_list(tmp_path: Path) -> None:
     clash = replace(source("r4"), classes={"up-to-down": "horizontal"})
     (failed,) = write_dataset(out, [clash], OPTIONS).failed
     assert "'up-to-down' is of class 'horizontal'" in failed.reason
+
+
+WITH_LIMBS = replace(OPTIONS, limbs=True, null_bins=(3,))
+
+
+def split_sources() -> list[Source]:
+    return [
+        source("r1", "anna", limbs=True),
+        source("r1", "ben", kinds=("real",)),  # no synthetic map, and nothing to split
+        source("r2", "ben", kinds=("synthetic", "real"), limbs=True, frames=61),
+    ]
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_limb_maps_add_up_to_the_synthetic_map(tmp_path: Path, ending: str) -> None:
+    out = tmp_path / f"set{ending}"
+    sources = split_sources()
+    write_dataset(out, sources[:1], WITH_LIMBS)
+    assert write_dataset(out, sources, WITH_LIMBS).added == 2
+    with open_dataset(out) as dataset:
+        assert dataset.header.parts == PARTS
+        assert dataset["limbs"].shape == (len(dataset), 24, 9, AXIS.bins)
+    rows = contents(out)
+    np.testing.assert_array_equal(rows["limbs"].sum(axis=2), rows["synthetic"])
+    assert rows["limbs"].any(axis=(0, 1)).tolist() == [[number != 3 for number in range(8)]] * 9
+    there = rows["available"][:, KINDS.index("synthetic")]
+    assert rows["limbs"].any(axis=(1, 2, 3)).tolist() == there.tolist() != [True] * len(there)
+    for row in np.flatnonzero(there):
+        known = sources[rows["source"][row]].maps["synthetic"].limbs
+        assert known is not None
+        start = rows["start_frame"][row]
+        expected = known.values[..., start : start + 24].transpose(2, 0, 1).copy()
+        expected[..., 3] = 0.0
+        np.testing.assert_array_equal(rows["limbs"][row], expected)
+    told = card.describe_dataset(open_dataset(out))
+    assert "parts of the body: trunk, upper_arm.L" in card.card_text(told)
+
+
+@pytest.mark.parametrize("begun_with", [True, False])
+def test_a_data_set_has_limb_maps_of_all_or_none(tmp_path: Path, begun_with: bool) -> None:
+    options = [replace(WITH_LIMBS, limbs=limbs) for limbs in (begun_with, not begun_with)]
+    write_dataset(tmp_path / "set.zarr", split_sources()[:1], options[0])
+    with pytest.raises(Sd2Error, match=r"begun with parts \["):
+        write_dataset(tmp_path / "set.zarr", split_sources(), options[1])
+
+
+def test_what_is_not_split_is_left_out_of_limb_maps(tmp_path: Path) -> None:
+    other = source("r3", "carla", limbs=True)
+    two = LimbMaps(("left", "right"), np.zeros((2, *other.maps["synthetic"].values.shape)))
+    odd = replace(other, maps={"synthetic": replace(other.maps["synthetic"], limbs=two)})
+    sources = [source("r3", "ben"), odd, *split_sources()]
+    written = write_dataset(tmp_path / "set.zarr", sources, WITH_LIMBS)
+    assert written.added == 3
+    assert [one.key for one in written.failed] == [one.key for one in sources[:2]]
+    assert "r3 of ben is not split. Expected: limb maps of trunk" in written.failed[0].reason
+    assert "carla is split into left, right" in written.failed[1].reason
+    with pytest.raises(Sd2Error, match="Limb maps of denoised, real maps"):
+        DatasetOptions(kinds=("real", "denoised"), limbs=True)
+
+
+def without_parts(path: Path) -> None:
+    """Take from the description what earlier versions did not write."""
+    if path.suffix == ".zarr":
+        described = json.loads((path / "zarr.json").read_text())
+        del described["attributes"]["parts"]
+        (path / "zarr.json").write_text(json.dumps(described))
+    elif path.suffix == ".h5":
+        with h5py.File(path, "r+") as file:
+            described = json.loads(file["meta"][()])
+            del described["parts"], file["meta"]
+            file["meta"] = json.dumps(described)
+    else:
+        arrays = dict(np.load(path))
+        described = json.loads(str(arrays["meta"]))
+        del described["parts"]
+        np.savez(path, **arrays | {"meta": np.array(json.dumps(described))})
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_data_sets_from_before_limb_maps_open_and_grow(
+    tmp_path: Path, whole: Callable[[str], Path], ending: str
+) -> None:
+    out = tmp_path / f"set{ending}"
+    write_dataset(out, several()[:2], OPTIONS)
+    without_parts(out)
+    with open_dataset(out) as dataset:
+        assert dataset.header.parts == ()
+    assert write_dataset(out, several(), OPTIONS).added == 3
+    found = contents(out)
+    assert "limbs" not in found
+    for name, values in contents(whole(ending)).items():
+        assert np.array_equal(values, found[name]), name
 
 
 def test_null_bins_are_empty_in_all_kinds(tmp_path: Path) -> None:

@@ -101,6 +101,21 @@ def test_gains_are_drawn_anew_in_every_epoch_and_are_the_same_for_both(
     assert len(set(found[0])) == 5
 
 
+def test_limb_maps_are_items_where_there_is_a_synthetic_map(tmp_path: Path) -> None:
+    sources = [
+        source("r1", "s1", kinds=("synthetic", "real"), limbs=True),
+        source("r2", "s1", kinds=("real",)),
+    ]
+    options = DatasetOptions(length=24, overlap=4, limbs=True)
+    write_dataset(tmp_path / "set.zarr", sources, options)
+    data = SegmentDataset(tmp_path / "set.zarr", "limbs", "synthetic", gain_db=3)
+    assert 0 < len(data) == len(SegmentDataset(tmp_path / "set.zarr", "synthetic", "limbs"))
+    assert len(data) < len(SegmentDataset(tmp_path / "set.zarr", "real", "label"))
+    for limbs, whole in data:
+        assert limbs.shape == (24, 9, 8)
+        torch.testing.assert_close(limbs.sum(dim=1), whole)
+
+
 def test_it_can_be_pickled_while_open(stores: dict[str, Path]) -> None:
     data = SegmentDataset(stores[".h5"], "synthetic", "label")
     first = data[0]
@@ -112,6 +127,8 @@ def test_it_can_be_pickled_while_open(stores: dict[str, Path]) -> None:
 def test_what_is_not_there_is_named(stores: dict[str, Path]) -> None:
     with pytest.raises(Sd2Error, match="has no simulated maps"):
         SegmentDataset(stores[".zarr"], "simulated")
+    with pytest.raises(Sd2Error, match="has no limbs"):
+        SegmentDataset(stores[".zarr"], "limbs")
     with pytest.raises(Sd2Error, match=r"No segment in .* has denoised and real"):
         SegmentDataset(stores[".zarr"], "denoised", "real")
     with pytest.raises(Sd2Error, match="one of train, validation, test"):
