@@ -22,7 +22,7 @@ from pathlib import Path
 
 from sd2core.accuracy.cache import this_machine
 from tools.documentation.classifier_protocols import HEADING, protocols_section
-from tools.documentation.places import DOCS, IMAGES
+from tools.documentation.places import BUILD, DOCS, IMAGES
 from tools.documentation.runs import campaign_of, sd2
 
 SEED = 2
@@ -136,7 +136,7 @@ def _options() -> argparse.Namespace:
     )
     parser.add_argument("--seeds", type=int, default=5, help="default: 5")
     parser.add_argument("--shares", help="of the real data, as `sd2 classify table` has them")
-    parser.add_argument("--out", type=Path, default=Path("work/classifier"), help="of all runs")
+    parser.add_argument("--out", type=Path, default=BUILD / "classifier", help="of all runs")
     return parser.parse_args()
 
 
