@@ -10,6 +10,7 @@ import numpy as np
 
 from sd2app.background.model_worker.library import DenoiserLibrary
 from sd2core.denoise.card import ModelCard
+from sd2core.denoise.files import LIMBS_MODEL, MAP_MODEL
 from sd2core.denoise.resample_to_model import input_of
 from sd2core.denoise.scaling import Compression, Scaling
 from sd2core.errors import Sd2Error
@@ -103,6 +104,14 @@ class FakeDenoisers:
         self.library = DenoiserLibrary(
             lambda: list(self.cards.values()), self._describe, self._load, self._close
         )
+
+    @classmethod
+    def bundled(cls, gain, limbs_gain=7.0):
+        """The two that are chosen of where nobody has chosen."""
+        made = cls(**{MAP_MODEL: gain})
+        path = Path(f"/models/{LIMBS_MODEL}.safetensors")
+        made.add(path, limbs_gain, parts=("trunk", "forearm.R"))
+        return made
 
     def add(self, path, gain, **more):
         self.cards[path] = card_of(path, **more)

@@ -17,8 +17,10 @@ from window_models import build_models
 from sd2app.denoise import map as denoised_map
 from sd2app.settings import Settings
 from sd2app.shell.parts import Parts
+from sd2core.denoise.files import LIMBS_MODEL, MAP_MODEL
 from sd2core.errors import Sd2Error
-from sd2core.io.mesh import save_mesh
+from sd2core.files.resources import resource_path
+from sd2core.io.mesh import load_mesh, save_mesh
 from sd2core.maps import DopplerMap
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.recording.recording import Recording, open_recording
@@ -118,7 +120,7 @@ def test_without_a_model_there_is_no_track(context, models, qtbot, ball):
 
 
 def test_the_bundled_model_is_used_where_nobody_has_chosen(make, qtbot, ball):
-    models = FakeDenoisers(denoiser=2.0)
+    models = FakeDenoisers.bundled(2.0)
     context = make(models)
     open_it(context, qtbot, ball)
     assert is_of(context, 2.0)
@@ -130,6 +132,24 @@ def test_the_bundled_model_is_used_where_nobody_has_chosen(make, qtbot, ball):
     assert context.denoised.map is None
     context.document.undo_stack.undo()
     rest(context, qtbot)
+    assert is_of(context, 2.0)
+
+
+def test_where_the_parts_of_the_body_are_known_the_bundled_model_for_them_is_used(
+    make, qtbot, tmp_path, ball
+):
+    path = tmp_path / "body.npz"
+    save_mesh(load_mesh(resource_path("swipes.sd2") / "mesh.zarr").between(100, 130), path)
+    context = make(FakeDenoisers.bundled(2.0, limbs_gain=3.0))
+    open_it(context, qtbot, path)
+    assert context.denoise.card.name == LIMBS_MODEL
+    of_forearm = context.synthesis.whole_map().limbs.energies(("forearm.R",)).T
+    np.testing.assert_allclose(
+        context.denoised.map.values, fading(of_forearm, np.float32(3.0)), rtol=1e-4, atol=1e-7
+    )
+    open_it(context, qtbot, ball)
+    assert context.denoise.card.name == MAP_MODEL
+    assert context.denoise.before is None
     assert is_of(context, 2.0)
 
 
@@ -195,7 +215,7 @@ def test_a_model_that_fails_is_named_and_can_be_chosen_again(context, models, qt
 
 
 def test_that_the_default_does_not_suit_is_no_failure(make, qtbot, ball):
-    models = FakeDenoisers(denoiser=2.0)
+    models = FakeDenoisers.bundled(2.0)
     models.failure = Sd2Error("The map has 64 bins", "32 bins")
     context = make(models)
     said = []
