@@ -6,6 +6,7 @@ All are causal. They work on compressed values, as the networks do.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -16,6 +17,9 @@ from sd2core.denoise.model import Denoiser, State
 
 _MEDIANS = ((3, 1), (3, 3), (5, 1), (5, 3), (7, 1), (7, 3))
 """Sizes of the median to choose from, in frames and bins."""
+
+_RIDGES = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0)
+"""Ridges to choose from, as shares of the features' mean variance."""
 
 _MEDIAN_FRAMES = 50_000
 """Number of frames from which a median and its gain are chosen."""
@@ -92,6 +96,22 @@ class WienerDenoiser(_Neighbourhood):
         return around @ self.weight + self.mean, state
 
 
+class RidgeDenoiser(_Neighbourhood):
+    """Linear map of all bins of the last frames to all bins, and a mean per bin."""
+
+    def __init__(self, bins: int, *, frames: int = 9) -> None:
+        super().__init__(bins, frames, 1)
+        here = torch.zeros(bins, frames, bins)
+        here[:, -1] = torch.eye(bins)
+        self.weight = nn.Parameter(here.flatten(0, 1), requires_grad=False)
+        self.mean = nn.Parameter(torch.zeros(bins), requires_grad=False)
+
+    def chunk(self, values: Tensor, state: State) -> tuple[Tensor, State]:
+        """Compute the weighted sums of the last frames."""
+        around, state = self.neighbours(values, state)
+        return around.flatten(2) @ self.weight + self.mean, state
+
+
 def fit_median(
     inputs: Sequence[NDArray[np.float32]],
     targets: Sequence[NDArray[np.float32]],
@@ -159,6 +179,74 @@ def fit_wiener(
     wiener.weight.copy_(torch.from_numpy(weight))
     wiener.mean[counted] = torch.from_numpy(mean_y - mean_x @ weight).float()
     return wiener
+
+
+def fit_ridge(
+    inputs: Sequence[NDArray[np.float32]],
+    targets: Sequence[NDArray[np.float32]],
+    null_bins: Sequence[int] = (),
+    *,
+    frames: int = 9,
+) -> RidgeDenoiser:
+    """Fit a ridge regression (A. E. Hoerl and R. W. Kennard, 1970) in closed form.
+
+    Inputs and targets are compressed, (frames, bins), one per take. ``null_bins`` do not count.
+    The ridge is the one of :data:`_RIDGES` that does best on every fifth take, fitted to the
+    others; of fewer than five takes it is the largest.
+    """
+    bins = inputs[0].shape[1]
+    ridge = RidgeDenoiser(bins, frames=frames)
+    counted = _counted(bins, null_bins)
+    sums = [
+        _Sums.of(ridge, one, target[:, counted])
+        for one, target in zip(inputs, targets, strict=True)
+    ]
+    chosen = max(_RIDGES)
+    if len(sums) >= 5:
+        known = _Sums.added([one for number, one in enumerate(sums) if number % 5])
+        held_out = _Sums.added(sums[::5])
+        chosen = min(_RIDGES, key=lambda size: held_out.squared_error(*known.solution(size)))
+    weight, mean = _Sums.added(sums).solution(chosen)
+    ridge.weight.zero_()[:, counted] = torch.from_numpy(weight).float()
+    ridge.mean[counted] = torch.from_numpy(mean).float()
+    return ridge
+
+
+class _Sums(NamedTuple):
+    """Sums over frames that a linear regression is made of; features end with a one."""
+
+    gram: NDArray[np.float64]  # (n + 1, n + 1)
+    cross: NDArray[np.float64]  # (n + 1, bins)
+    power: float
+
+    @classmethod
+    def of(
+        cls, ridge: RidgeDenoiser, values: NDArray[np.float32], target: NDArray[np.float32]
+    ) -> _Sums:
+        around = ridge.neighbours(torch.from_numpy(values)[None], None)[0][0].flatten(1).numpy()
+        x = np.column_stack([around, np.ones(len(around))]).astype(np.float64)
+        y = target.astype(np.float64)
+        return cls(x.T @ x, x.T @ y, float((y**2).sum()))
+
+    @classmethod
+    def added(cls, several: Sequence[_Sums]) -> _Sums:
+        gram, cross, power = (sum(parts) for parts in zip(*several, strict=True))
+        return cls(gram, cross, power)
+
+    def solution(self, ridge: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Weights (n, bins) and means (bins,); the ridge is a share of the features' variance."""
+        middle = self.gram[:-1, -1] / self.gram[-1, -1]
+        average = self.cross[-1] / self.gram[-1, -1]
+        gram = self.gram[:-1, :-1] - self.gram[-1, -1] * np.outer(middle, middle)
+        cross = self.cross[:-1] - self.gram[-1, -1] * np.outer(middle, average)
+        # Bins that are always empty have no variance.
+        size = max(float(np.trace(gram)) / len(gram), 1e-30)
+        weight = np.linalg.solve(gram + ridge * size * np.eye(len(gram)), cross)
+        return weight, average - middle @ weight
+
+    def squared_error(self, weight: NDArray[np.float64], mean: NDArray[np.float64]) -> float:
+        whole = np.vstack([weight, mean])
+        return self.power - float((whole * (2.0 * self.cross - self.gram @ whole)).sum())
 
 
 def _counted(bins: int, null_bins: Sequence[int]) -> list[int]:

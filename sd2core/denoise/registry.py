@@ -77,9 +77,10 @@ _ENTRIES: dict[str, _Entry] = {
         "linear filter of least squared error",
         {"frames": 9, "width": 5},
     ),
+    "ridge": _Entry("filters.RidgeDenoiser", "ridge regression on the last frames", {"frames": 9}),
 }
 
-FILTERS = ("none", "median", "wiener")
+FILTERS = ("none", "median", "wiener", "ridge")
 """Denoisers that are fitted by :func:`fit_filter` instead of trained."""
 
 MODELS = tuple(name for name in _ENTRIES if name not in FILTERS)
@@ -135,9 +136,11 @@ def fit_filter(
         return filters.NoDenoiser(inputs[0].shape[1]), {}
     if name not in FILTERS:
         raise Sd2Error(f"{name} is not a filter", f"one of {', '.join(FILTERS)}")
-    fit = filters.fit_median if name == "median" else filters.fit_wiener
-    fitted = fit(inputs, targets, null_bins)
-    return fitted, {"frames": fitted.frames, "width": fitted.width}
+    fits = {
+        "median": filters.fit_median, "wiener": filters.fit_wiener, "ridge": filters.fit_ridge
+    }  # fmt: skip
+    fitted = fits[name](inputs, targets, null_bins)
+    return fitted, {option: getattr(fitted, option) for option in options(name)}
 
 
 def _entry(name: str) -> _Entry:

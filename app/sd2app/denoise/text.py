@@ -19,6 +19,7 @@ _KINDS = {
     "none": "No denoising",
     "median": "Median filter",
     "wiener": "Wiener filter",
+    "ridge": "Ridge regression",
 }
 
 

@@ -57,6 +57,7 @@ class TestTrain:
             ("none", 1),
             ("median", 1),
             ("wiener", 1),
+            ("ridge", 1),
             ("gru (channels=4, depth=1)", 2),
         ]
         mean = content["groups"][-1]["peak_mae_mps"]["mean"]

@@ -26,10 +26,11 @@ SMALL: dict[str, dict[str, Any]] = {
     "none": {},
     "median": {},
     "wiener": {},
+    "ridge": {},
 }
 """Every model, as small as serves a test."""
 
-CAUSAL = ("s4", "s4d", "s4-serial", "gru", "none", "median", "wiener")
+CAUSAL = ("s4", "s4d", "s4-serial", "gru", "none", "median", "wiener", "ridge")
 WINDOWED = ("unet", "swin")
 
 

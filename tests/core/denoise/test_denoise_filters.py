@@ -7,7 +7,7 @@ import pytest
 import torch
 from denoisers import energies
 
-from sd2core.denoise.filters import fit_median, fit_wiener
+from sd2core.denoise.filters import fit_median, fit_ridge, fit_wiener
 from sd2core.denoise.registry import FILTERS, build, fit_filter
 
 NULLED = (14, 15, 16)
@@ -53,13 +53,40 @@ def test_wiener_without_fit_changes_nothing() -> None:
     torch.testing.assert_close(build("wiener")(values), values)
 
 
+def test_ridge_recovers_a_linear_map_of_all_bins() -> None:
+    random = np.random.default_rng(0)
+    across = random.normal(size=(32, 32)) / 32
+    inputs = takes(10)
+    goals = [(filtered(one) @ across).astype(np.float32) for one in inputs]
+    ridge = fit_ridge(inputs[:9], goals[:9], NULLED, frames=2)
+    counted = np.delete(np.arange(32), NULLED)
+    answer = ridge(torch.from_numpy(inputs[9])[None])[0].numpy()
+    np.testing.assert_allclose(answer[1:, counted], goals[9][1:, counted], atol=2e-3)
+    assert not answer[:, NULLED].any()
+
+
+def test_ridge_is_larger_where_there_is_little_to_learn_from() -> None:
+    """Noise that says nothing gets next to no weight, however few the takes."""
+    random = np.random.default_rng(0)
+    inputs = takes(10, frames=60)
+    goals = [random.normal(2.0, 1.0, one.shape).astype(np.float32) for one in inputs]
+    ridge = fit_ridge(inputs, goals)
+    answer = ridge(torch.from_numpy(np.sqrt(energies(60, 99)))[None])[0].numpy()
+    assert np.abs(answer - 2.0).mean() < 0.3
+
+
+def test_ridge_without_fit_changes_nothing() -> None:
+    values = torch.from_numpy(energies(30))[None]
+    torch.testing.assert_close(build("ridge")(values), values)
+
+
 def test_nulled_bins_do_not_count_in_a_fit() -> None:
     inputs = takes(2)
     targets = [filtered(one) for one in inputs]
     spoilt = [target.copy() for target in targets]
     for target in spoilt:
         target[:, list(NULLED)] = 1e3
-    for name in ("median", "wiener"):
+    for name in ("median", "wiener", "ridge"):
         one, other = (fit_filter(name, inputs, goal, NULLED) for goal in (targets, spoilt))
         assert one[1] == other[1]
         for a, b in zip(one[0].parameters(), other[0].parameters(), strict=True):
