@@ -146,7 +146,7 @@ def plan_arms(
 ) -> dict[str, list[Move]]:
     """Moves of both arms until there is no time for another; one arm moves at a time."""
     to_and_fro = protocol.order == "to-and-fro"
-    swipe = _SWIPE if protocol.others else _SWIPE + _ELSE
+    swipe = _SWIPE if protocol.others else 1.0
     alternating = itertools.cycle(_TO_AND_FRO[number % len(_IN_TURN) % len(_TO_AND_FRO)])
     arms: dict[str, list[Move]] = {"L": [], "R": []}
     at: dict[str, Floats] = {"L": _HANGS, "R": _HANGS}
