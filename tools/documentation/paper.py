@@ -63,7 +63,7 @@ does it. Made by
 make paper
 ```
 
-**No real radar has part in the numbers and pictures of this page.** The paper's data are not
+**No real radar has part in this page, but in the paper's own numbers.** Its data are not
 published; what stands for its six people, camera and 60 GHz radar is `sd2 simulate campaign
 --protocol paper`, with bodies that err as fits of videos do and a *simulated* radar ([decision
 26](decisions/0026-the-simulated-campaign.md)). Beside a real radar the program is measured in
