@@ -12,7 +12,7 @@ COMPILED := .venv/.compiled
 # Among them every module in KERNEL_MODULES of sd2core/numerics/compiled.py.
 KERNELS := $(wildcard sd2core/numerics/*.py sd2core/body/*.py sd2core/scattering/*.py sd2core/doppler/*.py sd2core/fmcw/*.py)
 
-.PHONY: help setup demo test test-slow lint format bench wheel screenshots accuracy fitting denoiser denoiser-comparison range-synthesis scale classifier real-gestures whole-loop clean
+.PHONY: help setup demo test test-slow lint format bench wheel screenshots accuracy fitting denoiser denoiser-comparison range-synthesis scale classifier real-gestures whole-loop paper clean
 
 help:
 	@echo "make demo         set up, and open the sample recording in the window"
@@ -32,6 +32,7 @@ help:
 	@echo "make classifier   docs/classifier.md, trained (an hour)"
 	@echo "make real-gestures  docs/real-gestures.md: real radar, suggestions and classifiers (five minutes)"
 	@echo "make whole-loop   docs/whole-loop.md: from a recording to a classifier (20 minutes)"
+	@echo "make paper        docs/paper.md: the paper's figures and tables (half an hour after make classifier)"
 	@echo "make scale        docs/scale.md, measured (some ten minutes)"
 	@echo "make clean        remove what the above made, .venv included"
 
@@ -109,6 +110,9 @@ real-gestures: setup
 
 whole-loop: setup
 	$(BIN)/python -m tools.documentation.whole_loop
+
+paper: setup
+	$(BIN)/python -m tools.documentation.paper
 
 scale: setup
 	$(BIN)/python -m tools.documentation.scale

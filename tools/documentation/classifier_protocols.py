@@ -29,23 +29,23 @@ from sd2core.simulate.campaign.takes import Campaign
 
 HEADING = "## The paper's experiment"
 
-_SEED = 5
-_RANDOM = replace(PAPER, order="random")
+SEED = 5
+RANDOM = replace(PAPER, order="random")
 _PROTOCOLS = {
     "*paper*, to and fro": PAPER,
-    "*paper*, random order": _RANDOM,
+    "*paper*, random order": RANDOM,
     "*varied*": VARIED,
 }
 _STEPS = {
     "*paper*: one kind of swipe to and fro in a take": PAPER,
-    "+ order: four kinds at random": _RANDOM,
-    "+ place of person, camera and radar": replace(_RANDOM, place=True),
-    "+ heading": replace(_RANDOM, place=True, heading=True),
+    "+ order: four kinds at random": RANDOM,
+    "+ place of person, camera and radar": replace(RANDOM, place=True),
+    "+ heading": replace(RANDOM, place=True, heading=True),
     "+ other movements: *varied*": VARIED,
 }
 _NETWORKS = {"ours": Network(), "the paper's": PAPER_NETWORK}
 _CLASSES = ("horizontal", "vertical", "background")
-_ADDED: dict[Added, str] = {"nothing": "radar only", "denoised": "+ denoised"}
+ADDED: dict[Added, str] = {"nothing": "radar only", "denoised": "+ denoised"}
 _GIVEN: dict[Added, list[list[float]]] = {
     "nothing": [[87.3, 5.3, 7.4], [6.8, 89.1, 4.1], [3.8, 4.1, 92.1]],
     "denoised": [[91.6, 4.0, 4.5], [4.1, 92.2, 3.7], [2.5, 3.2, 94.3]],
@@ -94,13 +94,8 @@ difference from the line above, of the same seeds.
 
 def protocols_section(out: Path, minutes: float, seeds: int) -> str:
     """Measure what is not measured yet, and return the section in Markdown."""
-    known = {one: _clips(out, one, minutes) for one in _STEPS.values()}
-    everything = [Condition(network=n, added=kind) for n in _NETWORKS.values() for kind in _ADDED]
-    tables = {
-        (name, people): _table(out, known[one], everything, TableOptions(seeds, same_people=same))
-        for name, one in _PROTOCOLS.items()
-        for people, same in (("unseen", False), ("same", True))
-    }
+    known = {one: protocol_clips(out, one, minutes) for one in _STEPS.values()}
+    tables = protocol_tables(out, known, seeds)
     steps = {
         name: _table(out, known[one], [Condition()], TableOptions(seeds))
         for name, one in _STEPS.items()
@@ -112,16 +107,16 @@ def protocols_section(out: Path, minutes: float, seeds: int) -> str:
         heading=HEADING,
         machine=this_machine(),
         minutes=minutes,
-        seed=_SEED,
+        seed=SEED,
         ours=network_of(Condition()),
         paper=network_of(Condition(network=PAPER_NETWORK)),
         seeds=seeds,
         runs=len(cpu_s),
         cpu_min=sum(cpu_s.values()) / 60.0,
     )
-    text += _lines(_mean_rows(tables)) + "\n" + _findings(tables)
-    for number, kind in enumerate(_ADDED, start=2):
-        text += f"\n### Table {number}: {_ADDED[kind]}\n\n" + _lines(_confusion_rows(tables, kind))
+    text += means_table(tables) + "\n" + _findings(tables)
+    for number, kind in enumerate(ADDED, start=2):
+        text += f"\n### Table {number}: {ADDED[kind]}\n\n" + confusion_table(tables, kind)
     return text + _STEPS_TEXT + _lines(_step_rows(steps)) + "\n"
 
 
@@ -129,13 +124,29 @@ Tables = Mapping[tuple[str, str], Table]
 """Of a protocol and whose takes are judged."""
 
 
-def _clips(out: Path, protocol: Protocol, minutes: float) -> ClipSet:
-    """Radar and synthetic maps of a campaign; what is there of it is not made again."""
+def protocol_tables(out: Path, known: Mapping[Protocol, ClipSet], seeds: int) -> Tables:
+    """Both networks of those protocols of the section whose clips are given."""
+    everything = [Condition(network=n, added=kind) for n in _NETWORKS.values() for kind in ADDED]
+    return {
+        (name, people): _table(out, known[one], everything, TableOptions(seeds, same_people=same))
+        for name, one in _PROTOCOLS.items()
+        if one in known
+        for people, same in (("unseen", False), ("same", True))
+    }
+
+
+def protocol_campaign(out: Path, protocol: Protocol, minutes: float) -> Path:
+    """A campaign of six people; what is there of it is not made again."""
     varying = [name for name in ("place", "heading", "others") if getattr(protocol, name)]
     path = out / f"{'-'.join([protocol.order, *varying])}.zarr"
     with progress_bar(f"Simulating {path.stem}", unit="take") as progress:
-        make_campaign(path, Campaign(_SEED, protocol=protocol), minutes=minutes, progress=progress)
-    pairs = read_pairs(path)
+        make_campaign(path, Campaign(SEED, protocol=protocol), minutes=minutes, progress=progress)
+    return path
+
+
+def protocol_clips(out: Path, protocol: Protocol, minutes: float) -> ClipSet:
+    """Radar and synthetic maps of a campaign."""
+    pairs = read_pairs(protocol_campaign(out, protocol, minutes))
     return merged([clips_of_pairs(pairs, kind) for kind in ("simulated", "synthetic")])
 
 
@@ -168,22 +179,23 @@ def _given_mean(kind: Added) -> float:
     return float(_recalls(np.array(_GIVEN[kind])).mean())
 
 
-def _mean_rows(tables: Tables) -> list[list[str]]:
-    head = [f"{who}, {words}" for who in _NETWORKS for words in (*_ADDED.values(), "gain")]
-    before, after = map(_given_mean, _ADDED)
+def means_table(tables: Tables) -> str:
+    """Mean recalls beside the paper's."""
+    head = [f"{who}, {words}" for who in _NETWORKS for words in (*ADDED.values(), "gain")]
+    before, after = map(_given_mean, ADDED)
     given = [f"{before:.1f}", f"{after:.1f}", f"{after - before:+.1f}"]
     rows = [["protocol", "people", *head], ["the paper, real radar", "–", "", "", "", *given]]
     for (name, people), table in tables.items():
         cells = []
         for network in _NETWORKS.values():
-            plain, added = (_means(table, network, kind) for kind in _ADDED)
+            plain, added = (_means(table, network, kind) for kind in ADDED)
             cells += [_spread(plain), _spread(added), _spread(added - plain, "+")]
         rows.append([name, people, *cells])
-    return rows
+    return _lines(rows)
 
 
-def _confusion_rows(tables: Tables, kind: Added) -> list[list[str]]:
-    """Rows of confusion matrices of both networks, side by side."""
+def confusion_table(tables: Tables, kind: Added) -> str:
+    """Confusion matrices of both networks side by side, and the paper's."""
     head = [f"{who}: {name}" for who in _NETWORKS for name in _CLASSES]
     rows = [["protocol", "people", "true", *head]]
     for name, values in zip(_CLASSES, _GIVEN[kind], strict=True):
@@ -194,7 +206,7 @@ def _confusion_rows(tables: Tables, kind: Added) -> list[list[str]]:
         )
         for row, name in enumerate(_CLASSES):
             rows.append([protocol, people, name, *map(_spread, both[:, row].T)])
-    return rows
+    return _lines(rows)
 
 
 def _step_rows(steps: Mapping[str, Table]) -> list[list[str]]:
@@ -212,7 +224,7 @@ def _step_rows(steps: Mapping[str, Table]) -> list[list[str]]:
 def _findings(tables: Tables) -> str:
     """Sentences from the numbers: the paper's means, and other people."""
     lines = []
-    for kind, words in _ADDED.items():
+    for kind, words in ADDED.items():
         found = {
             people: _means(table, Network(), kind)
             for (name, people), table in tables.items()

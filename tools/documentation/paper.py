@@ -1,0 +1,370 @@
+"""Makes ``paper.md`` and its pictures: ``make paper``, half an hour after ``make classifier``.
+
+The SD² paper's figures and tables, and its sentences in ``paper_lines.md`` with their places in
+the program. Runs stay in ``build/paper`` (or ``--folder``), campaigns and classifiers where
+``make classifier`` keeps them; what is there is not made again. ``--only`` renews some sections,
+and leaves the others as the page has them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sd2core.accuracy.cache import this_machine
+from sd2core.denoise.files import load_model
+from sd2core.denoise.metrics import VelocityError, peak_error, stands_out
+from sd2core.figures.maps import Levels, MapRow, draw_maps
+from sd2core.files.atomic import atomic_write_text
+from sd2core.files.figure_files import save_figure
+from sd2core.files.tables import markdown_table
+from sd2core.maps import DopplerMap, MapKind
+from sd2core.pairs.store import PairSet, Take, read_pairs
+from sd2core.simulate.campaign.protocol import PAPER
+from sd2core.timebase import Timebase
+from tools.documentation.classifier_protocols import (
+    ADDED,
+    RANDOM,
+    SEED,
+    confusion_table,
+    means_table,
+    protocol_campaign,
+    protocol_clips,
+    protocol_tables,
+)
+from tools.documentation.paper_bodies import draw_bodies
+from tools.documentation.places import BUILD, DOCS, IMAGES, REPOSITORY
+from tools.documentation.runs import Job, sd2, settings, timed, train
+
+PAGE = DOCS / "paper.md"
+LINES = Path(__file__).with_name("paper_lines.md")
+DROPOUT = 0.1
+TITLES = {"s4": "S4", "swin": "Swin transformer", "unet": "U-Net"}
+PRINTED = {"s4": (1.0126, 1.6329), "swin": (1.1640, 1.8734), "unet": (1.5835, 2.6549)}
+"""The paper's Table 1: MAE and σ in m/s."""
+PIXELS_PER_INCH = 110
+SHOWN_MINUTES = 3.0
+"""Of a campaign, for two takes of everybody; a longer one begins with the same ones."""
+
+HEAD = """\
+# The paper, line by line
+
+What "SD²: Synthetic Doppler Spectrum Denoiser using SSM" shows and says, and where this program
+does it. Made by
+
+```
+make paper
+```
+
+**No real radar has part in this page, but in the paper's own numbers.** Its data are not
+published; what stands for its six people, camera and 60 GHz radar is `sd2 simulate campaign
+--protocol paper`, with bodies that err as fits of videos do and a *simulated* radar ([decision
+26](decisions/0026-the-simulated-campaign.md)). Beside a real radar the program is measured in
+[denoiser-comparison.md](denoiser-comparison.md), [real-pairs.md](real-pairs.md) and
+[real-gestures.md](real-gestures.md). [Line by line](#line-by-line) says what was chosen where the
+paper is silent, [what differs](#what-differs-and-why) why numbers are not the paper's.
+
+"""
+
+PICTURES = """
+![Five frames of a horizontal swipe](images/paper-mesh.png)
+
+**Figure 2.** Frames 100, 110, … 140 of the bundled sample, a simulated recording: a swipe from
+right to left, and the hand after it. Dots are vertices of the mesh, in the colour of their velocity
+towards the sensor.
+`sd2 strip resources/swipes.sd2 --frames 100:141:10 --dots --v-max 1.5 --out mesh.png`
+
+![Distance of the body's surface from sensors at two ranges](images/paper-range.png)
+
+**Figure 4.** Frame {frame} of the same mesh from sensors {near:g} and {far:g} m before the body,
+each with its own colours: the distance of the surface from the sensor. Seen from {far:g} m
+(`sd2 synth resources/swipes.sd2 --sensor 0,0,{z:g} --out far.npz`), the synthetic map of the
+recording keeps {share:.1f} % of its energy. The radar equation gives ({near:g} / {far:g})⁴ =
+{law:.1f} % where the trunk is, and less for hands, which are nearer and move most.
+
+![Doppler maps of a take of horizontal and one of vertical swipes](images/paper-swipes.png)
+
+**Figure 7.** Doppler of a take of horizontal and one of vertical swipes by one person (*paper*, to
+and fro, seed {seed}): of the **simulated** radar, and synthetic of a body with the errors of a fit,
+before denoising. Each level is relative to the map's own strongest cell.
+
+"""
+
+DENOISERS = """
+On {machine}. Campaign: `sd2 simulate campaign random.zarr --protocol paper --order random
+--seed {seed} --minutes {campaign_minutes:g}`: six people, who make all four swipes in random order
+(4.1) in two of three takes, and let their hands hang in the third. Four are learnt from, one
+chooses the best epoch, one is judged. Each model is trained {seeds} times with different seeds,
+for {minutes:g} minutes of processor time on one thread, with a dropout of {dropout:g} and about as
+many parameters: {epochs}. More data and more rivals are in
+[denoiser-comparison.md](denoiser-comparison.md).
+
+![One take: synthetic, denoised by three models, and the simulated radar](images/paper-denoised.png)
+
+**Figure 6.** The liveliest take of the person judged. The radar is **simulated**. Each level is
+relative to the map's own strongest cell.
+
+**Table 1.** Error of the velocity of the strongest bin, m/s, in the {moving:,} of {frames:,} frames
+in which the **simulated** radar shows movement (`sd2 eval`); ± is the standard deviation over the
+trainings. *S4 to it*: S4's MAE compared with this one's. *None*: the synthetic map as it is.
+*Nothing moves*: an answer of 0 m/s everywhere.
+
+{table}
+{findings}
+
+"""
+
+CLASSIFIERS = """
+On {machine}. Two campaigns of {campaign_minutes:g} minutes of the same six people: one kind of
+swipe to and fro in a take (`--protocol paper`), or all four (`--order random`). Ours, of the
+**simulated** radar, in per cent of frames, mean ± standard deviation over {seeds} seeds; how they
+are made is told in [classifier.md](classifier.md#the-papers-experiment), which has the same runs.
+*Unseen*: people are judged who were not learnt from; *same*: other takes of those who were. The
+paper does not say which its numbers are. *Ours* is the network of `sd2 classify train`, *the
+paper's* that of its 5.1, here. Denoised maps are of the bundled denoiser.
+
+Mean of the three classes:
+
+"""
+
+
+@dataclass(frozen=True)
+class Section:
+    """Part of the page that is measured."""
+
+    heading: str
+    make: Callable[[argparse.Namespace], str]
+
+
+def main() -> None:
+    """Measure what is asked for and write the page."""
+    options = _options()
+    page = HEAD
+    kept = sections(PAGE.read_text("utf-8")) if PAGE.exists() else {}
+    for name, section in SECTIONS.items():
+        missing = f"\nNot measured yet: `python -m tools.documentation.paper --only {name}`.\n\n"
+        made = name in options.only
+        text = section.make(options) if made else kept.get(section.heading, missing)
+        page += f"## {section.heading}\n{text}"
+    atomic_write_text(PAGE, page + linked(LINES.read_text("utf-8")))
+
+
+def sections(page: str) -> dict[str, str]:
+    """Text below every heading of the second level, up to the next."""
+    _, *parts = re.split(r"^## (.+)\n", page, flags=re.MULTILINE)
+    return dict(zip(parts[::2], parts[1::2], strict=True))
+
+
+def linked(text: str) -> str:
+    """Replace ``[[file.py:name]]`` and ``[[number]]`` by links to code and decisions.
+
+    Files are below sd2core. ValueError for a name or a decision that is not there.
+    """
+    return re.sub(r"\[\[(.+?)\]\]", _link, text)
+
+
+def _link(match: re.Match[str]) -> str:
+    path, _, name = match[1].partition(":")
+    if path.isdecimal():
+        found = list((DOCS / "decisions").glob(f"{int(path):04d}-*.md"))
+        if len(found) != 1:
+            raise ValueError(f"there is no decision {path}")
+        return f"[decision {path}](decisions/{found[0].name})"
+    code = (REPOSITORY / "sd2core" / path).read_text("utf-8")
+    known = rf"^( *(class|def) {name.rpartition('.')[2]}\b|{name}\b.*=)"
+    if name and not re.search(known, code, re.MULTILINE):
+        raise ValueError(f"{path} has no {name}")
+    return f"[`{name or path}`](../sd2core/{path})"
+
+
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--only", nargs="+", choices=SECTIONS, default=tuple(SECTIONS))
+    parser.add_argument("--folder", type=Path, default=BUILD / "paper", help="of denoisers")
+    parser.add_argument(
+        "--protocols",
+        type=Path,
+        default=Path("work/classifier/protocols"),
+        help="of campaigns and classifiers, as `make classifier` keeps them",
+    )
+    parser.add_argument("--campaign-minutes", type=float, default=36.0, help="of all people")
+    parser.add_argument("--minutes", type=float, default=2.0, help="of a denoiser's training")
+    parser.add_argument("--seeds", type=int, default=3, help="of denoisers")
+    parser.add_argument("--classifier-seeds", type=int, default=5)
+    return parser.parse_args()
+
+
+def _pictures(options: argparse.Namespace) -> str:
+    """Figures 2, 4 and 7."""
+    bodies = draw_bodies(IMAGES / "paper-mesh.png", IMAGES / "paper-range.png")
+    pairs = read_pairs(protocol_campaign(options.protocols, PAPER, SHOWN_MINUTES))
+    takes = {
+        "Horizontal": _first(pairs, ("left-to-right", "right-to-left")),
+        "Vertical": _first(pairs, ("up-to-down", "down-to-up")),
+    }
+    rows = [
+        _row(pairs, take, values, kind, f"{name} swipes, {title}")
+        for name, take in takes.items()
+        for title, values, kind in (
+            ("radar (simulated)", take.radar, "simulated"),
+            ("synthetic", take.synthetic, "synthetic"),
+        )
+    ]
+    _save_maps("paper-swipes.png", rows, "Figure 7 on simulated people before a simulated radar")
+    return PICTURES.format(seed=SEED, **bodies)
+
+
+def _first(pairs: PairSet, swipes: Sequence[str]) -> Take:
+    """The first take with such swipes only."""
+    wanted = {pairs.labels.index(name) for name in swipes}
+    return next(take for take in pairs.takes if set(np.unique(take.label)) - {0} == wanted)
+
+
+def _row(pairs: PairSet, take: Take, values: np.ndarray, kind: MapKind, title: str) -> MapRow:
+    doppler = DopplerMap(
+        values.T, pairs.axis, Timebase(take.times_s), kind, null_bins=pairs.null_bins
+    )
+    return MapRow(doppler, title, float(values.max()))
+
+
+def _save_maps(name: str, rows: Sequence[MapRow], heading: str) -> None:
+    end_s = rows[0].doppler.timebase.end_s
+    figure = draw_maps(rows, Levels(), start_s=0.0, end_s=end_s, heading=heading)
+    save_figure(figure, IMAGES / name, pixels_per_inch=PIXELS_PER_INCH)
+
+
+def _denoisers(options: argparse.Namespace) -> str:
+    """Figure 6 and Table 1."""
+    folder: Path = options.folder
+    campaign = protocol_campaign(options.protocols, RANDOM, options.campaign_minutes)
+    how = settings({"dropout": DROPOUT})
+    jobs = {
+        name: timed(folder, Job(name, campaign, ("--model", name, *how)), options.minutes)
+        for name in PRINTED
+    }
+    runs = {name: [job.seeded(seed) for seed in range(options.seeds)] for name, job in jobs.items()}
+    train(folder, [run for those in runs.values() for run in those])
+    told = folder / "table-1.json"
+    models = [folder / run.name for those in runs.values() for run in those]
+    sd2("eval", *models, "--data", campaign, "--json", told)
+    evaluation = json.loads(told.read_text("utf-8"))
+    judged = read_pairs(campaign).of(evaluation["subjects"])
+    _compare(judged, {name: folder / those[0].name for name, those in runs.items()})
+    bin_mps = judged.axis.bin_width_mps
+    return DENOISERS.format(
+        machine=this_machine(),
+        seed=SEED,
+        campaign_minutes=options.campaign_minutes,
+        seeds=options.seeds,
+        minutes=options.minutes,
+        dropout=DROPOUT,
+        epochs=", ".join(f"{TITLES[name]} {job.epochs} epochs" for name, job in jobs.items()),
+        frames=evaluation["frames"],
+        moving=evaluation["moving_frames"],
+        table=table_1(evaluation, _nothing_moves(judged)),
+        findings=findings(evaluation, bin_mps),
+    )
+
+
+def _compare(judged: PairSet, runs: Mapping[str, Path]) -> None:
+    """Draw the take with most gestures as every model has it."""
+    take = max(judged.takes, key=lambda take: int((take.label > 0).sum()))
+    rows = [_row(judged, take, take.synthetic, "synthetic", "Synthetic")]
+    for name, run in runs.items():
+        values = load_model(run / "best.safetensors").denoise_values(take.synthetic)
+        rows.append(_row(judged, take, values, "denoised", f"Denoised by {TITLES[name]}"))
+    rows.append(_row(judged, take, take.radar, "simulated", "Radar (simulated)"))
+    _save_maps("paper-denoised.png", rows, "Figure 6 on a simulated person, simulated radar")
+
+
+def _nothing_moves(judged: PairSet) -> VelocityError:
+    """Error of answering 0 m/s everywhere."""
+    radar = np.concatenate([take.radar for take in judged.takes])
+    moving = np.concatenate([stands_out(take.radar, judged.null_bins) for take in judged.takes])
+    return peak_error(np.zeros_like(radar), radar, judged.axis, moving)
+
+
+def table_1(evaluation: Mapping[str, Any], nothing: VelocityError) -> str:
+    """The paper's Table 1 beside that of ``sd2 eval``, in Markdown."""
+    groups = {group["model"]: group for group in evaluation["groups"]}
+    ours = {name: groups[name]["peak_mae_mps"]["mean"] for name in (*PRINTED, "none")}
+    head = ["", "paper, real radar: MAE", "σ", "S4 to it"]
+    rows = [[*head, "ours, simulated radar: MAE", "σ", "S4 to it", "to none"]]
+    for name, printed in PRINTED.items():
+        rows.append(
+            [
+                TITLES[name],
+                *(f"{value:.4f}" for value in printed),
+                _change(PRINTED["s4"][0], printed[0]),
+                *(_spread(groups[name][key]) for key in ("peak_mae_mps", "peak_sd_mps")),
+                _change(ours["s4"], ours[name]),
+                _change(ours[name], ours["none"]),
+            ]
+        )
+    none = (_spread(groups["none"][key]) for key in ("peak_mae_mps", "peak_sd_mps"))
+    rows.append(["none", "", "", "", *none, _change(ours["s4"], ours["none"]), ""])
+    still = (f"{nothing.mae_mps:.3f}", f"{nothing.sd_mps:.3f}")
+    rows.append(["nothing moves", "", "", "", *still, _change(ours["s4"], nothing.mae_mps)])
+    rows[-1].append(_change(nothing.mae_mps, ours["none"]))
+    return "\n".join(markdown_table(rows)) + "\n"
+
+
+def findings(evaluation: Mapping[str, Any], bin_mps: float) -> str:
+    """Sentences from the numbers of Table 1."""
+    ours = {group["model"]: group["peak_mae_mps"]["mean"] for group in evaluation["groups"]}
+    ratios = "; ".join(
+        f"against the {TITLES[name]} {_change(ours['s4'], ours[name])} here and"
+        f" {_change(PRINTED['s4'][0], PRINTED[name][0])} in the paper"
+        for name in ("swin", "unet")
+    )
+    theirs_bins = [mae_mps / bin_mps for mae_mps, _ in PRINTED.values()]
+    ours_bins = [ours[name] / bin_mps for name in PRINTED]
+    return (
+        f"S4's MAE {ratios}. In bins of {bin_mps:g} m/s, as they are here, the paper's errors are"
+        f" {min(theirs_bins):.1f} to {max(theirs_bins):.1f}, ours {min(ours_bins):.1f} to"
+        f" {max(ours_bins):.1f}."
+    )
+
+
+def _change(value: float, reference: float) -> str:
+    return "" if value == reference else f"{100 * (value / reference - 1):+.0f} %".replace("-", "−")
+
+
+def _spread(values: Mapping[str, Any]) -> str:
+    spread = values["sd"]
+    return f"{values['mean']:.3f}" + (f" ± {spread:.3f}" if spread is not None else "")
+
+
+def _classifiers(options: argparse.Namespace) -> str:
+    """Tables 2 and 3."""
+    out: Path = options.protocols
+    known = {one: protocol_clips(out, one, options.campaign_minutes) for one in (PAPER, RANDOM)}
+    tables = protocol_tables(out, known, options.classifier_seeds)
+    text = CLASSIFIERS.format(
+        machine=this_machine(),
+        campaign_minutes=options.campaign_minutes,
+        seeds=options.classifier_seeds,
+    )
+    text += means_table(tables)
+    for number, kind in enumerate(ADDED, start=2):
+        text += f"\n**Table {number}**, {ADDED[kind]}. Rows are true classes.\n\n"
+        text += confusion_table(tables, kind)
+    return text + "\n"
+
+
+SECTIONS = {
+    "pictures": Section("Mesh, range and Doppler: Figures 2, 4 and 7", _pictures),
+    "denoisers": Section("Denoisers: Figure 6 and Table 1", _denoisers),
+    "classifiers": Section("Classifiers: Tables 2 and 3", _classifiers),
+}
+
+
+if __name__ == "__main__":
+    main()
