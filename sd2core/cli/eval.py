@@ -29,8 +29,8 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             "Denoises whole takes and compares them with the radar's: the velocity of the\n"
             "strongest bin per frame (mean absolute error and standard deviation in m/s), the\n"
             "mean velocity, and the map itself; in all, per gesture and per person. Beside the\n"
-            "models stand `none`, and a median, a Wiener filter and a ridge regression fitted to the\n"
-            "training.\n"
+            "models stand `none`, and a median, a Wiener filter and a ridge regression fitted to\n"
+            "the training.\n"
             "Several models of one architecture, trained with different seeds, make one row:\n"
             "mean ± standard deviation."
         ),

@@ -88,7 +88,8 @@ class Scaling:
 
     input: Compression
     target: Compression
-    # Weakest energy above zero in the radar's maps of the training: less, no such radar shows.
+    # Half the weakest energy above zero in the radar's maps of the training: no such radar shows
+    # less, and what it shows is not lost to a small error.
     floor: float = 0.0
 
     @classmethod
@@ -108,7 +109,7 @@ class Scaling:
         return cls(
             Compression.fitted(inputs, null_columns(null_bins, bins, parts), input_exponent),
             Compression.fitted(targets, null_bins, target_exponent),
-            min(float(values[values > 0].min(initial=np.inf)) for values in targets),
+            0.5 * min(float(values[values > 0].min(initial=np.inf)) for values in targets),
         )
 
     def to_json(self) -> dict[str, Any]:

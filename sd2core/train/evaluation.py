@@ -13,7 +13,7 @@ frame; :mod:`sd2core.denoise.metrics` defines how. Two sets of frames are judged
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -262,6 +262,8 @@ def _filters(
     scaling = Scaling.fitted(
         [take.synthetic for take in takes], [take.radar for take in takes], pairs.null_bins
     )
+    # What a filter answers weakly, because it is unsure, is its answer all the same.
+    scaling = replace(scaling, floor=0.0)
     inputs = [scaling.input.compress(take.synthetic) for take in takes]
     targets = [scaling.target.compress(take.radar) for take in takes]
     made = []

@@ -191,7 +191,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument(
         "--protocols",
         type=Path,
-        default=Path("work/classifier/protocols"),
+        default=BUILD / "classifier" / "protocols",
         help="of campaigns and classifiers, as `make classifier` keeps them",
     )
     parser.add_argument("--campaign-minutes", type=float, default=36.0, help="of all people")

@@ -85,11 +85,11 @@ def test_models_of_before_there_was_a_floor_have_none() -> None:
     assert Scaling.from_json(told).floor == 0.0
 
 
-def test_the_floor_is_the_weakest_that_the_radar_shows() -> None:
+def test_the_floor_is_half_of_the_weakest_that_the_radar_shows() -> None:
     inputs = [np.ones((2, 3), np.float32), np.ones((1, 3), np.float32)]
     targets = [np.array([[0, 2.0, 5.0], [0, 0, 0.3]]), np.array([[0, 0, 0.0]])]
     found = Scaling.fitted(inputs, [one.astype(np.float32) for one in targets])
-    assert found.floor == pytest.approx(0.3)
+    assert found.floor == pytest.approx(0.15)
 
 
 def test_silence_has_no_scale() -> None:
