@@ -38,9 +38,11 @@ from tools.documentation.runs import (
 
 MARS = (SHARED / "paired" / "mars_subject1", SHARED / "paired" / "mars_subject4")
 
-COMPARED = ("s4", "s4d", "gru", "unet", "swin")
+WITH_LIMBS = {f"{name}-limbs": (name, "--inputs", "limbs") for name in ("s4", "gru", "unet")}
+COMPARED = ("s4", "s4d", "gru", "unet", "swin", *WITH_LIMBS)
 ALL = {
-    **{name: (name,) for name in COMPARED},
+    **{name: (name,) for name in COMPARED if name not in WITH_LIMBS},
+    **WITH_LIMBS,
     # As long a step of training as the S4 has.
     "unet-step": ("unet", *settings({**options_of("unet"), "channels": 5})),
     "swin-step": ("swin", *settings({**options_of("swin"), "channels": 16})),
@@ -69,9 +71,9 @@ errors are is written in `sd2core/denoise/metrics.py`.
 ## Models at equal time
 
 Every model trained {seeds} times with different seeds for {minutes:g} minutes of processor time on
-one thread, with a dropout of {dropout:g}. All have about as many parameters. A run of {pilot}
-epochs tells the processor time of one, and so how many epochs fit: other work on the machine does
-not change what is learnt.
+one thread, with a dropout of {dropout:g}. All have about as many parameters. Three
+also learn from the maps of five parts of the body (`limbs`). A run of {pilot} epochs tells the processor time of one, and so how many epochs fit: other work on the machine does not
+change what is learnt.
 
 {epochs}
 
@@ -146,7 +148,7 @@ def main() -> None:
         before = path.read_text("utf-8").partition(REAL_HEAD)[0]
         atomic_write_text(path, before + _real(folder, options))
         return
-    campaign = campaign_of(folder, options.campaign_minutes, "--seed", 1)
+    campaign = campaign_of(folder, options.campaign_minutes, "--seed", 1, "--limbs")
     jobs = {name: _timed(folder, campaign, name, options) for name in ALL}
     compared = [jobs[name].seeded(seed) for seed in range(options.seeds) for name in COMPARED]
     alone = {name: jobs[name].seeded(0) for name in ALL if name not in COMPARED}
