@@ -72,8 +72,9 @@ errors are is written in `sd2core/denoise/metrics.py`.
 
 Every model trained {seeds} times with different seeds for {minutes:g} minutes of processor time on
 one thread, with a dropout of {dropout:g}. All have about as many parameters. Three
-also learn from the maps of five parts of the body (`limbs`). A run of {pilot} epochs tells the processor time of one, and so how many epochs fit: other work on the machine does not
-change what is learnt.
+also learn from the maps of five parts of the body (`limbs`). A run of {pilot} epochs tells the
+processor time of one, and so how many epochs fit: other work on the machine does not change what is
+learnt.
 
 {epochs}
 
