@@ -76,6 +76,7 @@ def _named(session: Session, features: Features, **others: object) -> SimpleName
         f.close()
 
     return SimpleNamespace(
+        session=s,
         settings=s.settings,
         jobs=s.jobs,
         document=s.document,

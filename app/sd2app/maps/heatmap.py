@@ -10,7 +10,7 @@ from PySide6.QtGui import QBrush, QColor, QMouseEvent, QPainter, QPen, QWheelEve
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from sd2app.maps.heatmap_image import MapWidget
-from sd2app.maps.limbs import part_words
+from sd2app.maps.limbs import title_of
 from sd2app.session.maps import UNCERTAIN_SHARE, MapModel, Reading
 from sd2app.session.session import Session
 from sd2app.widgets.canvas import AT_LEFT, AT_RIGHT, Overlay, clipped
@@ -72,8 +72,7 @@ class HeatmapView(MapWidget):
 
     def title(self) -> str:
         """Title of the map, with the part of the body that is shown alone."""
-        part = self._track.part
-        return f"{self._track.title} · {part_words(part)}" if part else self._track.title
+        return title_of(self._track)
 
     def null_colour(self) -> QColor:
         """Colour of zero."""

@@ -7,8 +7,14 @@ from PySide6.QtGui import QActionGroup
 from PySide6.QtWidgets import QMenu, QWidget
 
 from sd2app.maps.model import SynthesisModel
+from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
 from sd2core.mesh.vertex_parts import PARTS
+
+
+def title_of(track: MapModel) -> str:
+    """Title of a map, with the part of the body that is shown alone."""
+    return f"{track.title} · {part_words(track.part)}" if track.part else track.title
 
 
 def part_words(part: str) -> str:

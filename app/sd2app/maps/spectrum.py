@@ -9,6 +9,7 @@ import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QBrush, QColor, QFontMetrics, QPainter, QPen, QPolygonF
 
+from sd2app.maps.limbs import title_of
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
 from sd2app.widgets.canvas import Canvas, clipped
@@ -131,12 +132,12 @@ class SpectrumView(Canvas):
             ]
 
         known = curve.track.uncertainty
-        if known is not None:
+        if known is not None and not curve.track.part:
             # One standard deviation up and down.
             value, sd = known.expected[:, frame], known.sd[:, frame]
             band = line(value + sd) + line(np.maximum(value - sd, 0.0), -1)
             _fill(painter, band, curve.colour, 90, Qt.BrushStyle.Dense4Pattern)
-        points = line(curve.map.values[:, frame])
+        points = line(curve.track.values[:, frame])
         feet = [QPointF(plot.left(), end.y()) for end in (points[-1], points[0])]
         _fill(painter, points + feet, curve.colour, 40, Qt.BrushStyle.SolidPattern)
         painter.setPen(QPen(curve.colour, 2))
@@ -161,7 +162,7 @@ class SpectrumView(Canvas):
         entries: list[tuple[float, int, str, QColor]] = []
         x, row = 8.0, 0
         for curve in curves:
-            text = curve.track.title.lower() + (": no person" if curve.nobody else "")
+            text = title_of(curve.track).lower() + (": no person" if curve.nobody else "")
             width = 20 + metrics.horizontalAdvance(text)
             if entries and x + width > self.width() - 4:
                 x, row = 8.0, row + 1

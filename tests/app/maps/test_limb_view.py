@@ -10,10 +10,12 @@ import trimesh
 from fake_accuracy import FakeAccuracy
 from fake_denoisers import FakeDenoisers, fading
 from PySide6.QtCore import QObject
+from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QWidget
 from window_models import build_models
 
-from sd2app.maps.limbs import LimbMenu, part_words
+from sd2app.maps.limbs import LimbMenu, part_words, title_of
+from sd2app.maps.spectrum import SpectrumView
 from sd2app.settings import Settings
 from sd2app.shell.parts import Parts
 from sd2core.body.parts import known_parts
@@ -107,6 +109,29 @@ def test_one_part_is_shown_alone(context, qtbot, body):
     limbs.show("trunk")
     open_it(context, qtbot, body)
     assert track.part == ""
+
+
+def test_the_spectrum_is_of_the_part_that_is_shown(context, qtbot, body):
+    open_it(context, qtbot, body)
+    view = SpectrumView(context.session)
+    qtbot.addWidget(view)
+    view.resize(260, 320)
+    context.playback.seek(context.synthetic.map.times_s[15])
+
+    def coloured():
+        image = view.grab().toImage()
+        wanted = QColor(context.display.palette.synthetic).getRgb()[:3]
+        data = np.frombuffer(image.constBits(), np.uint8).reshape(image.height(), -1, 4)
+        below = data[90:, : image.width(), 2::-1].astype(int)  # not the legend
+        return int((np.abs(below - wanted).max(axis=2) < 30).sum())
+
+    moving = coloured()
+    assert moving > 30
+    context.limbs.show("lower_leg.L")  # it stands still
+    rest(context, qtbot)
+    assert not context.synthetic.values[:, 15].any()
+    assert coloured() < 0.5 * moving
+    assert title_of(context.synthetic) == "Synthetic · left lower leg"
 
 
 def test_what_is_no_body_is_shown_whole(context, qtbot, ball):
