@@ -145,7 +145,8 @@ _CHOSEN_BY_TOLERANCE = (
 class Denoise(_Section):
     """Section ``[denoise]``: options of ``sd2 denoise``."""
 
-    model: Text = "denoiser"  # a file, or the name of an installed model
+    # A file, or the name of an installed model; None: the bundled one for what is synthesised.
+    model: Text | None = None
 
 
 class Simulate(_Section):

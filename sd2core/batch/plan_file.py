@@ -97,7 +97,7 @@ def _with_paths(plan: BatchPlan, changed: Any) -> BatchPlan:
     updates: dict[str, Any] = {"out": changed(plan.out), "recordings": recordings}
     if plan.fit is not None and plan.fit.models is not None:
         updates["fit"] = plan.fit.model_copy(update={"models": changed(plan.fit.models)})
-    if plan.denoise is not None and _is_path(plan.denoise.model):
+    if plan.denoise is not None and plan.denoise.model and _is_path(plan.denoise.model):
         updates["denoise"] = plan.denoise.model_copy(update={"model": changed(plan.denoise.model)})
     if plan.simulate is not None and plan.simulate.radar != PAPER:
         update = {"radar": changed(plan.simulate.radar)}

@@ -72,7 +72,7 @@ class TaskGraph:
                 "vertices_kept": section.vertices_kept,
             }
         )
-        self._model = None if plan.denoise is None else _model_of(plan.denoise.model)
+        self._model = None if plan.denoise is None else _model_of(plan)
         self._simulation = None if plan.simulate is None else simulation_of(plan.simulate)
         # Of a map whose stretches are not all there yet: how many are missing.
         self._missing: dict[tuple[str, int], int] = {}
@@ -302,10 +302,12 @@ def simulation_of(section: Simulate) -> Simulation:
     return Simulation(named_radar(section.radar), section.seed)
 
 
-def _model_of(name: str) -> tuple[str, str]:
-    """Find a model; errors come before the work begins."""
-    from sd2core.denoise.files import describe_model, find_model
+def _model_of(plan: BatchPlan) -> tuple[str, str]:
+    """Find the denoiser; errors come before the work begins."""
+    from sd2core.denoise.files import default_name, describe_model, find_model
 
-    path = find_model(name)
+    assert plan.denoise is not None
+    limbs = plan.synthesise is not None and plan.synthesise.limbs
+    path = find_model(plan.denoise.model or default_name(limbs=limbs))
     describe_model(path)
     return str(path), file_digest(path)

@@ -52,7 +52,7 @@ plans = st.builds(
         null_bins=st.none() | st.just((1, 2)),
     ),
     denoise=st.none()
-    | st.builds(Denoise, model=st.sampled_from(["denoiser", str(FOLDER / "m.safetensors")])),
+    | st.builds(Denoise, model=st.sampled_from([None, "denoiser", str(FOLDER / "m.safetensors")])),
     export=st.none() | st.builds(Export, segment_frames=st.integers(20, 99)),
 )
 

@@ -21,7 +21,7 @@ from sd2core.batch.folder import BatchFolder
 from sd2core.batch.plan_file import plan_from_text
 from sd2core.batch.run import BatchEnd, run_batch
 from sd2core.batch.tasks import Task
-from sd2core.denoise.files import find_model
+from sd2core.denoise.files import LIMBS_MODEL, find_model
 from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.files.resources import resource_path
@@ -357,7 +357,7 @@ def test_limb_maps_are_exported_where_the_plan_says_so(run: Runs) -> None:
     (run.folder / "meshes").mkdir()
     mesh = load_mesh(resource_path("swipes.sd2") / "mesh.zarr").between(30, 50)
     save_mesh(mesh, run.folder / "meshes" / "anna.npz")
-    split = MAPS + "limbs = true\nvisibility = 'none'\n[export]\nsegment_frames = 20\n"
+    split = MAPS + "limbs = true\nvisibility = 'none'\n[denoise]\n[export]\nsegment_frames = 20\n"
     whole = run(split)
     with open_dataset(Path(whole.facts["dataset"])) as dataset:
         assert dataset.header.parts == ()
@@ -370,6 +370,9 @@ def test_limb_maps_are_exported_where_the_plan_says_so(run: Runs) -> None:
             known = DopplerMap.load(run.out / row["synthetic"]).limbs
             assert known is not None
             np.testing.assert_array_equal(found, known.values.transpose(2, 0, 1))
+            # No model is named, so it is the one that takes them.
+            denoised = DopplerMap.load(run.out / row["denoised"])
+            assert denoised.meta["denoiser"]["name"] == LIMBS_MODEL
 
 
 def test_what_would_be_done_is_what_is_done(run: Runs) -> None:
