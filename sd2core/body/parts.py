@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from itertools import permutations
 from typing import TYPE_CHECKING, NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,6 +54,7 @@ def body_parts(mesh: MeshSequence) -> VertexParts | None:
 
     Those of the bundled body's surfaces are known, and those of any closed surface that has a
     body's five tips (SMPL's, say), by its first frame with a person. A point cloud has none.
+    A mesh is searched once.
 
     Examples
     --------
@@ -62,6 +64,15 @@ def body_parts(mesh: MeshSequence) -> VertexParts | None:
     >>> parts.names[parts.numbers[0]]
     'trunk'
     """
+    if mesh not in _FOUND:
+        _FOUND[mesh] = _find_parts(mesh)
+    return _FOUND[mesh]
+
+
+_FOUND: WeakKeyDictionary[MeshSequence, VertexParts | None] = WeakKeyDictionary()
+
+
+def _find_parts(mesh: MeshSequence) -> VertexParts | None:
     resolution = own_resolution(mesh)
     if resolution is not None:
         return VertexParts(PARTS, _own_parts(resolution))

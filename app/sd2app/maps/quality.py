@@ -58,7 +58,6 @@ class SynthesizerCache:
         self.options = options
         self.full = Synthesizer(mesh, options)
         self.limbs = False  # True: maps are also split by the parts of the body
-        self._parts: dict[int, tuple[MeshSequence, VertexParts | None]] = {}
         self._library = library
         self._made: OrderedDict[AccuracyPlan, Synthesizer] = OrderedDict()
         self._lock = threading.Lock()
@@ -84,11 +83,8 @@ class SynthesizerCache:
         """Parts of the body, where they are wanted and known; the first time takes a moment."""
         if not self.limbs:
             return None
-        mesh = synthesizer.mesh
         with self._lock:
-            if id(mesh) not in self._parts:
-                self._parts[id(mesh)] = mesh, body_parts(mesh)
-            return self._parts[id(mesh)][1]
+            return body_parts(synthesizer.mesh)
 
     def ready(self, plan: AccuracyPlan | None) -> Synthesizer | None:
         """The synthesizer of a plan if there is one already; never waits."""

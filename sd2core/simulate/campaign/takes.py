@@ -17,11 +17,11 @@ from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.pairs.store import Take
-from sd2core.radar_config import CLUTTER, PAPER_RADAR, RadarConfig
+from sd2core.radar_config import PAPER_RADAR, RadarConfig
 from sd2core.simulate.campaign.fit_errors import FitErrors
 from sd2core.simulate.campaign.motion import perform
 from sd2core.simulate.campaign.protocol import VARIED, Protocol
-from sd2core.simulate.campaign.radar import TargetOptions, radar_target
+from sd2core.simulate.campaign.radar import PROCESSING, TargetOptions, radar_target
 from sd2core.simulate.campaign.scene import random_setting, random_subject
 from sd2core.timebase import Timebase
 
@@ -70,7 +70,7 @@ class Campaign:
             "seed": self.seed,
             "take_seconds": self.take_seconds,
             "radar": asdict(self.radar),
-            "target": {**asdict(self.target), "clutter": CLUTTER},
+            "target": {**asdict(self.target), "clutter": PROCESSING.clutter},
             "surfaces": {"synthetic": FITTED, "radar": TRUE},
             "synthesis": asdict(OPTIONS),
             **self.protocol.provenance(),

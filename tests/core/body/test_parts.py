@@ -102,3 +102,15 @@ def test_what_is_no_body_has_no_parts() -> None:
     gone = body.vertices_m.copy()
     gone[3] = np.nan
     assert parts_by_shape(gone, body.faces[::-1].copy()) is None
+
+
+def test_a_mesh_is_searched_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    searched = []
+    monkeypatch.setattr(
+        "sd2core.body.parts.parts_by_shape", lambda *surface: searched.append(surface)
+    )
+    for _ in range(2):
+        mesh = still(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32))
+        assert body_parts(mesh) is None
+        assert body_parts(mesh) is None
+    assert len(searched) == 2
