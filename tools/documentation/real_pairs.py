@@ -44,6 +44,7 @@ Maps = list[NDArray[np.float32]]
 
 DEFAULT = MarsChoices()
 RIDGES = (10.0, 100.0)
+Answers = tuple[NDArray[np.float64], NDArray[np.float64], float]
 
 
 def skeleton_cloud(clip: SkeletonClip) -> MeshSequence:
@@ -188,6 +189,28 @@ def examples(pairs: PairSet, parts: tuple[str, ...]) -> tuple[NDArray[np.float64
     )
 
 
+def ridge_map(
+    x: NDArray[np.float64], y: NDArray[np.float64], unseen: NDArray[np.float64], ridge: float
+) -> NDArray[np.float64]:
+    """Answers to unseen features by a linear map learnt from ``x`` and ``y``."""
+    centred = x - (middle := x.mean(axis=0))
+    slope = np.linalg.solve(
+        centred.T @ centred + ridge * np.eye(x.shape[1]), centred.T @ (y - y.mean())
+    )
+    return (unseen - middle) @ slope + y.mean()
+
+
+def judged(person: str, learnt: str, name: str, ridge: float, answers: Answers) -> str:
+    """One line of the second table."""
+    after, truth, plain = answers
+    error = np.abs(after - truth).mean()
+    alike = np.corrcoef(after, truth)[0, 1]
+    return (
+        f"| {person} | {learnt} | {name} | {ridge:g} | {error:.3f} | {error / plain - 1:+.0%} |"
+        f" {alike:.3f} |"
+    )
+
+
 def linear(path: Path) -> None:
     """Print the second table."""
     pairs = read_pairs(path)
@@ -196,30 +219,37 @@ def linear(path: Path) -> None:
         "limbs, sides together": DENOISER_PARTS,
         "limbs, sides apart": PARTS,
     }
-    print("| person | input | ridge | MAE, m/s | to no denoising | correlation |")
-    print("|---|---|---|---|---|---|")
+    print("| person | learnt from | input | ridge | MAE, m/s | to no denoising | correlation |")
+    print("|---|---|---|---|---|---|---|")
     for test in pairs.subjects:
-        others = [name for name in pairs.subjects if name != test]
+        own, others = pairs.of([test]), [name for name in pairs.subjects if name != test]
         for name, parts in ways.items():
             x, y, _ = examples(pairs.of(others), parts)
-            unseen, truth, before = examples(pairs.of([test]), parts)
+            unseen, truth, before = examples(own, parts)
             plain = np.abs(before - truth).mean()
             if not parts:
                 alike = np.corrcoef(before, truth)[0, 1]
-                print(f"| {test} | no denoising | | {plain:.3f} | | {alike:.3f} |")
-            middle = x.mean(axis=0)
+                print(f"| {test} | | no denoising | | {plain:.3f} | | {alike:.3f} |")
             for ridge in RIDGES:
-                slope = np.linalg.solve(
-                    (x - middle).T @ (x - middle) + ridge * np.eye(x.shape[1]),
-                    (x - middle).T @ (y - y.mean()),
-                )
-                after = (unseen - middle) @ slope + y.mean()
-                error = np.abs(after - truth).mean()
-                alike = np.corrcoef(after, truth)[0, 1]
-                print(
-                    f"| {test} | {name} | {ridge:g} | {error:.3f} | {error / plain - 1:+.0%} |"
-                    f" {alike:.3f} |"
-                )
+                after = ridge_map(x, y, unseen, ridge)
+                print(judged(test, "the other", name, ridge, (after, truth, plain)))
+        after, truth = own_minutes(own)
+        print(
+            judged(test, "own other minutes", "limbs, sides together", 10.0, (after, truth, plain))
+        )
+
+
+def own_minutes(pairs: PairSet) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Answers to a quarter of a person's takes by the other three, and the truth."""
+    found, truth = [], []
+    for fold in range(4):
+        unseen = pairs.takes[fold::4]
+        rest = tuple(take for number, take in enumerate(pairs.takes) if number % 4 != fold)
+        x, y, _ = examples(replace(pairs, takes=rest), DENOISER_PARTS)
+        asked, wanted, _ = examples(replace(pairs, takes=unseen), DENOISER_PARTS)
+        found.append(ridge_map(x, y, asked, 10.0))
+        truth.append(wanted)
+    return np.concatenate(found), np.concatenate(truth)
 
 
 def main() -> None:
