@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 from PySide6.QtGui import QAction, QActionGroup, QKeySequence
 from PySide6.QtWidgets import QInputDialog, QMenu, QWidget
 
 from sd2app.feature import Action
 from sd2app.labels.edits import LabelEdits
-from sd2app.labels.marking import LONGEST_MS, OFFERED_MS, Reaction
+from sd2app.labels.loop import SpanLoop
+from sd2app.labels.marking import LONGEST_MS, OFFERED_MS, LabelMarking, Reaction
 from sd2app.labels.model import LabelsModel
 from sd2app.widgets.icons import swatch_icon
 from sd2app.widgets.key_text import canonical, native
@@ -118,3 +120,21 @@ class ReactionMenu(QMenu):
         other = chosen_ms not in self._offered
         self._other.setText(f"Other: {chosen_ms} ms…" if other else "Other…")
         (self._other if other else self._offered[chosen_ms]).setChecked(True)
+
+
+def fill_place_menu(
+    menu: QMenu, time_s: float, edits: LabelEdits, marking: LabelMarking, loop: SpanLoop
+) -> None:
+    """Offer to play the span at a time, and to begin another one there."""
+    labels = edits.labels
+    if (span := labels.at(time_s)) is not None:
+        menu.addAction(f"Play “{span.label}” in a loop", lambda: loop.play(span))
+    begin = menu.addMenu("La&bel from here")
+    begin.setEnabled(not edits.refusal and bool(labels.track))
+
+    def mark(name: str) -> None:
+        edits.playback.seek(time_s)
+        marking.mark(name)
+
+    for label in labels.labels.label_set.labels:
+        begin.addAction(label.name, partial(mark, label.name))

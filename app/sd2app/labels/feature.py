@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from PySide6.QtCore import QObject, QTimer
+from PySide6.QtCore import QObject, QPointF, QTimer
 from PySide6.QtWidgets import QMenu, QWidget
 
 from sd2app.feature import Action, Feature, Shell
-from sd2app.labels.actions import LabelActions, ReactionMenu, editing
+from sd2app.labels.actions import LabelActions, ReactionMenu, editing, fill_place_menu
 from sd2app.labels.autosave import LabelAutosave
 from sd2app.labels.cut_out import CutOutModel, ask_about_others, ask_for_cut_outs
 from sd2app.labels.dragging import LabelDragging, SpanDragger
@@ -327,6 +327,7 @@ class LabelsFeature(Feature):
         s, shell = self._session, self._shell
         panel = LabelsPanel(s, self.edits, shell)
         timeline = LabelTimeline(s, self.edits, self.dragging, self.loop)
+        self._offer_places(timeline)
         return {"Labels": panel, "labels": LabelArea(timeline, self.model)}
 
     def bars(self) -> Sequence[QWidget]:
@@ -337,6 +338,17 @@ class LabelsFeature(Feature):
         """Let spans be selected and their edges be dragged on maps."""
         for view in views:
             SpanDragger(view, self.dragging, self.loop)
+            self._offer_places(view)
+
+    def _offer_places(self, view: TimePlot) -> None:
+        """Offer to label from a place, in the context menu."""
+
+        def fill(menu: QMenu, place: QPointF) -> None:
+            if view.plot_rect().contains(place):
+                time_s = view.scale.time_of(place.x())
+                fill_place_menu(menu, time_s, self.edits, self.marking, self.loop)
+
+        view.menu_parts = (*view.menu_parts, fill)
 
     # --- life -----------------------------------------------------------------------------
 

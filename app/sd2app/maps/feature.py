@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
-from PySide6.QtCore import QObject
+from PySide6.QtCore import QObject, QPointF
+from PySide6.QtGui import QAction, QGuiApplication
 from PySide6.QtWidgets import QMenu, QWidget
 
 from sd2app.accuracy.model import AccuracyModel
@@ -14,6 +16,8 @@ from sd2app.maps.heatmap import HeatmapView
 from sd2app.maps.level_bar import LevelBar
 from sd2app.maps.limbs import LimbMenu, LimbsModel
 from sd2app.maps.model import SynthesisModel
+from sd2app.maps.radar_place import RadarPlaceBadge
+from sd2app.maps.readout import reading_lines
 from sd2app.maps.spectrum import SpectrumView
 from sd2app.maps.stack import MapStack
 from sd2app.maps.uncertainty import UncertaintyModel
@@ -89,7 +93,33 @@ class MapsFeature(Feature):
 
     def stack(self, over_maps: Sequence[Overlay], over_all: Sequence[Overlay]) -> MapStack:
         """Maps one above the other, with what other features draw over them and the overview."""
-        return MapStack(self._session, self.difference, over_maps, over_all)
+        stack = MapStack(self._session, self.difference, over_maps, over_all)
+        self._spectrum.stand_beside(stack)
+        badge = RadarPlaceBadge(self._session, self._shell.action("sensor_to_camera"))
+        stack.real.set_button(badge)
+        maps = self._session.maps
+        for signal in (self._session.sensor.changed, maps.synthetic.changed, maps.real.changed):
+            signal.connect(lambda: badge.follow() and stack.real.redraw())
+        exports = {stack.synthetic: "export_map", stack.denoised: "export_denoised"}
+        for view in stack.views:
+            export = self._shell.action(exports.get(view, "export_maps"))
+            view.menu_parts = (partial(self._fill_menu, view, export), *view.menu_parts)
+        return stack
+
+    def _fill_menu(self, view: HeatmapView, export: QAction, menu: QMenu, place: QPointF) -> None:
+        """What can be done with a map, and with the cell at a place of it."""
+        reading, span = view.reading_at(place), self._session.span
+        copy = menu.addAction("Copy &value")
+        copy.setEnabled(reading is not None)
+        zero = menu.addAction("&0 dB here")
+        zero.setEnabled(reading is not None and reading.value > 0 and not reading.text)
+        if reading is not None:
+            words = "\t".join(reading_lines(reading))
+            copy.triggered.connect(lambda: QGuiApplication.clipboard().setText(words))
+            zero.triggered.connect(lambda: view.track.set_reference(reading.value))
+        play = self._session.playback.play_stretch
+        menu.addAction("Play what is in view in a &loop", lambda: play(span.start_s, span.end_s))
+        menu.addAction(export)
 
     def view_of(self, track: MapModel, overlays: Sequence[Overlay]) -> HeatmapView:
         """View of one more map on the shared time axis."""
@@ -98,7 +128,8 @@ class MapsFeature(Feature):
     def panels(self) -> Mapping[str, QWidget]:
         """The spectra of this frame over the levels of all maps."""
         levels = LevelBar(self._session, self._shell.action("uncertain"))
-        return {"spectrum": pane((SpectrumView(self._session), 1), levels)}
+        self._spectrum = SpectrumView(self._session)
+        return {"spectrum": pane((self._spectrum, 1), levels)}
 
     def take_over(self) -> None:
         """Compute the map of the recording that was opened."""

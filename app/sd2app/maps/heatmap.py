@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QBrush, QColor, QMouseEvent, QPainter, QPen, QWheelEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
+from sd2app.maps.arrangement import BELOW_PX, HEADER_PX
 from sd2app.maps.heatmap_image import MapWidget
 from sd2app.maps.limbs import title_of
+from sd2app.maps.readout import body_range_m, reading_lines
 from sd2app.session.maps import UNCERTAIN_SHARE, MapModel, Reading
 from sd2app.session.session import Session
 from sd2app.widgets.canvas import AT_LEFT, AT_RIGHT, Overlay, clipped
@@ -18,6 +21,7 @@ from sd2app.widgets.colour_maps import lookup_table
 from sd2app.widgets.time_axis import (
     GUTTER_PX,
     paint_cursor,
+    paint_readout,
     paint_title,
     signed_text,
     ticks,
@@ -25,7 +29,8 @@ from sd2app.widgets.time_axis import (
 )
 from sd2core.maps import DopplerMap
 
-_HEADER_PX = 24
+HANDLE_PX = 22
+"""Left end of the title row, which folds and moves the map."""
 
 
 class HeatmapView(MapWidget):
@@ -34,8 +39,8 @@ class HeatmapView(MapWidget):
     A drag of the header of a track that is ``alignable`` moves the capture in time.
     """
 
-    TOP_PX = _HEADER_PX
-    USUAL_PX = 640, _HEADER_PX + 160  # room for 32 bins of 5 pixels
+    TOP_PX, BOTTOM_PX = HEADER_PX, BELOW_PX
+    USUAL_PX = 640, HEADER_PX + 160  # room for 32 bins of 5 pixels
 
     def __init__(
         self,
@@ -47,17 +52,33 @@ class HeatmapView(MapWidget):
     ) -> None:
         super().__init__(track, session, overlays)
         self._pointer = session.pointer
-        self._alignable = alignable
-        if alignable:
-            self.setToolTip("Drag the title to align the capture in time")
+        self.setAccessibleName(f"{track.title} map")
+        self.alignable = alignable
+        self.folded = self.enlarged = False
         self._hint = ""
         self._button: QWidget | None = None
-        self.setMinimumHeight(96)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         self._room_px = 0
         self._span.changed.connect(self.invalidate)
         track.status_changed.connect(self.redraw)
         self.follow(self._pointer.changed)
+
+    @property
+    def track(self) -> MapModel:
+        """Map that is shown."""
+        return self._track
+
+    @property
+    def has_map(self) -> bool:
+        """True while there is a map to show."""
+        return self._track.map is not None
+
+    def set_state(self, *, folded: bool, enlarged: bool) -> None:
+        """Show the title alone, or that this map stands for all."""
+        if (folded, enlarged) != (self.folded, self.enlarged):
+            self.folded, self.enlarged = folded, enlarged
+            self.redraw()
 
     def set_hint(self, hint: str) -> None:
         """Text shown while there is no map."""
@@ -112,7 +133,7 @@ class HeatmapView(MapWidget):
         if self._button_px != self._room_px:
             self._kept = None
         self.paint_kept(painter, self._paint_map)
-        if self._track.map is not None:
+        if self._track.map is not None and not self.folded:
             self._paint_cursors(painter, self.plot_rect())
 
     def _paint_map(self, painter: QPainter) -> None:
@@ -123,6 +144,8 @@ class HeatmapView(MapWidget):
             painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, self._hint)
             return
         self._paint_header(painter)
+        if self.folded:
+            return
         plot = self.plot_rect()
         self.paint_map(painter, plot, self._span.start_s, self._span.end_s)
         self._paint_marked_bins(painter, plot)
@@ -133,15 +156,31 @@ class HeatmapView(MapWidget):
 
     def _paint_header(self, painter: QPainter) -> None:
         colours = self._display.palette
-        box = QRectF(8, 0, self.width() - 16, _HEADER_PX)
-        left = 8 + paint_title(painter, box, self.title(), colours.text) + 12
+        self._paint_handle(painter, colours.muted)
+        box = QRectF(HANDLE_PX, 0, self.width() - HANDLE_PX - 8, HEADER_PX)
+        left = HANDLE_PX + paint_title(painter, box, self.title(), colours.text) + 12
         painter.setPen(QColor(colours.muted))
         left += self._place_button(left)
         room = self.width() - 16 - left - self._paint_corner(painter, box, left)
         status = painter.fontMetrics().elidedText(
             self._status(), Qt.TextElideMode.ElideRight, int(max(room - 16, 40))
         )
-        painter.drawText(QRectF(left, 0, self.width(), _HEADER_PX), AT_LEFT, status)
+        painter.drawText(QRectF(left, 0, self.width(), HEADER_PX), AT_LEFT, status)
+
+    def _paint_handle(self, painter: QPainter, colour: str) -> None:
+        """A triangle that folds; an enlarged map has an arrow back."""
+        corners = {
+            "down": ((-4, -2.5), (4, -2.5), (0, 3)),
+            "right": ((-2.5, -4), (-2.5, 4), (3, 0)),
+            "left": ((2.5, -4), (2.5, 4), (-3, 0)),
+        }["left" if self.enlarged else "right" if self.folded else "down"]
+        centre = QPointF(HANDLE_PX / 2 + 2, HEADER_PX / 2)
+        painter.save()
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(colour))
+        painter.drawPolygon([centre + QPointF(x, y) for x, y in corners])
+        painter.restore()
 
     @property
     def _button_px(self) -> int:
@@ -156,8 +195,8 @@ class HeatmapView(MapWidget):
         if self._room_px:
             assert self._button is not None
             size = self._button.sizeHint()
-            height = min(size.height(), _HEADER_PX - 2)
-            self._button.setGeometry(left - 4, (_HEADER_PX - height) // 2, size.width(), height)
+            height = min(size.height(), HEADER_PX - 2)
+            self._button.setGeometry(left - 4, (HEADER_PX - height) // 2, size.width(), height)
         return self._room_px
 
     def _paint_corner(self, painter: QPainter, box: QRectF, left: float) -> float:
@@ -206,7 +245,8 @@ class HeatmapView(MapWidget):
         painter.setPen(QPen(QColor(colours.border), 1))
         painter.drawRect(plot.adjusted(-0.5, -0.5, 0.5, 0.5))
         line_px = painter.fontMetrics().height()
-        for velocity in ticks(-v_max, v_max, max(int(plot.height() / (line_px * 1.8)), 2)):
+        room_px = plot.height() / (line_px * 1.8)
+        for velocity in ticks(-v_max, v_max, int(room_px)) if room_px >= 2 else (0.0,):
             y = self.y_of(velocity)
             painter.setPen(QPen(QColor(colours.muted), 1))
             painter.drawLine(QPointF(plot.left() - 4, y), QPointF(plot.left(), y))
@@ -225,6 +265,10 @@ class HeatmapView(MapWidget):
                     y = self.y_of(self._pointer.velocity_mps)
                     painter.drawLine(QPointF(plot.left(), y), QPointF(plot.right(), y))
             paint_cursor(painter, plot, scale.x_of(self._playback.time_s))
+        if self.underMouse() and self._pointer.reading is not None:
+            reading = self._pointer.reading
+            place = QPointF(scale.x_of(reading.time_s), self.y_of(reading.velocity_mps))
+            paint_readout(painter, plot, place, reading_lines(reading), self._display.palette)
 
     # --- mouse ----------------------------------------------------------------------------
 
@@ -234,7 +278,7 @@ class HeatmapView(MapWidget):
         if event.button() == Qt.MouseButton.MiddleButton:
             self._grab = ("pan", position.x())
         elif event.button() == Qt.MouseButton.LeftButton:
-            if self._alignable and position.y() < _HEADER_PX:
+            if self.alignable and position.y() < HEADER_PX:
                 self._grab = ("offset", position.x())
                 self._session.edits.begin_offset_drag()
             else:
@@ -246,7 +290,7 @@ class HeatmapView(MapWidget):
         position = event.position()
         self._read(position)
         if self._grab is None:
-            over_header = self._alignable and position.y() < _HEADER_PX
+            over_header = self.alignable and position.y() < HEADER_PX
             self.setCursor(
                 Qt.CursorShape.SizeHorCursor if over_header else Qt.CursorShape.CrossCursor
             )
@@ -269,24 +313,34 @@ class HeatmapView(MapWidget):
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         """Show the whole recording."""
-        if event.position().y() >= _HEADER_PX:
+        if event.position().y() >= HEADER_PX:
             self._span.fit()
 
     def leaveEvent(self, event: object) -> None:
         """Clear the reading under the pointer."""
         self._pointer.leave()
+        self.update()
 
     def wheelEvent(self, event: QWheelEvent) -> None:
         """Zoom about the pointer, or pan with Shift or a sideways wheel."""
         turn_wheel(event, self._span, self.scale)
 
+    def reading_at(self, position: QPointF) -> Reading | None:
+        """Cell at a pixel, None where there is none."""
+        if self._track.map is None or self.folded or not self.plot_rect().contains(position):
+            return None
+        return self.read(self.scale.time_of(position.x()), self.velocity_of(position.y()))
+
     def _read(self, position: QPointF) -> None:
-        if self._track.map is None or not self.plot_rect().contains(position):
+        if self._track.map is None or self.folded or not self.plot_rect().contains(position):
             self._pointer.leave()
             return
         time_s, velocity_mps = self.scale.time_of(position.x()), self.velocity_of(position.y())
         self._pointer.point_at(time_s, velocity_mps, self.read(time_s, velocity_mps))
 
     def read(self, time_s: float, velocity_mps: float) -> Reading | None:
-        """Cell at a time and velocity."""
-        return self._track.read(time_s, velocity_mps)
+        """Cell at a time and velocity, with the range of the body that was synthesised from."""
+        found = self._track.read(time_s, velocity_mps)
+        if found is None or self._track is not self._session.maps.synthetic:
+            return found
+        return replace(found, range_m=body_range_m(self._session, time_s))

@@ -13,7 +13,6 @@ from sd2app.widgets.canvas import Canvas, image_of
 from sd2app.widgets.colour_maps import lookup_table, uncertain_table
 from sd2app.widgets.inputs import Choice, NumberBox, action_button
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
-from sd2app.widgets.panel import ElidedLabel
 
 _STRIP_PX = 14
 
@@ -64,16 +63,13 @@ class LevelBar(QWidget):
             {name: name for name in COLOUR_MAPS},
             lambda name: set_levels(colour_map=name),
         )
-        # One line each: the plot above needs the height.
-        self._references = [ElidedLabel(self, "muted") for _ in self._tracks]
         ends = row_of(
             self._low, STRETCH, action_button(uncertain, "Uncertain"), STRETCH, self._high
         )
         choices = row_of((self._scale, 1), (self._colours, 1))
-        controls = column_of(_ColourStrip(session, self), ends, choices, spacing_px=4)
-        self.setLayout(
-            column_of(controls, *self._references, spacing_px=4, margins_px=(8, 4, 8, 8))
-        )
+        self._strip = _ColourStrip(session, self)
+        controls = column_of(self._strip, ends, choices, spacing_px=4)
+        self.setLayout(column_of(controls, spacing_px=0, margins_px=(8, 0, 8, 4)))
         for signal in (self._display.levels_changed, *(track.changed for track in self._tracks)):
             signal.connect(self._refresh)
         self._refresh()
@@ -85,8 +81,11 @@ class LevelBar(QWidget):
         self._low.setEnabled(levels.scale == "dB")
         self._scale.show_value(levels.scale)
         self._colours.show_value(levels.colour_map)
-        for label, track in zip(self._references, self._tracks, strict=True):
-            label.setVisible(track.map is not None)
-            if track.map is not None:
-                text = f"0 dB {track.title.lower()}: {track.reference:.3g} {track.map.unit}"
-                label.setText(text.rstrip())
+        # A tip, because the plot above stands beside its map and needs the height.
+        self._strip.setToolTip(
+            "\n".join(
+                f"0 dB {track.title.lower()}: {track.reference:.3g} {track.map.unit}".rstrip()
+                for track in self._tracks
+                if track.map is not None
+            )
+        )

@@ -1,4 +1,4 @@
-"""Range, velocity and visibility of each vertex in the frame on screen."""
+"""What is under the pointer, in words and per vertex of the frame on screen."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from sd2app.session.maps import Reading
 from sd2app.session.session import Session
+from sd2app.widgets.time_axis import clock_text
 from sd2core.doppler.synthesizer import FrameScattering, Synthesizer, Visibility
 from sd2core.sensor import Vector
 
@@ -76,3 +78,34 @@ class FrameReader:
             visible_share=float(frame.visible.mean()),
             beyond_share=float((seen > v_max_mps).mean()) if seen.size else 0.0,
         )
+
+
+def reading_lines(reading: Reading) -> tuple[str, ...]:
+    """Time and range, where it is known; velocity with its sign, and level; in words."""
+    if reading.velocity_mps > 0:
+        direction = "approaching"
+    else:
+        direction = "receding" if reading.velocity_mps < 0 else "still"
+    velocity = f"{reading.velocity_mps:+.3f}".replace("-", "−")
+    value = f"{reading.value:.3g}"
+    if reading.deviation is not None:
+        value += f" ± {reading.deviation:.2g}"
+    when = [clock_text(reading.time_s), f"frame {reading.frame}"]
+    if reading.range_m is not None:
+        when.append(f"body at {reading.range_m:.2f} m")
+    what = [f"{velocity} m/s {direction}", reading.text or f"{reading.level} ({value})"]
+    if reading.note:
+        what.append(reading.note)
+    return tuple("  ·  ".join(parts) for parts in (when, what))
+
+
+def body_range_m(session: Session, time_s: float) -> float | None:
+    """Distance from the virtual sensor to the torso at a time, None without a person then."""
+    mesh = session.document.mesh
+    if mesh is None or not mesh.timebase.covers(time_s):
+        return None
+    frame = mesh.timebase.frame_at(time_s)
+    if not mesh.presence.there[frame]:
+        return None
+    torso_m = np.median(mesh.frame(frame), axis=0)
+    return float(np.linalg.norm(torso_m - session.sensor.sensor.position_m))

@@ -10,14 +10,15 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QBrush, QColor, QFontMetrics, QPainter, QPen, QPolygonF
 
 from sd2app.maps.limbs import title_of
+from sd2app.maps.stack import MapStack
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
-from sd2app.widgets.canvas import Canvas, clipped
+from sd2app.widgets.canvas import AT_LEFT, Canvas, clipped
 from sd2app.widgets.plot import paint_axes
 from sd2app.widgets.time_axis import paint_title, signed_text, ticks
 from sd2core.maps import DopplerMap
 
-_LEFT_PX, _TOP_PX, _RIGHT_PX, _BOTTOM_PX = 48, 30, 12, 40
+_LEFT_PX, _TOP_PX, _RIGHT_PX, _BOTTOM_PX = 34, 30, 12, 40
 _LEGEND_PX = 20
 
 
@@ -38,7 +39,7 @@ class _Curve:
 
 
 class SpectrumView(Canvas):
-    """Level to the right, velocity upwards like in the heatmaps beside it."""
+    """Level to the right, velocity upwards on the axis of a map beside it."""
 
     USUAL_PX = 240, 280
 
@@ -46,7 +47,9 @@ class SpectrumView(Canvas):
         super().__init__()
         self._maps, self._playback = session.maps, session.playback
         self._display, self._pointer = session.display, session.pointer
-        self.setMinimumSize(180, 160)
+        self._stack: MapStack | None = None
+        self.setMinimumSize(160, 160)
+        self.setAccessibleName("This frame")
         self.follow(
             session.playback.frame_changed,
             session.display.levels_changed,
@@ -54,6 +57,21 @@ class SpectrumView(Canvas):
             session.pointer.changed,
             *(track.changed for track in session.maps.all),
         )
+
+    def stand_beside(self, stack: MapStack) -> None:
+        """Share the velocity axis of the leading map of a stack."""
+        self._stack = stack
+        self.follow(stack.arranged)
+
+    def plot_rect(self) -> QRectF:
+        """Rectangle of the plot, in pixels: as high as the leading map, in its place."""
+        whole = QRectF(self.rect()).adjusted(_LEFT_PX, _TOP_PX, -_RIGHT_PX, -_BOTTOM_PX)
+        view = self._stack.leading if self._stack is not None else None
+        if view is None:
+            return whole
+        plot = view.plot_rect()
+        top = QPointF(self.mapFromGlobal(view.mapToGlobal(plot.topLeft()))).y()
+        return QRectF(whole.left(), top, whole.width(), plot.height())
 
     def _curves(self) -> list[_Curve]:
         time_s, palette = self._playback.time_s, self._display.palette
@@ -70,11 +88,7 @@ class SpectrumView(Canvas):
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         colours = self._display.palette
         painter.fillRect(self.rect(), QColor(colours.panel))
-        legend = self._legend(painter.fontMetrics(), curves)
-        rows = 1 + max((row for _, row, _, _ in legend), default=0)
-        plot = QRectF(self.rect()).adjusted(
-            _LEFT_PX, _TOP_PX + _LEGEND_PX * rows, -_RIGHT_PX, -_BOTTOM_PX
-        )
+        plot = self.plot_rect()
         paint_title(painter, QRectF(8, 0, self.width() - 8, 24), "This frame", colours.text)
         if not curves:
             return
@@ -88,7 +102,7 @@ class SpectrumView(Canvas):
                 y = _y_of(plot, self._pointer.velocity_mps, v_max)
                 painter.setPen(QPen(QColor(colours.muted), 1, Qt.PenStyle.DotLine))
                 painter.drawLine(QPointF(plot.left(), y), QPointF(plot.right(), y))
-        self._paint_legend(painter, legend)
+        self._paint_legend(painter, self._legend(painter.fontMetrics(), curves), plot)
 
     def _paint_axes(self, painter: QPainter, plot: QRectF, doppler_map: DopplerMap) -> None:
         colours, levels = self._display.palette, self._display.levels
@@ -103,20 +117,28 @@ class SpectrumView(Canvas):
         if levels.scale == "linear":
             low, high, unit = 0.0, 100.0 * 10.0 ** (levels.high_db / 10.0), "%"
         most = max(int(plot.height() / (2 * painter.fontMetrics().height())), 2)
+        across = [
+            (plot.left() + plot.width() * (level - low) / (high - low), f"{level:g} {unit}")
+            for level in ticks(low, high, 4)
+        ]
+        upwards = [(_y_of(plot, each, v_max), each) for each in ticks(-v_max, v_max, most)]
         paint_axes(
             painter,
             plot,
             colours,
-            [
-                (
-                    plot.left() + plot.width() * (level - low) / (high - low),
-                    f"{level:g}".replace("-", "−"),
-                )
-                for level in ticks(low, high, 4)
-            ],
-            [(_y_of(plot, each, v_max), signed_text(each)) for each in ticks(-v_max, v_max, most)],
-            f"level ({unit} of the reference)",
+            [(x, "" if self._is_tight(plot) else text.replace("-", "−")) for x, text in across],
+            [(y, signed_text(velocity)) for y, velocity in upwards],
+            "" if self._is_tight(plot) else "level over the reference",
         )
+        if self._is_tight(plot):
+            line_px = painter.fontMetrics().height()
+            for x, text in across[:-1]:
+                box = QRectF(x + 3, plot.bottom() - line_px - 2, 60, line_px)
+                painter.drawText(box, AT_LEFT, text.replace("-", "−"))
+
+    def _is_tight(self, plot: QRectF) -> bool:
+        """True where the map takes all the height: the scale then stands in the plot."""
+        return plot.bottom() + _BOTTOM_PX > self.height()
 
     def _paint_curve(
         self, painter: QPainter, plot: QRectF, curve: _Curve, frame: int, v_max: float
@@ -145,10 +167,17 @@ class SpectrumView(Canvas):
         painter.drawPolyline(QPolygonF(points))
 
     def _paint_legend(
-        self, painter: QPainter, entries: list[tuple[float, int, str, QColor]]
+        self, painter: QPainter, entries: list[tuple[float, int, str, QColor]], plot: QRectF
     ) -> None:
-        for x, row, text, colour in entries:
-            top = 24.0 + _LEGEND_PX * row
+        rows = 1 + max(row for _, row, _, _ in entries)
+        first = plot.bottom() + _BOTTOM_PX
+        if first + _LEGEND_PX * rows > self.height():
+            first, indent = plot.top() + 2.0, plot.left()
+        else:
+            indent = 0.0
+        for left, row, text, colour in entries:
+            x = left + indent
+            top = first + _LEGEND_PX * row
             painter.setPen(QPen(colour, 2))
             painter.drawLine(QPointF(x, top + 10), QPointF(x + 13, top + 10))
             painter.setPen(QColor(self._display.palette.muted))

@@ -1,25 +1,32 @@
-"""The Doppler maps one above the other."""
+"""The Doppler maps one above the other, as the user arranged them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
-from PySide6.QtWidgets import QWidget
+from PySide6.QtCore import QEvent, QObject, QPointF, Qt, Signal
+from PySide6.QtGui import QKeyEvent, QMouseEvent, QResizeEvent
+from PySide6.QtWidgets import QFrame, QMenu, QScrollArea, QScrollBar, QWidget
 
+from sd2app.maps.arrangement import BELOW_PX, HEADER_PX, LEAST_PX, Arrangement, heights_px
 from sd2app.maps.difference import DifferenceModel
 from sd2app.maps.difference_view import DifferenceView
-from sd2app.maps.heatmap import HeatmapView
+from sd2app.maps.heatmap import HANDLE_PX, HeatmapView
 from sd2app.maps.overview import Overview
 from sd2app.session.session import Session
 from sd2app.widgets.canvas import Overlay
-from sd2app.widgets.layouts import column_of
+from sd2app.widgets.time_axis import MARGIN_PX
 
-_LOWEST_PX = {1: 96, 2: 96, 3: 72, 4: 54}
-"""Least height of a map, by the number of maps."""
+_BORDER_PX = BELOW_PX + 2  # two pixels of the map, to be hit
+_MOVED_PX = 4
 
 
-class MapStack(QWidget):
-    """One view per map; views without content are hidden."""
+class MapStack(QScrollArea):
+    """One view per map; views without content are hidden, and the rest scrolls if it must."""
+
+    arranged = Signal()
+    """Views have moved, or others are to be seen."""
 
     def __init__(
         self,
@@ -30,16 +37,40 @@ class MapStack(QWidget):
     ) -> None:
         super().__init__()
         self._session, self._difference, maps = session, difference, session.maps
+        self._content = QWidget()
         self.synthetic = HeatmapView(maps.synthetic, session, over_maps)
         self.denoised = HeatmapView(maps.denoised, session, over_maps)
         self.before = HeatmapView(maps.before, session, over_maps)
         self.real = HeatmapView(maps.real, session, over_maps, alignable=True)
         self.difference = DifferenceView(difference, session, over_maps)
+        self._named = {
+            "synthetic": self.synthetic,
+            "denoised": self.denoised,
+            "before": self.before,
+            "real": self.real,
+            "difference": self.difference,
+        }
+        self.arrangement = Arrangement(tuple(self._named), session.settings, self)
         self.overview = Overview(session, over_all)
         self._offer: QWidget | None = None
-        views = [(view, 1) for view in self.views]
-        self.setLayout(column_of(*views, spacing_px=0, margins_px=0))
         self._shown: object = None
+        self._with_content: frozenset[str] = frozenset()
+        self.setWidget(self._content)
+        self.setFrameShape(QFrame.Shape.NoFrame)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        # A bar beside the maps would shift their time axis against that of the labels below.
+        self.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self._bar = QScrollBar(Qt.Orientation.Vertical, self)
+        self._bar.valueChanged.connect(self.verticalScrollBar().setValue)
+        self.verticalScrollBar().valueChanged.connect(self._bar.setValue)
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.setMinimumHeight(LEAST_PX)
+        for name, view in self._named.items():
+            view.setParent(self._content)
+            view.menu_parts = (partial(self._fill_menu, name),)
+            _Hands(self, name, view)
+        self.arrangement.changed.connect(self._arrange)
+        self.verticalScrollBar().valueChanged.connect(lambda _: self.arranged.emit())
         for track in maps.all:
             track.changed.connect(self.refresh)
         difference.state_changed.connect(self.refresh)
@@ -48,7 +79,27 @@ class MapStack(QWidget):
     @property
     def views(self) -> tuple[HeatmapView, ...]:
         """All views from top to bottom, hidden ones included."""
-        return (self.synthetic, self.denoised, self.before, self.real, self.difference)
+        return tuple(self._named[name] for name in self.arrangement.order)
+
+    @property
+    def shown(self) -> tuple[str, ...]:
+        """Names of the maps on screen from top to bottom."""
+        if self.arrangement.enlarged in self._with_content:
+            return (self.arrangement.enlarged,)
+        return tuple(name for name in self.arrangement.order if name in self._with_content)
+
+    @property
+    def leading(self) -> HeatmapView | None:
+        """First open map of which the upper half is in view: *This frame* shares its axis."""
+        top = self.verticalScrollBar().value()
+        views = [self._named[name] for name in self.shown]
+        opened = [view for view in views if not view.folded and view.has_map]
+        seen = [view for view in opened if view.y() + view.height() // 2 > top]
+        return next(iter(seen or opened), None)
+
+    def view(self, name: str) -> HeatmapView:
+        """View of a map by its name."""
+        return self._named[name]
 
     def set_denoiser_buttons(self, offer: QWidget, chosen: QWidget) -> None:
         """Put the choice of the denoiser beside the map it makes, or the one it could use."""
@@ -62,21 +113,18 @@ class MapStack(QWidget):
         """Show the views that have content."""
         document, maps = self._session.document, self._session.maps
         has_any = maps.synthetic.map is not None or maps.real.map is not None
-        shown = {
-            self.synthetic: maps.synthetic.map is not None or not has_any,
-            self.denoised: maps.denoised.map is not None,
-            self.before: maps.before.map is not None,
-            self.real: maps.real.map is not None,
-            self.difference: self._difference.shown,
+        with_content = {
+            "synthetic": maps.synthetic.map is not None or not has_any,
+            "denoised": maps.denoised.map is not None,
+            "before": maps.before.map is not None,
+            "real": maps.real.map is not None,
+            "difference": self._difference.shown,
         }
-        state = *shown.values(), maps.synthetic.map is None, document.content is None
+        state = *with_content.values(), maps.synthetic.map is None, document.content is None
         if state == self._shown:
             return  # maps change many times a second
         self._shown = state
-        lowest_px = _LOWEST_PX.get(sum(shown.values()), 44)
-        for view, there in shown.items():
-            view.setMinimumHeight(lowest_px)
-            view.setVisible(there)
+        self._with_content = frozenset(name for name, there in with_content.items() if there)
         if self._offer is not None:
             self._offer.setVisible(maps.synthetic.map is not None and maps.denoised.map is None)
         self.overview.set_track(maps.synthetic if maps.synthetic.map is not None else maps.real)
@@ -87,3 +135,175 @@ class MapStack(QWidget):
             else "Drop a recording, video, mesh or radar capture here, or choose File → Open….\n\n"
             "Help → Open the sample recording shows what it looks like."
         )
+        self._arrange()
+
+    def toggle_enlarged(self, name: str) -> None:
+        """Show a map alone, or all of them again."""
+        arrangement = self.arrangement
+        arrangement.enlarge(None if arrangement.enlarged == name else name)
+        self.view(name).setFocus(Qt.FocusReason.OtherFocusReason)
+
+    def under(self, name: str, y_px: float) -> tuple[str, bool] | None:
+        """Map at a height of the stack, and if it is its lower half; None over the same map."""
+        for other in self.shown:
+            view = self.view(other)
+            if view.y() <= y_px < view.y() + view.height():
+                lower = y_px >= view.y() + view.height() / 2
+                return None if other == name else (other, lower)
+        return None
+
+    def _arrange(self) -> None:
+        arrangement, shown = self.arrangement, self.shown
+        alone = shown == (arrangement.enlarged,)
+        rows = [arrangement.row(name) for name in shown]
+        if alone:
+            rows = [row._replace(wanted_px=None, folded=False) for row in rows]
+        if shown == ("synthetic",) and self._session.maps.synthetic.map is None:
+            rows = [rows[0]._replace(folded=False)]  # the hint is to be read
+        heights = heights_px(rows, self.viewport().height())
+        self._content.resize(self.viewport().width(), max(sum(heights), 1))
+        top = 0
+        for name, row, height in zip(shown, rows, heights, strict=True):
+            view = self.view(name)
+            view.set_state(folded=row.folded, enlarged=alone)
+            view.setGeometry(0, top, self._content.width(), height)
+            top += height
+        for name, view in self._named.items():
+            view.setVisible(name in shown)
+        inner = self.verticalScrollBar()
+        self._bar.setRange(inner.minimum(), inner.maximum())
+        self._bar.setPageStep(inner.pageStep())
+        self._bar.setSingleStep(LEAST_PX)
+        self._bar.setGeometry(self.width() - MARGIN_PX, 0, MARGIN_PX, self.height())
+        self._bar.setVisible(inner.maximum() > 0)
+        self.arranged.emit()
+
+    def _fill_menu(self, name: str, menu: QMenu, place: QPointF) -> None:
+        """Offer what can be made of a map's room."""
+        arrangement, shown = self.arrangement, self.shown
+        alone = arrangement.enlarged == name
+        menu.addAction(
+            "Show a&ll maps" if alone else "En&large", lambda: self.toggle_enlarged(name)
+        )
+        if alone:
+            return
+        folded = arrangement.row(name).folded
+        menu.addAction("&Unfold" if folded else "&Fold", lambda: arrangement.fold(name, not folded))
+        row = shown.index(name)
+        for text, other, below in (("Move u&p", row - 1, False), ("Move &down", row + 1, True)):
+            action = menu.addAction(text)
+            action.setEnabled(0 <= other < len(shown))
+            action.triggered.connect(
+                lambda _, other=other, below=below: arrangement.move(name, shown[other], below)
+            )
+        shared = menu.addAction("Usual &height", lambda: arrangement.set_height(name, None))
+        shared.setEnabled(arrangement.row(name).wanted_px is not None)
+
+    # --- events ---------------------------------------------------------------------------
+
+    def event(self, event: QEvent) -> bool:
+        """Claim Escape while a map is enlarged."""
+        if event.type() == QEvent.Type.ShortcutOverride and self._ends(event):
+            event.accept()
+            return True
+        return super().event(event)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Show all maps again."""
+        if self._ends(event):
+            self.arrangement.enlarge(None)
+        else:
+            event.ignore()  # arrows belong to the playback
+
+    def _ends(self, event: QEvent) -> bool:
+        escape = isinstance(event, QKeyEvent) and event.key() == Qt.Key.Key_Escape
+        return escape and self.arrangement.enlarged is not None
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Share out the new room."""
+        super().resizeEvent(event)
+        self._arrange()
+
+
+class _Hands(QObject):
+    """Mouse on the title row and the lower border of one map."""
+
+    def __init__(self, stack: MapStack, name: str, view: HeatmapView) -> None:
+        super().__init__(view)
+        self._stack, self._name, self._view = stack, name, view
+        self._held = ""  # "height" or "place"
+        self._from_px = 0.0
+        self._moved = False
+        view.installEventFilter(self)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Fold, enlarge, move, or change the height."""
+        if not isinstance(event, QMouseEvent):
+            return False
+        place, kind = event.position(), event.type()
+        if kind == QEvent.Type.MouseMove:
+            return self._move(place, event)
+        if event.button() != Qt.MouseButton.LeftButton:
+            return False
+        if kind == QEvent.Type.MouseButtonPress:
+            return self._press(place)
+        if kind == QEvent.Type.MouseButtonRelease:
+            return self._release(place)
+        if kind == QEvent.Type.MouseButtonDblClick:
+            return self._double_click(place)
+        return False
+
+    def _part_at(self, place: QPointF) -> str:
+        view = self._view
+        if place.y() < HEADER_PX:
+            return "place" if place.x() < HANDLE_PX or not view.alignable else ""
+        at_border = place.y() >= view.height() - _BORDER_PX
+        return "height" if at_border and not view.folded and not view.enlarged else ""
+
+    def _press(self, place: QPointF) -> bool:
+        self._held, self._moved = self._part_at(place), False
+        self._from_px = place.y()
+        return bool(self._held)
+
+    def _move(self, place: QPointF, event: QMouseEvent) -> bool:
+        part = self._held or ("" if event.buttons() else self._part_at(place))
+        if part == "height":
+            self._view.setCursor(Qt.CursorShape.SizeVerCursor)
+        elif part == "place":
+            self._view.setCursor(Qt.CursorShape.PointingHandCursor)
+        if not self._held:
+            return bool(part)
+        self._moved = self._moved or abs(place.y() - self._from_px) >= _MOVED_PX
+        if self._moved and self._held == "height":
+            self._stack.arrangement.set_height(self._name, round(place.y()) + BELOW_PX // 2)
+        elif self._moved and not self._view.enlarged:
+            self._view.setCursor(Qt.CursorShape.ClosedHandCursor)
+            found = self._stack.under(self._name, self._view.y() + place.y())
+            if found is not None:
+                self._swap(*found)
+        return True
+
+    def _swap(self, other: str, lower: bool) -> None:
+        """Change places as soon as the pointer is beyond the middle of the other map."""
+        order = self._stack.shown
+        downwards = order.index(other) > order.index(self._name)
+        if downwards == lower:
+            self._stack.arrangement.move(self._name, other, below=downwards)
+
+    def _release(self, place: QPointF) -> bool:
+        held, self._held = self._held, ""
+        if held == "place" and not self._moved and place.x() < HANDLE_PX:
+            if self._view.enlarged:
+                self._stack.toggle_enlarged(self._name)
+            else:
+                self._stack.arrangement.fold(self._name, not self._view.folded)
+        return bool(held)
+
+    def _double_click(self, place: QPointF) -> bool:
+        if place.y() < HEADER_PX and place.x() >= HANDLE_PX:
+            self._stack.toggle_enlarged(self._name)
+            return True
+        if self._part_at(place) == "height":
+            self._stack.arrangement.set_height(self._name, None)
+            return True
+        return False

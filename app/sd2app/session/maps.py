@@ -28,7 +28,7 @@ class Reading:
     """One cell of a map under the pointer.
 
     ``deviation`` is how far from the value the truth may be, where that is known;
-    ``text`` stands in place of level and value.
+    ``text`` stands in place of level and value; ``range_m`` is that of the body, where known.
     """
 
     track: str
@@ -40,6 +40,7 @@ class Reading:
     note: str = ""
     deviation: float | None = None
     text: str = ""
+    range_m: float | None = None
 
     @property
     def level(self) -> str:

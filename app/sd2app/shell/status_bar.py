@@ -7,26 +7,24 @@ from PySide6.QtWidgets import QLabel, QToolButton, QWidget
 from sd2app.accuracy.model import AccuracyModel
 from sd2app.background.latest import delayed
 from sd2app.maps.model import SynthesisModel
-from sd2app.session.maps import Reading
 from sd2app.session.session import Session
 from sd2app.widgets.layouts import STRETCH, row_of
 from sd2app.widgets.panel import ElidedLabel
 from sd2app.widgets.progress_bar import ProgressBar
-from sd2app.widgets.time_axis import clock_text
 
 _QUIET_MS = 300
 
 
 class StatusLine(QWidget):
-    """Pointer read-out, plan in use, and the oldest job with a cancel button on the right."""
+    """Plan in use, and the oldest job with a cancel button on the right."""
 
     def __init__(
         self, session: Session, accuracy: AccuracyModel, synthesis: SynthesisModel, parent: QWidget
     ) -> None:
         super().__init__(parent)
-        self._pointer, self._jobs = session.pointer, session.jobs
+        self._jobs = session.jobs
         self._accuracy, self._synthesis = accuracy, synthesis
-        self._reading, self._plan = ElidedLabel(self, "muted"), ElidedLabel(self, "muted")
+        self._plan = ElidedLabel(self, "muted")
         self._title = QLabel(self)
         self._title.setObjectName("muted")
         self._bar = ProgressBar("", width_px=140)
@@ -34,21 +32,16 @@ class StatusLine(QWidget):
         self._cancel.setText("Cancel")
         self._cancel.clicked.connect(self._cancel_job)
         self._job = (self._title, self._bar, self._cancel)
-        parts = (self._reading, STRETCH, self._plan, *self._job)
+        parts = (STRETCH, self._plan, *self._job)
         self.setLayout(row_of(*parts, spacing_px=16, margins_px=(12, 0, 8, 4)))
         for widget in self._job:
             widget.hide()
         self.setFixedHeight(28)
         # Work that is over at once should not flicker.
         self._delay = delayed(self._show_job, _QUIET_MS, self)
-        session.pointer.changed.connect(self._read)
         for signal in (accuracy.changed, accuracy.plan_changed, synthesis.moving_changed):
             signal.connect(self._show_plan)
         session.jobs.changed.connect(self._follow)
-
-    def _read(self) -> None:
-        reading = self._pointer.reading
-        self._reading.setText(reading_text(reading) if reading is not None else "")
 
     def _show_plan(self) -> None:
         """While the sensor moves the budget rules, at rest the tolerance does."""
@@ -79,25 +72,3 @@ class StatusLine(QWidget):
     def _cancel_job(self) -> None:
         if self._jobs.jobs:
             self._jobs.cancel(self._jobs.jobs[0])
-
-
-def reading_text(reading: Reading) -> str:
-    """Time, frame, velocity with sign, and level, in words."""
-    if reading.velocity_mps > 0:
-        direction = "approaching"
-    else:
-        direction = "receding" if reading.velocity_mps < 0 else "still"
-    velocity = f"{reading.velocity_mps:+.3f}".replace("-", "−")
-    value = f"{reading.value:.3g}"
-    if reading.deviation is not None:
-        value += f" ± {reading.deviation:.2g}"
-    parts = [
-        reading.track,
-        clock_text(reading.time_s),
-        f"frame {reading.frame}",
-        f"{velocity} m/s ({direction})",
-        reading.text or f"{reading.level} ({value})",
-    ]
-    if reading.note:
-        parts.append(reading.note)
-    return "   ".join(parts)

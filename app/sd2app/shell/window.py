@@ -86,7 +86,10 @@ class MainWindow(QMainWindow):
             [self._panels["tracks"], self._panels["spectrum"]],
             (992, 272),
         )
-        self._rows = splitter(Qt.Orientation.Vertical, [self._top, self._bottom], (360, 336))
+        self._rows = splitter(Qt.Orientation.Vertical, [self._top, self._bottom], (264, 456))
+        # Of the room of a larger window, maps take most.
+        self._rows.setStretchFactor(0, 1)
+        self._rows.setStretchFactor(1, 2)
         self._column = column_of((self._rows, 1), spacing_px=4, margins_px=(8, 0, 8, 0))
         centre = QWidget(self)
         centre.setLayout(self._column)

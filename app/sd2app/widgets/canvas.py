@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QRectF, QSize, Qt, SignalInstance
-from PySide6.QtGui import QImage, QPainter, QPaintEvent, QPixmap
-from PySide6.QtWidgets import QWidget
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt, SignalInstance
+from PySide6.QtGui import QContextMenuEvent, QImage, QPainter, QPaintEvent, QPixmap
+from PySide6.QtWidgets import QMenu, QWidget
 
 from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, ShownTime, TimeScale
 
@@ -39,6 +39,10 @@ def image_of(
     return QImage(pixels.data, width, height, 4 * width, form).copy()
 
 
+MenuPart = Callable[[QMenu, QPointF], None]
+"""Adds to the context menu of a widget what concerns a place in it."""
+
+
 class Canvas(QWidget):
     """Widget that paints itself; a subclass may keep a picture of what rarely changes."""
 
@@ -48,6 +52,22 @@ class Canvas(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._kept: QPixmap | None = None
+        self.menu_parts: Sequence[MenuPart] = ()
+
+    def contextMenuEvent(self, event: QContextMenuEvent) -> None:
+        """Offer what features add for this place, and the picture."""
+        # Imported here because most plots are never asked for a picture.
+        from sd2app.widgets.picture import copy_picture, save_picture
+
+        menu = QMenu(self)
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        for part in self.menu_parts:
+            part(menu, QPointF(event.pos()))
+            menu.addSeparator()
+        menu.addAction("&Copy picture", lambda: copy_picture(self))
+        name = self.accessibleName().lower().replace(" ", "-") or "plot"
+        menu.addAction("&Save picture…", lambda: save_picture(self, f"{name}.png"))
+        menu.popup(event.globalPos())
 
     def sizeHint(self) -> QSize:
         """Width and height where there is a choice."""

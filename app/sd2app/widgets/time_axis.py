@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPen, QWheelEvent
+
+from sd2app.palette import Palette
 
 GUTTER_PX = 56
 """Space left of every track for the velocity axis, so that all tracks line up."""
@@ -95,6 +98,30 @@ def paint_title(painter: QPainter, box: QRectF, text: str, colour: str) -> int:
     font.setBold(False)
     painter.setFont(font)
     return metrics.horizontalAdvance(shown)
+
+
+def paint_readout(
+    painter: QPainter, plot: QRectF, place: QPointF, lines: Sequence[str], colours: Palette
+) -> None:
+    """Paint lines of text in a box beside a place, on the side of it where there is room."""
+    metrics = painter.fontMetrics()
+    width = max(metrics.horizontalAdvance(line) for line in lines) + 12
+    height = metrics.height() * len(lines) + 6
+    left = place.x() + 12 if place.x() + 12 + width < plot.right() else place.x() - 12 - width
+    top = place.y() - height - 8 if place.y() - height - 8 > plot.top() else place.y() + 8
+    # Where the plot is lower than the box, the box lies over what is around it.
+    top = max(min(top, painter.device().height() - height - 1.0), 1.0)
+    box = QRectF(left, top, width, height)
+    back = QColor(colours.panel)
+    back.setAlpha(225)
+    painter.save()
+    painter.setPen(QPen(QColor(colours.border), 1))
+    painter.setBrush(back)
+    painter.drawRoundedRect(box, 3, 3)
+    painter.setPen(QColor(colours.text))
+    flags = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop
+    painter.drawText(box.adjusted(6, 3, 0, 0), flags, "\n".join(lines))
+    painter.restore()
 
 
 _ZOOM_PER_NOTCH = 0.8
