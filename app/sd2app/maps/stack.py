@@ -124,6 +124,7 @@ class MapStack(QScrollArea):
         if state == self._shown:
             return  # maps change many times a second
         self._shown = state
+        before = self._with_content
         self._with_content = frozenset(name for name, there in with_content.items() if there)
         if self._offer is not None:
             self._offer.setVisible(maps.synthetic.map is not None and maps.denoised.map is None)
@@ -136,6 +137,8 @@ class MapStack(QScrollArea):
             "Help → Open the sample recording shows what it looks like."
         )
         self._arrange()
+        if before and (added := self._with_content - before):
+            self.ensureWidgetVisible(self.view(min(added, key=self.arrangement.order.index)), 0, 0)
 
     def toggle_enlarged(self, name: str) -> None:
         """Show a map alone, or all of them again."""

@@ -15,7 +15,8 @@ from sd2app.scene.colours import Colouring, SceneColours
 from sd2app.scene.navigation import Navigator
 from sd2app.scene.scene import Scene
 from sd2app.widgets.canvas import AT_RIGHT, Canvas
-from sd2app.widgets.time_axis import tick_step, ticks
+from sd2app.widgets.plot import Themed
+from sd2app.widgets.time_axis import paint_readout, tick_step, ticks
 from sd2core.figures.colours import DIVERGING, SEQUENTIAL, Rgb
 
 HINT = "Drag moves the sensor  ·  Shift: up and down  ·  Ctrl: nearer and farther"
@@ -58,8 +59,10 @@ class _Bar:
 class Overlay(Canvas):
     """Colour bar, metre labels, axes and the sensor's coordinates."""
 
-    def __init__(self, scene: Scene, navigator: Navigator, parent: QWidget) -> None:
+    def __init__(self, scene: Scene, navigator: Navigator, theme: Themed, parent: QWidget) -> None:
         super().__init__(parent)
+        self._theme = theme
+        self._reading, self._read_at = "", QPointF()
         self._scene = scene
         self._navigator = navigator
         self.message = ""
@@ -102,6 +105,15 @@ class Overlay(Canvas):
             self._state = state
             self._kept = None
         self.paint_kept(painter, self._paint_all)
+        if self._reading:
+            area, colours = QRectF(self.rect()), self._theme.palette
+            paint_readout(painter, area, self._read_at, (self._reading,), colours)
+
+    def show_reading(self, place_px: tuple[float, float], text: str) -> None:
+        """Show what is read of the mesh beside the pointer; an empty text ends it."""
+        if text or self._reading:
+            self._reading, self._read_at = text, QPointF(*place_px)
+            self.update()
 
     def _paint_all(self, painter: QPainter) -> None:
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, get_args
 
 import numpy as np
-from PySide6.QtCore import QEvent, QObject, QSize, Qt
+from PySide6.QtCore import QEvent, QObject, QPointF, QSize, Qt
 from PySide6.QtGui import QCloseEvent, QMouseEvent, QResizeEvent, QWheelEvent
 from PySide6.QtWidgets import QLabel, QWidget
 
@@ -18,6 +19,7 @@ from sd2app.scene.colours import SceneColours
 from sd2app.scene.navigation import Navigator
 from sd2app.scene.overlay import Overlay
 from sd2app.scene.scene import Scene
+from sd2app.widgets.picture import picture_menu
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
@@ -32,6 +34,9 @@ _MOUSE = (
     QEvent.Type.MouseButtonRelease,
     QEvent.Type.MouseButtonDblClick,
 )
+_REACH_PX = 8.0
+"""Distance from the pointer within which vertices are looked for."""
+_CLICK_PX = 4.0
 _NOTCH = 120.0
 """Angle of one notch of the wheel in Qt's units."""
 
@@ -59,7 +64,9 @@ class SceneView(QWidget):
             return
         self.scene = Scene(self._backend.renderer)
         self.navigator = Navigator(self.scene, session.edits, placements.use, self.request_render)
-        self.overlay = Overlay(self.scene, self.navigator, self)
+        self.overlay = Overlay(self.scene, self.navigator, session.display, self)
+        self._pressed_px = (0.0, 0.0)
+        self.setAccessibleName("Scene")
         self._frame: int | None = None
         self._stale_scattering = True
         self._planned: object = None
@@ -125,6 +132,7 @@ class SceneView(QWidget):
             self.navigator.wheel(*_place(event), event.angleDelta().y() / _NOTCH)
         elif kind == QEvent.Type.Leave:
             self.navigator.leave()
+            self.overlay.show_reading((0.0, 0.0), "")
         elif kind in (QEvent.Type.KeyPress, QEvent.Type.KeyRelease):
             # QtInteractor would take them; they belong to the window.
             event.ignore()
@@ -140,13 +148,40 @@ class SceneView(QWidget):
         kind, place = event.type(), _place(event)
         if kind == QEvent.Type.MouseMove:
             self.navigator.move(*place, event.modifiers())
+            at_body = not event.buttons() and not self._at_something(place)
+            self.overlay.show_reading(place, self.reading_at(*place) if at_body else "")
         elif kind == QEvent.Type.MouseButtonRelease:
             self.navigator.release(*place, event.button())
+            if event.button() == Qt.MouseButton.RightButton and self._clicked_at(place):
+                menu = picture_menu(self, (), QPointF(*place))
+                menu.popup(event.globalPosition().toPoint())
         elif kind == QEvent.Type.MouseButtonDblClick and not self._at_something(place):
             self.set_view("overview")
         else:
             # Also the second press of a double click: a hurried hand takes the sensor.
+            self._pressed_px = place
             self.navigator.press(*place, event.button(), event.modifiers())
+
+    def _clicked_at(self, place: tuple[float, float]) -> bool:
+        """True if the button was released where it was pressed, without a drag."""
+        return math.dist(place, self._pressed_px) < _CLICK_PX
+
+    def reading_at(self, x_px: float, y_px: float) -> str:
+        """Range, radial velocity and visibility of the vertex in front at a pixel, in words."""
+        mesh, scattering = self._session.document.mesh, self._synthesis.frame
+        if mesh is None or scattering is None or self._frame is None or self.overlay.message:
+            return ""
+        vertices_m = mesh.frame(self._frame)
+        if len(vertices_m) != len(scattering.range_m):
+            return ""
+        x, y, depth = self.scene.pose.project(vertices_m).T
+        near = np.flatnonzero((np.hypot(x - x_px, y - y_px) <= _REACH_PX) & (depth > 0.01))
+        if not near.size:
+            return ""
+        vertex = near[depth[near].argmin()]
+        velocity = f"{scattering.velocity_mps[vertex]:+.2f}".replace("-", "−")
+        seen = "seen by the sensor" if scattering.visible[vertex] else "hidden from the sensor"
+        return f"{scattering.range_m[vertex]:.2f} m  ·  {velocity} m/s  ·  {seen}"
 
     def _at_something(self, place: tuple[float, float]) -> bool:
         at_marker = self.navigator.marker_at(*place) is not None

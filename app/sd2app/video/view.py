@@ -41,6 +41,7 @@ class VideoView(Canvas):
 
     def __init__(self, session: Session, overlay: OverlayModel, landmarks: Landmarks) -> None:
         super().__init__()
+        self.setAccessibleName("Video")
         self._session, self._overlay, self._found = session, overlay, landmarks
         self.setMinimumSize(200, 150)
         self.follow(

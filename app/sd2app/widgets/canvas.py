@@ -57,17 +57,9 @@ class Canvas(QWidget):
     def contextMenuEvent(self, event: QContextMenuEvent) -> None:
         """Offer what features add for this place, and the picture."""
         # Imported here because most plots are never asked for a picture.
-        from sd2app.widgets.picture import copy_picture, save_picture
+        from sd2app.widgets.picture import picture_menu
 
-        menu = QMenu(self)
-        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        for part in self.menu_parts:
-            part(menu, QPointF(event.pos()))
-            menu.addSeparator()
-        menu.addAction("&Copy picture", lambda: copy_picture(self))
-        name = self.accessibleName().lower().replace(" ", "-") or "plot"
-        menu.addAction("&Save picture…", lambda: save_picture(self, f"{name}.png"))
-        menu.popup(event.globalPos())
+        picture_menu(self, self.menu_parts, QPointF(event.pos())).popup(event.globalPos())
 
     def sizeHint(self) -> QSize:
         """Width and height where there is a choice."""

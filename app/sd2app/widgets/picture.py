@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
-from PySide6.QtCore import QBuffer, QIODevice, QPoint, QRect
+from PySide6.QtCore import QBuffer, QIODevice, QPoint, QPointF, QRect, Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtSvg import QSvgGenerator
-from PySide6.QtWidgets import QMessageBox, QWidget
+from PySide6.QtWidgets import QMenu, QMessageBox, QWidget
 
+from sd2app.widgets.canvas import MenuPart
 from sd2app.widgets.dialogs import ask_new
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
 
-KINDS = "Picture (*.png);;Drawing (*.svg)"
+_KINDS = "Picture (*.png);;Drawing (*.svg)"
 
 
 def copy_picture(widget: QWidget) -> None:
@@ -44,10 +46,23 @@ def write_picture(widget: QWidget, path: Path) -> None:
 
 def save_picture(widget: QWidget, name: str) -> None:
     """Ask where a picture of a widget is to be written, and write it."""
-    path = ask_new(widget.window(), "Save picture", name, KINDS)
+    path = ask_new(widget.window(), "Save picture", name, _KINDS)
     if path is None:
         return
     try:
         write_picture(widget, path)
     except (Sd2Error, OSError) as error:
         QMessageBox.warning(widget.window(), "Save picture", str(error))
+
+
+def picture_menu(widget: QWidget, parts: Sequence[MenuPart], place: QPointF) -> QMenu:
+    """Context menu of a widget: what its parts add for a place, then its picture."""
+    menu = QMenu(widget)
+    menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+    for part in parts:
+        part(menu, place)
+        menu.addSeparator()
+    menu.addAction("&Copy picture", lambda: copy_picture(widget))
+    name = widget.accessibleName().lower().replace(" ", "-") or "plot"
+    menu.addAction("&Save picture…", lambda: save_picture(widget, f"{name}.png"))
+    return menu

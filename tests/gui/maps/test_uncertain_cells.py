@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
-from PySide6.QtWidgets import QLabel, QToolButton
+from PySide6.QtWidgets import QToolButton
 from window_models import models_of
 
 from sd2app.maps.heatmap import HeatmapView
 from sd2app.maps.level_bar import LevelBar
-from sd2app.shell.status_bar import StatusLine
+from sd2app.maps.readout import reading_lines
 from sd2core.io.mesh import load_mesh, save_mesh
 from sd2core.maps import DopplerMap
 from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
@@ -68,8 +68,7 @@ def test_a_key_takes_the_colour_from_what_is_not_known(fitted, qtbot, tmp_path):
     missed = known.expected[25, frame] - reading.value
     assert reading.deviation == pytest.approx(np.hypot(known.sd[25, frame], missed), rel=1e-5)
     assert reading.deviation > 0.5 * reading.value
-    texts = [label.text() for label in fitted.findChild(StatusLine).findChildren(QLabel)]
-    assert any(f"{reading.value:.3g} ± {reading.deviation:.2g}" in text for text in texts)
+    assert f"{reading.value:.3g} ± {reading.deviation:.2g}" in reading_lines(reading)[1]
     c.synthesis.export(tmp_path / "map.npz")
     np.testing.assert_array_equal(
         DopplerMap.load(tmp_path / "map.npz").uncertainty.sd, c.synthetic.uncertainty.sd

@@ -102,10 +102,11 @@ class Stage:
         self.document.opened.emit()
 
     def scatter(self, velocity_mps: Any, visible: Any) -> None:
-        """Hand the view other velocities and visibility."""
+        """Hand the view other velocities and visibility; vertex N is N metres away."""
         self.synthesis.frame = SimpleNamespace(
             velocity_mps=np.asarray(velocity_mps, np.float32),
             visible=np.asarray(visible, bool),
+            range_m=np.arange(len(visible), dtype=np.float32),
         )
         self.synthesis.frame_changed.emit()
 

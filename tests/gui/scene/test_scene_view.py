@@ -13,7 +13,7 @@ import pytest
 from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
 from PySide6.QtGui import QColor, QGuiApplication, QImage, QWheelEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QLabel
+from PySide6.QtWidgets import QLabel, QMenu
 from scene_stage import LEFT, RIGHT, Stage, two_plates
 
 from sd2app.scene import backend as choose
@@ -420,7 +420,7 @@ def test_a_closed_view_stays_quiet(stage: Stage) -> None:
 
 
 _LEFT_OPEN = """
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QMenu, QApplication
 from sd2app.scene.offscreen_backend import ImageBackend
 from sd2app.scene.scene import Scene
 application = QApplication([])
@@ -445,7 +445,7 @@ def test_a_view_that_nobody_closed_does_not_crash_at_exit() -> None:
 
 
 _WITHOUT_DRIVER = """
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QMenu, QApplication
 from sd2app.scene.backend import NoOpenGL
 from sd2app.scene.offscreen_backend import ImageBackend
 application = QApplication([])
@@ -562,6 +562,37 @@ def test_a_click_on_a_place_picks_it_and_its_words_are_shown(stage: Stage) -> No
     QTest.mouseClick(widget, Qt.MouseButton.LeftButton, pos=place)
     assert stage.placements.picked == [1]
     assert stage.log == []
+
+
+def test_pointing_at_the_mesh_reads_the_vertex_in_front(stage: Stage) -> None:
+    vertices_m = stage.document.mesh.frame(0)
+    stage.scatter(np.linspace(-1.0, 1.0, len(vertices_m)), np.arange(len(vertices_m)) % 2 == 0)
+    stage.view.set_view("camera")
+    stage.view.grab()
+    for vertex, point_m in enumerate(vertices_m):
+        place = stage.pixel_of(tuple(point_m))
+        read = stage.view.reading_at(place.x(), place.y())
+        assert read.startswith(f"{vertex:.2f} m")
+        assert read.endswith("hidden from the sensor" if vertex % 2 else "seen by the sensor")
+    before = as_array(stage.view.grab().toImage())
+    QTest.mouseMove(stage.view.childAt(place), place)
+    assert (as_array(stage.view.grab().toImage()) != before).any()
+    assert stage.view.reading_at(2, 2) == ""
+
+
+def test_a_right_click_offers_the_picture_and_a_drag_does_not(stage: Stage) -> None:
+    menus = lambda: stage.view.findChildren(QMenu)  # noqa: E731
+    start, button = QPoint(300, 300), Qt.MouseButton.RightButton
+    widget = stage.view.childAt(start)
+    QTest.mousePress(widget, button, pos=start)
+    QTest.mouseMove(widget, start + QPoint(40, 0))
+    QTest.mouseRelease(widget, button, pos=start + QPoint(40, 0))
+    assert not menus()
+    QTest.mouseClick(widget, button, pos=start)
+    assert [one.text() for one in menus()[0].actions()] == ["&Copy picture", "&Save picture…"]
+    menus()[0].actions()[0].trigger()
+    menus()[0].close()
+    assert QGuiApplication.clipboard().image().size() == stage.view.grab().toImage().size()
 
 
 def test_a_thousand_places_are_one_actor(stage: Stage) -> None:

@@ -7,13 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from PySide6.QtCore import QPoint
-from PySide6.QtWidgets import QLabel
 from window_models import models_of
 
 from sd2app.maps.heatmap import HeatmapView
 from sd2app.maps.overview import Overview
+from sd2app.maps.readout import reading_lines
 from sd2app.maps.spectrum import SpectrumView
-from sd2app.shell.status_bar import StatusLine
 from sd2app.video.view import VideoView
 from sd2core.io.mesh import load_mesh, save_mesh
 
@@ -55,8 +54,7 @@ def test_the_map_is_empty_there_and_says_so_under_the_pointer(window, qtbot):
     middle = QPoint(round(view.scale.x_of(32 / 30)), round(view.y_of(1.0)))
     qtbot.mouseMove(view, middle)
     assert c.pointer.reading.note == "no person"
-    line = window.findChild(StatusLine)
-    assert any("no person" in label.text() for label in line.findChildren(QLabel))
+    assert "no person" in reading_lines(c.pointer.reading)[1]
     qtbot.mouseMove(view, QPoint(round(view.scale.x_of(10 / 30)), middle.y()))
     assert c.pointer.reading.note == ""
     assert real.isVisible()

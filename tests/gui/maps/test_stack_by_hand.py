@@ -1,0 +1,178 @@
+"""The stack of maps, arranged with mouse and keys."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtGui import QContextMenuEvent, QGuiApplication
+from PySide6.QtWidgets import QApplication, QMenu
+from window_models import models_of
+
+from sd2app.maps.arrangement import HEADER_PX, LEAST_PX
+from sd2app.maps.radar_place import RadarPlaceBadge
+from sd2app.maps.spectrum import SpectrumView
+from sd2app.widgets.picture import write_picture
+from sd2core.errors import Sd2Error
+from sd2core.sensor import VirtualSensor
+
+HANDLE, TITLE = QPoint(10, HEADER_PX // 2), QPoint(120, HEADER_PX // 2)
+LEFT = Qt.MouseButton.LeftButton
+
+
+@pytest.fixture
+def stack(window, qtbot):
+    yield window.maps
+    for name in ("synthetic", "real"):
+        window.maps.arrangement.fold(name, False)
+        window.maps.arrangement.set_height(name, None)
+    window.maps.arrangement.move("real", "before", below=True)
+    window.maps.arrangement.enlarge(None)
+
+
+def drag(qtbot, view, start, end):
+    qtbot.mousePress(view, LEFT, pos=start)
+    for step in range(1, 6):
+        qtbot.mouseMove(view, start + (end - start) * step / 5)
+        QApplication.processEvents()
+    qtbot.mouseRelease(view, LEFT, pos=end)
+
+
+def menu_at(view, place):
+    QApplication.sendEvent(
+        view, QContextMenuEvent(QContextMenuEvent.Reason.Mouse, place, view.mapToGlobal(place))
+    )
+    return view.findChildren(QMenu, options=Qt.FindChildOption.FindDirectChildrenOnly)[-1]
+
+
+def chosen(menu, text):
+    action = next(one for one in menu.actions() if one.text().replace("&", "") == text)
+    action.trigger()
+    menu.close()
+
+
+def test_maps_are_of_use_at_any_size(window, stack, qtbot):
+    for size in ((1280, 720), (1600, 1000), (2560, 1440), (960, 640)):
+        window.resize(*size)
+        QApplication.processEvents()
+        for view in (stack.synthetic, stack.real):
+            assert view.plot_rect().height() >= 72
+            # All time axes of the window lie below each other.
+            assert view.width() == stack.overview.width()
+    window.resize(1280, 800)
+
+
+def test_most_of_the_extra_height_goes_to_the_maps(window, stack):
+    window.resize(1280, 800)
+    QApplication.processEvents()
+    before = window.height(), stack.height()
+    window.resize(1280, 1400)
+    QApplication.processEvents()
+    assert stack.height() - before[1] > 0.6 * (window.height() - before[0])
+    window.resize(1280, 800)
+
+
+def test_the_handle_folds_and_opens(stack, qtbot):
+    view = stack.real
+    qtbot.mouseClick(view, LEFT, pos=HANDLE)
+    assert view.height() == HEADER_PX
+    assert stack.arrangement.row("real").folded
+    qtbot.mouseClick(view, LEFT, pos=HANDLE)
+    assert view.height() >= LEAST_PX
+
+
+def test_a_double_click_on_the_title_enlarges_and_escape_goes_back(window, stack, qtbot):
+    for view, other in ((stack.synthetic, stack.real), (stack.real, stack.synthetic)):
+        qtbot.mouseDClick(view, LEFT, pos=TITLE)
+        assert view.height() == stack.viewport().height()
+        assert other.isHidden()
+        qtbot.keyClick(view, Qt.Key.Key_Escape)
+        assert stack.arrangement.enlarged is None
+        assert other.isVisible()
+
+
+def test_the_border_is_dragged(stack, qtbot):
+    view = stack.synthetic
+    before = view.height()
+    border = QPoint(200, before - 2)
+    drag(qtbot, view, border, border + QPoint(0, 90))
+    assert abs(view.height() - before - 90) <= 4
+    assert stack.arrangement.row("synthetic").wanted_px == view.height()
+    qtbot.mouseDClick(view, LEFT, pos=QPoint(200, view.height() - 2))
+    assert stack.arrangement.row("synthetic").wanted_px is None
+
+
+def test_a_title_is_dragged_to_another_place(window, stack, qtbot):
+    window.resize(1280, 1000)
+    QApplication.processEvents()
+    view, below = stack.synthetic, stack.real
+    assert view.y() < below.y()
+    deep = QPoint(TITLE.x(), below.y() + below.height() - 10)
+    drag(qtbot, view, TITLE, deep)
+    assert below.y() < view.y()
+    order = stack.arrangement.order
+    assert order.index("real") < order.index("synthetic")
+    window.resize(1280, 800)
+
+
+def test_this_frame_stands_beside_the_leading_map(window, stack, qtbot):
+    spectrum = window.findChild(SpectrumView)
+    for name in ("synthetic", "real"):
+        stack.toggle_enlarged(name)
+        QApplication.processEvents()
+        view = stack.view(name)
+        for velocity_mps in (-1.0, 0.0, 1.5):
+            y = view.mapToGlobal(QPointF(0, view.y_of(velocity_mps))).y()
+            plot = spectrum.plot_rect()
+            v_max = view.track.map.axis.v_max_mps
+            share = (v_max - velocity_mps) / (2 * v_max)
+            beside = spectrum.mapToGlobal(QPointF(0, plot.top() + share * plot.height())).y()
+            assert abs(y - beside) <= 1
+        stack.toggle_enlarged(name)
+
+
+def test_the_context_menu_reads_sets_and_plays(window, stack, qtbot):
+    c, view = models_of(window), stack.synthetic
+    values = c.synthetic.map.values
+    bin_, frame = divmod(int(values.argmax()), values.shape[1])
+    time_s = c.synthetic.map.timebase.time_of(frame) + 1e-3
+    velocity_mps = c.synthetic.map.axis.centres_mps[bin_]
+    place = QPoint(round(view.scale.x_of(time_s)), round(view.y_of(velocity_mps)))
+    chosen(menu_at(view, place), "Copy value")
+    words = QGuiApplication.clipboard().text()
+    assert f"frame {frame}" in words
+    assert "body at" in words
+    before = c.synthetic.reference
+    chosen(menu_at(view, place), "0 dB here")
+    assert c.synthetic.reference == pytest.approx(values.max())
+    c.synthetic.set_reference(before)
+    chosen(menu_at(view, place), "Play what is in view in a loop")
+    assert c.playback.playing
+    assert c.playback.stretch_s == (window.session.span.start_s, window.session.span.end_s)
+    c.playback.pause()
+    c.playback.set_stretch(None)
+    chosen(menu_at(view, place), "Copy picture")
+    assert QGuiApplication.clipboard().image().width() >= view.width()
+
+
+def test_pictures_are_written(stack, tmp_path):
+    for name in ("map.png", "map.svg"):
+        write_picture(stack.synthetic, tmp_path / name)
+        assert (tmp_path / name).stat().st_size > 1000
+    assert b"<svg" in (tmp_path / "map.svg").read_bytes()[:500]
+    with pytest.raises(Sd2Error, match=r"map\.bmp"):
+        write_picture(stack.synthetic, tmp_path / "map.bmp")
+    assert not (tmp_path / "map.bmp").exists()
+
+
+def test_a_badge_says_that_the_sensor_is_elsewhere(window, stack, qtbot):
+    badge = stack.real.findChild(RadarPlaceBadge)
+    assert badge.isHidden()
+    window.session.edits.place_sensor(VirtualSensor(position_m=(1.0, 0.0, 0.5)))
+    qtbot.waitUntil(badge.isVisible)
+    assert "1.1 m beside the radar" in badge.text()
+    qtbot.mouseClick(badge, LEFT)
+    assert window.session.sensor.sensor.position_m == (0.0, 0.0, 0.0)
+    assert badge.isHidden()
+    window.action("undo").trigger()
+    assert window.session.sensor.sensor.position_m == (1.0, 0.0, 0.5)
+    window.action("undo").trigger()
