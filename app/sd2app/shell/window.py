@@ -7,7 +7,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtCore import QEvent, Qt, QTimer, Signal
 from PySide6.QtGui import (
     QAction,
     QCloseEvent,
@@ -17,13 +17,15 @@ from PySide6.QtGui import (
     QDropEvent,
     QPaintEvent,
 )
-from PySide6.QtWidgets import QApplication, QMainWindow, QWidget
+from PySide6.QtWidgets import QAbstractButton, QApplication, QMainWindow, QWidget
 
 from sd2app.background.latest import LatestRunner
 from sd2app.settings import Settings
 from sd2app.shell.drop import DropOverlay
 from sd2app.shell.parts import Parts
 from sd2app.shell.side_panel import PageWidths, SidePanel
+from sd2app.shell.tab_order import controls_of
+from sd2app.widgets.inputs import claims
 from sd2app.widgets.layouts import column_of
 from sd2app.widgets.message_bar import MessageBar
 from sd2app.widgets.panel import fill, panel, splitter
@@ -62,6 +64,7 @@ class MainWindow(QMainWindow):
         self._parts = parts or Parts()
         self._ready = False
         self._painted = False
+        self._tabbed: QWidget | None = None  # control that Tab has reached last
         self.setWindowTitle("SD² Studio")
         self.setAcceptDrops(True)
         self.setMinimumSize(960, 640)
@@ -127,11 +130,12 @@ class MainWindow(QMainWindow):
         bars = [*self.features.labels.bars(), *self.features.fit.bars()]
         for place, bar in enumerate((self.messages, *bars)):
             self._column.insertWidget(place, bar)
-        self._column.addWidget(
-            TransportBar(s.playback, self.features.labels.loop, self.action, self)
-        )
         accuracy, synthesis = self.features.accuracy.model, self.features.maps.synthesis
-        self._column.addWidget(StatusLine(s, accuracy, synthesis, self))
+        transport = TransportBar(s.playback, self.features.labels.loop, self.action, self)
+        below = (transport, StatusLine(s, accuracy, synthesis, self))
+        for bar in below:
+            self._column.addWidget(bar)
+        self._regions = (self.messages, *bars, *self._panels.values(), *below)
         self._connect()
         self._restyle()
         self._refresh()
@@ -247,6 +251,25 @@ class MainWindow(QMainWindow):
         self.features.files.open(paths)
 
     # --- Qt events ------------------------------------------------------------------------
+
+    def focusNextPrevChild(self, forward: bool) -> bool:
+        """Go through all controls with Tab, from top left to bottom right."""
+        controls = controls_of(self._regions) if self._ready else []
+        if not controls:
+            return False
+        focus, step = self.focusWidget(), 1 if forward else -1
+        at = controls.index(focus) + step if focus in controls else min(step, 0)
+        self._tabbed = controls[at % len(controls)]
+        reason = Qt.FocusReason
+        self._tabbed.setFocus(reason.TabFocusReason if forward else reason.BacktabFocusReason)
+        return True
+
+    def event(self, event: QEvent) -> bool:
+        """Leave Space to a button that was reached with Tab."""
+        focus = self.focusWidget()
+        if isinstance(focus, QAbstractButton) and focus is self._tabbed:
+            return claims(event, (Qt.Key.Key_Space,)) or super().event(event)
+        return super().event(event)
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Say when the skeleton is on screen."""
