@@ -39,6 +39,14 @@ class Action:
     why_not: Callable[[], str] | None = None
 
 
+@dataclass(frozen=True)
+class Drop:
+    """What can be done with files that are dropped on the window, in words and as a function."""
+
+    text: str
+    run: Callable[[], object]
+
+
 class Keys(Protocol):
     """Keys of actions and labels, of which no two are alike."""
 
@@ -128,9 +136,9 @@ class Feature:
     def take_over(self) -> None:
         """Follow a recording that has just been opened."""
 
-    def take_dropped(self, path: Path) -> bool:
-        """Use a file that was dropped on the window; False if it is none of this feature's."""
-        return False
+    def drop_of(self, path: Path) -> Drop | None:
+        """Use of a file that is dropped on the window; None if it is none of this feature's."""
+        return None
 
     def look_for_unfinished(self) -> None:
         """Find runs in the background that an earlier window began."""

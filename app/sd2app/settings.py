@@ -47,14 +47,14 @@ class Settings:
         self._store: Store = store if store is not None else QSettings("SD2 Studio", "SD2 Studio")
 
     @property
-    def recent(self) -> list[Path]:
-        """Recently opened paths, the newest first."""
-        return self.paths("recent")
+    def recent(self) -> list[tuple[Path, ...]]:
+        """What was opened together lately, the newest first."""
+        return [tuple(map(Path, str(paths).split("\n"))) for paths in self.paths("recent")]
 
-    def add_recent(self, path: Path) -> None:
-        """Remember a path as the newest."""
-        paths = [path, *(known for known in self.recent if known != path)]
-        self.set_paths("recent", paths[:_RECENT])
+    def add_recent(self, *paths: Path) -> None:
+        """Remember paths that are opened together as the newest."""
+        groups = [paths, *(known for known in self.recent if known != paths)]
+        self.set_paths("recent", [Path("\n".join(map(str, one))) for one in groups[:_RECENT]])
 
     def flag(self, name: str, default: bool) -> bool:
         """Boolean, which may have been stored as text."""

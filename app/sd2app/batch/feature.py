@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from PySide6.QtCore import QObject
 
 from sd2app.batch.dialog import BatchWindow
 from sd2app.batch.model import BatchModel
 from sd2app.batch.questions import BatchQuestions
+from sd2app.denoise.model import DenoiseModel
 from sd2app.feature import Action, Feature, Shell
 from sd2app.sensor.placements import PlacementsModel
 from sd2app.session.session import Session
@@ -23,7 +24,7 @@ class BatchFeature(Feature):
         session: Session,
         shell: Shell,
         placements: PlacementsModel,
-        installed: Callable[[], Sequence[str]],
+        denoiser: DenoiseModel,
         command: Sequence[str] | None,
         parent: QObject,
     ) -> None:
@@ -32,23 +33,24 @@ class BatchFeature(Feature):
         self.model.failed.connect(shell.warn)
         self.model.noted.connect(shell.note)
         self._shell = shell
-        self._questions = BatchQuestions(self.model, session, shell, placements, installed)
+        self._questions = BatchQuestions(self.model, session, shell, placements, denoiser)
         self._questions.said.connect(self._say)
         self._window: BatchWindow | None = None
 
     def show(self) -> None:
-        """Bring up the batch in view, or set up another."""
+        """Bring up the batch in view, or set up another as the open recording is."""
         if self._window is None:
             self._window = BatchWindow(self.model, self._questions, self._shell.dialog_parent)
-        self._questions.add_what_is_open()
+        if not self._window.isVisible():
+            self._questions.begin_as_open()
         self._window.show()
         self._window.raise_()
         self._window.activateWindow()
 
     def show_with_placements(self) -> None:
         """Set up a batch with the places that are planned in the open recording."""
-        self._questions.place_as_planned()
         self.show()
+        self._questions.place_as_planned()
 
     def _say(self, text: str) -> None:
         """Show a sentence in the batch window if it is open, else in the main window."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import TypeVar
@@ -13,12 +13,14 @@ from PySide6.QtWidgets import QApplication, QFileDialog, QWidget
 
 from sd2app.batch.model import BatchModel
 from sd2app.batch.results import Result
+from sd2app.denoise.model import DenoiseModel
 from sd2app.feature import Shell
 from sd2app.sensor.placements import PlacementsModel
 from sd2app.session.session import Session
 from sd2app.widgets.dialogs import ask_file, ask_folder, ask_new
 from sd2app.widgets.text import counted
 from sd2core.batch.plan_file import write_plan
+from sd2core.denoise.card import ModelCard
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import plain_path
 from sd2core.io.kinds import VIDEO_SUFFIXES
@@ -37,7 +39,7 @@ _PLAN_BEFORE = "what was planned before"
 
 
 class BatchQuestions(QObject):
-    """Dialogs, followed by calls of the models; ``installed`` names the denoisers."""
+    """Dialogs, followed by calls of the models; ``denoiser`` is that of the open recording."""
 
     said = Signal(str)  # what went wrong; empty when something else is tried
 
@@ -47,11 +49,11 @@ class BatchQuestions(QObject):
         session: Session,
         shell: Shell,
         placements: PlacementsModel,
-        installed: Callable[[], Sequence[str]],
+        denoiser: DenoiseModel,
     ) -> None:
         super().__init__(batch)
         self._batch, self._session, self._shell = batch, session, shell
-        self._placements, self.model_names = placements, installed
+        self._placements, self._denoiser = placements, denoiser
         self._opening: tuple[Result, set[Path]] | None = None
         placements.changed.connect(self._follow_plan)
         session.document.opened.connect(self._place_sensor)
@@ -63,12 +65,22 @@ class BatchQuestions(QObject):
         if placements is not None and self._batch.run is None:
             self._batch.setup.set_placements(placements, _PLAN_HERE)
 
-    def add_what_is_open(self) -> None:
-        """Work on the open recording, where nothing has been chosen yet."""
-        content = self._session.document.content
-        new = self._batch.run is None and not self._batch.setup.data
-        if new and content is not None and content.saved:
-            self._batch.setup.add(content.recording.folder)
+    def begin_as_open(self) -> None:
+        """Begin a set-up with what is open: recording, planned places, denoiser.
+
+        Recordings and places that were chosen before stay.
+        """
+        content, setup = self._session.document.content, self._batch.setup
+        if self._batch.run is not None or content is None:
+            return
+        if not setup.data and content.saved:
+            setup.add(content.recording.folder)
+        if setup.placements is None:
+            self.place_as_planned()
+        card = self._denoiser.card
+        for name, one in self.models.items():
+            if card is not None and one.path == card.path:
+                self.choose_model(name)
 
     # --- setting up -----------------------------------------------------------------------
 
@@ -81,6 +93,18 @@ class BatchQuestions(QObject):
         """Let the user choose a folder of recordings, videos or meshes."""
         if path := ask_folder(self._over, "A recording, or a folder of some"):
             self._batch.setup.add(path)
+
+    @property
+    def models(self) -> Mapping[str, ModelCard]:
+        """Denoisers by name or file."""
+        return self._denoiser.by_name()
+
+    def choose_model(self, name: str) -> None:
+        """Denoise with another model, from the maps that it takes."""
+        card = self.models.get(name)
+        if card is not None:
+            self._batch.setup.set_value("limbs", card.inputs == "limbs")
+        self._batch.setup.set_value("model", name)
 
     def placement_choices(self) -> Sequence[str]:
         """Choices of sensor placements in words."""
@@ -139,7 +163,9 @@ class BatchQuestions(QObject):
     def save_plan(self) -> None:
         """Let the user choose a file for the plan."""
         kinds = "Plan of a batch (*.toml)"
-        if path := ask_new(self._over, "Save plan", "plan.toml", kinds, ".toml"):
+        out = self._batch.setup.out
+        name = "plan.toml" if out is None else f"{out.name}.toml"
+        if path := ask_new(self._over, "Save plan", name, kinds, ".toml"):
             self._attempt(lambda: write_plan(path, self._batch.setup.plan()))
 
     def start(self) -> None:

@@ -32,6 +32,7 @@ _DEFAULTS: dict[str, Any] = {
     "export": True,
     "accuracy": "exact",
     "model": "denoiser",
+    "limbs": False,  # the model takes the map of each part of the body
     "format": "zarr",
     "subjects": "recording",
     "workers": worker_count(),
@@ -135,7 +136,7 @@ class BatchSetupModel(RunSetup[Entry]):
             ),
             placements=where,
             fit=Fit() if values["fit"] else None,
-            synthesise=Synthesise(tolerance=tolerance),
+            synthesise=Synthesise(tolerance=tolerance, limbs=values["denoise"] and values["limbs"]),
             denoise=Denoise(model=values["model"]) if values["denoise"] else None,
             export=Export(format=values["format"]) if values["export"] else None,
         )

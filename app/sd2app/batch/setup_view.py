@@ -89,7 +89,7 @@ class BatchSetupView(QWidget):
             box.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self._accuracy = Choice("How exactly", self, _ACCURACY_TEXT, partial(set_value, "accuracy"))
         self._model = Choice("Model to denoise with", self)
-        self._model.currentTextChanged.connect(lambda name: name and set_value("model", name))
+        self._model.textActivated.connect(self._asks.choose_model)
         self._format = Choice(
             "Format of the data set", self, _FORMAT_TEXT, partial(set_value, "format")
         )
@@ -133,7 +133,7 @@ class BatchSetupView(QWidget):
         self._accuracy.show_value(setup.value("accuracy"))
         self._format.show_value(setup.value("format"))
         self._placements.offer(self._asks.placement_choices(), self._asks.placement_index())
-        names = list(dict.fromkeys([*self._asks.model_names(), setup.value("model")]))
+        names = list(dict.fromkeys([*self._asks.models, setup.value("model")]))
         self._model.offer(names, names.index(setup.value("model")))
         for step, box in self._steps.items():
             box.show_checked(setup.value(step))

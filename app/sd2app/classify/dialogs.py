@@ -45,13 +45,12 @@ class ClassifyDialogs:
         if card is not None:
             ModelCardDialog(classifier_page(card), self._parent).exec()
 
-    def take_dropped(self, path: Path) -> bool:
-        """Use a file that was dropped; False where it is no classifier."""
+    def is_classifier(self, path: Path) -> bool:
+        """True if a file can be used as one."""
         try:
             self._classify.describe(path)
         except Sd2Error:
             return False
-        self.use(path)
         return True
 
     # --- the panel ------------------------------------------------------------------------

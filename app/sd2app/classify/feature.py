@@ -18,7 +18,7 @@ from sd2app.classify.strip import ClassStrip
 from sd2app.classify.text import learned_text, network_text
 from sd2app.classify.training import ClassTraining
 from sd2app.denoise.validity import MapValidity
-from sd2app.feature import Action, Feature, Shell
+from sd2app.feature import Action, Drop, Feature, Shell
 from sd2app.labels.actions import editing
 from sd2app.labels.edits import LabelEdits
 from sd2app.labels.model import LabelsModel
@@ -122,6 +122,8 @@ class ClassifyFeature(Feature):
         """Page of the Train panel."""
         return ClassPanel(self.training, self._session.display, self.dialogs)
 
-    def take_dropped(self, path: Path) -> bool:
-        """Use a classifier that was dropped."""
-        return path.suffix == ".safetensors" and self.dialogs.take_dropped(path)
+    def drop_of(self, path: Path) -> Drop | None:
+        """Use a classifier that is dropped."""
+        if path.suffix != ".safetensors" or not self.dialogs.is_classifier(path):
+            return None
+        return Drop("Classify with this model", lambda: self.dialogs.use(path))

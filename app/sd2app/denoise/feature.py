@@ -13,7 +13,7 @@ from sd2app.background.model_worker.library import DenoiserLibrary
 from sd2app.denoise.live import LiveDenoiseModel
 from sd2app.denoise.model import DenoiseModel
 from sd2app.denoise.text import denoiser_page, kind_words, origin_words
-from sd2app.feature import Action, Feature, Shell
+from sd2app.feature import Action, Drop, Feature, Shell
 from sd2app.maps.model import SynthesisModel
 from sd2app.maps.stack import MapStack
 from sd2app.session.session import Session
@@ -104,12 +104,11 @@ class DenoiseFeature(Feature):
         """Denoise with a model file, or with none."""
         self._shell.attempt(lambda: self.model.use(path))
 
-    def take_dropped(self, path: Path) -> bool:
-        """Use a model file that was dropped."""
+    def drop_of(self, path: Path) -> Drop | None:
+        """Use a model file that is dropped."""
         if path.suffix != ".safetensors":
-            return False
-        self.use(path)
-        return True
+            return None
+        return Drop("Denoise with this model", lambda: self.use(path))
 
     def _open(self) -> None:
         start = str(self.model.path or "")
@@ -121,5 +120,6 @@ class DenoiseFeature(Feature):
             ModelCardDialog(denoiser_page(self.model.card), self._shell.dialog_parent).exec()
 
     def _export(self) -> None:
-        if path := ask_map(self._shell.dialog_parent, "Export denoised map", "denoised.npz"):
+        name = self._session.document.file_name("-denoised.npz")
+        if path := ask_map(self._shell.dialog_parent, "Export denoised map", name):
             self._shell.attempt(lambda: self.model.export(path))

@@ -107,9 +107,13 @@ class DenoiseModel(QObject):
         known = {card.path for card in cards}
         return [*cards, *(one for one in (self.before, self.card) if one and one.path not in known)]
 
-    def installed(self) -> list[str]:
-        """Names of the installed models."""
-        return [card.name for card in self._library.available()]
+    def by_name(self) -> dict[str, ModelCard]:
+        """Models that can be chosen, as commands call them: an installed one by its name."""
+        installed = [card.path for card in self._library.available()]
+        return {
+            card.name if card.path in installed else str(card.path): card
+            for card in self.available()
+        }
 
     # --- requests -------------------------------------------------------------------------
 

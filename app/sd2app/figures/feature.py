@@ -50,14 +50,15 @@ class FiguresFeature(Feature):
     def _export_maps(self) -> None:
         s, window = self._session, self._shell.dialog_parent
         model = MapFigure(s, self._difference, self._labels(), self._denoiser(), window)
-        self._ask(MapFigureDialog(model, s.display.palette, "doppler-maps", window), model)
+        name = s.document.file_name("-maps")
+        self._ask(MapFigureDialog(model, s.display.palette, name, window), model)
 
     def _export_strip(self) -> None:
         s, content = self._session, self._session.document.content
         if content is not None:
-            window, title = self._shell.dialog_parent, content.recording.title
+            window, name = self._shell.dialog_parent, s.document.file_name("-frames")
             model = StripModel(content, s.playback.time_s, window)
-            self._ask(StripDialog(model, s.display.palette, title, window), model)
+            self._ask(StripDialog(model, s.display.palette, name, window), model)
 
     @staticmethod
     def _ask(dialog: QDialog, model: DrawnFigure) -> None:

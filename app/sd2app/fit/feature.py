@@ -101,14 +101,14 @@ class FitFeature(Feature):
         if self._shell.attempt(lambda: (self.model.start(request), True)) is None:
             return
         if not self.on_screen.visible and self._shell.may_discard():
-            self._session.document.open([request.video])
+            self._session.document.open([request.to_open])
 
     def _resume(self) -> None:
         """Continue a stopped fit; where nothing else is open, its video is."""
         if self._shell.attempt(lambda: (self.model.resume(), True)) is None:
             return
         if not self._session.has_content() and self.model.busy and self.model.request:
-            self._session.document.open([self.model.request.video])
+            self._session.document.open([self.model.request.to_open])
 
     def _open_result(self) -> None:
         if self._shell.may_discard():

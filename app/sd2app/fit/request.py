@@ -105,6 +105,11 @@ class FitRequest:
             self.folder.rmdir()
 
     @property
+    def to_open(self) -> Path:
+        """What shows the video: the recording where there is one, or the file."""
+        return self.folder if (self.folder / FILE_NAME).exists() else self.video
+
+    @property
     def unfinished(self) -> bool:
         """True if there is a fit to continue, or a mesh without its recording."""
         return (self.folder / REQUEST_NAME).exists() and self.video.exists()

@@ -32,7 +32,7 @@ def export_labels(shell: Shell, session: Session, labels: LabelsModel) -> None:
         labels.labels,
         session.playback.timebase,
         content.recording.video,
-        session.document.title,
+        session.document.file_name(""),
         shell.dialog_parent,
     )
     dialog.written.connect(lambda _, text: shell.note(text))

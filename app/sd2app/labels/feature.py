@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from PySide6.QtCore import QObject, QPointF, QTimer
+from PySide6.QtCore import QObject, QPointF
 from PySide6.QtWidgets import QMenu, QWidget
 
-from sd2app.feature import Action, Feature, Shell
+from sd2app.feature import Action, Drop, Feature, Shell
 from sd2app.labels.actions import LabelActions, ReactionMenu, editing, fill_place_menu
 from sd2app.labels.autosave import LabelAutosave
 from sd2app.labels.cut_out import CutOutModel, ask_about_others, ask_for_cut_outs
@@ -365,10 +365,8 @@ class LabelsFeature(Feature):
         self.autosave.take_over()
         self._follow_capture()
 
-    def take_dropped(self, path: Path) -> bool:
-        """Import a dropped file of labels; False where it is none."""
+    def drop_of(self, path: Path) -> Drop | None:
+        """Import a dropped file of labels."""
         if not is_label_file(path):
-            return False
-        # A dialog during the drop would keep the program waiting that it came from.
-        QTimer.singleShot(0, lambda: import_labels(self._shell, self.edits, path))
-        return True
+            return None
+        return Drop("Import these labels", lambda: import_labels(self._shell, self.edits, path))

@@ -88,7 +88,8 @@ class MapsFeature(Feature):
         return {"limbs": lambda menu: menu.addMenu(LimbMenu(self.limbs, menu))}
 
     def _export(self) -> None:
-        if path := ask_map(self._shell.dialog_parent, "Export synthetic map", "synthetic.npz"):
+        name = self._session.document.file_name("-synthetic.npz")
+        if path := ask_map(self._shell.dialog_parent, "Export synthetic map", name):
             self._shell.attempt(lambda: self.synthesis.export(path))
 
     def stack(self, over_maps: Sequence[Overlay], over_all: Sequence[Overlay]) -> MapStack:

@@ -37,7 +37,7 @@ class ComparisonWindow(QWidget):
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent, Qt.WindowType.Window)
-        self._model, self._attempt = model, attempt
+        self._model, self._attempt, self._session = model, attempt, session
         model.setParent(self)
         simulated = " (simulated)" if session.document.simulated else ""
         self.setWindowTitle(f"{session.document.title}{simulated}: compare meshes")
@@ -103,7 +103,8 @@ class ComparisonWindow(QWidget):
         )
 
     def _ask(self) -> None:
-        if path := ask_figure(self, "Export comparison", "comparison"):
+        name = self._session.document.file_name("-comparison")
+        if path := ask_figure(self, "Export comparison", name):
             self._attempt(lambda: self._model.save_figure(path))
 
     def closeEvent(self, event: QCloseEvent) -> None:

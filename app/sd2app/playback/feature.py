@@ -41,11 +41,11 @@ class PlaybackFeature(Feature):
                 lambda: playback.step_seconds(1.0), there,
             ),
             Action(
-                "first_frame", "Play", "First frame", ("Ctrl+Left",), "Go to the start",
+                "first_frame", "Play", "First frame", ("Home", "Ctrl+Left"), "Go to the start",
                 lambda: playback.seek_frame(0), there, icon="first",
             ),
             Action(
-                "last_frame", "Play", "Last frame", ("Ctrl+Right",), "Go to the end",
+                "last_frame", "Play", "Last frame", ("End", "Ctrl+Right"), "Go to the end",
                 lambda: playback.seek_frame(len(playback.timebase) - 1), there, icon="last",
             ),
             Action(

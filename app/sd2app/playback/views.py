@@ -45,7 +45,7 @@ class TransportBar(QWidget):
         self._frame = self._label("frame 162000 / 162000")
         self._frame.setObjectName("muted")
         self._slider = QSlider(Qt.Orientation.Horizontal, self)
-        self._slider.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._slider.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self._slider.setAccessibleName("Frame")
         self._slider.valueChanged.connect(playback.seek_frame)
         self._speed = self._label("0.25× ")
@@ -64,7 +64,7 @@ class TransportBar(QWidget):
 
     def _button(self, action: QAction | None = None) -> QToolButton:
         button = QToolButton(self)
-        button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         if action is not None:
             button.setDefaultAction(action)
         return button

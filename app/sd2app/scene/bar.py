@@ -45,7 +45,7 @@ def _view_menu(action: Callable[[str], QAction]) -> QToolButton:
     button = QToolButton()
     button.setText("Look from")
     button.setToolTip("Where to look at the scene from")
-    button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+    button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
     button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
     menu = QMenu(button)
     for name in _VIEWS:

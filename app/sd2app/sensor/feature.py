@@ -41,7 +41,7 @@ class SensorFeature(Feature):
         edits, synthesis, placements = self._session.edits, self._synthesis, self.placements
         return (
             Action(
-                "sensor_to_camera", "Edit", "Sensor at the camera", ("Home",),
+                "sensor_to_camera", "Edit", "Sensor at the camera", ("Shift+Home",),
                 "Put the sensor at the camera, looking along its axis", edits.sensor_to_camera,
             ),
             Action(

@@ -75,7 +75,6 @@ class SensorPanel(QWidget):
 
     def _button(self, action: QAction, text: str) -> QWidget:
         button = outlined(text, action.toolTip(), action.trigger, self)
-        button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         button.setEnabled(action.isEnabled())
         action.enabledChanged.connect(button.setEnabled)
         return button

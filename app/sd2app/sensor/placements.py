@@ -68,6 +68,11 @@ class PlacementsModel(QObject):
         return recording.placements if recording is not None else None
 
     @property
+    def file_name(self) -> str:
+        """Proposed name of a file of the plan."""
+        return self._document.file_name("-placements.json")
+
+    @property
     def possible(self) -> bool:
         """True if there is a body to place sensors around."""
         return self._document.mesh is not None

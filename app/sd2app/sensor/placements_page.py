@@ -154,7 +154,8 @@ class PlacementsPage(QWidget):
         if plan is None:
             return
         parent = self._shell.dialog_parent
-        path = ask_new(parent, "Export placements", "placements.json", _WRITTEN, ".json")
+        name = self._model.file_name
+        path = ask_new(parent, "Export placements", name, _WRITTEN, ".json")
         if path is None:
             return
         try:

@@ -93,7 +93,7 @@ def recording_of(paths: Sequence[Path], base: Recording | None = None) -> Record
             raise Sd2Error(
                 f"{kinds['recording']} is a recording: it cannot be added to another",
                 "a video, mesh or radar capture",
-                "Open it with File → Open folder…",
+                "Open it with File → Open…",
             )
         return open_recording(kinds["recording"])
     recording = base or Recording(UNTITLED, title=Path(paths[0]).stem)

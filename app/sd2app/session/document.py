@@ -11,7 +11,7 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QUndoStack
 
 from sd2app.background.latest import Emit, LatestRunner
-from sd2app.session.content import Content, load_content, recording_of
+from sd2app.session.content import UNTITLED, Content, load_content, recording_of
 from sd2app.session.tasks import ListedRunner, TaskList
 from sd2core.body.camera import PinholeCamera
 from sd2core.labels.spans import Labels
@@ -79,6 +79,21 @@ class DocumentModel(QObject):
     def title(self) -> str:
         """Name on the window."""
         return self.content.recording.title if self.content else ""
+
+    def file_name(self, ending: str) -> str:
+        """Proposed name of a file about the recording: its title and an ending."""
+        return "".join("-" if one in "/\\:" else one for one in self.title) + ending
+
+    @property
+    def paths(self) -> tuple[Path, ...]:
+        """Folder of the recording, or its files while it has none; what opens it again."""
+        recording = self.recording
+        if recording is None:
+            return ()
+        if recording.folder != UNTITLED:
+            return (recording.folder,)
+        files = (recording.video, recording.mesh, recording.radar)
+        return tuple(path for path in files if path is not None)
 
     @property
     def simulated(self) -> bool:

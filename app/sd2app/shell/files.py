@@ -3,27 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
-from PySide6.QtWidgets import QFileDialog, QMenu, QMessageBox
+from PySide6.QtWidgets import QMenu, QMessageBox
 
-from sd2app.feature import Action, Feature, Shell
+from sd2app.feature import Action, Drop, Feature, Shell
+from sd2app.fit.model import FitModel
+from sd2app.fit.request import read_request
+from sd2app.session.content import recording_of
 from sd2app.session.session import Session
+from sd2app.shell.open_dialog import ask_to_open
 from sd2app.widgets.dialogs import ask_folder, ask_new
+from sd2core.errors import Sd2Error
+from sd2core.files.paths import plain_path
 from sd2core.files.resources import resource_path
 
-_FILES = (
-    "Video, mesh, radar (*.mp4 *.mkv *.mov *.avi *.webm *.npz *.zip *.obj *.ply *.glb *.pkl *.npy"
-    " recording.json);;All files (*)"
-)
+_PARTS = ("video", "mesh", "radar")
 
 
 class FilesFeature(Feature):
-    """The recording as files."""
+    """The recording as files; a folder in which a ``fit`` was stopped is taken up."""
 
-    def __init__(self, session: Session, shell: Shell) -> None:
-        self._session, self._shell = session, shell
+    def __init__(self, session: Session, shell: Shell, fit: FitModel) -> None:
+        self._session, self._shell, self._fit = session, shell, fit
         self._document = session.document
+        self._document.opened.connect(self._remember)
+        self._document.saved.connect(self._remember)
         self._document.failed.connect(shell.warn)
         self._document.noted.connect(shell.note)
         self.changing = (self._document.changed,)
@@ -35,22 +41,14 @@ class FilesFeature(Feature):
         return (
             Action(
                 "open", "File", "Open…", ("Ctrl+O",),
-                "Open a video, mesh or radar capture, or several that belong together",
-                self._open_files,
-            ),
-            Action(
-                "open_folder", "File", "Open folder…", ("Ctrl+Shift+O",),
-                "Open a recording (.sd2), a radar capture or a folder of meshes",
-                self._open_folder,
+                "Open a recording (.sd2), a video, a mesh or a radar capture, or several files that"
+                " belong together",
+                self._ask_open,
             ),
             Action(
                 "add", "File", "Add to this recording…", (),
-                "Add a video, mesh or radar capture to what is open", self._add_files, has_content,
-            ),
-            Action(
-                "add_folder", "File", "Add folder to this recording…", (),
-                "Add a radar capture or a folder of meshes to what is open",
-                self._add_folder, has_content,
+                "Add a video, a mesh or a radar capture to what is open", self._ask_add,
+                has_content,
             ),
             Action(
                 "relink", "File", "Find missing files…", (),
@@ -82,40 +80,68 @@ class FilesFeature(Feature):
 
     def _list_recent(self, menu: QMenu) -> None:
         menu.clear()
-        for path in self._session.settings.recent:
-            action = menu.addAction(str(path))
-            action.triggered.connect(lambda _=False, path=path: self._open([path]))
+        for paths in self._session.settings.recent:
+            others = "".join(f" + {path.name}" for path in paths[1:])
+            action = menu.addAction(f"{paths[0]}{others}".replace("&", "&&"))
+            action.triggered.connect(lambda _=False, paths=paths: self._replace(paths))
         menu.setEnabled(True)
         if menu.isEmpty():
             menu.addAction("Nothing yet").setEnabled(False)
 
-    def _open(self, paths: Sequence[Path]) -> None:
+    def _remember(self) -> None:
+        if paths := self._document.paths:
+            self._session.settings.add_recent(*map(plain_path, paths))
+
+    def open(self, paths: Sequence[Path]) -> None:
+        """Open files in place of what is open, or continue the fit of a folder."""
+        if len(paths) == 1 and self._fit.take_up(paths[0]):
+            assert self._fit.request is not None
+            self._session.settings.add_recent(plain_path(paths[0]))
+            paths = [self._fit.request.to_open]
+        self._document.open(paths)
+
+    def _replace(self, paths: Sequence[Path]) -> None:
         if self.may_discard():
-            self._shell.open_paths(paths)
+            self.open(paths)
 
     def open_sample(self) -> None:
         """Open the recording that comes with the program."""
-        self._open([resource_path("swipes.sd2")])
+        self._replace([resource_path("swipes.sd2")])
 
-    def _open_files(self) -> None:
-        if (paths := self._ask_files("Open")) and self.may_discard():
-            self._document.open(paths)
+    def _ask_open(self) -> None:
+        if paths := self._ask("Open"):
+            self._replace(paths)
 
-    def _open_folder(self) -> None:
-        if (folder := self._ask_folder("Open folder")) and self.may_discard():
-            self._document.open([folder])
-
-    def _add_files(self) -> None:
-        if paths := self._ask_files("Add to this recording"):
+    def _ask_add(self) -> None:
+        if paths := self._ask("Add to this recording"):
             self._document.add(paths)
 
-    def _add_folder(self) -> None:
-        if folder := self._ask_folder("Add folder to this recording"):
-            self._document.add([folder])
+    def _ask(self, title: str) -> list[Path]:
+        recent = self._session.settings.recent
+        folder = recent[0][0].parent if recent and recent[0][0].parent.is_dir() else None
+        return ask_to_open(self._shell.dialog_parent, title, folder)
+
+    def drops_of(self, paths: Sequence[Path]) -> Sequence[Drop]:
+        """Ways to use dropped files: in place of what is open, and with it."""
+        document, title = self._document, self._document.title
+        open_them = Drop(f"Open instead of “{title}”", lambda: self._replace(paths))
+        if document.recording is None:
+            return (Drop("Open", lambda: self._replace(paths)),)
+        if len(paths) == 1 and read_request(paths[0]) is not None:
+            return (open_them,)
+        try:
+            added = recording_of(paths, replace(document.recording))
+        except (Sd2Error, OSError):
+            return (open_them,)
+        before = document.recording
+        changed = [one for one in _PARTS if getattr(added, one) != getattr(before, one)]
+        replaced = [one for one in changed if getattr(before, one) is not None]
+        words = f"Replace the {' and the '.join(replaced)} of" if replaced else "Add to"
+        return (Drop(f"{words} “{title}”", lambda: document.add(paths)), open_them)
 
     def _relink(self) -> None:
         """Choose the one folder below which missing files are."""
-        folder = self._ask_folder("Find missing files below")
+        folder = ask_folder(self._shell.dialog_parent, "Find missing files below")
         if folder is None:
             return
         relinked = self._shell.attempt(lambda: self._document.relink(folder))
@@ -140,7 +166,7 @@ class FilesFeature(Feature):
 
     def save_as(self) -> bool:
         """Ask for a new recording folder and save there."""
-        start = f"{self._document.title}.sd2"
+        start = self._document.file_name(".sd2")
         path = ask_new(self._shell.dialog_parent, "Save recording as", start)
         if path is None:
             return False
@@ -165,10 +191,3 @@ class FilesFeature(Feature):
     def may_close(self) -> bool:
         """Ask what becomes of unsaved edits."""
         return self.may_discard()
-
-    def _ask_files(self, title: str) -> list[Path]:
-        names, _ = QFileDialog.getOpenFileNames(self._shell.dialog_parent, title, "", _FILES)
-        return [Path(name) for name in names]
-
-    def _ask_folder(self, title: str) -> Path | None:
-        return ask_folder(self._shell.dialog_parent, title)

@@ -18,9 +18,9 @@ _FILLED, _SUBMENU = "@", ">"
 
 LAYOUT: Mapping[str, tuple[str, ...]] = {
     "File": (
-        "new_from_video", "open", "open_folder", "@recent", "add", "add_folder", "compare",
-        "relink", "-", "save", "save_as", "export_map", "export_denoised", "export_maps",
-        "export_strip", "export_dataset", "-", "batch", "-", "recover_labels", "-", "quit",
+        "new_from_video", "open", "@recent", "add", "compare", "relink", "-", "save",
+        "save_as", "export_map", "export_denoised", "export_maps", "export_strip",
+        "export_dataset", "-", "batch", "-", "recover_labels", "-", "quit",
     ),
     "Edit": ("undo", "redo", "-", "sensor_to_camera", "aim_sensor", "placements"),
     "View": (

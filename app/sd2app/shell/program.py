@@ -29,6 +29,7 @@ MOUSE = (
     ("Drag the sensor in the scene", "Move it in the plane of the screen"),
     ("Click a planned place in the scene", "Put the sensor there"),
     ("Shift+drag, Ctrl+drag the sensor", "Move it vertically, or along the line to the body"),
+    ("Drop files", "Open them, or add them to the recording; the window says which"),
     ("Drop a model file (.safetensors)", "Denoise this recording with it, or classify"),
     ("Drop a file of labels", "Import them"),
     ("Drag elsewhere, middle drag, wheel in the scene", "Turn, shift, zoom; double click resets"),

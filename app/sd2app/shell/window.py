@@ -7,14 +7,25 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QAction, QCloseEvent, QDragEnterEvent, QDropEvent, QPaintEvent
-from PySide6.QtWidgets import QApplication, QMainWindow, QWidget
+from PySide6.QtCore import QEvent, Qt, QTimer, Signal
+from PySide6.QtGui import (
+    QAction,
+    QCloseEvent,
+    QDragEnterEvent,
+    QDragLeaveEvent,
+    QDragMoveEvent,
+    QDropEvent,
+    QPaintEvent,
+)
+from PySide6.QtWidgets import QAbstractButton, QApplication, QMainWindow, QWidget
 
 from sd2app.background.latest import LatestRunner
 from sd2app.settings import Settings
+from sd2app.shell.drop import DropOverlay
 from sd2app.shell.parts import Parts
 from sd2app.shell.side_panel import PageWidths, SidePanel
+from sd2app.shell.tab_order import controls_of
+from sd2app.widgets.inputs import claims
 from sd2app.widgets.layouts import column_of
 from sd2app.widgets.message_bar import MessageBar
 from sd2app.widgets.panel import fill, panel, splitter
@@ -53,6 +64,7 @@ class MainWindow(QMainWindow):
         self._parts = parts or Parts()
         self._ready = False
         self._painted = False
+        self._tabbed: QWidget | None = None  # control that Tab has reached last
         self.setWindowTitle("SD² Studio")
         self.setAcceptDrops(True)
         self.setMinimumSize(960, 640)
@@ -94,6 +106,7 @@ class MainWindow(QMainWindow):
         centre = QWidget(self)
         centre.setLayout(self._column)
         self.setCentralWidget(centre)
+        self._drops = DropOverlay(centre)
 
     def populate(self) -> None:
         """Load what takes time to import, and fill the skeleton."""
@@ -120,11 +133,12 @@ class MainWindow(QMainWindow):
         bars = [*self.features.labels.bars(), *self.features.fit.bars()]
         for place, bar in enumerate((self.messages, *bars)):
             self._column.insertWidget(place, bar)
-        self._column.addWidget(
-            TransportBar(s.playback, self.features.labels.loop, self.action, self)
-        )
         accuracy, synthesis = self.features.accuracy.model, self.features.maps.synthesis
-        self._column.addWidget(StatusLine(s, accuracy, synthesis, self))
+        transport = TransportBar(s.playback, self.features.labels.loop, self.action, self)
+        below = (transport, StatusLine(s, accuracy, synthesis, self))
+        for bar in below:
+            self._column.addWidget(bar)
+        self._regions = (self.messages, *bars, *self._panels.values(), *below)
         self._connect()
         self._restyle()
         self._refresh()
@@ -237,16 +251,28 @@ class MainWindow(QMainWindow):
 
     def open_paths(self, paths: Sequence[Path]) -> None:
         """Open files in place of what is open."""
-        paths, fit = list(paths), self.features.fit.model
-        if len(paths) == 1 and fit.take_up(paths[0]):
-            # No recording yet: a folder in which a fit was stopped.
-            assert fit.request is not None
-            paths = [fit.request.video]
-        self.session.document.open(paths)
-        if len(paths) == 1:
-            self._settings.add_recent(paths[0].resolve())
+        self.features.files.open(paths)
 
     # --- Qt events ------------------------------------------------------------------------
+
+    def focusNextPrevChild(self, forward: bool) -> bool:
+        """Go through all controls with Tab, from top left to bottom right."""
+        controls = controls_of(self._regions) if self._ready else []
+        if not controls:
+            return False
+        focus, step = self.focusWidget(), 1 if forward else -1
+        at = controls.index(focus) + step if focus in controls else min(step, 0)
+        self._tabbed = controls[at % len(controls)]
+        reason = Qt.FocusReason
+        self._tabbed.setFocus(reason.TabFocusReason if forward else reason.BacktabFocusReason)
+        return True
+
+    def event(self, event: QEvent) -> bool:
+        """Leave Space to a button that was reached with Tab."""
+        focus = self.focusWidget()
+        if isinstance(focus, QAbstractButton) and focus is self._tabbed:
+            return claims(event, (Qt.Key.Key_Space,)) or super().event(event)
+        return super().event(event)
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Say when the skeleton is on screen."""
@@ -256,22 +282,30 @@ class MainWindow(QMainWindow):
             self.first_painted.emit()
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
-        """Take files."""
-        if self._ready and event.mimeData().hasUrls():
-            event.acceptProposedAction()
+        """Say what a drop of these files would do."""
+        paths = [Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()]
+        if self._ready and paths:
+            used = [feature.drop_of(paths[0]) for feature in self.features if len(paths) == 1]
+            own = [drop for drop in used if drop is not None][:1]
+            self._drops.offer(paths, own or self.features.files.drops_of(paths))
+            self.dragMoveEvent(event)
+
+    def dragMoveEvent(self, event: QDragMoveEvent) -> None:
+        """Follow the pointer."""
+        self._drops.point(self._drops.mapFrom(self, event.position()))
+        event.acceptProposedAction()
+
+    def dragLeaveEvent(self, event: QDragLeaveEvent) -> None:
+        """Show the window again."""
+        self._drops.hide()
 
     def dropEvent(self, event: QDropEvent) -> None:
-        """Open what was dropped; with Shift, add it. A model is used, labels are imported."""
-        paths = [Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()]
-        if not paths:
-            return
+        """Do what the field below the pointer says."""
+        self._drops.point(self._drops.mapFrom(self, event.position()))
+        self._drops.hide()
         event.acceptProposedAction()
-        if len(paths) == 1 and any(feature.take_dropped(paths[0]) for feature in self.features):
-            return
-        if event.modifiers() & Qt.KeyboardModifier.ShiftModifier:
-            self.session.document.add(paths)
-        elif self.may_discard():
-            self.open_paths(paths)
+        # A dialog during the drop would keep the program waiting that it came from.
+        QTimer.singleShot(0, self._drops.drops[self._drops.current].run)
 
     def closeEvent(self, event: QCloseEvent) -> None:
         """Ask, remember the layout, stop every thread, release VTK."""

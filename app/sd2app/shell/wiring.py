@@ -95,7 +95,7 @@ class Features:
             session,
             shell,
             self.sensor.placements,
-            denoise.model.installed,
+            denoise.model,
             parts.batch_command,
             parent,
         )
@@ -108,7 +108,7 @@ class Features:
         )
         self.playback = PlaybackFeature(session)
         self.program = ProgramFeature(session, shell, labels)
-        self.files = FilesFeature(session, shell)
+        self.files = FilesFeature(session, shell, self.fit.model)
         self.scene = SceneFeature(session, shell, maps.synthesis, self.sensor.placements)
         self._in_order: tuple[Feature, ...] = (
             self.mesh_comparison, self.sensor, self.suggestions, self.agreement,

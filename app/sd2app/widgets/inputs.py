@@ -168,7 +168,7 @@ def action_button(action: QAction, text: str, *, outlined: bool = False) -> QToo
     button.setText(text)
     button.setAccessibleName(text)
     button.setToolTip(action.toolTip())
-    button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+    button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
     button.setCheckable(action.isCheckable())
     button.setEnabled(action.isEnabled())
     button.clicked.connect(action.trigger)

@@ -221,6 +221,30 @@ def test_placements_of_the_recording_or_of_a_file_are_taken(opened, qtbot, tmp_p
     assert read_plan(tmp_path / "plan.toml") == setup.plan()
 
 
+def test_a_batch_begins_with_planned_places_and_the_model_in_use(
+    opened, qtbot, fake_models, tmp_path
+):
+    own = tmp_path / "hall.safetensors"
+    own.write_bytes(b"weights")
+    fake_models.add(own, 3.0, parts=("trunk",))
+    window = opened()
+    c = models_of(window)
+    c.denoise.use(own)
+    c.edits.plan_placements(PlacementGrid((1.0, 2.0)))
+    qtbot.waitUntil(lambda: c.denoise.card is not None, timeout=20_000)
+    QTest.keyClick(window, Qt.Key.Key_B, Qt.KeyboardModifier.ControlModifier)
+    plan = c.batch.setup
+    qtbot.waitUntil(lambda: not plan.problem, timeout=20_000)
+    assert plan.placements == PlacementGrid((1.0, 2.0))
+    assert plan.plan().denoise.model == next(
+        name for name, card in c.denoise.by_name().items() if card.path == own
+    )
+    # This one takes the map of each part of the body.
+    assert plan.plan().synthesise.limbs
+    choice = window.findChild(BatchWindow)._setup._model
+    assert choice.currentText() == plan.value("model")
+
+
 @pytest.mark.slow
 def test_the_window_closes_and_the_batch_goes_on(opened, qtbot):
     window = opened("--step-s", 20)

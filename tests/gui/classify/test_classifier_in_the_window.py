@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from answering import answer, once_asked
 from class_tables import a_table
+from dropping import drop, hover
 from fake_classifiers import CLASSES, expected
 from label_hands import CONTROL, LEFT, SHIFT, key
-from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
-from PySide6.QtGui import QDropEvent
+from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QFileDialog, QLabel, QToolButton
 from small_pairs import write_pairs
 from window_models import models_of
@@ -255,10 +255,8 @@ def test_the_card_calls_simulated_what_is(classified, qtbot):
 
 def test_a_classifier_that_is_dropped_is_used(window, fake_classes, qtbot):
     (path,) = fake_classes.cards
-    data = QMimeData()
-    data.setUrls([QUrl.fromLocalFile(str(path))])
-    none = Qt.KeyboardModifier.NoModifier
-    window.dropEvent(QDropEvent(QPointF(50, 50), Qt.DropAction.CopyAction, data, LEFT, none))
+    assert [one.text for one in hover(window, path).drops] == ["Classify with this model"]
+    drop(window, path)
     qtbot.waitUntil(lambda: models_of(window).classify.track.complete, timeout=10_000)
     assert models_of(window).classify.path == path
     assert models_of(window).denoise.path is None

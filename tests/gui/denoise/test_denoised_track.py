@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from answering import once_asked
+from dropping import drop
 from fake_denoisers import fading
-from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QTimer, QUrl
-from PySide6.QtGui import QColor, QDropEvent
+from PySide6.QtCore import QPoint, Qt, QTimer
+from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QApplication, QFileDialog, QLabel, QPushButton
 from window_models import models_of
 
@@ -90,15 +91,12 @@ def test_a_click_chooses_a_model_and_the_track_appears(window, qtbot):
 
 
 def test_a_model_file_that_is_dropped_is_used(window, fake_models, qtbot, tmp_path):
-    data = QMimeData()
-    data.setUrls([QUrl.fromLocalFile(str(tmp_path / "hall.safetensors"))])
-    actions, button = Qt.DropAction.CopyAction, Qt.MouseButton.LeftButton
-    none = Qt.KeyboardModifier.NoModifier
-    window.dropEvent(QDropEvent(QPointF(50, 50), actions, data, button, none))
+    drop(window, tmp_path / "hall.safetensors")
+    qtbot.waitUntil(lambda: models_of(window).denoise.path == tmp_path / "hall.safetensors")
     wait(window, qtbot)
     assert is_of(models_of(window), 3.0)
-    data.setUrls([QUrl.fromLocalFile(str(tmp_path / "other.safetensors"))])
-    window.dropEvent(QDropEvent(QPointF(50, 50), actions, data, button, none))
+    drop(window, tmp_path / "other.safetensors")
+    qtbot.waitUntil(lambda: window.messages.isVisible())
     assert "no model file" in window.messages.text
     assert is_of(models_of(window), 3.0)
 

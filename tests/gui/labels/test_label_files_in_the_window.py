@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 from answering import once_asked
-from PySide6.QtCore import QMimeData, QPointF, Qt, QUrl
-from PySide6.QtGui import QDropEvent
+from dropping import drop, hover
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QComboBox, QFileDialog, QPushButton
 from window_models import models_of
 
@@ -77,10 +77,9 @@ def test_an_import_is_one_step(window, theirs, qtbot, monkeypatch) -> None:
 
 def test_a_dropped_file_is_imported(window, theirs, qtbot) -> None:
     c = models_of(window)
-    data = QMimeData()
-    data.setUrls([QUrl.fromLocalFile(str(theirs))])
+    assert [one.text for one in hover(window, theirs).drops] == ["Import these labels"]
     press(qtbot, "Import", "instead of all labels of this recording")
-    window.dropEvent(QDropEvent(QPointF(9, 9), Qt.DropAction.CopyAction, data, LEFT, NONE))
+    drop(window, theirs)
     qtbot.waitUntil(lambda: len(c.labels.labels.tracks) == 1 and c.document.modified)
     assert [track.name for track in c.labels.labels.tracks] == ["Ben"]
     assert c.document.undo_stack.count() == 1

@@ -152,6 +152,7 @@ def test_typing_in_a_number_box_fires_no_action(window, qtbot) -> None:
     """Whatever keys are chosen: letters, signs and arrows belong to the field."""
     c = models_of(window)
     c.keys.bind("dots", ["Up"])
+    c.keys.bind("last_frame", [])
     c.keys.bind("show_trade", ["End"])
     window.activateWindow()
     qtbot.waitUntil(window.isActiveWindow, timeout=5000)

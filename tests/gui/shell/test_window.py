@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QTimer, QUrl
-from PySide6.QtGui import QDragEnterEvent, QDropEvent, QWheelEvent
+from PySide6.QtCore import QPoint, QPointF, Qt, QTimer
+from PySide6.QtGui import QWheelEvent
 from PySide6.QtWidgets import QApplication, QMessageBox
 from window_models import all_actions, models_of
 
 from sd2app.maps.overview import Overview
 from sd2app.playback.views import TimeRuler
 from sd2app.shell.keys.dialog import KeysDialog
-from sd2app.video.view import VideoView
 from sd2core.accuracy.plans import AccuracyPlan
 from sd2core.maps import DopplerMap
 from sd2core.sensor import VirtualSensor
@@ -58,6 +57,10 @@ def test_keys_play_step_and_change_speed(window, qtbot):
     qtbot.keyClick(window, Qt.Key.Key_Left)
     assert playback.frame == 30
     qtbot.keyClick(window, Qt.Key.Key_Left, Qt.KeyboardModifier.ShiftModifier)
+    assert playback.frame == 0
+    qtbot.keyClick(window, Qt.Key.Key_End)
+    assert playback.frame == 59
+    qtbot.keyClick(window, Qt.Key.Key_Home)
     assert playback.frame == 0
     qtbot.keyClick(window, Qt.Key.Key_Comma)
     assert playback.speed == 0.5
@@ -204,7 +207,7 @@ def test_typing_a_range_moves_the_sensor_along_its_direction(window, qtbot):
         pytest.approx(6.0, abs=0.01)
     )
     assert c.sensor.sensor.position_m[2] == pytest.approx(-4.0, abs=0.05)
-    qtbot.keyClick(window, Qt.Key.Key_Home)
+    qtbot.keyClick(window, Qt.Key.Key_Home, Qt.KeyboardModifier.ShiftModifier)
     assert c.sensor.sensor.position_m == (0.0, 0.0, 0.0)
     assert c.document.undo_stack.undoText() == "Sensor to camera"
 
@@ -396,28 +399,6 @@ def test_a_farther_sensor_shows_weaker_levels(window, qtbot):
     assert loss_db == pytest.approx(12.0, abs=1.5)
     qtbot.keyClick(window, Qt.Key.Key_R)
     assert c.synthetic.reference == pytest.approx(float(c.synthetic.map.values.max()))
-
-
-def test_dropped_files_are_opened_and_added(empty_window, small_recording, qtbot):
-    document = models_of(empty_window).document
-
-    def drop(path, modifiers=Qt.KeyboardModifier.NoModifier):
-        mime = QMimeData()
-        mime.setUrls([QUrl.fromLocalFile(str(path))])
-        how = (Qt.DropAction.CopyAction, mime, Qt.MouseButton.LeftButton, modifiers)
-        entering = QDragEnterEvent(QPoint(50, 50), *how)
-        QApplication.sendEvent(empty_window, entering)
-        assert entering.isAccepted()
-        with qtbot.waitSignal(document.opened, timeout=10_000):
-            QApplication.sendEvent(empty_window, QDropEvent(QPointF(50, 50), *how))
-
-    drop(small_recording / "video.mp4")
-    assert document.video is not None
-    assert document.mesh is None
-    drop(small_recording / "mesh.npz", Qt.KeyboardModifier.ShiftModifier)
-    assert document.video is not None
-    assert document.mesh is not None
-    assert empty_window.findChild(VideoView).isVisible()
 
 
 def test_a_point_cloud_counts_every_point(empty_window, fake, tmp_path, qtbot):

@@ -1,0 +1,75 @@
+"""One dialog for files and for folders that are opened as a whole."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtWidgets import QDialog, QFileDialog, QWidget
+
+from sd2app.fit.request import REQUEST_NAME
+from sd2core.errors import Sd2Error
+from sd2core.io.kinds import MESH_SUFFIXES, RADAR_MAP_SUFFIXES, VIDEO_SUFFIXES, kind_of
+
+_SUFFIXES = sorted(VIDEO_SUFFIXES | MESH_SUFFIXES | RADAR_MAP_SUFFIXES | {".npz", ".npy", ".zip"})
+_FILES = (
+    f"Recordings, videos, meshes, radar ({' '.join(f'*{one}' for one in _SUFFIXES)}"
+    " recording.json);;All files (*)"
+)
+_CLOSED = ("recording.json", REQUEST_NAME, "zarr.json", "radar.npy")
+"""Files of folders into which nobody has to look."""
+_KINDS = ("recording", "mesh", "radar")
+
+
+class OpenDialog(QFileDialog):
+    """Files, and folders that are a recording, a capture or a mesh.
+
+    A double click on such a folder chooses it, one on any other looks into it.
+    """
+
+    def __init__(self, parent: QWidget, title: str, folder: Path | None) -> None:
+        super().__init__(parent, title, str(folder or ""), _FILES)
+        # Those of the systems know either files or folders.
+        self.setOption(QFileDialog.Option.DontUseNativeDialog)
+        self.setFileMode(QFileDialog.FileMode.ExistingFiles)
+        self.directoryEntered.connect(self._enter)
+        self.paths: list[Path] = []
+
+    def accept(self) -> None:
+        """Choose what is selected; look into a folder that cannot be opened."""
+        chosen = [Path(name) for name in self.selectedFiles()]
+        if any(path.is_dir() for path in chosen) and all(map(can_be_opened, chosen)):
+            self._choose(chosen)
+        else:
+            super().accept()
+
+    def done(self, result: int) -> None:
+        """Take the files."""
+        if result and not self.paths:
+            self.paths = [Path(name) for name in self.selectedFiles()]
+        super().done(result)
+
+    def _enter(self, folder: str) -> None:
+        if any((Path(folder) / name).is_file() for name in _CLOSED):
+            self._choose([Path(folder)])
+
+    def _choose(self, paths: list[Path]) -> None:
+        self.paths = paths
+        self.done(QDialog.DialogCode.Accepted)
+
+
+def can_be_opened(path: Path) -> bool:
+    """True for a file, and for a folder that is a recording, a capture, a mesh or a begun fit."""
+    if path.is_file() or (path / REQUEST_NAME).is_file():
+        return True
+    try:
+        return kind_of(path) in _KINDS
+    except (Sd2Error, OSError):
+        return False
+
+
+def ask_to_open(parent: QWidget, title: str, folder: Path | None) -> list[Path]:
+    """Let the user choose files and folders; none where the dialog is cancelled."""
+    dialog = OpenDialog(parent, title, folder)
+    dialog.exec()
+    dialog.deleteLater()
+    return dialog.paths

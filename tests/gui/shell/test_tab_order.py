@@ -1,0 +1,89 @@
+"""Tab reaches every control of the window, region by region from top left."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QAbstractSpinBox,
+    QApplication,
+    QComboBox,
+    QSlider,
+    QTabBar,
+    QToolButton,
+    QWidget,
+)
+from window_models import models_of
+
+_KINDS = (QAbstractButton, QAbstractSpinBox, QComboBox, QSlider, QTabBar)
+
+
+def walk(window, qtbot, key=Qt.Key.Key_Tab) -> list[QWidget]:
+    """Controls in the order in which a key reaches them, once round."""
+    window.activateWindow()
+    qtbot.waitUntil(window.isActiveWindow, timeout=5000)
+    reached: list[QWidget] = []
+    while True:
+        QTest.keyClick(QApplication.focusWidget() or window, key)
+        focus = QApplication.focusWidget()
+        if focus in reached:
+            assert focus is reached[0]
+            return reached
+        reached.append(focus)
+
+
+def controls(window) -> set[QWidget]:
+    """What a mouse could use: shown, enabled, not in another control or one choice of a group."""
+    found = set()
+    for one in window.centralWidget().findChildren(QWidget):
+        if not isinstance(one, _KINDS):
+            continue
+        inside = isinstance(one.parentWidget(), _KINDS)
+        group = one.group() if isinstance(one, QAbstractButton) else None
+        other = group is not None and group.exclusive() and not one.isChecked()
+        used = one.isVisible() and one.isEnabled() and one.window() is window
+        if used and not inside and not other:
+            found.add(one)
+    return found
+
+
+def test_every_control_is_reached_with_tab_and_back(window, qtbot) -> None:
+    reached = walk(window, qtbot)
+    assert controls(window) <= set(reached)
+    back = walk(window, qtbot, Qt.Key.Key_Backtab)
+    assert set(back) == set(reached)
+    start = back.index(reached[0])
+    assert [*back[start:], *back[:start]] == [reached[0], *reversed(reached[1:])]
+
+
+def test_the_order_is_that_of_reading(window, qtbot) -> None:
+    reached = walk(window, qtbot)
+    regions = window._regions
+    places = [next(k for k, one in enumerate(regions) if one.isAncestorOf(at)) for at in reached]
+    first = places.index(min(places))
+    turned = [*places[first:], *places[:first]]
+    assert turned == sorted(turned)
+    by_region = {place: [] for place in places}
+    for place, control in zip(places, reached, strict=True):
+        by_region[place].append(control.mapTo(window, QPoint(0, 0)).y())
+    for place, tops in by_region.items():
+        turned = sorted(tops)
+        if place != places[0]:  # where Tab began, the walk may have begun in its middle
+            assert all(abs(a - b) < 20 for a, b in zip(tops, turned, strict=True)), tops
+
+
+def test_space_presses_the_button_that_tab_has_reached_and_plays_elsewhere(window, qtbot) -> None:
+    playback = models_of(window).playback
+    named = {one.toolTip().split(" (")[0]: one for one in walk(window, qtbot)}
+    button = named["One frame on"]
+    assert isinstance(button, QToolButton)
+    while QApplication.focusWidget() is not button:
+        QTest.keyClick(QApplication.focusWidget(), Qt.Key.Key_Tab)
+    QTest.keyClick(button, Qt.Key.Key_Space)
+    assert playback.frame == 1
+    assert not playback.playing
+    button.clearFocus()
+    QTest.keyClick(window, Qt.Key.Key_Space)
+    assert playback.playing
+    playback.pause()
