@@ -27,7 +27,7 @@ from window_models import models_of
 # Before the fork, so that a window stands in a second.
 import sd2app.scene.view
 import sd2app.shell.wiring  # noqa: F401
-from sd2app.labels.recovery import LabelBar
+from sd2app.labels.recovery import LabelNotice
 from sd2app.labels.timeline import ROW_PX, LabelTimeline
 from sd2app.settings import Settings
 from sd2app.shell.parts import Parts
@@ -71,7 +71,7 @@ class Editor:
         offer = self.models.label_session.offer
         self.edits = 0 if offer is None else offer.edits
         if offer is not None:
-            buttons = window.findChild(LabelBar).findChildren(QToolButton)
+            buttons = window.findChild(LabelNotice).findChildren(QToolButton)
             restore = next(one for one in buttons if one.text() == "Restore")
             QTest.mouseClick(restore, Qt.MouseButton.LeftButton)
         self.labels = self.models.document.labels

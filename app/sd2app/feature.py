@@ -77,11 +77,21 @@ class Shell(Protocol):
     def warn(self, text: str) -> None:
         """Tell the user about something that went wrong."""
 
+    def show_messages(self) -> None:
+        """Show what the user was told so far."""
+
     def attempt(self, work: Callable[[], T]) -> T | None:
         """Result of ``work``; an error is told to the user, and None returned."""
 
     def bring_up(self, panel: str, page: str = "") -> None:
         """Show a panel at the side, and a page of it."""
+
+    @property
+    def side_folded(self) -> bool:
+        """True while the panel at the side is folded away."""
+
+    def fold_side(self, folded: bool) -> None:
+        """Fold the panel at the side away, or bring it back."""
 
     def save(self) -> bool:
         """Save the recording, asking where if need be; False where the user cancels."""
@@ -130,7 +140,11 @@ class Feature:
         return {}
 
     def bars(self) -> Sequence[QWidget]:
-        """Bars above the content, hidden while they have nothing to say."""
+        """Bars above the content, which the user calls up; hidden otherwise."""
+        return ()
+
+    def notices(self) -> Sequence[QWidget]:
+        """Each a ``Notice``, which lies over the content since it appears by itself."""
         return ()
 
     def take_over(self) -> None:

@@ -151,7 +151,8 @@ class KeptWindow:
         for table in window.findChildren(QTableView):
             table.setCurrentIndex(QModelIndex())
         window.side.bring_up("Sensor")
-        window.messages.hide()
+        window.messages.dismiss()
+        window.messages.forget()
         for splitter, state in self._splitters:
             splitter.restoreState(state)
         window.activateWindow()

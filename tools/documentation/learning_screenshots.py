@@ -80,7 +80,7 @@ def classifier(application: QApplication, sample: Path, campaign: Path) -> None:
     wait_for(application, lambda: classify.track.complete and not classify.busy)
     window.session.playback.seek(3.7)
     wait_until_settled(application, window, LIMIT_S)
-    window.messages.hide()
+    window.messages.dismiss()
     application.processEvents()
     save(window, "classifier.png")
     model.setup.set_value("steps", _COMPARE_STEPS)

@@ -156,7 +156,7 @@ def take(
         sys.exit(f"{name}: the window was still busy after {LIMIT_S:.0f} s")
     if window.messages.text:
         print(f"{name}: {window.messages.text}", file=sys.stderr)
-        window.messages.hide()
+        window.messages.dismiss()
         application.processEvents()
     save(window, name)
     window.session.document.undo_stack.setClean()

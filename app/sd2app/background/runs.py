@@ -100,8 +100,12 @@ class Runs(QObject, Generic[Run]):
             return ""
         if self.run.phase == "paused":
             return "paused"
-        share = self.run.history.share
-        return "…" if share is None else f"{100 * share:.0f} %"
+        return "…" if self.share is None else f"{100 * self.share:.0f} %"
+
+    @property
+    def share(self) -> float | None:
+        """Share of the run in view that is done; None while that is not known."""
+        return None if self.run is None else self.run.history.share
 
     def follow_setup(self, setup: RunSetup[Any]) -> None:
         """Follow the set-up of a new run; its data is read again whenever runs become visible."""

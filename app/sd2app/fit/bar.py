@@ -1,4 +1,4 @@
-"""The fit that is offered, under way, stopped, failed or done: one line over the window."""
+"""A notice that offers a fit, and a line about the one under way, stopped, failed or done."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QFrame, QLabel, QToolButton
 from sd2app.fit.model import FitModel
 from sd2app.fit.on_screen import FitOnScreen
 from sd2app.widgets.layouts import row_of
+from sd2app.widgets.notices import Notice
 from sd2app.widgets.panel import ElidedLabel, outlined, sentence
 from sd2app.widgets.progress_bar import ProgressBar
 from sd2app.widgets.text import about
@@ -17,10 +18,29 @@ _HEIGHT = 40
 """Height in all states, so that the view below does not move."""
 
 
-class FitBar(QFrame):
-    """Offer, progress and end of a fit; hidden otherwise.
+class FitOffer(Notice):
+    """Offers to fit a body where there is a video and no mesh; ``begin`` asks what it needs."""
 
-    ``begin`` asks for what a new fit needs, ``open_result`` opens the recording of a finished
+    def __init__(self, on_screen: FitOnScreen, begin: Callable[[], None]) -> None:
+        tip = "Choose person, height and place"
+        buttons = (("begin", "Fit a body…", tip, begin),)
+        super().__init__("Offer of a fit", buttons, on_screen.decline)
+        self._on_screen = on_screen
+        on_screen.changed.connect(self._refresh)
+
+    def _refresh(self) -> None:
+        video = self._on_screen.offered
+        if video is None:
+            self.show_words("", "")
+        else:
+            text = "A body can be fitted to the person in it."
+            self.show_words(f"{video.name} has no mesh", text)
+
+
+class FitBar(QFrame):
+    """Progress and end of a fit; hidden otherwise.
+
+    ``change`` asks again for what a fit needs, ``open_result`` opens the recording of a finished
     fit, ``resume`` continues a stopped one.
     """
 
@@ -28,7 +48,7 @@ class FitBar(QFrame):
         self,
         fit: FitModel,
         on_screen: FitOnScreen,
-        begin: Callable[[], None],
+        change: Callable[[], None],
         open_result: Callable[[], None],
         resume: Callable[[], None],
     ) -> None:
@@ -45,13 +65,13 @@ class FitBar(QFrame):
         self._left.setObjectName("muted")
         self._left.setMinimumWidth(self._left.fontMetrics().horizontalAdvance("about 55 min left"))
         self._buttons = {
-            "begin": self._button("Fit a body…", "Choose person, height and place", begin),
+            "change": self._button("Change…", "Choose person, height and place again", change),
             "follow": self._button("Follow", "Show each frame as it is worked on", self._toggle),
             "cancel": self._button("Cancel", "Stop; what is done can be continued", fit.cancel),
             "resume": self._button("Resume", "Continue where it stopped", resume),
             "discard": self._button("Discard", "Remove what was done", fit.discard),
             "open": self._button("Open", "Open the new recording", open_result),
-            "close": self._button("✕", "Close this message", self._close),
+            "close": self._button("✕", "Close this message", fit.dismiss),
         }
         self._buttons["follow"].setCheckable(True)
         parts = (self._title, (self._reason, 1), (self._stage, 1), self._bar, self._left)
@@ -71,33 +91,24 @@ class FitBar(QFrame):
 
     def _refresh(self) -> None:
         state = self._fit.state
+        self.setVisible(state != "idle")
+        if state == "idle":
+            return
         shown = {
-            "idle": {"begin", "close"},
             "running": {"follow", "cancel"},
             "cancelling": {"follow", "cancel"},
-            "stopped": {"begin", "resume", "discard", "close"},
-            "failed": {"begin", "resume", "close"},
+            "stopped": {"change", "resume", "discard", "close"},
+            "failed": {"change", "resume", "close"},
             "finished": {"open", "close"},
         }[state]
         for name, button in self._buttons.items():
             button.setVisible(name in shown)
-        self._buttons["begin"].setText("Fit a body…" if state == "idle" else "Change…")
         self._buttons["resume"].setText("Try again" if state == "failed" else "Resume")
         self._bar.setVisible(self._fit.busy)
         self._left.setVisible(self._fit.busy)
         self._reason.setVisible(state == "failed")
         self._stage.setVisible(state != "failed")
-        if state == "idle":
-            self._show_offer()
-        else:
-            self._show_fit()
-        self.setVisible(state != "idle" or self._on_screen.offered is not None)
-
-    def _show_offer(self) -> None:
-        video = self._on_screen.offered
-        if video is not None:
-            self._title.setText(f"{video.name} has no mesh")
-            self._stage.setText("A body can be fitted to the person in it.")
+        self._show_fit()
 
     def _show_fit(self) -> None:
         request, state = self._fit.request, self._fit.state
@@ -141,9 +152,3 @@ class FitBar(QFrame):
 
     def _toggle(self) -> None:
         self._on_screen.set_following(self._buttons["follow"].isChecked())
-
-    def _close(self) -> None:
-        if self._fit.state == "idle":
-            self._on_screen.decline()
-        else:
-            self._fit.dismiss()

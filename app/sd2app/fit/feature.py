@@ -11,7 +11,7 @@ from PySide6.QtCore import QObject, SignalInstance
 from PySide6.QtWidgets import QDialog, QWidget
 
 from sd2app.feature import Action, Feature, Shell
-from sd2app.fit.bar import FitBar
+from sd2app.fit.bar import FitBar, FitOffer
 from sd2app.fit.dialog import VIDEOS, NewFromVideoDialog
 from sd2app.fit.model import FitModel
 from sd2app.fit.on_screen import FitOnScreen
@@ -19,6 +19,7 @@ from sd2app.fit.request import FitRequest
 from sd2app.fit.setup import FitSetupModel
 from sd2app.session.session import Session
 from sd2app.widgets.dialogs import Answer, ask_file, confirmed
+from sd2app.widgets.notices import Notice
 from sd2core.runs.command_folder import COMMAND_IN_FOLDER
 
 
@@ -62,11 +63,15 @@ class FitFeature(Feature):
             FitBar(
                 self.model,
                 self.on_screen,
-                begin=self.new_from_video,
+                change=self.new_from_video,
                 open_result=self._open_result,
                 resume=self._resume,
             ),
         )
+
+    def notices(self) -> Sequence[Notice]:
+        """Offer of a fit."""
+        return (FitOffer(self.on_screen, self.new_from_video),)
 
     def take_over(self) -> None:
         """Follow the fit again: staying elsewhere was a wish about the recording before."""

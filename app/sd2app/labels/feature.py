@@ -21,11 +21,12 @@ from sd2app.labels.marking import LabelMarking, Reaction
 from sd2app.labels.model import LabelsModel
 from sd2app.labels.painting import map_overlay, strip_overlay
 from sd2app.labels.panel import LabelsPanel
-from sd2app.labels.recovery import LabelBar, recover
+from sd2app.labels.recovery import LabelNotice, recover
 from sd2app.labels.timeline import LabelArea, LabelTimeline
 from sd2app.labels.tracks import LabelTracks, TrackMenu
 from sd2app.session.session import Session
 from sd2app.widgets.canvas import TimePlot
+from sd2app.widgets.notices import Notice
 
 
 class LabelsFeature(Feature):
@@ -330,9 +331,9 @@ class LabelsFeature(Feature):
         self._offer_places(timeline)
         return {"Labels": panel, "labels": LabelArea(timeline, self.model)}
 
-    def bars(self) -> Sequence[QWidget]:
+    def notices(self) -> Sequence[Notice]:
         """Labels that were not saved, and who else edits."""
-        return (LabelBar(self.autosave, self.edits, self._session.document, self._shell),)
+        return (LabelNotice(self.autosave, self.edits, self._session.document, self._shell),)
 
     def let_drag_on(self, views: Sequence[TimePlot]) -> None:
         """Let spans be selected and their edges be dragged on maps."""

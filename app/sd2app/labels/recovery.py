@@ -1,4 +1,4 @@
-"""Offers of labels that were not saved: a bar above the window, and a list of all recordings."""
+"""Offers of labels that were not saved: a notice, and a list of all recordings."""
 
 from __future__ import annotations
 
@@ -6,11 +6,8 @@ from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import (
     QDialog,
     QDialogButtonBox,
-    QFrame,
     QHeaderView,
     QMessageBox,
-    QSizePolicy,
-    QToolButton,
     QTreeWidget,
     QTreeWidgetItem,
     QWidget,
@@ -21,8 +18,9 @@ from sd2app.labels.autosave import LabelAutosave
 from sd2app.labels.edits import LabelEdits
 from sd2app.session.document import DocumentModel
 from sd2app.widgets.dialogs import ask_new, may_delete
-from sd2app.widgets.layouts import column_of, row_of
-from sd2app.widgets.panel import outlined, sentence, show_words, title
+from sd2app.widgets.layouts import column_of
+from sd2app.widgets.notices import Notice
+from sd2app.widgets.panel import sentence, show_words
 from sd2app.widgets.text import clock_text, counted
 from sd2core.errors import Sd2Error
 from sd2core.labels.comparison import compare
@@ -34,7 +32,7 @@ _SAID = (
     " they change."
 )
 _NOTHING = "There is nothing to recover: all edits were saved or discarded."
-_ROW_PX, _MARGIN_PX, _BAR_PX = 24, 16, 40
+_ROW_PX, _MARGIN_PX = 24, 16
 _HEADINGS = ("Recording", "Edits that were not saved", "Holds", "")
 
 
@@ -44,21 +42,13 @@ def _edits_text(offer: Offer) -> str:
     return f"{edits} until {until}, the last “{offer.last}”"
 
 
-class LabelBar(QFrame):
-    """Offers what the user has to decide about the labels; hidden when there is nothing."""
+class LabelNotice(Notice):
+    """What the user has to decide about the labels; hidden when there is nothing."""
 
     def __init__(
         self, autosave: LabelAutosave, edits: LabelEdits, document: DocumentModel, shell: Shell
     ) -> None:
-        super().__init__()
-        self.setObjectName("panel")
-        self.setAccessibleName("State of the labels")
-        self.setMinimumHeight(_BAR_PX)
-        self._autosave, self._document = autosave, document
-        self._title, self._text = title(""), sentence("")
-        self._text.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
-        self._buttons: dict[str, QToolButton] = {}
-        for name, text, tip, run in (
+        buttons = (
             ("again", "Try again", "Edit them here, once the other window is closed",
              autosave.try_again),
             ("restore", "Restore", "Use these labels; one undo takes that back", edits.restore),
@@ -68,43 +58,36 @@ class LabelBar(QFrame):
              autosave.postpone),
             ("recover", "Recover labels…", "See what is there, and open its recording",
              lambda: recover(autosave, document, shell)),
-            ("close", "✕", "Close this message", autosave.dismiss),
-        ):  # fmt: skip
-            self._buttons[name] = outlined(text, tip, run, self)
-        self._buttons["close"].setObjectName("")
-        self._buttons["close"].setAccessibleName("Close this message")
-        buttons = row_of(*self._buttons.values(), spacing_px=8)
-        self.setLayout(
-            row_of(self._title, (self._text, 1), buttons, spacing_px=8, margins_px=(12, 4, 4, 4))
-        )
+        )  # fmt: skip
+        super().__init__("State of the labels", buttons, self._put_off)
+        self._autosave, self._document = autosave, document
         autosave.changed.connect(self._refresh)
         # What is offered is compared with what is there by now.
         document.undo_stack.indexChanged.connect(self._refresh)
         self._refresh()
 
-    @property
-    def text(self) -> str:
-        """Text shown, empty while hidden."""
-        return "" if self.isHidden() else f"{self._title.text()}: {self._text.text()}"
+    def _put_off(self) -> None:
+        if self._autosave.read_only:
+            return
+        if self._autosave.offer is not None:
+            self._autosave.postpone()
+        else:
+            self._autosave.dismiss()
 
     def _refresh(self) -> None:
         autosave, offer = self._autosave, self._autosave.offer
+        head, text, shown = "Labels were not saved", "", set()
         if autosave.read_only:
-            said = "Labels are read-only", f"{autosave.refusal}."
-            shown = {"again"}
+            head, text, shown = "Labels are read-only", f"{autosave.refusal}.", {"again"}
         elif offer is not None:
-            said = "Labels were not saved", self._offered(offer)
-            shown = {"restore", "decline", "postpone"}
+            text, shown = self._offered(offer), {"restore", "decline", "postpone"}
         elif autosave.notes:
-            said, shown = ("Labels", ""), {"close"}
+            head = "Labels"
         else:
-            said = "Labels were not saved", self._waiting()
-            shown = {"recover", "close"}
-        self._title.setText(said[0])
-        self._text.setText("\n".join(filter(None, (said[1], *autosave.notes))))
-        for name, button in self._buttons.items():
+            text, shown = self._waiting(), {"recover"}
+        for name, button in self.buttons.items():
             button.setVisible(name in shown)
-        self.setVisible(bool(self._text.text()))
+        self.show_words(head, "\n".join(filter(None, (text, *autosave.notes))))
 
     def _offered(self, offer: Offer) -> str:
         """Offer, compared with the open labels."""

@@ -75,7 +75,9 @@ class SensorFeature(Feature):
         """The panel at the side, of two pages."""
         shell = self._shell
         to_camera, aim = shell.action("sensor_to_camera"), shell.action("aim_sensor")
-        sensor = SensorPanel(self._session, self._synthesis, to_camera, aim)
+        sensor = SensorPanel(
+            self._session, self._synthesis, lambda: self.placements.radar, to_camera, aim
+        )
         placements = PlacementsPage(self.placements, self._accuracy, shell, self._make_batch)
         return {
             "Sensor": paged_panel(

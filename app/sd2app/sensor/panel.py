@@ -14,7 +14,7 @@ from sd2app.maps.model import SynthesisModel
 from sd2app.session.session import Session
 from sd2app.widgets.inputs import Choice, NumberBox
 from sd2app.widgets.layouts import STRETCH, column_of, form_of, pane, row_of
-from sd2app.widgets.panel import outlined, rule, sentence, title
+from sd2app.widgets.panel import outlined, rule, sentence, show_words, title
 from sd2core.radar_config import RadarConfig
 from sd2core.sensor import aimed_at, position_from_spherical, spherical_from_position
 
@@ -44,17 +44,24 @@ class SensorPanel(QWidget):
     """Type a placement; read range, visible share and limits."""
 
     def __init__(
-        self, session: Session, synthesis: SynthesisModel, to_camera: QAction, aim: QAction
+        self,
+        session: Session,
+        synthesis: SynthesisModel,
+        radar: Callable[[], RadarConfig],
+        to_camera: QAction,
+        aim: QAction,
     ) -> None:
         super().__init__()
         self.setObjectName("page")
-        self._session, self._synthesis = session, synthesis
+        self._session, self._synthesis, self._radar = session, synthesis, radar
+        self._too_far = sentence("", "warning")
         self._capture = self._capture_part()
         buttons = (self._button(aim, "Aim at body"), self._button(to_camera, "To camera"))
         self.setLayout(
             column_of(
                 row_of(title("Placement"), STRETCH, *buttons),
                 self._placement_form(),
+                self._too_far,
                 rule(),
                 title("What it sees"),
                 self._readout_form(),
@@ -190,7 +197,21 @@ class SensorPanel(QWidget):
             spherical = spherical_from_position(target, position)
             for box, value in zip(self._spherical, spherical, strict=True):
                 box.show_value(value)
+            self._mark_range(float(spherical[0]))
+        else:
+            self._mark_range(0.0)
         self._refresh_readout()
+
+    def _mark_range(self, range_m: float) -> None:
+        """Mark a range at which the radar in use sees the body elsewhere."""
+        radar = self._radar()
+        too_far = range_m > radar.range_max_m
+        self._spherical[0].mark(too_far)
+        words = (
+            f"{range_m:.2f} m is beyond R max of {radar.name}, {radar.range_max_m:.1f} m: it would"
+            " see the body at another range."
+        )
+        show_words(self._too_far, words if too_far else "")
 
     def _refresh_readout(self) -> None:
         readout, texts = self._synthesis.readout(), ("–", "–", "–")
@@ -205,6 +226,7 @@ class SensorPanel(QWidget):
             label.setText(text)
 
     def _refresh_capture(self) -> None:
+        self._refresh_placement()
         document = self._session.document
         capture, recording, radar_map = document.capture, document.recording, document.radar_map
         self._capture.setVisible(capture is not None)

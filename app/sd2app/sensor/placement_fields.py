@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Literal, get_args
 
 from PySide6.QtCore import QObject, Signal
@@ -9,11 +10,16 @@ from PySide6.QtCore import QObject, Signal
 from sd2app.sensor.placements import PlacementsModel
 from sd2core.errors import Sd2Error
 from sd2core.files.number_lists import format_numbers, parse_interval, parse_numbers
+from sd2core.files.quantities import parse_quantity
 from sd2core.placements.placements import PlacementCloud, PlacementGrid, Placements
 
 Kind = Literal["none", "grid", "cloud"]
 Name = Literal["range", "azimuth", "elevation", "count", "seed"]
 NAMES: tuple[Name, ...] = get_args(Name)
+
+_UNITS: dict[Name, str] = {"range": "m", "azimuth": "°", "elevation": "°"}
+_WITH_UNIT = re.compile(r"[^,:\s]+\s*[^\W\d]+|[^,:\s]+\s*°")
+"""A number and letters behind it."""
 
 _FIRST: dict[Kind, Placements | None] = {
     "none": None,
@@ -105,13 +111,25 @@ def _texts_of(plan: Placements) -> dict[Name, str]:
 
 
 def _plan_of(kind: Kind, texts: dict[Name, str]) -> Placements:
-    around = (texts["range"], texts["azimuth"], texts["elevation"])
+    around = [_plain(texts[name], unit) for name, unit in _UNITS.items()]
     if kind == "grid":
         ranges_m, azimuths_deg, elevations_deg = map(parse_numbers, around)
         return PlacementGrid(ranges_m, azimuths_deg, elevations_deg)
     range_m, azimuth_deg, elevation_deg = map(parse_interval, around)
     count, seed = (_whole(name, texts[name]) for name in ("count", "seed"))
     return PlacementCloud(count, range_m, azimuth_deg, elevation_deg, seed)
+
+
+def _plain(text: str, unit: str) -> str:
+    """Numbers without their units: ``1, 250 cm`` as ``1, 2.5``; what is no number stays."""
+
+    def value_of(found: re.Match[str]) -> str:
+        try:
+            return repr(parse_quantity(found[0], unit))
+        except Sd2Error:
+            return found[0]
+
+    return _WITH_UNIT.sub(value_of, text)
 
 
 def _whole(name: str, text: str) -> int:

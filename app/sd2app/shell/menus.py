@@ -28,7 +28,8 @@ LAYOUT: Mapping[str, tuple[str, ...]] = {
         "overlay_dots", "draw_placements", "-", "view_three_quarter", "view_camera", "view_sensor",
         "view_side", "view_top", "-", "zoom_in", "zoom_out", "zoom_fit", "reset_reference",
         "uncertain", "@limbs", "-", "show_sensor", "show_trade", "show_train", "show_labels",
-        "show_agree", "measure", "-", "dark",
+        "show_agree", "side_panel", "measure", "-",
+        "messages", "dark",
     ),
     "Play": (
         "play", "previous_frame", "next_frame", "back_second", "on_second", "first_frame",

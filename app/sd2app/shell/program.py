@@ -46,9 +46,9 @@ class ProgramFeature(Feature):
         self.changing = (stack.indexChanged, stack.cleanChanged, session.display.theme_changed)
 
     def actions(self) -> Sequence[Action]:
-        """Undo, theme, keys, about, quit."""
+        """Undo, theme, messages, side panel, keys, about, quit."""
         stack, display = self._session.document.undo_stack, self._session.display
-        dragging = self._labels.dragging
+        dragging, shell = self._labels.dragging, self._shell
         return (
             Action("quit", "File", "Quit", ("Ctrl+Q",), "Close the window", self._quit),
             Action(
@@ -62,6 +62,16 @@ class ProgramFeature(Feature):
             Action(
                 "dark", "View", "Dark theme", ("Ctrl+D",), "Dark or light",
                 lambda: self.set_dark(not display.dark), checked=lambda: display.dark,
+            ),
+            Action(
+                "messages", "View", "Messages…", (), "What you were told since the window opened",
+                lambda: shell.show_messages(),
+            ),
+            Action(
+                "side_panel", "View", "Side panel", ("F9",),
+                "Show the panel at the side, or only its icons",
+                lambda: shell.fold_side(not shell.side_folded),
+                checked=lambda: not shell.side_folded,
             ),
             Action(
                 "keys", "Help", "Keys…", ("?", "F1"), "All keys, to be found and changed",

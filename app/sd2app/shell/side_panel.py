@@ -1,15 +1,33 @@
-"""Panels that share one place, one tab each, and the room that each of them gets."""
+"""Panels that share the column at the side: an icon for each, one open at a time."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Protocol, runtime_checkable
 
-from PySide6.QtCore import QObject, Qt
-from PySide6.QtWidgets import QScrollArea, QSplitter, QTabWidget, QWidget
+from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtGui import QColor, QKeyEvent, QPainter, QPaintEvent
+from PySide6.QtWidgets import (
+    QFrame,
+    QScrollArea,
+    QSplitter,
+    QStackedWidget,
+    QToolButton,
+    QWidget,
+)
 
 from sd2app.settings import Settings
+from sd2app.widgets.icons import draw_panel_icon, draw_ring
+from sd2app.widgets.layouts import STRETCH, column_of, row_of
+from sd2app.widgets.panel import outlined, title
 
-_SHOWN = "panel/shown"
+_SHOWN, _FOLDED = "panel/shown", "panel/folded"
+_RAIL_PX, _BUTTON_PX, _ICON_PX = 44, 36, 20
+_MOST_SHARE = 0.42
+"""Share of the window that a panel with a width of its own takes before the user says so."""
+_ANY_WIDTH_PX = (1 << 24) - 1  # Qt's largest
+_STEPS = {Qt.Key.Key_Up: -1, Qt.Key.Key_Down: 1}
 
 
 @runtime_checkable
@@ -20,38 +38,145 @@ class Paged(Protocol):
         """Show a page by its name."""
 
 
-class SidePanel(QTabWidget):
-    """Tabs by name; what does not fit is scrolled."""
+class SidePanel(QFrame):
+    """Open panel under its title, scrolled where it is high, beside a rail with an icon for each.
+
+    The icon of the open panel folds it away, so that only the rail is left; any icon opens it.
+    """
+
+    turned = Signal()
+    folded_changed = Signal()
 
     def __init__(self, pages: dict[str, QWidget]) -> None:
         super().__init__()
-        self.setDocumentMode(True)
-        self.tabBar().setDrawBase(False)
-        self.tabBar().setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self._names = list(pages)
         self._pages = dict(pages)
-        for name, page in pages.items():
-            self.addTab(_scrolled(page), name)
+        self._stack = QStackedWidget(self)
+        self._title = title("", "Open panel")
+        self._fold = outlined("»", "Fold the panel away", lambda: self.set_folded(True), self)
+        self._fold.setObjectName("")
+        self._fold.setAccessibleName("Fold the panel away")
+        self._icons = [RailButton(name, self._step, self) for name in pages]
+        for place, (icon, page) in enumerate(zip(self._icons, pages.values(), strict=True)):
+            icon.clicked.connect(partial(self._click, place))
+            self._stack.addWidget(_scrolled(page))
+        head = row_of((self._title, 1), self._fold, margins_px=(8, 4, 4, 0))
+        self._open = QWidget(self)
+        self._open.setLayout(column_of(head, (self._stack, 1), spacing_px=2, margins_px=0))
+        rail = QFrame(self)
+        rail.setObjectName("rail")
+        rail.setFixedWidth(_RAIL_PX)
+        rail.setLayout(column_of(*self._icons, STRETCH, spacing_px=4, margins_px=(4, 4, 3, 4)))
+        self.setLayout(row_of((self._open, 1), rail, spacing_px=0, margins_px=0))
+        self._turn(0)
 
     @property
     def shown(self) -> str:
         """Name of the panel in front."""
-        return self._names[self.currentIndex()]
+        return self._names[self._stack.currentIndex()]
 
-    def set_mark(self, name: str, mark: str) -> None:
-        """Say a word about a panel beside its name, or none."""
-        index = self._names.index(name)
-        text = f"{name} · {mark}" if mark else name
-        if text != self.tabText(index):
-            self.setTabText(index, text)
+    @property
+    def folded(self) -> bool:
+        """True while only the icons are there."""
+        return self._open.isHidden()
+
+    def set_folded(self, folded: bool) -> None:
+        """Fold the open panel away, or bring it back."""
+        if folded != self.folded:
+            self._open.setVisible(not folded)
+            self._icons[self._stack.currentIndex()].setChecked(not folded)
+            self.folded_changed.emit()
+
+    def set_mark(self, name: str, mark: str, share: float | None = None) -> None:
+        """Say a word about a panel with its name, and show how much is done as a ring."""
+        self._icons[self._names.index(name)].set_mark(mark, share)
 
     def bring_up(self, name: str, page: str = "") -> None:
         """Show a panel, and a page of one that has several."""
-        self.setCurrentIndex(self._names.index(name))
+        self.set_folded(False)
+        self._turn(self._names.index(name))
         if page:
             shown = self._pages[name]
             assert isinstance(shown, Paged)
             shown.turn_to(page)
+
+    def button(self, name: str) -> RailButton:
+        """Icon of a panel."""
+        return self._icons[self._names.index(name)]
+
+    def _click(self, place: int) -> None:
+        if place == self._stack.currentIndex():
+            self.set_folded(not self.folded)
+        else:
+            self.bring_up(self._names[place])
+
+    def _step(self, by: int) -> None:
+        """Open the panel whose icon is above or below, with the keyboard on that icon."""
+        place = min(max(self._stack.currentIndex() + by, 0), len(self._names) - 1)
+        self.bring_up(self._names[place])
+        self._icons[place].setFocus(Qt.FocusReason.TabFocusReason)
+
+    def _turn(self, place: int) -> None:
+        self._stack.setCurrentIndex(place)
+        self._title.setText(self._names[place])
+        for number, button in enumerate(self._icons):
+            button.setChecked(number == place and not self.folded)
+            # The open panel's icon stands for all of them in the order of the keyboard.
+            button.setFocusPolicy(
+                Qt.FocusPolicy.TabFocus if number == place else Qt.FocusPolicy.NoFocus
+            )
+        self.turned.emit()
+
+
+class RailButton(QToolButton):
+    """Icon of a panel, with a ring around it while something is being done there."""
+
+    def __init__(self, name: str, step: Callable[[int], None], parent: QWidget) -> None:
+        super().__init__(parent)
+        self.setObjectName("rail")
+        self.setCheckable(True)
+        self.setFixedSize(_BUTTON_PX, _BUTTON_PX)
+        self.name, self._step = name, step
+        self.mark = ""
+        self.share: float | None = None
+        self._say()
+
+    def set_mark(self, mark: str, share: float | None) -> None:
+        """Say how far what is being done is; nothing is being done without a word."""
+        if (mark, share) != (self.mark, self.share):
+            self.mark, self.share = mark, share
+            self._say()
+
+    def _say(self) -> None:
+        words = f"{self.name} · {self.mark}" if self.mark else self.name
+        self.setAccessibleName(words)
+        self.setToolTip(words)
+        self.update()
+
+    def nextCheckState(self) -> None:
+        """Leave it to the panel what is open after a click."""
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Go to the panels above and below with the arrows."""
+        if event.key() in _STEPS:
+            self._step(_STEPS[Qt.Key(event.key())])
+        else:
+            super().keyPressEvent(event)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Paint the icon in the colour of the text, and the ring."""
+        super().paintEvent(event)
+        palette = self.palette()
+        with QPainter(self) as painter:
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+            text = palette.text().color()
+            colour = text if self.isChecked() else palette.placeholderText().color()
+            if self.mark:
+                ground = QColor(text)
+                ground.setAlpha(50)
+                draw_ring(painter, self.rect(), self.share, palette.highlight().color(), ground)
+            painter.translate((self.width() - _ICON_PX) / 2, (self.height() - _ICON_PX) / 2)
+            draw_panel_icon(painter, self.name, colour)
 
 
 def _scrolled(widget: QWidget) -> QScrollArea:
@@ -66,7 +191,7 @@ def _scrolled(widget: QWidget) -> QScrollArea:
 
 
 class PageWidths(QObject):
-    """Remembers which panel is in front, and how wide the last part of a splitter is for it.
+    """Remembers which panel is open, if any, and how wide the last part of a splitter is for it.
 
     The panels are in that part; the one before gives or takes. ``usual`` has the widths in pixels
     of the panels with a width of their own, until the user chooses another.
@@ -78,28 +203,45 @@ class PageWidths(QObject):
         super().__init__(side)
         self._splitter, self._side, self._settings = splitter, side, settings
         self._usual = usual
+        self._otherwise_px = splitter.sizes()[-1]
         side.bring_up(settings.stored(_SHOWN, side.shown))
+        side.set_folded(settings.flag(_FOLDED, False))
         self._shown = side.shown
-        side.currentChanged.connect(self._turn)
+        self._widen()
+        side.turned.connect(self._turn)
+        side.folded_changed.connect(self._widen)
         splitter.splitterMoved.connect(self._remember)
 
     def remember(self) -> None:
-        """Keep which panel is in front."""
+        """Keep which panel is open, or that none is."""
         self._settings.set_value(_SHOWN, self._shown)
+        self._settings.set_value(_FOLDED, self._side.folded)
 
     def _remember(self) -> None:
-        self._settings.set_value(self._name(self._shown), self._splitter.sizes()[-1])
+        if not self._side.folded:
+            self._settings.set_value(self._name(self._shown), self._splitter.sizes()[-1])
 
     def _turn(self) -> None:
         if self._shown not in self._usual:
             # A wide panel's width counts where a hand chose it: a small window may have cut it.
             self._remember()
         before, self._shown = self._shown, self._side.shown
-        if self._name(before) == self._name(self._shown):
-            return
+        if self._name(before) != self._name(self._shown):
+            self._widen()
+
+    def _widen(self) -> None:
+        """Give the open panel the width that the user chose, or its usual one."""
         *others, beside, now_px = self._splitter.sizes()
-        usual_px = self._usual.get(self._shown, now_px)
+        all_px = sum(others) + beside + now_px
+        usual_px = self._usual.get(self._shown, 0)
+        usual_px = max(min(usual_px, round(_MOST_SHARE * all_px)), self._otherwise_px)
         wide_px = self._settings.stored(self._name(self._shown), usual_px)
+        part = self._splitter.widget(self._splitter.count() - 1)
+        assert part is not None
+        part.setMaximumWidth(_ANY_WIDTH_PX)
+        if self._side.folded:
+            wide_px = _RAIL_PX + 2  # with the frame's pixel on either side
+            part.setMaximumWidth(wide_px)
         self._splitter.setSizes([*others, beside + now_px - wide_px, wide_px])
 
     def _name(self, shown: str) -> str:

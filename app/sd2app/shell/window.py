@@ -22,12 +22,14 @@ from PySide6.QtWidgets import QAbstractButton, QApplication, QMainWindow, QWidge
 from sd2app.background.latest import LatestRunner
 from sd2app.settings import Settings
 from sd2app.shell.drop import DropOverlay
+from sd2app.shell.messages.model import MessagesModel
+from sd2app.shell.messages.views import MessageNotice, MessagesDialog
 from sd2app.shell.parts import Parts
 from sd2app.shell.side_panel import PageWidths, SidePanel
 from sd2app.shell.tab_order import controls_of
 from sd2app.widgets.inputs import claims
 from sd2app.widgets.layouts import column_of
-from sd2app.widgets.message_bar import MessageBar
+from sd2app.widgets.notices import Notice, NoticeStack
 from sd2app.widgets.panel import fill, panel, splitter
 from sd2app.widgets.theme import apply_theme
 
@@ -41,7 +43,8 @@ T = TypeVar("T")
 
 _LABELS_PX = 560
 """Room for the usual columns of the table of spans."""
-_PANELS = ("video", "scene", "sensor", "tracks", "spectrum")
+_PANELS = ("video", "scene", "tracks", "spectrum", "side")
+_SIDE_PX = 328
 
 
 class MainWindow(QMainWindow):
@@ -90,21 +93,30 @@ class MainWindow(QMainWindow):
     def _build_skeleton(self) -> None:
         self._top = splitter(
             Qt.Orientation.Horizontal,
-            [self._panels[name] for name in ("video", "scene", "sensor")],
-            (360, 620, 284),
+            [self._panels[name] for name in ("video", "scene")],
+            (340, 588),
         )
         self._bottom = splitter(
             Qt.Orientation.Horizontal,
             [self._panels["tracks"], self._panels["spectrum"]],
-            (992, 272),
+            (664, 264),
         )
         self._rows = splitter(Qt.Orientation.Vertical, [self._top, self._bottom], (264, 456))
         # Of the room of a larger window, maps take most.
         self._rows.setStretchFactor(0, 1)
         self._rows.setStretchFactor(1, 2)
-        self._column = column_of((self._rows, 1), spacing_px=4, margins_px=(8, 0, 8, 0))
+        self._column = column_of((self._rows, 1), spacing_px=4, margins_px=0)
+        beside = QWidget(self)
+        beside.setLayout(self._column)
+        # The side panel has the window's full height, from the menus to the last line.
+        self._across = splitter(
+            Qt.Orientation.Horizontal,
+            [beside, self._panels["side"]],
+            (936, _SIDE_PX),
+        )
+        self._lines = column_of((self._across, 1), spacing_px=4, margins_px=(8, 0, 8, 0))
         centre = QWidget(self)
-        centre.setLayout(self._column)
+        centre.setLayout(self._lines)
         self.setCentralWidget(centre)
         self._drops = DropOverlay(centre)
 
@@ -119,7 +131,7 @@ class MainWindow(QMainWindow):
         from sd2app.shell.status_bar import StatusLine
         from sd2app.shell.wiring import Features
 
-        self.messages = MessageBar(self)
+        self.messages = MessagesModel(self)
         self.session = s = build_session(self, self._settings)
         s.display.set_dark(is_dark(self._settings))
         self.features = Features(s, self, self._parts, self)
@@ -130,15 +142,23 @@ class MainWindow(QMainWindow):
             {name: fill for feature in self.features for name, fill in feature.menus().items()}
         )
         self._fill_panels()
-        bars = [*self.features.labels.bars(), *self.features.fit.bars()]
-        for place, bar in enumerate((self.messages, *bars)):
-            self._column.insertWidget(place, bar)
+        bars = self.features.fit.bars()
+        for bar in bars:
+            self._column.insertWidget(0, bar)
+        said = (notice for feature in self.features for notice in feature.notices())
+        notices = [notice for notice in said if isinstance(notice, Notice)]
+        for notice in notices:
+            notice.said.connect(self.messages.keep)
+        beside = self._column.parentWidget()
+        assert beside is not None
+        notices.insert(0, MessageNotice(self.messages))
+        self._notices = NoticeStack(beside, self._top, notices)
         accuracy, synthesis = self.features.accuracy.model, self.features.maps.synthesis
         transport = TransportBar(s.playback, self.features.labels.loop, self.action, self)
-        below = (transport, StatusLine(s, accuracy, synthesis, self))
-        for bar in below:
-            self._column.addWidget(bar)
-        self._regions = (self.messages, *bars, *self._panels.values(), *below)
+        status = StatusLine(s, accuracy, synthesis, self)
+        self._column.addWidget(transport)
+        self._lines.addWidget(status)
+        self._regions = (*notices, *bars, *self._panels.values(), transport, status)
         self._connect()
         self._restyle()
         self._refresh()
@@ -159,8 +179,8 @@ class MainWindow(QMainWindow):
         for name in ("video", "spectrum"):
             fill(self._panels[name], views[name])
         self.side = SidePanel(side_pages(self.features, views))
-        fill(self._panels["sensor"], self.side)
-        self._widths = PageWidths(self._top, self.side, {"Labels": _LABELS_PX}, self._settings)
+        fill(self._panels["side"], self.side)
+        self._widths = PageWidths(self._across, self.side, {"Labels": _LABELS_PX}, self._settings)
         stack, self.maps = track_stack(self.session, self.features, views)
         fill(self._panels["tracks"], stack)
 
@@ -174,6 +194,7 @@ class MainWindow(QMainWindow):
             for signal in feature.changing:
                 signal.connect(self._refresh)
         self.keys.changed.connect(self._refresh)
+        self.side.folded_changed.connect(self._refresh)
         s.document.opened.connect(self._show_document)
         for runs in (features.training.model, features.classify.training):
             runs.changed.connect(self._mark_training)
@@ -182,13 +203,14 @@ class MainWindow(QMainWindow):
         s.display.theme_changed.connect(self._restyle)
 
     def _mark_training(self) -> None:
-        training, classify = self.features.training.model, self.features.classify.training
-        self.side.set_mark("Train", training.mark or classify.mark)
+        runs = self.features.training.model, self.features.classify.training
+        marked = next((model for model in runs if model.mark), runs[0])
+        self.side.set_mark("Train", marked.mark, marked.share)
 
     # --- following the models -------------------------------------------------------------
 
     def _show_document(self) -> None:
-        self.messages.hide()
+        self.messages.dismiss()
         self.maps.refresh()
         self._refresh()
 
@@ -227,6 +249,12 @@ class MainWindow(QMainWindow):
         """Tell the user about something that went wrong."""
         self.messages.warn(text)
 
+    def show_messages(self) -> None:
+        """Show what was said so far."""
+        dialog = MessagesDialog(self.messages, self)
+        dialog.exec()
+        dialog.deleteLater()
+
     def attempt(self, work: Callable[[], T]) -> T | None:
         """Result of ``work``; an error is told to the user, and None returned."""
         from sd2core.errors import Sd2Error
@@ -240,6 +268,15 @@ class MainWindow(QMainWindow):
     def bring_up(self, panel: str, page: str = "") -> None:
         """Show a panel at the side, and a page of it."""
         self.side.bring_up(panel, page)
+
+    @property
+    def side_folded(self) -> bool:
+        """True while the panel at the side is folded away."""
+        return self.side.folded
+
+    def fold_side(self, folded: bool) -> None:
+        """Fold the panel at the side away, or bring it back."""
+        self.side.set_folded(folded)
 
     def save(self) -> bool:
         """Save the recording, asking where if need be; False where the user cancels."""

@@ -5,16 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
-from PySide6.QtCore import QEvent, QSignalBlocker, Qt, Signal
-from PySide6.QtGui import QAction, QFocusEvent, QKeyEvent, QWheelEvent
+from PySide6.QtCore import QEvent, QPoint, QSignalBlocker, Qt, QTimer, Signal
+from PySide6.QtGui import QAction, QFocusEvent, QKeyEvent, QValidator, QWheelEvent
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
     QDoubleSpinBox,
     QLineEdit,
     QToolButton,
+    QToolTip,
     QWidget,
 )
+
+from sd2core.errors import Sd2Error
+from sd2core.files.quantities import parse_quantity
 
 _STEP_KEYS = (
     Qt.Key.Key_Up,
@@ -35,12 +39,15 @@ _ENDING_KEYS = (Qt.Key.Key_Escape, Qt.Key.Key_Return, Qt.Key.Key_Enter)
 
 
 class NumberBox(QDoubleSpinBox):
-    """A number with its unit.
+    """A number with its unit; other units of its kind are understood, as in ``250cm``.
 
     Return takes what was typed, Escape takes it back; either gives the keyboard
     back to the window, so that Space and Ctrl+Z mean what they mean everywhere.
+    What is no such number, or out of range, is refused with a sentence below the box.
     The wheel changes it only while it has the keyboard.
     """
+
+    refused = Signal(str)  # why what was typed is not taken
 
     def __init__(
         self,
@@ -74,6 +81,40 @@ class NumberBox(QDoubleSpinBox):
             with QSignalBlocker(self):
                 self.setValue(value)
 
+    def mark(self, marked: bool) -> None:
+        """Show the number in the colour of warnings, or as usual."""
+        name = "marked" if marked else ""
+        if name != self.objectName():
+            self.setObjectName(name)
+            self.style().unpolish(self)
+            self.style().polish(self)
+
+    def valueFromText(self, text: str) -> float:
+        """Number that was typed, in the box's unit."""
+        # The box puts its own unit behind whatever is typed.
+        return parse_quantity(text.removesuffix(self.suffix()), self.suffix().strip())
+
+    def validate(self, text: str, position: int) -> tuple[QValidator.State, str, int]:
+        """Let anything be typed; only a number within the range is taken."""
+        kinds = QValidator.State
+        kind = kinds.Intermediate if self._refusal(text) else kinds.Acceptable
+        return kind, text, position
+
+    def _refusal(self, text: str) -> str:
+        """Reason why a text cannot be taken, empty if it can."""
+        try:
+            value = self.valueFromText(text)
+        except Sd2Error as error:
+            return str(error)
+        low, high = self.minimum(), self.maximum()
+        slack = 0.5 * 10.0 ** -self.decimals()
+        if low - slack <= value <= high + slack:
+            return ""
+        ends = (f"{self.textFromValue(end)}{self.suffix()}" for end in (low, high))
+        return str(
+            Sd2Error(f"“{text.removesuffix(self.suffix())}” is out of range", " to ".join(ends))
+        )
+
     def event(self, event: QEvent) -> bool:
         """Claim the keys that step or end the editing."""
         return claims(event, _STEP_KEYS) or super().event(event)
@@ -87,9 +128,27 @@ class NumberBox(QDoubleSpinBox):
             )
             self.clearFocus()
             return
-        super().keyPressEvent(event)
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+            if refusal := self._refusal(self.lineEdit().text()):
+                self._refuse(refusal)
+                return
+            super().keyPressEvent(event)
             self.clearFocus()
+            return
+        super().keyPressEvent(event)
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:
+        """Take what was typed, or go back to the number before it and say why."""
+        refusal = self._refusal(self.lineEdit().text())
+        super().focusOutEvent(event)
+        if refusal:
+            self._refuse(refusal)
+
+    def _refuse(self, refusal: str) -> None:
+        self.refused.emit(refusal)
+        place = self.mapToGlobal(QPoint(0, self.height()))
+        # Later, since the change of the focus would hide it.
+        QTimer.singleShot(0, self, lambda: QToolTip.showText(place, refusal, self))
 
     def wheelEvent(self, event: QWheelEvent) -> None:
         """Scroll what is behind it unless it has the keyboard."""

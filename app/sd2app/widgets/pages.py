@@ -24,7 +24,9 @@ class InnerPages(QWidget):
 
     turned = Signal(int)  # number of the page that is shown now
 
-    def __init__(self, pages: Sequence[InnerPage], beside: QWidget | None = None) -> None:
+    def __init__(
+        self, pages: Sequence[InnerPage], beside: QWidget | None = None, inset_px: int = 0
+    ) -> None:
         super().__init__()
         self._names = [page.name for page in pages]
         self._pages = QStackedWidget(self)
@@ -41,6 +43,7 @@ class InnerPages(QWidget):
         top = row_of(
             *self._buttons.buttons(), STRETCH if beside is None else (beside, 1), spacing_px=6
         )
+        top.setContentsMargins(inset_px, 0, inset_px, 0)
         self.setLayout(column_of(top, (self._pages, 1), spacing_px=6, margins_px=0))
 
     @property
@@ -82,7 +85,6 @@ class InnerPages(QWidget):
 
 def paged_panel(*pages: InnerPage) -> InnerPages:
     """A panel at the side that has pages of its own."""
-    panel = InnerPages(pages)
+    panel = InnerPages(pages, inset_px=8)
     panel.setObjectName("page")
-    panel.setContentsMargins(0, 6, 0, 0)
     return panel

@@ -56,6 +56,11 @@ def _style_sheet(c: Palette) -> str:
     QSplitter::handle {{ background: {c.window}; }}
     QToolTip {{ border: 1px solid {c.border}; padding: 4px; }}
     QFrame#panel {{ background: {c.panel}; border: 1px solid {c.border}; border-radius: 6px; }}
+    QDoubleSpinBox#marked {{ color: {c.warning}; font-weight: 600; }}
+    QFrame#notice {{
+        background: {c.panel}; border: 1px solid {c.muted}; border-left: 3px solid {c.accent};
+        border-radius: 6px;
+    }}
     QLabel#title {{ font-weight: 600; }}
     QLabel#muted, QLabel#unit {{ color: {c.muted}; }}
     QLabel#warning {{ color: {c.warning}; }}
@@ -79,14 +84,8 @@ def _style_sheet(c: Palette) -> str:
     QToolButton#fold:checked {{ background: transparent; border-color: transparent; }}
     QToolButton#preset {{ border-color: {c.border}; padding: 3px 0; }}
     QToolButton#preset:checked {{ border-color: {c.accent}; background: {c.well}; }}
-    QTabWidget::pane {{ border: none; border-top: 1px solid {c.border}; }}
-    QTabBar {{ background: transparent; }}
-    QTabBar::tab {{
-        color: {c.muted}; background: transparent; border: none;
-        border-bottom: 2px solid transparent; padding: 3px 9px; font-weight: 600;
-    }}
-    QTabBar::tab:selected {{ color: {c.text}; border-bottom-color: {c.accent}; }}
-    QTabBar::tab:hover, QTabBar::tab:focus {{ color: {c.text}; background: {c.well}; }}
+    QFrame#rail {{ border: none; border-left: 1px solid {c.border}; border-radius: 0; }}
+    QToolButton#rail {{ border-radius: 6px; }}
     QToolButton:focus {{ border-color: {c.accent}; }}
     QTableView {{ border: 1px solid {c.border}; border-radius: 4px; }}
     QTableView:focus {{ border-color: {c.accent}; }}

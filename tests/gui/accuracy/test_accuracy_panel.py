@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from fake_accuracy import COUNTING, EXACT, FACING, WAVES, measurement_of, result_of, stale
 from PySide6.QtCore import QPoint, Qt
-from PySide6.QtWidgets import QLabel, QTabBar, QToolButton, QToolTip
+from PySide6.QtWidgets import QLabel, QToolButton, QToolTip
 from window_models import models_of
 
 from sd2app.accuracy.panel import AccuracyPanel, ReasonList, ToleranceRow
@@ -62,10 +62,9 @@ def done(window):
     return c.synthesis.complete and not c.synthesis.busy and not c.jobs.jobs
 
 
-def test_a_tab_and_a_key_bring_the_panel_up(window, qtbot):
-    tabs = window.side.findChild(QTabBar)
+def test_an_icon_and_a_key_bring_the_panel_up(window, qtbot):
     assert window.side.shown == "Sensor"
-    qtbot.mouseClick(tabs, Qt.MouseButton.LeftButton, pos=tabs.tabRect(1).center())
+    qtbot.mouseClick(window.side.button("Accuracy"), Qt.MouseButton.LeftButton)
     assert window.side.shown == "Accuracy"
     qtbot.keyClick(window, Qt.Key.Key_S)
     assert window.side.shown == "Sensor"

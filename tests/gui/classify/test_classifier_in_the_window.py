@@ -351,7 +351,7 @@ def test_stopped_by_a_click(trainable, qtbot):
     training._command = (*training._command, "--step-s", "0.5")
     press(panel, "Start training", qtbot)
     qtbot.waitUntil(lambda: training.run.history.steps_done >= 1, timeout=20_000)
-    assert trainable.side.tabText(2).startswith("Train · ")
+    assert trainable.side.button("Train").toolTip().startswith("Train · ")
     press(panel, "Stop", qtbot)
     qtbot.waitUntil(lambda: not training.run.under_way, timeout=20_000)
     assert training.run.phase == "stopped"

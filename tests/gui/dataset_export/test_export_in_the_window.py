@@ -30,7 +30,7 @@ FAKE = Path(__file__).resolve().parents[2] / "fake_export.py"
 @pytest.fixture
 def dialog(window, qtbot):
     """The dialog, opened by its key, with the counts of the small recording."""
-    window.messages.hide()
+    window.messages.dismiss()
     qtbot.keyClick(window, Qt.Key.Key_D, Qt.KeyboardModifier.ControlModifier
                    | Qt.KeyboardModifier.ShiftModifier)  # fmt: skip
     found = QApplication.activeModalWidget()

@@ -20,7 +20,7 @@ from PySide6.QtWidgets import (
 )
 from window_models import models_of
 
-from sd2app.fit.bar import FitBar
+from sd2app.fit.bar import FitBar, FitOffer
 from sd2app.fit.dialog import NewFromVideoDialog
 from sd2app.fit.request import FitRequest, Person
 from sd2app.fit.setup import FitSetupModel
@@ -78,9 +78,9 @@ def show(window, qtbot, path: Path) -> None:
 
 
 def click(window, qtbot, text: str) -> None:
-    bar = window.findChild(FitBar)
-    button = next(b for b in bar.findChildren(QToolButton) if b.text() == text)
-    assert button.isVisible()
+    parts = window.findChild(FitBar), window.findChild(FitOffer)
+    buttons = [button for part in parts for button in part.findChildren(QToolButton)]
+    (button,) = (one for one in buttons if one.text() == text and one.isVisible())
     qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
 
 
@@ -88,7 +88,8 @@ def test_from_the_offer_to_the_recording(made, qtbot, video) -> None:
     window = made("--body")
     show(window, qtbot, video)
     bar = window.findChild(FitBar)
-    assert bar.isVisible()
+    assert not bar.isVisible()
+    assert window.findChild(FitOffer).isVisible()
     asked: list[FitRequest] = []
 
     def fill(dialog: NewFromVideoDialog) -> None:
@@ -271,14 +272,14 @@ def test_the_key_asks_for_a_video(made, qtbot, monkeypatch) -> None:
 
 def test_no_offer_where_there_is_a_mesh_or_it_was_declined(made, qtbot, video, small_recording):
     window = made()
-    bar = window.findChild(FitBar)
-    assert not bar.isVisible()
+    offer = window.findChild(FitOffer)
+    assert not offer.isVisible()
     show(window, qtbot, small_recording)
-    assert not bar.isVisible()
+    assert not offer.isVisible()
     show(window, qtbot, video)
-    assert bar.isVisible()
+    assert offer.isVisible()
     click(window, qtbot, "✕")
-    assert not bar.isVisible()
+    assert not offer.isVisible()
 
 
 def test_the_skeleton_has_two_equal_sides() -> None:

@@ -33,7 +33,7 @@ def cut(window, qtbot, which: str, *left_out: str) -> None:
         button = next(one for one in dialog.findChildren(QPushButton) if "folder" in one.text())
         qtbot.mouseClick(button, LEFT)
 
-    window.messages.hide()
+    window.messages.dismiss()
     once_asked(CutOutDialog, work)
     window.action("cut_out").trigger()
     qtbot.waitUntil(lambda: bool(window.messages.text), timeout=30_000)

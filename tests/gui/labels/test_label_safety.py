@@ -17,7 +17,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QToolButton
 from window_models import models_of
 
-from sd2app.labels.recovery import LabelBar, RecoverLabelsDialog
+from sd2app.labels.recovery import LabelNotice, RecoverLabelsDialog
 from sd2app.labels.timeline import ROW_PX, LabelTimeline
 from sd2core.labels.recovery import RecoveryPlace, offers_in, recovery_folder
 from sd2core.labels.spans import Span
@@ -74,8 +74,8 @@ def mark(window, qtbot, first: int, stop: int) -> None:
         qtbot.keyClick(window, Qt.Key.Key_1)
 
 
-def bar(window) -> LabelBar:
-    return window.findChild(LabelBar)
+def bar(window) -> LabelNotice:
+    return window.findChild(LabelNotice)
 
 
 def press(window, qtbot, text: str) -> None:

@@ -214,7 +214,7 @@ def test_marks_go_back_by_the_reaction_time_while_it_plays(labelled, qtbot) -> N
 
 def test_a_region_is_selected_looped_and_its_edges_dragged(labelled) -> None:
     c, view = models_of(labelled), labelled.maps.synthetic
-    QTest.mouseClick(view, LEFT, NONE, on_map(view, 1.5))
+    QTest.mouseClick(view, LEFT, NONE, on_map(view, 1.515))
     assert (chosen(labelled), c.playback.frame) == (["back"], 45)
     QTest.mouseClick(view, LEFT, NONE, on_map(view, 0.915))
     assert (chosen(labelled), c.playback.frame) == (["back"], 27)
@@ -223,7 +223,7 @@ def test_a_region_is_selected_looped_and_its_edges_dragged(labelled) -> None:
     assert c.playback.frame == 27
     assert steps(labelled) == ["Move start of span"]
     # Only what is selected is held: elsewhere a drag still seeks.
-    pull(view, on_map(view, 0.8), on_map(view, 0.6))
+    pull(view, on_map(view, 0.8), on_map(view, 0.615))
     assert spans(labelled)[0] == THERE
     assert c.playback.frame == 18
     assert chosen(labelled) == ["back"]

@@ -156,7 +156,8 @@ def test_the_overview_pans_and_zooms(window, qtbot):
 
 def test_the_ruler_seeks(window, qtbot):
     ruler = window.findChild(TimeRuler)
-    qtbot.mouseClick(ruler, Qt.MouseButton.LeftButton, pos=QPoint(round(ruler.scale.x_of(1.5)), 12))
+    middle_px = round(ruler.scale.x_of(1.5 + 0.5 / 30))  # of a frame
+    qtbot.mouseClick(ruler, Qt.MouseButton.LeftButton, pos=QPoint(middle_px, 12))
     assert models_of(window).playback.time_s == pytest.approx(1.5, abs=1 / 30)
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from answering import answer
 from PySide6.QtCore import QCoreApplication, QEvent, Qt
-from PySide6.QtWidgets import QTabBar, QToolButton
+from PySide6.QtWidgets import QToolButton
 from training_pairs import write_pairs
 from window_models import models_of
 
@@ -69,7 +69,7 @@ def click(window: MainWindow, qtbot, text: str) -> None:
 def test_a_run_outlives_its_window_and_is_found_by_the_next(made, qtbot, tmp_path) -> None:
     settings = Settings.forgetful()
     window = made("--rest-at", 1, settings=settings)
-    tabs = window.side.findChild(QTabBar)
+    icon = window.side.button("Train")
     qtbot.keyClick(window, Qt.Key.Key_T, Qt.KeyboardModifier.ShiftModifier)
     assert window.side.shown == "Train"
     training = models_of(window).training
@@ -77,7 +77,7 @@ def test_a_run_outlives_its_window_and_is_found_by_the_next(made, qtbot, tmp_pat
     training.setup.set_value("epochs", 4)
     qtbot.waitUntil(lambda: not training.setup.problem)
     click(window, qtbot, "Start training")
-    qtbot.waitUntil(lambda: tabs.tabText(2) == "Train · 25 %", timeout=15_000)
+    qtbot.waitUntil(lambda: icon.toolTip() == "Train · 25 %", timeout=15_000)
     path = training.run.folder.path
     # Beside it the window is used as ever.
     qtbot.keyClick(window, Qt.Key.Key_S)
@@ -97,7 +97,7 @@ def test_a_run_outlives_its_window_and_is_found_by_the_next(made, qtbot, tmp_pat
     assert training.run.history.best.epoch == 1
     training.tell("stop")
     qtbot.waitUntil(lambda: training.run.phase == "stopped", timeout=15_000)
-    assert again.side.findChild(QTabBar).tabText(2) == "Train"
+    assert again.side.button("Train").accessibleName() == "Train"
 
 
 def test_a_trained_model_denoises_the_recording(

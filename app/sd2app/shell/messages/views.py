@@ -1,0 +1,80 @@
+"""The messages of the window: as a notice, and as a list of all there were."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QTimer
+from PySide6.QtWidgets import QDialog, QDialogButtonBox, QPlainTextEdit, QWidget
+
+from sd2app.shell.messages.model import Message, MessagesModel
+from sd2app.widgets.layouts import column_of
+from sd2app.widgets.notices import Notice
+from sd2app.widgets.text import clock_text
+
+_REMARK_MS = 12_000
+_MOST_LINES = 6
+_NOTHING = "Nothing was said yet."
+
+
+class MessageNotice(Notice):
+    """What is to be read now: failures until they are closed, a remark for a while."""
+
+    def __init__(self, messages: MessagesModel) -> None:
+        super().__init__("Message", close=messages.dismiss)
+        self._messages = messages
+        self._timer = QTimer(self)
+        self._timer.setSingleShot(True)
+        self._timer.timeout.connect(self._time_out)
+        messages.changed.connect(self._refresh)
+
+    def _refresh(self) -> None:
+        messages = self._messages
+        lines, several = messages.lines, len(messages.lines) > 1 and messages.failed
+        shown = list(lines[-_MOST_LINES:])
+        if several:
+            shown = [f"• {line}" for line in shown]
+        if len(lines) > len(shown):
+            shown.append(f"{len(lines) - len(shown)} more: View → Messages")
+        head = f"{len(lines)} things went wrong" if several else ""
+        if (head, "\n".join(shown)) == self._words:
+            return
+        self._closed = ("", "")  # the same may be said again
+        self.show_words(head, "\n".join(shown), "warning" if messages.failed else "plain")
+        self._timer.stop()
+        if lines and not messages.failed:
+            self._timer.start(_REMARK_MS)
+
+    def _time_out(self) -> None:
+        if self.underMouse():
+            self._timer.start(_REMARK_MS)  # it is being read
+        else:
+            self._messages.dismiss()
+
+
+class MessagesDialog(QDialog):
+    """All messages since the window was opened, the newest first, to be read and copied."""
+
+    def __init__(self, messages: MessagesModel, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Messages")
+        self.resize(640, 420)
+        self._messages = messages
+        self.list = QPlainTextEdit(self)
+        self.list.setReadOnly(True)
+        self.list.setAccessibleName("Messages, the newest first")
+        self.list.setPlaceholderText(_NOTHING)
+        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close, self)
+        buttons.addButton("Clear", QDialogButtonBox.ButtonRole.ResetRole).clicked.connect(
+            messages.forget
+        )
+        buttons.rejected.connect(self.reject)
+        self.setLayout(column_of(self.list, buttons))
+        messages.changed.connect(self._refresh)
+        self._refresh()
+
+    def _refresh(self) -> None:
+        self.list.setPlainText("\n".join(map(_line, reversed(self._messages.history))))
+
+
+def _line(message: Message) -> str:
+    mark = "Failed: " if message.failed else ""
+    return f"{clock_text(message.time_unix_s)}   {mark}{message.text}"

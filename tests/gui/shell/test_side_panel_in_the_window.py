@@ -1,0 +1,139 @@
+"""The column of panels at the side, by real keys and a real mouse."""
+
+from __future__ import annotations
+
+import pytest
+from kept_window import close_window
+from PySide6.QtCore import QPoint, QRect, Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QSplitterHandle, QWidget
+
+from sd2app.settings import Settings
+from sd2app.shell.parts import Parts
+from sd2app.shell.status_bar import StatusLine
+from sd2app.shell.window import MainWindow
+
+LEFT = Qt.MouseButton.LeftButton
+NAMES = ("Sensor", "Accuracy", "Train", "Labels", "Agree")
+
+
+def place_of(widget: QWidget) -> QRect:
+    """Place of a widget on the screen."""
+    return QRect(widget.mapToGlobal(QPoint(0, 0)), widget.size())
+
+
+def drag(handle: QSplitterHandle, by_px: int) -> None:
+    """Drag the handle of a splitter sideways."""
+    start = handle.rect().center()
+    QTest.mousePress(handle, LEFT, pos=start)
+    # The handle follows, so that each way is from where it is now.
+    QTest.mouseMove(handle, start + QPoint(by_px, 0))
+    QTest.mouseRelease(handle, LEFT, pos=start)
+
+
+@pytest.fixture
+def windows(qtbot, compiled_kernels, fake, fake_models, fake_classes):
+    """Makes windows one after the other on the same settings."""
+    settings = Settings.forgetful()
+    made: list[MainWindow] = []
+
+    def make(width_px: int = 1280, height_px: int = 720) -> MainWindow:
+        if made:
+            close_window(made[-1])
+        parts = Parts(
+            accuracy=fake, denoisers=fake_models.library, classifiers=fake_classes.library
+        )
+        window = MainWindow(settings, parts)
+        window.resize(width_px, height_px)
+        window.show()
+        window.populate()
+        qtbot.waitUntil(lambda: window.settled, timeout=120_000)
+        window.resize(width_px, height_px)
+        made.append(window)
+        return window
+
+    yield make
+    fake.gate.set()
+    fake_classes.gate.set()
+    close_window(made[-1])
+
+
+@pytest.mark.parametrize("size", [(960, 640), (1280, 720), (2560, 1440)])
+def test_it_stands_beside_scene_and_maps_and_shows_every_icon(windows, size) -> None:
+    window = windows(*size)
+    side, line = place_of(window.side), place_of(window.findChild(StatusLine))
+    assert (
+        side.top() <= window.menuBar().mapToGlobal(QPoint(0, 0)).y() + window.menuBar().height() + 8
+    )
+    assert line.top() - 12 <= side.bottom() <= line.top()
+    window.side.set_mark("Train", "0 %", 0.0)
+    QApplication.processEvents()
+    for name in NAMES:
+        icon = place_of(window.side.button(name))
+        assert side.contains(icon), name
+        assert icon.width() >= 32
+    for other in ("tracks", "scene"):
+        assert place_of(window._panels[other]).right() < side.left()
+
+
+def test_icons_have_names_tips_and_a_ring_for_what_is_under_way(windows) -> None:
+    side = windows().side
+    for name in NAMES:
+        assert (side.button(name).accessibleName(), side.button(name).toolTip()) == (name, name)
+    icon = side.button("Train")
+    before, size = icon.grab().toImage(), icon.size()
+    side.set_mark("Train", "25 %", 0.25)
+    assert icon.size() == size
+    assert icon.toolTip() == icon.accessibleName() == "Train · 25 %"
+    quarter = icon.grab().toImage()
+    side.set_mark("Train", "75 %", 0.75)
+    assert before != quarter != icon.grab().toImage()
+    side.set_mark("Train", "")
+    assert icon.grab().toImage() == before
+
+
+def test_arrows_go_from_panel_to_panel(windows) -> None:
+    window = windows()
+    side = window.side
+    side.button("Sensor").setFocus(Qt.FocusReason.TabFocusReason)
+    for name in (*NAMES[1:], NAMES[-1]):
+        QTest.keyClick(QApplication.focusWidget(), Qt.Key.Key_Down)
+        assert side.shown == name
+        assert side._title.text() == name
+        assert QApplication.focusWidget() is side.button(name)
+    QTest.keyClick(QApplication.focusWidget(), Qt.Key.Key_Up)
+    assert side.shown == NAMES[-2]
+
+
+def test_its_own_icon_or_a_key_folds_it_and_another_opens_it(windows) -> None:
+    window = windows()
+    side, scene = window.side, window._panels["scene"]
+    wide_px, scene_px = side.width(), scene.width()
+    QTest.mouseClick(side.button("Sensor"), LEFT)
+    assert side.folded
+    assert not window.action("side_panel").isChecked()
+    assert side.width() < 60
+    assert scene.width() > scene_px + 100
+    assert all(side.rect().contains(side.button(name).geometry()) for name in NAMES)
+    QTest.mouseClick(side.button("Accuracy"), LEFT)
+    assert (side.folded, side.shown, side.width()) == (False, "Accuracy", wide_px)
+    QTest.keyClick(window, Qt.Key.Key_F9)
+    assert side.folded
+    QTest.keyClick(window, Qt.Key.Key_S)
+    assert (side.folded, side.shown, side.width()) == (False, "Sensor", wide_px)
+
+
+def test_the_next_window_has_the_width_that_was_chosen(windows) -> None:
+    window = windows()
+    before_px = window.side.width()
+    drag(window._across.handle(1), -90)
+    chosen_px = window.side.width()
+    assert chosen_px == pytest.approx(before_px + 90, abs=2)
+    again = windows()
+    assert again.side.width() == chosen_px
+    QTest.keyClick(again, Qt.Key.Key_F9)
+    folded = windows()
+    assert folded.side.folded
+    assert folded.side.width() < 60
+    QTest.keyClick(folded, Qt.Key.Key_F9)
+    assert folded.side.width() == chosen_px
