@@ -114,7 +114,7 @@ def offer(
     tracks = labels.tracks
     if TRACK not in {track.name for track in tracks}:
         tracks = (*tracks, LabelTrack(TRACK, "free"))
-    after = _tidied(replace(labels, tracks=tracks, spans=(*kept, *made)))
+    after = tidied(replace(labels, tracks=tracks, spans=(*kept, *made)))
     name = f"Suggest {len(made)} span{'s' * (len(made) != 1)}"
     return Edit(name, labels if after == labels else after, tuple(span.id for span in made))
 
@@ -130,11 +130,13 @@ def take(
 ) -> Edit:
     """Accept suggestions on a track and with a label.
 
-    Those for which the track has no free time stay suggestions. ``keep_known`` keeps the label of
-    suggestions that name a gesture or a label of the set. Raises Sd2Error when one is no
-    suggestion, or none has free time.
+    A track that is not there is added. Those for which it has no free time stay suggestions.
+    ``keep_known`` keeps the label of suggestions that name a gesture or a label of the set. Raises
+    Sd2Error when one is no suggestion, or none has free time.
     """
     after, done, refusal = labels, [], None
+    if track not in {one.name for one in labels.tracks}:
+        after = replace(labels, tracks=(LabelTrack(track), *labels.tracks))
     for one in ids:
         span = labels.span(one)
         try:
@@ -148,16 +150,16 @@ def take(
             after = relabel(after, [one], label).labels
     if refusal is not None and not done:
         raise refusal
-    return Edit(_name("Accept", len(done)), _tidied(after), tuple(done))
+    return Edit(_name("Accept", len(done)), tidied(after), tuple(done))
 
 
 def reject(labels: Labels, ids: Iterable[int]) -> Edit:
     """Delete suggestions, and nothing else by mistake."""
     gone = {span.id for span in _suggestions(labels, ids)}
-    return Edit(_name("Reject", len(gone)), _tidied(labels.with_spans(without=gone)))
+    return Edit(_name("Reject", len(gone)), tidied(labels.with_spans(without=gone)))
 
 
-def _tidied(labels: Labels) -> Labels:
+def tidied(labels: Labels) -> Labels:
     """Remove the track of suggestions where it is empty."""
     if labels.of_track(TRACK):
         return labels

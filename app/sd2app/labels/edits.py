@@ -39,6 +39,12 @@ class _Step(QUndoCommand):
         self._become(self.text(), self._before, self._after)
 
 
+def _deleted(labels: Labels, ids: Iterable[int]) -> Edit:
+    """Delete spans; the track of suggestions goes with the last of them."""
+    done = edits.delete(labels, ids)
+    return Edit(done.name, field_edits.tidied(done.labels))
+
+
 class LabelEdits(QObject):
     """Edits of labels by keys and menus.
 
@@ -105,7 +111,7 @@ class LabelEdits(QObject):
     def delete(self) -> None:
         """Delete the selected spans."""
         if ids := self._ids():
-            self.apply(lambda labels, base: edits.delete(labels, ids))
+            self.apply(lambda labels, _: _deleted(labels, ids))
 
     def merge(self) -> None:
         """Merge the selected spans."""
@@ -159,8 +165,9 @@ class LabelEdits(QObject):
 
     def step(self, towards: Literal[-1, 1]) -> None:
         """Select the next span of the track, or the one before, and go to its start."""
-        spans = self.labels.labels.of_track(self.labels.track) if self.labels.track else ()
         chosen = self.labels.selected
+        track = chosen[0].track if chosen else self.labels.track
+        spans = self.labels.labels.of_track(track) if track else ()
         from_s = chosen[0].start_s if chosen else self._now_s
         if towards > 0:
             found = next((one for one in spans if one.start_s > from_s), None)
@@ -181,7 +188,8 @@ class LabelEdits(QObject):
         return self.playback.timebase.time_of(self.playback.frame)
 
     def _candidates(self) -> Iterable[Span]:
-        return self.labels.selected or self.labels.labels.of_track(self.labels.track)
+        track = self.labels.track
+        return self.labels.selected or (self.labels.labels.of_track(track) if track else ())
 
     def _ids(self) -> tuple[int, ...]:
         return tuple(span.id for span in self.labels.selected)

@@ -22,10 +22,11 @@ from sd2app.labels.model import LabelsModel
 from sd2app.labels.painting import map_overlay, strip_overlay
 from sd2app.labels.panel import LabelsPanel
 from sd2app.labels.recovery import LabelNotice, recover
-from sd2app.labels.timeline import LabelArea, LabelTimeline
+from sd2app.labels.timeline import LabelArea, LabelTimeline, TargetLine
 from sd2app.labels.tracks import LabelTracks, TrackMenu
 from sd2app.session.session import Session
 from sd2app.widgets.canvas import TimePlot
+from sd2app.widgets.layouts import pane
 from sd2app.widgets.notices import Notice
 
 
@@ -99,7 +100,7 @@ class LabelsFeature(Feature):
             return bool(labels.track)
 
         def has_tracks() -> bool:
-            return len(labels.labels.tracks) > 1
+            return len(labels.targets) > 1
 
         def can_put() -> bool:
             return some_selected() and has_tracks()
@@ -329,7 +330,8 @@ class LabelsFeature(Feature):
         panel = LabelsPanel(s, self.edits, shell)
         timeline = LabelTimeline(s, self.edits, self.dragging, self.loop)
         self._offer_places(timeline)
-        return {"Labels": panel, "labels": LabelArea(timeline, self.model)}
+        area = LabelArea(timeline, self.model)
+        return {"Labels": panel, "labels": pane(TargetLine(self.model), area)}
 
     def notices(self) -> Sequence[Notice]:
         """Labels that were not saved, and who else edits."""

@@ -13,6 +13,9 @@ OFFERED_MS = (0, 100, 150, 200, 250, 300, 400)
 _NAME = "reaction_ms"
 
 
+_NO_TRACK = "There is no track to mark on. Add one: Labels → Tracks → Add track…"
+
+
 class Reaction:
     """The user's reaction time, kept in the settings; marks are put back by it."""
 
@@ -50,7 +53,10 @@ class LabelMarking:
         On an exclusive track this also ends other marks.
         """
         track = self._labels.track
-        if not track or self._edits.refused():
+        if self._edits.refused():
+            return
+        if not track:
+            self._edits.failed.emit(_NO_TRACK)
             return
         self._labels.set_label(label)
         seen_s = self._seen_s(track)

@@ -9,7 +9,8 @@ import numpy as np
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.labels.arrays import UNKNOWN_COLOUR, SpanArrays
-from sd2core.labels.spans import Labels, Span
+from sd2core.labels.spans import Labels, LabelTrack, Span
+from sd2core.labels.suggest import TRACK as SUGGESTIONS
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ class LabelsModel(QObject):
         super().__init__(parent)
         self.labels = Labels()
         self.arrays = SpanArrays.of(self.labels)  # the spans
-        self.track = self.labels.tracks[0].name  # for new spans; empty without any track
+        self.track = self.labels.tracks[0].name  # for new spans; empty without one
         self.label = self.labels.label_set.labels[0].name  # for drawn spans: the one used last
         self.marks: tuple[Mark, ...] = ()  # in progress, in the order of their starts
         self.selected_ids: frozenset[int] = frozenset()
@@ -65,6 +66,11 @@ class LabelsModel(QObject):
         known = self.labels.label_set.find(label)
         return known.colour if known is not None else UNKNOWN_COLOUR
 
+    @property
+    def targets(self) -> tuple[LabelTrack, ...]:
+        """Tracks that new spans can go to: all but that of the suggestions."""
+        return tuple(one for one in self.labels.tracks if one.name != SUGGESTIONS)
+
     # --- changing -------------------------------------------------------------------------
 
     def open(self, labels: Labels) -> None:
@@ -87,12 +93,15 @@ class LabelsModel(QObject):
             self.selection_changed.emit()
 
     def select(self, ids: Iterable[int]) -> None:
-        """Select these spans and no others; the track of the first is the one for new spans."""
+        """Select these spans and no others.
+
+        The track of the first is the one for new spans, unless it is that of the suggestions.
+        """
         wanted = frozenset(ids) & frozenset(self.arrays.ids.tolist())
         if wanted == self.selected_ids:
             return
         self.selected_ids = wanted
-        if wanted:
+        if wanted and self.selected[0].track != SUGGESTIONS:
             self.track = self.selected[0].track
         self.selection_changed.emit()
 
@@ -113,8 +122,8 @@ class LabelsModel(QObject):
         )
 
     def set_track(self, name: str) -> None:
-        """Choose the track for new spans."""
-        if name != self.track:
+        """Choose the track for new spans; that of the suggestions is none."""
+        if name not in (self.track, SUGGESTIONS):
             self.track = self.labels.track(name).name
             self.selection_changed.emit()
 
@@ -134,7 +143,7 @@ class LabelsModel(QObject):
     def _assign(self, labels: Labels) -> None:
         self.labels = labels
         self.arrays = SpanArrays.of(labels)
-        names = [track.name for track in labels.tracks]
+        names = [track.name for track in self.targets]
         left = tuple(mark for mark in self.marks if mark.track in names)
         dropped, self.marks = left != self.marks, left
         if self.track not in names:

@@ -180,20 +180,24 @@ class SpanTable(CellTable):
             self._mirroring = False
 
     def focusInEvent(self, event: QFocusEvent) -> None:
-        """Make a row current: the selected one, else that of the frame on screen."""
-        super().focusInEvent(event)
-        if self.currentIndex().isValid() or not self._model.spans:
-            return
+        """Make a row current, which is no wish to go there: the selected one, else the nearest."""
+        self._mirroring = True
+        try:
+            if self._model.spans and not self.currentIndex().isValid():
+                self._make_nearest_current()
+            super().focusInEvent(event)
+        finally:
+            self._mirroring = False
+
+    def _make_nearest_current(self) -> None:
         now_s = self._playback.time_s
         nearest = min(
             range(len(self._model.spans)),
             key=lambda row: abs(self._model.spans[row].start_s - now_s),
         )
-        self._mirroring = True
         self.selectionModel().setCurrentIndex(
             self._model.index(nearest, 0), QItemSelectionModel.SelectionFlag.NoUpdate
         )
-        self._mirroring = False
 
     # --- the rest -------------------------------------------------------------------------
 

@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple
 
 from PySide6.QtCore import QEvent, QObject, QRectF, QSize, Qt, QTimer
 from PySide6.QtGui import QColor, QMouseEvent, QPainter, QResizeEvent, QWheelEvent
-from PySide6.QtWidgets import QFrame, QScrollArea, QScrollBar, QSizePolicy
+from PySide6.QtWidgets import QFrame, QLabel, QScrollArea, QScrollBar, QSizePolicy
 
 from sd2app.labels.dragging import MOVED_PX, LabelDragging, attraction_s
 from sd2app.labels.edits import LabelEdits
@@ -47,7 +47,8 @@ class LabelTimeline(TimePlot):
 
     With Shift a new span is drawn over others, which it cuts. A click selects a span and goes to
     its start, with Ctrl it adds to the selection, with Shift it selects all up to it; a double
-    click plays it in a loop. A click on the name of a track makes it the one for new spans.
+    click plays it in a loop. A click on the name of a track makes it the one for new spans; what
+    is drawn on that of the suggestions comes there too.
     """
 
     def __init__(
@@ -224,9 +225,9 @@ class LabelTimeline(TimePlot):
         within_s = self._within_s
         time_s, pressed_s = scale.time_of(self._pointer_px), scale.time_of(target.x_px)
         if target.span is None or self._cutting:
-            self._dragging.drag_new(
-                target.track, pressed_s, time_s, within_s, cutting=self._cutting
-            )
+            known = {one.name for one in self._labels.targets}
+            track = target.track if target.track in known else self._labels.track
+            self._dragging.drag_new(track, pressed_s, time_s, within_s, cutting=self._cutting)
         elif target.part == "span":
             start_s = target.span.start_s + time_s - pressed_s
             self._dragging.drag_span(target.span.id, start_s, within_s)
@@ -253,6 +254,28 @@ class LabelTimeline(TimePlot):
         part = "nothing" if target is None or self._edits.refusal else target.part
         self.setCursor(shapes.get(part, Qt.CursorShape.ArrowCursor))
         self.setToolTip("" if target is None else _tip_of(target))
+
+
+class TargetLine(QLabel):
+    """Name of the track that new spans go to, where there is more than one."""
+
+    def __init__(self, labels: LabelsModel) -> None:
+        super().__init__()
+        self._labels = labels
+        self.setObjectName("muted")
+        self.setTextFormat(Qt.TextFormat.PlainText)
+        self.setIndent(GUTTER_PX)
+        self.setAccessibleName("Track that is marked on")
+        self.setToolTip("Click the name of another track to mark on that one")
+        for signal in (labels.changed, labels.selection_changed):
+            signal.connect(self._follow)
+        self._follow()
+
+    def _follow(self) -> None:
+        labels = self._labels
+        target = labels.track or "no track – add one with Labels → Tracks → Add track…"
+        self.setText(f"Marking on: {target}")
+        self.setVisible(len(labels.labels.tracks) > 1 or not labels.track)
 
 
 _HIGHEST_PX = round(8.5 * ROW_PX)

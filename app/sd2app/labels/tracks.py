@@ -38,7 +38,8 @@ class LabelTracks:
 
     def step(self, towards: Literal[-1, 1]) -> None:
         """Make the next or the previous track the one for new spans."""
-        names, place = self._names, self._place + towards
+        names = [track.name for track in self._labels.targets]
+        place = names.index(self._labels.track) + towards if self._labels.track else -1
         if 0 <= place < len(names):
             self._labels.set_track(names[place])
 
@@ -93,8 +94,9 @@ class LabelTracks:
 
     def put_spans(self, towards: Literal[-1, 1]) -> None:
         """Move the selected spans to the track below or above."""
-        names, chosen = self._names, self._labels.selected
-        place = names.index(chosen[0].track) + towards if chosen else -1
+        names, chosen = [track.name for track in self._labels.targets], self._labels.selected
+        marked = bool(chosen) and chosen[0].track in names
+        place = names.index(chosen[0].track) + towards if marked else -1
         if 0 <= place < len(names):
             self._edits.put_on_track(names[place])
             self._labels.set_track(self._labels.selected[0].track)
@@ -149,7 +151,7 @@ class TrackMenu:
         self._follow()
 
     def _follow(self) -> None:
-        tracks = self._labels.labels.tracks
+        tracks = self._labels.targets
         if tracks != self._shown:
             self._shown = tracks
             for action in self._group.actions():

@@ -13,7 +13,7 @@ from sd2app.suggestions.finders import Found, SpanFinder
 from sd2app.widgets.text import counted
 from sd2core.labels.field_edits import offer, pending, reject, take
 from sd2core.labels.spans import Labels, Span
-from sd2core.labels.suggest import LABEL, TRACK
+from sd2core.labels.suggest import LABEL
 
 
 class SuggestionsModel(QObject):
@@ -37,13 +37,13 @@ class SuggestionsModel(QObject):
         self._thresholds = {finder.title: finder.threshold.usual for finder in finders}
         self._if_none = ""
         self._problem = ""
+        self._why_not = ""  # of the finder, when it was last looked at
         self._declined: tuple[Span, ...] = ()
-        self._home = self._labels.track
         self._made: tuple[Labels, int] | None = None
         self._runner = LatestRunner("suggest", self, self._receive, self._fail)
         self._runner.idle_changed.connect(lambda _: self.changed.emit())
         self._labels.changed.connect(self._follow)
-        self._labels.selection_changed.connect(self._remember_home)
+        self._labels.selection_changed.connect(self.changed)
         for finder in finders:
             for signal in finder.signals:
                 signal.connect(self._begin_if_complete)
@@ -70,8 +70,10 @@ class SuggestionsModel(QObject):
     def text(self) -> str:
         """State of the search, as a sentence."""
         source, why_not = self.finder.source, self._problem or self.finder.why_not
+        to_decide = f"{counted(len(self.pending), 'suggestion')} to decide on"
         if why_not or source is None:
-            return why_not
+            # Those of a file can be decided on before their map is there.
+            return to_decide if self.pending and not self._problem else why_not
         if self._wanted:
             title = source.title.lower()
             waits = source.covered is not None
@@ -79,7 +81,7 @@ class SuggestionsModel(QObject):
         if self._runner.busy:
             return "Looking…"
         if self.pending:
-            return f"{counted(len(self.pending), 'suggestion')} to decide on"
+            return to_decide
         return self._if_none or "No suggestions left to decide on"
 
     # --- asking ---------------------------------------------------------------------------
@@ -159,7 +161,8 @@ class SuggestionsModel(QObject):
         if not spans:
             return
         ids = [span.id for span in spans]
-        track, given = self._target(), label or self._labels.label
+        track = self._labels.track or Labels().tracks[0].name
+        given = label or self._labels.label
         done = self._edits.apply(
             lambda labels, base: take(labels, base, ids, track, given, keep_known=label is None)
         )
@@ -180,12 +183,6 @@ class SuggestionsModel(QObject):
         if after and not self._playback.playing:
             self._playback.seek(after[0].start_s)
 
-    def _target(self) -> str:
-        """The track in use; that of suggestions is not for what was accepted."""
-        names = [track.name for track in self._labels.labels.tracks]
-        others = [name for name in names if name != TRACK]
-        return self._home if self._home in others else (others[0] if others else TRACK)
-
     # --- looking --------------------------------------------------------------------------
 
     def _look(self) -> None:
@@ -202,8 +199,11 @@ class SuggestionsModel(QObject):
         self.changed.emit()
 
     def _begin_if_complete(self) -> None:
+        before, self._why_not = self._why_not, self.finder.why_not
         if self._wanted:
             self._look()
+        elif self.active and self._why_not != before:
+            self.changed.emit()
 
     def _receive(self, found: Found) -> None:
         self._if_none = found.if_none
@@ -232,8 +232,3 @@ class SuggestionsModel(QObject):
         if now != self.pending:
             self.pending = now
             self.changed.emit()
-
-    def _remember_home(self) -> None:
-        if self._labels.track != TRACK:
-            self._home = self._labels.track
-        self.changed.emit()

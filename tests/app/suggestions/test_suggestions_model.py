@@ -185,6 +185,22 @@ def test_without_a_map_there_is_nothing_to_look_in(set_up) -> None:
     assert set_up.model.text == "There is no map to look in"
 
 
+def test_nothing_says_that_there_is_no_map_once_there_is_one(set_up) -> None:
+    model, real = set_up.model, set_up.real
+    there = real.map
+    real.set_map(None)
+    offered = Span(5, "Gestures", 3.0, 4.0, "background", confidence=0.5, origin="suggestion")
+    set_up.labels.open(Labels((LabelTrack("Gestures"),), (offered,)))
+    model.open()
+    assert model.text == "1 suggestion to decide on"
+    model.reject()
+    assert (model.active, model.text) == (True, "There is no map to look in")
+    told = []
+    model.changed.connect(lambda: told.append(model.text))
+    real.set_map(there)
+    assert told == ["No suggestions left to decide on"]
+
+
 def test_suggestions_of_a_file_are_to_be_decided_on_without_looking(set_up) -> None:
     offered = Span(5, "Gestures", 3.0, 4.0, "background", confidence=0.5, origin="suggestion")
     set_up.labels.open(Labels((LabelTrack("Gestures"),), (offered,)))

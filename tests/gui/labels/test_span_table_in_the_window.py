@@ -74,6 +74,22 @@ def test_the_key_of_the_panel_puts_the_keyboard_into_the_table(labelled) -> None
     assert QApplication.focusWidget() is not table(labelled)
 
 
+def test_opening_the_page_leaves_the_playhead_where_it_is(window, qtbot) -> None:
+    window.activateWindow()
+    qtbot.waitUntil(window.isActiveWindow, timeout=5000)
+    c = models_of(window)
+    c.playback.seek_frame(47)
+    tabs = window.side.tabBar()
+    titles = [tabs.tabText(place) for place in range(tabs.count())]
+    QTest.mouseClick(tabs, LEFT, NONE, tabs.tabRect(titles.index("Labels")).center())
+    assert window.side.shown == "Labels"
+    press(window, "L", SHIFT)
+    assert QApplication.focusWidget() is table(window)
+    assert table(window).currentIndex().row() == 1, "the row nearest to the playhead"
+    assert c.playback.frame == 47
+    assert not c.labels.selected
+
+
 def test_one_selection_in_table_and_timeline(labelled) -> None:
     c, timeline = models_of(labelled), labelled.findChild(LabelTimeline)
     click(labelled, 1, "start")

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import label_hands as hands
 import numpy as np
 import pytest
+from kept_window import opened
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QToolButton
 from window_models import models_of
 
+from sd2app.labels.timeline import TargetLine
 from sd2app.suggestions.bar import SuggestionBar
 from sd2core.maps import DopplerMap
 from sd2core.sensor import VelocityAxis
@@ -94,3 +97,72 @@ def test_while_it_plays_a_label_key_marks_also_with_a_suggestion_selected(moving
     c.playback.toggle()
     assert [mark.label for mark in c.labels.marks] == ["up-to-down"]
     assert len(c.suggestions.pending) == 2
+
+
+def marked_by_key(window, qtbot, at_frame: int) -> str:
+    """Mark ten frames with a key; the track that the new span is on."""
+    c = models_of(window)
+    key(window, qtbot, "Escape")
+    before = {span.id for span in c.labels.labels.spans}
+    for frame in (at_frame, at_frame + 9):
+        c.playback.seek_frame(frame)
+        key(window, qtbot, "3")
+    (made,) = (span for span in c.labels.labels.spans if span.id not in before)
+    return made.track
+
+
+def test_new_labels_never_go_to_the_track_of_the_suggestions(moving, qtbot, tmp_path) -> None:
+    c, line = models_of(moving), moving.findChild(TargetLine)
+    own = c.labels.track
+    assert not line.isVisible(), "one track needs no telling which"
+    asked(moving, qtbot)
+    assert [span.track for span in c.labels.selected] == ["Suggestions"]
+    assert (line.isVisible(), line.text()) == (True, f"Marking on: {own}")
+    assert marked_by_key(moving, qtbot, 20) == own
+    # By the mouse neither: not by the name, not by drawing there, not by a click on one of them.
+    hands.click(moving, c.suggestions.pending[0].start_s + 0.1, track="Suggestions")
+    view = hands.timeline(moving)
+    name = hands.at(moving, 0.0, "Suggestions")
+    name.setX(10)
+    qtbot.mouseClick(view, Qt.MouseButton.LeftButton, NONE, name)
+    assert c.labels.track == own
+    before = len(c.labels.labels.of_track(own))
+    ends = (hands.at(moving, time_s, "Suggestions") for time_s in (1.05, 1.25))
+    hands.pull(view, *ends, hands.ALT)
+    assert len(c.labels.labels.of_track(own)) == before + 1
+    # Nor once they are saved and opened again, nor once all are rejected.
+    folder = tmp_path / "saved.sd2"
+    c.document.save_as(folder)
+    opened(moving, qtbot, folder)
+    assert line.text() == f"Marking on: {own}"
+    assert marked_by_key(moving, qtbot, 0) == own
+    key(moving, qtbot, "W", Qt.KeyboardModifier.ShiftModifier)
+    assert [track.name for track in c.labels.labels.tracks] == [own]
+    assert marked_by_key(moving, qtbot, 50) == own
+    assert not line.isVisible()
+
+
+def test_the_last_suggestion_deleted_takes_its_track_along(moving, qtbot) -> None:
+    asked(moving, qtbot)
+    c = models_of(moving)
+    key(moving, qtbot, "A", Qt.KeyboardModifier.ControlModifier)
+    key(moving, qtbot, "Backspace")
+    assert "Suggestions" not in [track.name for track in c.labels.labels.tracks]
+
+
+def test_with_suggestions_alone_accepting_makes_a_track_and_marking_says_what_to_do(
+    moving, qtbot
+) -> None:
+    c, line = models_of(moving), moving.findChild(TargetLine)
+    asked(moving, qtbot)
+    own = c.labels.track
+    moving.action("remove_track").trigger()
+    assert (c.labels.track, line.isVisible()) == ("", True)
+    assert "Add track" in line.text()
+    key(moving, qtbot, "Escape")
+    key(moving, qtbot, "3")
+    assert not c.labels.marks
+    assert "Add track" in moving.messages.text
+    key(moving, qtbot, "Y")
+    assert [track.name for track in c.labels.labels.tracks] == [own, "Suggestions"]
+    assert c.labels.track == own
