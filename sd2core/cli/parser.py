@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 
 from sd2core.cli import (
+    align,
     batch,
     classify,
     compare_meshes,
@@ -40,6 +41,7 @@ examples:
   sd2 info walk.npz                           what is in a file
   sd2 fit walk.mp4 --out walk.zarr            a moving mesh from a video of a person
   sd2 import walk.sd2 --video walk.mkv --mesh walk.npz
+  sd2 align walk.sd2 --save                   the radar's clock, from what both saw
   sd2 synth walk.npz --out map.npz --sensor 0,0,1
   sd2 radar capture/ --out real.npz
   sd2 denoise map.npz --out denoised.npz      what a radar would show
@@ -67,6 +69,7 @@ def build_parser() -> tuple[argparse.ArgumentParser, argparse._SubParsersAction]
     groups = (
         info,
         importing,
+        align,
         fit,
         synth,
         radar,

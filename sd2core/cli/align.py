@@ -1,0 +1,121 @@
+"""``sd2 align``: the offset of a radar's clock, from what mesh and radar saw."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sd2core.cli.options import add_command, add_json, positive_float
+from sd2core.cli.output import print_facts, print_json
+from sd2core.errors import Sd2Error
+
+if TYPE_CHECKING:
+    from sd2core.doppler.alignment import Alignment
+    from sd2core.recording.recording import Recording
+
+
+def add_commands(commands: argparse._SubParsersAction) -> None:
+    """Add ``align``."""
+    parser = add_command(
+        commands,
+        "align",
+        "find the time offset of video and radar from what both saw",
+        handler=_align,
+        description=(
+            "Compares mean velocity and motion of the mesh's synthetic map with those of the\n"
+            "radar's map at every offset. Where none stands out, as the motion repeats itself or\n"
+            "the two do not belong together, the recording stays as it is, the reason is printed,\n"
+            "and the exit code is 1."
+        ),
+        examples=(
+            "  sd2 align walk.sd2\n"
+            "  sd2 align anna.sd2 ben.sd2 --save\n"
+            "  sd2 align walk.sd2 --within 20 --json"
+        ),
+    )
+    parser.add_argument(
+        "recordings", type=Path, nargs="+", metavar="RECORDING", help="with a mesh and a radar"
+    )
+    parser.add_argument(
+        "--within",
+        type=positive_float,
+        metavar="S",
+        help="search so many seconds before and after the recording's offset (default: 5)",
+    )
+    parser.add_argument(
+        "--save", action="store_true", help="write what was found into the recordings"
+    )
+    add_json(parser)
+
+
+def _align(options: argparse.Namespace) -> int:
+    from sd2core.files.resources import is_bundled
+    from sd2core.recording.recording import open_recording
+
+    recordings = [open_recording(path) for path in options.recordings]
+    for recording in recordings:
+        if options.save and is_bundled(recording.folder):
+            raise Sd2Error(f"{recording.folder} comes with the program", "a recording of your own")
+    entries = [_aligned(recording, options) for recording in recordings]
+    if options.json:
+        print_json({"recordings": entries})
+    else:
+        for recording, entry in zip(recordings, entries, strict=True):
+            print_facts(str(recording.folder), _facts(entry))
+    return 1 if any(entry["problem"] for entry in entries) else 0
+
+
+def _aligned(recording: Recording, options: argparse.Namespace) -> dict[str, Any]:
+    """Entry of one recording; what cannot be aligned is told in it, and the others go on."""
+    before_s = recording.radar_offset_s
+    entry: dict[str, Any] = {
+        "recording": str(recording.folder), "before_s": before_s, "saved": False
+    }  # fmt: skip
+    try:
+        found = _found(recording, options.within)
+    except Sd2Error as error:
+        return entry | {"problem": str(error)}
+    if options.save and not found.problem:
+        recording.radar_offset_s = found.offset_s
+        recording.save()
+        entry["saved"] = True
+    return entry | {
+        "problem": found.problem,
+        "offset_s": found.offset_s,
+        "confidence": found.confidence,
+        "correlation": found.peak,
+        "curve": {
+            "offset_s": found.offsets_s.round(3).tolist(),
+            "correlation": found.correlation.round(4).tolist(),
+        },
+    }
+
+
+def _found(recording: Recording, within_s: float | None) -> Alignment:
+    from sd2core.cli.recording_maps import maps_of
+    from sd2core.doppler.alignment import WITHIN_S, align
+
+    maps, offset_s = maps_of(recording, ("synthetic", "radar")), recording.radar_offset_s
+    return align(
+        maps["synthetic"],
+        maps["radar"].shifted(-offset_s),
+        around_s=offset_s,
+        within_s=within_s or WITHIN_S,
+    )
+
+
+def _facts(entry: dict[str, Any]) -> dict[str, str]:
+    if "offset_s" not in entry:
+        return {"not aligned": entry["problem"]}
+    facts = {
+        "confidence": f"{entry['confidence']:.3f}",
+        "correlation": f"{entry['correlation']:.2f}",
+    }
+    if entry["problem"]:
+        return {"not aligned": entry["problem"]} | facts
+    return {
+        "radar offset": f"{entry['offset_s']:g} s (was {entry['before_s']:g} s)",
+        **facts,
+        "saved": "yes" if entry["saved"] else "no (--save)",
+    }

@@ -1,0 +1,228 @@
+"""Offset of a radar's clock, from what its Doppler map and a synthetic one have in common."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+
+from sd2core.errors import Sd2Error
+from sd2core.maps import DopplerMap
+
+Floats = NDArray[np.float64]
+
+WITHIN_S = 5.0
+"""Farthest that an offset is looked for, either way, where nobody chooses otherwise."""
+LEAST_CONFIDENCE = 0.9
+"""Chosen on takes of one person, judged on another's: docs/decisions/0056-alignment.md."""
+
+_STEP_S = 1.0 / 30.0
+_SMOOTH_S, _SLOW_S = 0.1, 2.0
+"""Changes faster than the one are noise; those slower than the other, drift."""
+_MOMENT_S = 2.0 * math.sqrt(math.pi) * _SMOOTH_S
+"""White noise that was smoothed has one independent value in so long."""
+_LEAST_WITHIN_S, _LEAST_OVERLAP_S = 0.1, 3.0
+_LEAST_HALF_WIDTH_S = 0.2
+_CERTAIN = 1.0 - 1e-9
+_STILL_MPS = 1e-6
+_MOVES = "a recording in which somebody moves"
+
+
+@dataclass(frozen=True, eq=False)
+class Alignment:
+    """Offset of a radar's clock, and how well all the others fit that were tried."""
+
+    offset_s: float  # the best one, between two of the tried
+    confidence: float
+    """That this is it rather than the next best, from 0 to 1; 0.5 if they are alike."""
+    offsets_s: Floats  # (N,) tried
+    correlation: Floats  # (N,) of the two maps, 0 to 1; time without an overlap counts as 0
+    other_s: float | None  # next best, beyond the peak; None if there is nothing else
+    at_the_end: bool  # the best is where the search ends: it may be beyond
+
+    @property
+    def peak(self) -> float:
+        """Highest correlation."""
+        return float(self.correlation.max())
+
+    @property
+    def problem(self) -> str:
+        """Reason not to trust the offset; empty if it is clear."""
+        if self.peak <= 0:
+            return "The mesh and the radar have nothing in common at any offset."
+        if self.at_the_end:
+            return (
+                f"The mesh and the radar fit best at {self.offset_s:+.2f} s, where the search ends."
+                " Search farther."
+            )
+        if self.confidence >= LEAST_CONFIDENCE:
+            return ""
+        return (
+            f"No offset stands out: {self.offset_s:+.2f} s and {self.other_s:+.2f} s fit nearly"
+            " alike. The motion repeats itself, or is not the same in both."
+        )
+
+    def checked(self) -> Alignment:
+        """Return the alignment itself; Sd2Error if there is no clear peak."""
+        if self.problem:
+            found, _, more = self.problem.rstrip(".").partition(". ")
+            raise Sd2Error(found, "one clear peak", more or "Align by hand")
+        return self
+
+
+def align(
+    synthetic: DopplerMap, radar: DopplerMap, *, around_s: float = 0.0, within_s: float = WITHIN_S
+) -> Alignment:
+    """Find what to add to a radar's times for its map to fit a synthetic one.
+
+    Two series of either map are compared: its mean velocity per frame, and its motion, the root
+    mean square of velocity, in which coming and going are alike. Where n independent moments
+    overlap and the series correlate with r₁ and r₂ (0 if negative), that both show one motion is
+    likelier than that they do not by −n/2 · log((1 − r₁²)(1 − r₂²)). The offset is where this
+    is greatest. If it is less by d at an offset beyond that peak, or per moment, over no more of
+    them than both offsets have, then 1 / (1 + exp(−d)) of the least such d is the confidence.
+
+    Parameters
+    ----------
+    synthetic : DopplerMap
+        Map of the mesh.
+    radar : DopplerMap
+        Map of the radar, on its own clock.
+    around_s, within_s : float
+        Offsets are tried up to ``within_s`` from ``around_s``.
+
+    Raises
+    ------
+    Sd2Error
+        When nothing moves in a map, or they cannot overlap by three seconds. That no offset is
+        clear is no error until :meth:`Alignment.checked`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import sd2core as sd2
+    >>> from sd2core.doppler.alignment import align
+    >>> values = np.random.default_rng(0).random((32, 300), dtype=np.float32)
+    >>> times = sd2.Timebase.regular(frames=300, frames_per_s=30)
+    >>> seen = sd2.DopplerMap(values, sd2.VelocityAxis(), times, kind="synthetic")
+    >>> align(seen, seen.shifted(-1.2)).checked().offset_s
+    1.2
+    """
+    if not (_LEAST_WITHIN_S <= within_s < math.inf and math.isfinite(around_s)):
+        raise Sd2Error(
+            f"The search goes {within_s:g} s from {around_s:g} s", f"{_LEAST_WITHIN_S} s or more"
+        )
+    (ours, start_s), (theirs, their_start_s) = _series(synthetic), _series(radar)
+    for name, values in (("map of the mesh", ours), ("radar's map", theirs)):
+        if np.ptp(values, axis=1).max() < _STILL_MPS:
+            raise Sd2Error(f"Nothing moves in the {name}", _MOVES)
+    # A shift of so many steps is an offset of 0.
+    unmoved = (their_start_s - start_s) / _STEP_S
+    low, high = (unmoved + (around_s + end_s) / _STEP_S for end_s in (-within_s, within_s))
+    least = math.ceil(_LEAST_OVERLAP_S / _STEP_S)
+    shifts = np.arange(
+        max(math.ceil(low), least - theirs.shape[1]),
+        min(math.floor(high), ours.shape[1] - least) + 1,
+    )
+    longest = min(ours.shape[1], theirs.shape[1])
+    if len(shifts) < 3 or longest < least:
+        raise Sd2Error(
+            f"The mesh and the radar do not overlap by {_LEAST_OVERLAP_S:g} s at offsets up to"
+            f" {within_s:g} s from {around_s:g} s",
+            "two recordings of the same time",
+            "Search farther",
+        )
+    evidence = np.array([_evidence(ours, theirs, int(shift)) for shift in shifts])
+    moments = _moments(np.minimum(ours.shape[1], theirs.shape[1] + shifts) - np.maximum(0, shifts))
+    return _best_of((shifts - unmoved) * _STEP_S, evidence, moments, _moments(longest))
+
+
+def _best_of(offsets_s: Floats, evidence: Floats, moments: Floats, longest: float) -> Alignment:
+    """Alignment from evidence and overlap at each offset; ``longest`` is the longest overlap."""
+    best = int(evidence.argmax())
+    # In all, and over the time that both have: of a motion that repeats itself the longest overlap
+    # explains most, and tells nothing.
+    rates = evidence / moments
+    shared = np.minimum(moments, moments[best]) * (rates[best] - rates)
+    margins = np.minimum(evidence[best] - evidence, shared)
+    margins[slice(*_own_width(evidence, best))] = np.inf
+    other = int(margins.argmin())
+    at_the_end = best in (0, len(evidence) - 1)
+    offset_s = float(offsets_s[best])
+    if not at_the_end:
+        before, here, after = evidence[best - 1 : best + 2]
+        bend = before - 2.0 * here + after
+        offset_s += _STEP_S * 0.5 * (before - after) / bend if bend < 0 else 0.0
+    return Alignment(
+        offset_s=round(float(offset_s), 3),
+        confidence=float(1.0 / (1.0 + np.exp(-margins[other]))),
+        offsets_s=offsets_s,
+        correlation=np.sqrt(1.0 - np.exp(-2.0 * evidence / longest)),
+        other_s=round(float(offsets_s[other]), 3) if np.isfinite(margins[other]) else None,
+        at_the_end=at_the_end,
+    )
+
+
+def _series(doppler: DopplerMap) -> tuple[Floats, float]:
+    """Mean velocity and motion in even steps, (2, N), without noise and drift; and the start."""
+    values = doppler.values.astype(np.float64)
+    if doppler.present is not None:
+        values *= doppler.present
+    velocity_mps, total = doppler.axis.centres_mps, values.sum(axis=0)
+    # In a frame without an echo nothing moves.
+    share = np.divide(values, total, out=np.zeros_like(values), where=total > 0)
+    even = _in_steps(doppler.times_s, np.stack([velocity_mps @ share, velocity_mps**2 @ share]))
+    even[1] = np.sqrt(even[1])
+    smooth, slow = (
+        gaussian_filter1d(even, width_s / _STEP_S, mode="nearest")
+        for width_s in (_SMOOTH_S, _SLOW_S)
+    )
+    return smooth - slow, doppler.timebase.start_s
+
+
+def _in_steps(times_s: Floats, series: Floats) -> Floats:
+    """Means over even steps around times from the first on, of lines between the frames."""
+    if len(times_s) < 2:
+        return series
+    middles_s = np.arange(times_s[0], times_s[-1] + 1e-9, _STEP_S)
+    edges_s = np.append(middles_s - 0.5 * _STEP_S, middles_s[-1] + 0.5 * _STEP_S)
+    fine_s = np.unique(np.concatenate([times_s, edges_s]))
+    steps = []
+    for row in series:
+        line = np.interp(fine_s, times_s, row)
+        area = np.append(0.0, np.cumsum(0.5 * (line[1:] + line[:-1]) * np.diff(fine_s)))
+        steps.append(np.diff(area[np.searchsorted(fine_s, edges_s)]) / _STEP_S)
+    return np.stack(steps)
+
+
+def _evidence(ours: Floats, theirs: Floats, shift: int) -> float:
+    """Log-likelihood that two series are of one motion, over that of two."""
+    begin, end = max(0, shift), min(ours.shape[1], theirs.shape[1] + shift)
+    one, other = (
+        part - part.mean(axis=1, keepdims=True)
+        for part in (ours[:, begin:end], theirs[:, begin - shift : end - shift])
+    )
+    norm = np.sqrt((one**2).sum(axis=1) * (other**2).sum(axis=1))
+    agreed = np.divide((one * other).sum(axis=1), norm, out=np.zeros(2), where=norm > 0)
+    agreed = agreed.clip(0.0, _CERTAIN)
+    return float(-0.5 * _moments(end - begin) * np.log(1.0 - agreed**2).sum())
+
+
+def _moments(steps: Any) -> Any:
+    """Numbers of independent values in so many steps."""
+    return steps * _STEP_S / _MOMENT_S
+
+
+def _own_width(evidence: Floats, best: int) -> tuple[int, int]:
+    """Range of the peak: down on both sides until the curve rises again."""
+    least = round(_LEAST_HALF_WIDTH_S / _STEP_S)
+    begin, end = max(best - least, 0), min(best + least + 1, len(evidence))
+    while begin > 0 and 0 < evidence[begin - 1] <= evidence[begin]:
+        begin -= 1
+    while end < len(evidence) and 0 < evidence[end] <= evidence[end - 1]:
+        end += 1
+    return begin, end

@@ -1,0 +1,59 @@
+"""``sd2 align``."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+import swinging_recordings
+from cli_outcome import Sd2
+
+from sd2core.files.resources import resource_path
+from sd2core.recording.recording import open_recording
+
+
+@pytest.mark.slow
+def test_the_sample_is_aligned_to_a_frame_and_saved(sd2: Sd2, tmp_path: Path) -> None:
+    folder = tmp_path / "swipes.sd2"
+    shutil.copytree(resource_path("swipes.sd2"), folder)
+    recording = open_recording(folder)
+    recording.radar_offset_s = -2.4
+    recording.save()
+
+    outcome = sd2("align", folder, "--json")
+    assert outcome.code == 0, outcome.err
+    (entry,) = json.loads(outcome.out)["recordings"]
+    assert entry["offset_s"] == pytest.approx(0.0, abs=1 / 30)
+    assert entry["before_s"] == -2.4
+    assert entry["confidence"] > 0.99
+    offsets_s, correlation = entry["curve"]["offset_s"], entry["curve"]["correlation"]
+    assert max(correlation) == pytest.approx(entry["correlation"], abs=1e-3)
+    # Five seconds around where it was.
+    assert (offsets_s[0], offsets_s[-1]) == pytest.approx((-7.4, 2.6), abs=0.04)
+    assert open_recording(folder).radar_offset_s == -2.4
+
+    outcome = sd2("align", folder, "--save", "--within", "3")
+    assert outcome.code == 0, outcome.err
+    assert "(was -2.4 s)" in outcome.out
+    assert open_recording(folder).radar_offset_s == entry["offset_s"]
+
+
+def test_noise_is_refused_and_the_others_go_on(sd2: Sd2, tmp_path: Path) -> None:
+    noise = swinging_recordings.recording(tmp_path / "noise.sd2", offset_s=0.5).folder
+    bare = swinging_recordings.recording(tmp_path / "bare.sd2", radar=False).folder
+    outcome = sd2("align", bare, noise, "--save", "--within", "0.6", "--json")
+    assert outcome.code == 1
+    first, second = json.loads(outcome.out)["recordings"]
+    assert "no radar" in first["problem"]
+    assert second["problem"]
+    assert not second["saved"]
+    assert open_recording(noise).radar_offset_s == 0.5
+    assert "not aligned" in sd2("align", bare).out
+
+
+def test_what_comes_with_the_program_is_not_changed(sd2: Sd2) -> None:
+    outcome = sd2("align", resource_path("swipes.sd2"), "--save")
+    assert outcome.code == 1
+    assert "a recording of your own" in outcome.err
