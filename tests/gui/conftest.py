@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import av
 import numpy as np
 import pytest
 import trimesh
 from fake_accuracy import FakeAccuracy
 from fake_classifiers import FakeClassifiers
 from fake_denoisers import FakeDenoisers
+from grey_video import FRAMES, RATE, write_video
 from kept_window import KeptWindow, close_window, new_window
 
 from sd2core.io.mesh import save_mesh
@@ -19,9 +19,6 @@ from sd2core.mesh.sequence import MeshSequence
 from sd2core.radar_config import PAPER_RADAR
 from sd2core.recording.recording import Recording, Span
 from sd2core.timebase import Timebase
-
-FRAMES = 60
-RATE = 30.0
 
 
 def swinging_ball() -> MeshSequence:
@@ -32,19 +29,6 @@ def swinging_ball() -> MeshSequence:
     vertices = np.repeat(ball.vertices[None], FRAMES, axis=0).astype(np.float32)
     vertices[:, :, 2] += depth[:, None].astype(np.float32)
     return MeshSequence(vertices, np.asarray(ball.faces, np.int32), Timebase(times_s))
-
-
-def write_video(path: Path) -> None:
-    """A grey video whose brightness is the frame number."""
-    with av.open(str(path), "w") as container:
-        stream = container.add_stream("mpeg4", rate=int(RATE))
-        stream.width, stream.height, stream.pix_fmt = 160, 120, "yuv420p"
-        for number in range(FRAMES):
-            picture = np.full((120, 160, 3), 40 + 3 * number, np.uint8)
-            for packet in stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")):
-                container.mux(packet)
-        for packet in stream.encode():
-            container.mux(packet)
 
 
 @pytest.fixture(scope="session")

@@ -118,7 +118,7 @@ class SpectrumView(Canvas):
             low, high, unit = 0.0, 100.0 * 10.0 ** (levels.high_db / 10.0), "%"
         most = max(int(plot.height() / (2 * painter.fontMetrics().height())), 2)
         across = [
-            (plot.left() + plot.width() * (level - low) / (high - low), f"{level:g} {unit}")
+            (plot.left() + plot.width() * (level - low) / (high - low), f"{level:g}")
             for level in ticks(low, high, 4)
         ]
         upwards = [(_y_of(plot, each, v_max), each) for each in ticks(-v_max, v_max, most)]
@@ -128,13 +128,13 @@ class SpectrumView(Canvas):
             colours,
             [(x, "" if self._is_tight(plot) else text.replace("-", "−")) for x, text in across],
             [(y, signed_text(velocity)) for y, velocity in upwards],
-            "" if self._is_tight(plot) else "level over the reference",
+            "" if self._is_tight(plot) else f"level ({unit} of the reference)",
         )
         if self._is_tight(plot):
             line_px = painter.fontMetrics().height()
             for x, text in across[:-1]:
                 box = QRectF(x + 3, plot.bottom() - line_px - 2, 60, line_px)
-                painter.drawText(box, AT_LEFT, text.replace("-", "−"))
+                painter.drawText(box, AT_LEFT, f"{text} {unit}".replace("-", "−"))
 
     def _is_tight(self, plot: QRectF) -> bool:
         """True where the map takes all the height: the scale then stands in the plot."""

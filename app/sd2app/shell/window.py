@@ -99,7 +99,7 @@ class MainWindow(QMainWindow):
         self._bottom = splitter(
             Qt.Orientation.Horizontal,
             [self._panels["tracks"], self._panels["spectrum"]],
-            (664, 264),
+            (728, 200),
         )
         self._rows = splitter(Qt.Orientation.Vertical, [self._top, self._bottom], (264, 456))
         # Of the room of a larger window, maps take most.

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from answering import once_asked
-from conftest import write_video
+from grey_video import write_video
 from PySide6.QtCore import QPoint, QRect, Qt
 from PySide6.QtGui import QCursor
 from PySide6.QtTest import QTest
