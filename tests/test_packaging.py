@@ -137,7 +137,14 @@ def test_the_wheel_holds_the_program_and_nothing_else(wheel: Path) -> None:
     }
     assert "sd2core/resources/swipes.sd2/recording.json" in resources
     assert resources <= names
-    others = {name for name in names if ".dist-info/" not in name} - sources - resources
+    guide = {
+        f"sd2app/{path.relative_to(REPOSITORY).as_posix()}"
+        for path in (REPOSITORY / "docs").rglob("*")
+        if path.is_file()
+    }
+    assert "sd2app/docs/manual.md" in guide
+    assert guide <= names
+    others = {name for name in names if ".dist-info/" not in name} - sources - resources - guide
     assert not others
     assert any(name.endswith("/LICENSE") for name in names)
 

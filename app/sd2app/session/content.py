@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     from sd2core.io.video import VideoReader
     from sd2core.radar_config import Clutter
 
+PARTS = ("video", "mesh", "radar", "Doppler map of the radar")
+"""Parts of a recording in the order in which they are read, each a share of the progress."""
+
 UNTITLED = Path()
 """Folder of a recording that was not saved yet."""
 

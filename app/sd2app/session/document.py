@@ -11,8 +11,8 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QUndoStack
 
 from sd2app.background.latest import Emit, LatestRunner
-from sd2app.session.content import UNTITLED, Content, load_content, recording_of
-from sd2app.session.tasks import ListedRunner, TaskList
+from sd2app.session.content import PARTS, UNTITLED, Content, load_content, recording_of
+from sd2app.session.tasks import Job, ListedRunner, TaskList
 from sd2core.body.camera import PinholeCamera
 from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap
@@ -128,6 +128,19 @@ class DocumentModel(QObject):
         return self.content is not None and not self.undo_stack.isClean()
 
     # --- opening --------------------------------------------------------------------------
+
+    @property
+    def reading(self) -> Job | None:
+        """Task of reading files; None while nothing is being read."""
+        return self._runner.job
+
+    @property
+    def part_read(self) -> str:
+        """Part that is being read, in words; empty before the first."""
+        job = self.reading
+        if job is None or not job.total:
+            return ""
+        return f"Reading the {PARTS[min(len(PARTS) * job.done // job.total, len(PARTS) - 1)]}"
 
     def open(self, paths: Sequence[Path]) -> None:
         """Open a recording, or files that make up one, in the background."""

@@ -39,9 +39,13 @@ class TaskList(QObject):
     def start(self, title: str, cancel: Callable[[], None]) -> Job:
         """Announce a job."""
         job = Job(title, cancel)
+        self.add(job)
+        return job
+
+    def add(self, job: Job) -> None:
+        """Announce a job that is known already."""
         self._jobs.append(job)
         self.changed.emit()
-        return job
 
     def report(self, job: Job, done: int, total: int) -> None:
         """Report the progress of a job."""
@@ -89,7 +93,8 @@ class ListedRunner(LatestRunner):
         """Ask for ``task(emit)`` in the background, in place of the one before."""
         self._end()
         if title:
-            self.job = self._tasks.start(title, self._cancel)
+            self.job = Job(title, self._cancel)
+            self._tasks.add(self.job)
         revision = super().submit(task)
         if not self.busy:
             self._end()  # closed

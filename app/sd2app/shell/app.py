@@ -42,7 +42,7 @@ def run(paths: Sequence[Path] = (), *, screenshot: Path | None = None) -> int:
     def fill() -> None:
         window.populate()
         if paths:
-            window.open_paths(list(paths))
+            window.open_paths(paths)
         else:
             window.features.labels.autosave.look_around()
 

@@ -54,7 +54,7 @@ LAYOUT: Mapping[str, tuple[str, ...]] = {
         "-", "@classifiers", "open_classifier", "classifier_card", "show_classes",
         "train_classifier",
     ),
-    "Help": ("sample", "keys", "about"),
+    "Help": ("getting_started", "manual", "keys", "-", "sample", "-", "about"),
 }  # fmt: skip
 """Order of the menus: ids of actions, ``-`` lines, ``@`` places that a feature fills, ``>`` menus
 within a menu."""

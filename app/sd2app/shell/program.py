@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QMessageBox
 from sd2app.feature import Action, Feature, Shell
 from sd2app.labels.feature import LabelsFeature
 from sd2app.session.session import Session
+from sd2app.shell.guide import GETTING_STARTED, MANUAL, GuideWindow
 from sd2app.shell.keys.bindings import KeyBindings
 from sd2app.shell.keys.dialog import KeysDialog
 from sd2app.shell.keys.model import KeyListModel
@@ -42,11 +43,12 @@ class ProgramFeature(Feature):
 
     def __init__(self, session: Session, shell: Shell, labels: LabelsFeature) -> None:
         self._session, self._shell, self._labels = session, shell, labels
+        self._guide: GuideWindow | None = None
         stack = session.document.undo_stack
         self.changing = (stack.indexChanged, stack.cleanChanged, session.display.theme_changed)
 
     def actions(self) -> Sequence[Action]:
-        """Undo, theme, messages, side panel, keys, about, quit."""
+        """Undo, theme, messages, side panel, guide, keys, about, quit."""
         stack, display = self._session.document.undo_stack, self._session.display
         dragging, shell = self._labels.dragging, self._shell
         return (
@@ -74,7 +76,15 @@ class ProgramFeature(Feature):
                 checked=lambda: not shell.side_folded,
             ),
             Action(
-                "keys", "Help", "Keys…", ("?", "F1"), "All keys, to be found and changed",
+                "getting_started", "Help", "Getting started", (),
+                "The first ten minutes with the program", lambda: self._show_page(GETTING_STARTED),
+            ),
+            Action(
+                "manual", "Help", "Manual", ("F1",), "What can be done, and how",
+                lambda: self._show_page(MANUAL),
+            ),
+            Action(
+                "keys", "Help", "Keys…", ("?",), "All keys, to be found and changed",
                 self._show_keys,
             ),
             Action(
@@ -89,6 +99,11 @@ class ProgramFeature(Feature):
 
     def _quit(self) -> None:
         self._shell.dialog_parent.close()
+
+    def _show_page(self, name: str) -> None:
+        if self._guide is None:
+            self._guide = GuideWindow(self._shell.dialog_parent)
+        self._shell.attempt(lambda: self._guide and self._guide.show_page(name))
 
     def _show_keys(self) -> None:
         bindings = self._shell.keys

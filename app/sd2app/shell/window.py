@@ -22,6 +22,7 @@ from PySide6.QtWidgets import QAbstractButton, QApplication, QMainWindow, QWidge
 from sd2app.background.latest import LatestRunner
 from sd2app.settings import Settings
 from sd2app.shell.drop import DropOverlay
+from sd2app.shell.loading import LoadingCover
 from sd2app.shell.messages.model import MessagesModel
 from sd2app.shell.messages.views import MessageNotice, MessagesDialog
 from sd2app.shell.parts import Parts
@@ -30,7 +31,7 @@ from sd2app.shell.tab_order import controls_of
 from sd2app.widgets.inputs import claims
 from sd2app.widgets.layouts import column_of
 from sd2app.widgets.notices import Notice, NoticeStack
-from sd2app.widgets.panel import fill, panel, splitter
+from sd2app.widgets.panel import fill, panel, replace_content, sentence, splitter
 from sd2app.widgets.theme import apply_theme
 
 if TYPE_CHECKING:
@@ -115,10 +116,10 @@ class MainWindow(QMainWindow):
             (936, _SIDE_PX),
         )
         self._lines = column_of((self._across, 1), spacing_px=4, margins_px=(8, 0, 8, 0))
-        centre = QWidget(self)
-        centre.setLayout(self._lines)
-        self.setCentralWidget(centre)
-        self._drops = DropOverlay(centre)
+        self._centre = QWidget(self)
+        self._centre.setLayout(self._lines)
+        self.setCentralWidget(self._centre)
+        self._loading = LoadingCover(self._centre)
 
     def populate(self) -> None:
         """Load what takes time to import, and fill the skeleton."""
@@ -131,6 +132,7 @@ class MainWindow(QMainWindow):
         from sd2app.shell.status_bar import StatusLine
         from sd2app.shell.wiring import Features
 
+        self._drops = DropOverlay(self._centre)
         self.messages = MessagesModel(self)
         self.session = s = build_session(self, self._settings)
         s.display.set_dark(is_dark(self._settings))
@@ -165,6 +167,7 @@ class MainWindow(QMainWindow):
         for name in ("top", "bottom", "rows"):
             if (state := self._settings.layout(name)) is not None:
                 getattr(self, f"_{name}").restoreState(state)
+        self._loading.follow(s)
         self._ready = True
         for feature in self.features:
             feature.look_for_unfinished()
@@ -183,10 +186,13 @@ class MainWindow(QMainWindow):
         self._widths = PageWidths(self._across, self.side, {"Labels": _LABELS_PX}, self._settings)
         stack, self.maps = track_stack(self.session, self.features, views)
         fill(self._panels["tracks"], stack)
+        self._scene_comes = sentence("Loading the 3D view…")
+        self._scene_comes.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        fill(self._panels["scene"], self._scene_comes)
 
     def _add_scene(self) -> None:
         if self._ready:
-            fill(self._panels["scene"], self.features.scene.make_view())
+            replace_content(self._scene_comes, self.features.scene.make_view())
 
     def _connect(self) -> None:
         s, features = self.session, self.features

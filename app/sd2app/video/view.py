@@ -72,8 +72,10 @@ class VideoView(Canvas):
 
     def _absence(self) -> str:
         recording = self._session.document.recording
-        if recording is None or self._session.video.reader is not None:
+        if recording is None:
             return ""
+        if self._session.video.reader is not None:
+            return "Reading the first frame…"
         if recording.video is None:
             return "No video in this recording"
         return "The video cannot be shown"

@@ -178,3 +178,12 @@ def splitter(
 def fill(frame: QFrame, content: QWidget | QLayout) -> None:
     """Fill an empty panel."""
     frame.setLayout(column_of(content, spacing_px=0, margins_px=1))
+
+
+def replace_content(content: QWidget, by: QWidget) -> None:
+    """Put a widget in the place of what a panel was filled with."""
+    frame = content.parentWidget()
+    layout = frame.layout() if frame is not None else None
+    assert layout is not None
+    layout.replaceWidget(content, by)
+    content.deleteLater()

@@ -1,0 +1,78 @@
+"""Cover of the empty window that says what is being read, and how far it is."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QEvent, QObject, Qt
+from PySide6.QtWidgets import QFrame, QWidget
+
+from sd2app.background.latest import delayed
+from sd2app.widgets.layouts import STRETCH, column_of, row_of
+from sd2app.widgets.panel import outlined, sentence, title
+from sd2app.widgets.progress_bar import ProgressBar
+
+if TYPE_CHECKING:
+    from sd2app.session.document import DocumentModel
+    from sd2app.session.session import Session
+
+_BAR_PX = 320
+_PATIENCE_MS = 1000
+"""Time without a bar."""
+
+
+class LoadingCover(QFrame):
+    """Covers its parent until something is open, or nothing is being read."""
+
+    def __init__(self, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.setAutoFillBackground(True)
+        self.title, self.part = title("Starting SD² Studio…"), sentence("")
+        self.bar = ProgressBar("How much has been read", width_px=_BAR_PX)
+        for label in (self.title, self.part):
+            label.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        bar = row_of(STRETCH, self.bar, STRETCH)
+        self.cancel = outlined("Cancel", "Open nothing", None, self)
+        cancel = row_of(STRETCH, self.cancel, STRETCH)
+        parts = (STRETCH, self.title, self.part, bar, cancel, STRETCH)
+        self.setLayout(column_of(*parts, spacing_px=8))
+        self.cancel.hide()
+        # Room is kept for it, so that nothing jumps.
+        policy = self.bar.sizePolicy()
+        policy.setRetainSizeWhenHidden(True)
+        self.bar.setSizePolicy(policy)
+        self.bar.hide()
+        self._patience = delayed(self.bar.show, _PATIENCE_MS, self)
+        self._patience.start()
+        self.bar.show_share(None)
+        parent.installEventFilter(self)
+
+    def follow(self, session: Session) -> None:
+        """Show from now on what is being read, while there is nothing to show."""
+        self.cancel.clicked.connect(
+            lambda: session.document.reading and session.jobs.cancel(session.document.reading)
+        )
+        self.cancel.show()
+        session.jobs.changed.connect(lambda: self._refresh(session.document))
+        self._refresh(session.document)
+
+    def _refresh(self, document: DocumentModel) -> None:
+        reading = document.reading if document.content is None else None
+        if reading is None:
+            self._patience.stop()
+            self.bar.hide()
+            self.hide()
+            return
+        if not self.isVisible():
+            self._patience.start()
+        self.title.setText(f"{reading.title}…")
+        self.part.setText(document.part_read)
+        self.bar.show_count(reading.done, reading.total)
+        self.raise_()
+        self.show()
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Stay as large as the parent."""
+        if event.type() == QEvent.Type.Resize and isinstance(watched, QWidget):
+            self.setGeometry(watched.rect())
+        return False

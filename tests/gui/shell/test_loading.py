@@ -1,0 +1,89 @@
+"""Nobody looks at empty boxes: the window says what is being read, and how far it is."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QLabel
+from window_models import models_of
+
+from sd2app.session import document
+from sd2app.settings import Settings
+from sd2app.shell.loading import LoadingCover
+from sd2app.shell.parts import Parts
+from sd2app.shell.window import MainWindow
+
+
+def words(cover: LoadingCover) -> str:
+    return " ".join(one.text() for one in cover.findChildren(QLabel) if one.isVisible())
+
+
+@pytest.fixture
+def skeleton(qtbot, tmp_path):
+    """The window before anything is imported."""
+    window = MainWindow(Settings.forgetful(), Parts(recovery=tmp_path))
+    window.show()
+    yield window
+    window.close()
+    window.deleteLater()
+
+
+def test_the_skeleton_says_that_it_starts(skeleton) -> None:
+    cover = skeleton.findChild(LoadingCover)
+    assert cover.isVisible()
+    assert cover.size() == skeleton.centralWidget().size()
+    assert "Starting" in words(cover)
+
+
+def test_the_cover_goes_where_nothing_is_opened(empty_window) -> None:
+    assert not empty_window.findChild(LoadingCover).isVisible()
+
+
+def test_what_is_read_is_said_at_once_and_until_it_is_there(
+    empty_window, qtbot, small_recording
+) -> None:
+    c, cover = models_of(empty_window), empty_window.findChild(LoadingCover)
+    with qtbot.waitSignal(c.document.opened, timeout=20_000):
+        empty_window.open_paths([small_recording])
+        assert cover.isVisible()
+        assert "Opening ball.sd2" in words(cover)
+        empty_window.resize(1000, 700)
+        assert cover.size() == empty_window.centralWidget().size()
+    qtbot.waitUntil(lambda: not cover.isVisible(), timeout=5000)
+
+
+def test_reading_that_takes_long_shows_how_far_it_is(
+    empty_window, qtbot, small_recording, monkeypatch
+) -> None:
+    c, cover = models_of(empty_window), empty_window.findChild(LoadingCover)
+    gate = threading.Event()
+    monkeypatch.setattr(document, "recording_of", lambda *_: gate.wait(20))
+    cover._patience.setInterval(0)
+    empty_window.open_paths([small_recording])
+    c.jobs.report(c.document.reading, 250, 400)
+    qtbot.waitUntil(cover.bar.isVisible, timeout=5000)
+    assert "Reading the radar" in words(cover)
+    gate.set()
+    assert cover.bar.maximum() == 400
+    QTest.mouseClick(cover.cancel, Qt.MouseButton.LeftButton)
+    assert not cover.isVisible()
+    assert c.document.content is None
+
+
+def test_a_failure_uncovers_the_window(empty_window, qtbot, tmp_path) -> None:
+    cover = empty_window.findChild(LoadingCover)
+    with qtbot.waitSignal(models_of(empty_window).document.failed, timeout=20_000):
+        empty_window.open_paths([Path(tmp_path / "missing.mp4")])
+    assert not cover.isVisible()
+    assert "does not exist" in empty_window.messages.text
+
+
+def test_an_open_recording_stays_in_view_while_another_is_read(window, qtbot, small_recording):
+    cover, c = window.findChild(LoadingCover), models_of(window)
+    with qtbot.waitSignal(c.document.opened, timeout=20_000):
+        window.open_paths([small_recording])
+        assert not cover.isVisible()
