@@ -98,6 +98,7 @@ def _named(session: Session, features: Features, **others: object) -> SimpleName
         uncertainty=f.maps.uncertainty,
         limbs=f.maps.limbs,
         placements=f.sensor.placements,
+        alignment=f.sensor.alignment,
         denoise=f.denoise.model,
         live=f.denoise.live,
         classify=f.classify.model,

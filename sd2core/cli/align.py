@@ -41,7 +41,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         "--within",
         type=positive_float,
         metavar="S",
-        help="search so many seconds before and after the recording's offset (default: 5)",
+        help="search so far before and after the recording's offset, 2 s at least (default: 5)",
     )
     parser.add_argument(
         "--save", action="store_true", help="write what was found into the recordings"

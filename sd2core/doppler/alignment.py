@@ -15,19 +15,23 @@ from sd2core.maps import DopplerMap
 
 Floats = NDArray[np.float64]
 
-WITHIN_S = 5.0
-"""Farthest that an offset is looked for, either way, where nobody chooses otherwise."""
+WITHIN_S, LEAST_WITHIN_S = 5.0, 2.0
+"""How far to look for an offset, either way: usually, and at least, as a peak stands out only
+among others."""
 LEAST_CONFIDENCE = 0.9
 """Chosen on takes of one person, judged on another's: docs/decisions/0056-alignment.md."""
 
 _STEP_S = 1.0 / 30.0
-_SMOOTH_S, _SLOW_S = 0.1, 2.0
-"""Changes faster than the one are noise; those slower than the other, drift."""
+_SMOOTH_S = 0.1
+"""Standard deviation of the smoothing: what changes faster is noise."""
 _MOMENT_S = 2.0 * math.sqrt(math.pi) * _SMOOTH_S
 """White noise that was smoothed has one independent value in so long."""
-_LEAST_WITHIN_S, _LEAST_OVERLAP_S = 0.1, 3.0
+_ONE_SIDED = 0.01
+"""Share of the energy on one side of 0 m/s below which a map does not tell the sign."""
+_LEAST_OVERLAP_S = 3.0
 _LEAST_HALF_WIDTH_S = 0.2
-_CERTAIN = 1.0 - 1e-9
+_ALIKE = 0.99
+"""Correlation of a mesh and a radar at best; nearer to 1, differences would mean too much."""
 _STILL_MPS = 1e-6
 _MOVES = "a recording in which somebody moves"
 
@@ -80,11 +84,12 @@ def align(
     """Find what to add to a radar's times for its map to fit a synthetic one.
 
     Two series of either map are compared: its mean velocity per frame, and its motion, the root
-    mean square of velocity, in which coming and going are alike. Where n independent moments
+    of energy times velocity squared, in which noise adds what is constant and no sign is needed;
+    a map with echoes on one side of 0 m/s only has motion alone. Where n independent moments
     overlap and the series correlate with r₁ and r₂ (0 if negative), that both show one motion is
     likelier than that they do not by −n/2 · log((1 − r₁²)(1 − r₂²)). The offset is where this
-    is greatest. If it is less by d at an offset beyond that peak, or per moment, over no more of
-    them than both offsets have, then 1 / (1 + exp(−d)) of the least such d is the confidence.
+    is greatest. Offsets beyond that peak have less by d: in all, or per moment times the moments
+    of the shorter overlap, whichever is less. The least 1 / (1 + exp(−d)) is the confidence.
 
     Parameters
     ----------
@@ -93,7 +98,7 @@ def align(
     radar : DopplerMap
         Map of the radar, on its own clock.
     around_s, within_s : float
-        Offsets are tried up to ``within_s`` from ``around_s``.
+        Offsets are tried up to ``within_s`` from ``around_s``, two seconds at least.
 
     Raises
     ------
@@ -112,9 +117,9 @@ def align(
     >>> align(seen, seen.shifted(-1.2)).checked().offset_s
     1.2
     """
-    if not (_LEAST_WITHIN_S <= within_s < math.inf and math.isfinite(around_s)):
+    if not (LEAST_WITHIN_S <= within_s < math.inf and math.isfinite(around_s)):
         raise Sd2Error(
-            f"The search goes {within_s:g} s from {around_s:g} s", f"{_LEAST_WITHIN_S} s or more"
+            f"The search goes {within_s:g} s from {around_s:g} s", f"{LEAST_WITHIN_S:g} s or more"
         )
     (ours, start_s), (theirs, their_start_s) = _series(synthetic), _series(radar)
     for name, values in (("map of the mesh", ours), ("radar's map", theirs)):
@@ -168,20 +173,21 @@ def _best_of(offsets_s: Floats, evidence: Floats, moments: Floats, longest: floa
 
 
 def _series(doppler: DopplerMap) -> tuple[Floats, float]:
-    """Mean velocity and motion in even steps, (2, N), without noise and drift; and the start."""
+    """Mean velocity and motion in even steps, (2, N), smoothed; and the start."""
     values = doppler.values.astype(np.float64)
     if doppler.present is not None:
         values *= doppler.present
     velocity_mps, total = doppler.axis.centres_mps, values.sum(axis=0)
-    # In a frame without an echo nothing moves.
+    # In a frame without an echo nothing moves. In one with noise alone the share has no end of
+    # motion, so motion is of the energy itself.
     share = np.divide(values, total, out=np.zeros_like(values), where=total > 0)
-    even = _in_steps(doppler.times_s, np.stack([velocity_mps @ share, velocity_mps**2 @ share]))
+    even = _in_steps(doppler.times_s, np.stack([velocity_mps @ share, velocity_mps**2 @ values]))
     even[1] = np.sqrt(even[1])
-    smooth, slow = (
-        gaussian_filter1d(even, width_s / _STEP_S, mode="nearest")
-        for width_s in (_SMOOTH_S, _SLOW_S)
-    )
-    return smooth - slow, doppler.timebase.start_s
+    approaching = share[velocity_mps > 0].sum() / max(share.sum(), 1.0)
+    if not _ONE_SIDED <= approaching <= 1.0 - _ONE_SIDED:
+        even[0] = 0.0  # coming and going may look alike, and a mean be that of speeds
+    smooth = gaussian_filter1d(even, _SMOOTH_S / _STEP_S, mode="nearest")
+    return smooth, doppler.timebase.start_s
 
 
 def _in_steps(times_s: Floats, series: Floats) -> Floats:
@@ -208,7 +214,7 @@ def _evidence(ours: Floats, theirs: Floats, shift: int) -> float:
     )
     norm = np.sqrt((one**2).sum(axis=1) * (other**2).sum(axis=1))
     agreed = np.divide((one * other).sum(axis=1), norm, out=np.zeros(2), where=norm > 0)
-    agreed = agreed.clip(0.0, _CERTAIN)
+    agreed = _ALIKE * agreed.clip(0.0, 1.0)
     return float(-0.5 * _moments(end - begin) * np.log(1.0 - agreed**2).sum())
 
 

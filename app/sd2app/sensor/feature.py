@@ -1,4 +1,4 @@
-"""The virtual sensor's panel, and the placements where others are planned."""
+"""The virtual sensor's panel, the placements of others, and the radar's time offset."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from PySide6.QtWidgets import QWidget
 from sd2app.accuracy.model import AccuracyModel
 from sd2app.feature import Action, Feature, Shell
 from sd2app.maps.model import SynthesisModel
+from sd2app.sensor.alignment import AlignmentModel
+from sd2app.sensor.alignment_dialog import AlignmentDialog
 from sd2app.sensor.panel import SensorPanel
 from sd2app.sensor.placements import PlacementsModel
 from sd2app.sensor.placements_page import PlacementsPage
@@ -34,11 +36,13 @@ class SensorFeature(Feature):
         self.placements = PlacementsModel(session, accuracy, parent)
         self.placements.failed.connect(shell.warn)
         self.changing = (self.placements.changed,)
-        self.closing = self.working = (self.placements,)
+        self.alignment = AlignmentModel(session, synthesis, parent)
+        self.closing = self.working = (self.placements, self.alignment)
 
     def actions(self) -> Sequence[Action]:
         """Sensor and placements."""
         edits, synthesis, placements = self._session.edits, self._synthesis, self.placements
+        alignment = self.alignment
         return (
             Action(
                 "sensor_to_camera", "Edit", "Sensor at the camera", ("Shift+Home",),
@@ -53,6 +57,11 @@ class SensorFeature(Feature):
                 "placements", "Edit", "Placements…", ("Shift+S",),
                 "Plan a grid or a cloud of sensors around the body, for a map from each",
                 lambda: self._shell.bring_up("Sensor", "Placements"),
+            ),
+            Action(
+                "align", "Edit", "Align automatically…", (),
+                "Find the time offset of the radar by the motion that mesh and radar both show",
+                self._align, lambda: not alignment.why_not, why_not=lambda: alignment.why_not,
             ),
             Action(
                 "draw_placements", "View", "Placements in the scene", (),
@@ -71,13 +80,18 @@ class SensorFeature(Feature):
         if self._synthesis.torso_m is not None:
             self._session.edits.aim_sensor(self._synthesis.torso_m)
 
+    def _align(self) -> None:
+        shell, display = self._shell, self._session.display
+        dialog = AlignmentDialog(self.alignment, display, shell.dialog_parent)
+        dialog.exec()
+        dialog.deleteLater()
+
     def panels(self) -> Mapping[str, QWidget]:
         """The panel at the side, of two pages."""
         shell = self._shell
         to_camera, aim = shell.action("sensor_to_camera"), shell.action("aim_sensor")
-        sensor = SensorPanel(
-            self._session, self._synthesis, lambda: self.placements.radar, to_camera, aim
-        )
+        align, radar = shell.action("align"), lambda: self.placements.radar
+        sensor = SensorPanel(self._session, self._synthesis, radar, to_camera, aim, align)
         placements = PlacementsPage(self.placements, self._accuracy, shell, self._make_batch)
         return {
             "Sensor": paged_panel(

@@ -50,12 +50,13 @@ class SensorPanel(QWidget):
         radar: Callable[[], RadarConfig],
         to_camera: QAction,
         aim: QAction,
+        align: QAction,
     ) -> None:
         super().__init__()
         self.setObjectName("page")
         self._session, self._synthesis, self._radar = session, synthesis, radar
         self._too_far = sentence("", "warning")
-        self._capture = self._capture_part()
+        self._capture = self._capture_part(self._button(align, "Find…"))
         buttons = (self._button(aim, "Aim at body"), self._button(to_camera, "To camera"))
         self.setLayout(
             column_of(
@@ -84,6 +85,7 @@ class SensorPanel(QWidget):
         button = outlined(text, action.toolTip(), action.trigger, self)
         button.setEnabled(action.isEnabled())
         action.enabledChanged.connect(button.setEnabled)
+        action.changed.connect(lambda: button.setToolTip(action.toolTip()))
         return button
 
     def _placement_form(self) -> QGridLayout:
@@ -139,7 +141,7 @@ class SensorPanel(QWidget):
             ("Field of view", field),
         )
 
-    def _capture_part(self) -> QWidget:
+    def _capture_part(self, find: QWidget) -> QWidget:
         edits = self._session.edits
         self._capture_title = title("Radar capture")
         self._offset = NumberBox(
@@ -153,7 +155,8 @@ class SensorPanel(QWidget):
         self._clutter.setSizeAdjustPolicy(
             QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
         )
-        form = _form_of(("Offset", self._offset), ("Clutter", self._clutter))
+        offset = pane(row_of((self._offset, 1), find, spacing_px=6, margins_px=0))
+        form = _form_of(("Offset", offset), ("Clutter", self._clutter))
         limits = QGridLayout()
         limits.setHorizontalSpacing(12)
         limits.setVerticalSpacing(3)

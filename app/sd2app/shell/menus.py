@@ -22,7 +22,7 @@ LAYOUT: Mapping[str, tuple[str, ...]] = {
         "save_as", "export_map", "export_denoised", "export_maps", "export_strip",
         "export_dataset", "-", "batch", "-", "recover_labels", "-", "quit",
     ),
-    "Edit": ("undo", "redo", "-", "sensor_to_camera", "aim_sensor", "placements"),
+    "Edit": ("undo", "redo", "-", "sensor_to_camera", "aim_sensor", "placements", "-", "align"),
     "View": (
         "colour_velocity", "colour_range", "colour_visibility", "colour_plain", "dots", "overlay",
         "overlay_dots", "draw_placements", "-", "view_three_quarter", "view_camera", "view_sensor",

@@ -43,7 +43,7 @@ def test_the_sample_is_aligned_to_a_frame_and_saved(sd2: Sd2, tmp_path: Path) ->
 def test_noise_is_refused_and_the_others_go_on(sd2: Sd2, tmp_path: Path) -> None:
     noise = swinging_recordings.recording(tmp_path / "noise.sd2", offset_s=0.5).folder
     bare = swinging_recordings.recording(tmp_path / "bare.sd2", radar=False).folder
-    outcome = sd2("align", bare, noise, "--save", "--within", "0.6", "--json")
+    outcome = sd2("align", bare, noise, "--save", "--within", "2", "--json")
     assert outcome.code == 1
     first, second = json.loads(outcome.out)["recordings"]
     assert "no radar" in first["problem"]

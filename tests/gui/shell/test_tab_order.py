@@ -16,6 +16,8 @@ from PySide6.QtWidgets import (
 )
 from window_models import models_of
 
+from sd2app.shell.side_panel import RailButton
+
 _KINDS = (QAbstractButton, QAbstractSpinBox, QComboBox, QSlider, QTabBar)
 
 
@@ -41,7 +43,9 @@ def controls(window) -> set[QWidget]:
             continue
         inside = isinstance(one.parentWidget(), _KINDS)
         group = one.group() if isinstance(one, QAbstractButton) else None
-        other = group is not None and group.exclusive() and not one.isChecked()
+        # Of one choice of several, the arrows reach the others.
+        choice = isinstance(one, RailButton) or (group is not None and group.exclusive())
+        other = choice and not one.isChecked()
         used = one.isVisible() and one.isEnabled() and one.window() is window
         if used and not inside and not other:
             found.add(one)

@@ -1,0 +1,97 @@
+"""Time offset of the radar, found by what its map and the synthetic one have in common."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from PySide6.QtCore import QObject, Signal
+
+from sd2app.background.latest import LatestRunner
+from sd2app.maps.model import SynthesisModel
+from sd2app.session.session import Session
+from sd2core.doppler.alignment import WITHIN_S, Alignment, align
+
+_SURE = 0.99
+
+
+class AlignmentModel(QObject):
+    """Looks in the background for the offset at which the maps on screen fit."""
+
+    changed = Signal()
+
+    def __init__(self, session: Session, synthesis: SynthesisModel, parent: QObject) -> None:
+        super().__init__(parent)
+        self._session, self._synthesis = session, synthesis
+        self.within_s = WITHIN_S  # how far is searched
+        self.found: Alignment | None = None
+        self.problem = ""  # why nothing can be applied
+        self._runner = LatestRunner("alignment", self, self._take, self._refuse)
+
+    @property
+    def busy(self) -> bool:
+        """True while it searches."""
+        return self._runner.busy
+
+    @property
+    def now_s(self) -> float:
+        """Offset of the recording."""
+        recording = self._session.document.recording
+        return recording.radar_offset_s if recording is not None else 0.0
+
+    @property
+    def why_not(self) -> str:
+        """Reason why nothing can be aligned; empty if it can."""
+        if self._session.maps.real.map is None:
+            return "There is no radar to align: add its recording first (File → Add…)"
+        if not self._session.has_mesh():
+            return "There is no mesh to compare the radar with: fit one to the video first"
+        if not self._synthesis.complete:
+            return "Wait until the synthetic map is complete"
+        return ""
+
+    def search(self, within_s: float | None = None) -> None:
+        """Search up to so many seconds from the recording's offset, by default as before."""
+        self.within_s = reach_s = within_s or self.within_s
+        self.found, self.problem = None, ""
+        synthetic, radar, now_s = (
+            self._session.maps.synthetic.map, self._session.maps.real.map, self.now_s
+        )  # fmt: skip
+        if synthetic is None or radar is None:
+            return
+        self._runner.submit(lambda emit: align(synthetic, radar, around_s=now_s, within_s=reach_s))
+        self.changed.emit()
+
+    def apply(self) -> None:
+        """Give the recording the offset, as one step in the history."""
+        if self.found is not None and not self.problem:
+            self._session.edits.set_radar_offset(self.found.offset_s)
+
+    def cancel(self) -> None:
+        """Stop searching."""
+        self._runner.cancel()
+
+    def close(self) -> None:
+        """Stop searching for good."""
+        self._runner.close()
+
+    def _take(self, found: Any) -> None:
+        self.found, self.problem = found, found.problem
+        self.changed.emit()
+
+    def _refuse(self, error: Exception) -> None:
+        self.problem = str(error)
+        self.changed.emit()
+
+
+def result_text(model: AlignmentModel) -> str:
+    """What was found, in a sentence; empty where there is a problem."""
+    found = model.found
+    if model.busy:
+        return "Comparing…"
+    if found is None or model.problem:
+        return ""
+    sure = "high" if found.confidence >= _SURE else "sufficient"
+    return (
+        f"The radar fits best with an offset of {found.offset_s:.3f} s (now {model.now_s:.3f} s)."
+        f" Confidence is {sure} ({found.confidence:.2f})."
+    )

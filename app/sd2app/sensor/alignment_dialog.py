@@ -1,0 +1,85 @@
+"""Dialog that shows how well each time offset of the radar fits, and applies the best."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QDialog, QWidget
+
+from sd2app.sensor.alignment import AlignmentModel, result_text
+from sd2app.widgets.chart import Chart, ChartView, Curve, Mark, Scale
+from sd2app.widgets.dialogs import accepting
+from sd2app.widgets.inputs import NumberBox
+from sd2app.widgets.layouts import column_of, form_of
+from sd2app.widgets.panel import sentence, show_words, side_by_side
+from sd2app.widgets.plot import Themed
+from sd2core.doppler.alignment import LEAST_WITHIN_S
+
+
+class AlignmentDialog(QDialog):
+    """A view of :class:`AlignmentModel`; the search begins with it."""
+
+    def __init__(self, model: AlignmentModel, display: Themed, parent: QWidget) -> None:
+        super().__init__(parent)
+        self._model = model
+        self.setWindowTitle("Align automatically")
+        self._chart = ChartView(display, "Correlation over offsets", offset_chart(model))
+        self._result, self._problem = sentence("", "plain"), sentence("", "warning")
+        self._within = NumberBox(
+            LEAST_WITHIN_S, 600.0, " s", "How far from the present offset to search, either way",
+            decimals=1, step=1.0,
+        )  # fmt: skip
+        self._within.show_value(model.within_s)
+        self._within.valueChanged.connect(model.search)
+        buttons, self._apply = accepting(self, "Apply")
+        self.setLayout(
+            column_of(
+                sentence(
+                    "Mean velocity and motion of the synthetic map, compared with the radar's at"
+                    " each time offset."
+                ),
+                (self._chart, 1),
+                self._result,
+                self._problem,
+                form_of(("Search within ±", side_by_side(self._within))),
+                buttons,
+                spacing_px=12,
+                margins_px=16,
+            )
+        )
+        self.accepted.connect(model.apply)
+        self.finished.connect(lambda _: model.cancel())
+        model.changed.connect(self._refresh)
+        model.search()
+        self._refresh()
+        self._apply.setFocus(Qt.FocusReason.OtherFocusReason)
+        self.resize(560, 440)
+
+    def _refresh(self) -> None:
+        model = self._model
+        self._chart.show_chart(offset_chart(model))
+        show_words(self._result, result_text(model))
+        show_words(self._problem, model.problem)
+        self._apply.setEnabled(model.found is not None and not model.problem)
+
+
+def offset_chart(model: AlignmentModel) -> Chart:
+    """Correlation over the offsets, with the best one and the present one marked."""
+    found, now_s, within_s = model.found, model.now_s, model.within_s
+    across = Scale(now_s - within_s, now_s + within_s)
+    chart = Chart(across, Scale(0.0, 1.0), "Offset of the radar, s", "correlation")
+    if found is None:
+        return chart
+    points = list(zip(found.offsets_s.tolist(), found.correlation.tolist(), strict=True))
+    best = Mark(found.offset_s, found.peak, f"Best: {found.offset_s:.3f} s, {found.peak:.2f}")
+    marks = [best]
+    if found.other_s is not None:
+        other = min(points, key=lambda point: abs(point[0] - found.other_s))
+        marks.append(Mark(*other, f"Next best: {other[0]:.3f} s, {other[1]:.2f}"))
+    curves = (
+        Curve("now", "muted", ((now_s, 0.0), (now_s, 1.0)), width_px=1.0),
+        Curve("", "accent", points),
+    )
+    return Chart(
+        across, Scale(0.0, 1.0), chart.below, chart.unit, curves,
+        sorted(marks, key=lambda mark: mark.x), best,
+    )  # fmt: skip
