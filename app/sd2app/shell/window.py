@@ -102,7 +102,7 @@ class MainWindow(QMainWindow):
             [self._panels["tracks"], self._panels["spectrum"]],
             (728, 200),
         )
-        self._rows = splitter(Qt.Orientation.Vertical, [self._top, self._bottom], (264, 456))
+        self._rows = splitter(Qt.Orientation.Vertical, [self._top, self._bottom], (250, 470))
         # Of the room of a larger window, maps take most.
         self._rows.setStretchFactor(0, 1)
         self._rows.setStretchFactor(1, 2)
