@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import pairwise, product
 from typing import Any
 
+from sd2core.accuracy.cost_model import modelled_ns
 from sd2core.accuracy.plans import (
     FRAME_RATE_FACTORS,
     MASK_REUSE_M,
@@ -17,7 +18,7 @@ from sd2core.accuracy.plans import (
     counting_plans,
     visibility_plans,
 )
-from sd2core.accuracy.reasons import SceneFacts, reasons_for, scene_facts
+from sd2core.accuracy.reasons import Chosen, SceneFacts, reasons_for, scene_facts
 from sd2core.accuracy.results import Choice, Errors, relative_l1
 from sd2core.accuracy.sample import take_sample
 from sd2core.accuracy.trial import Trial
@@ -64,6 +65,11 @@ class Survey:
             saved = per_vertex - self.count_ms[_with(base, "range_law", "frame")]
             count_ms -= min(max(saved, 0.0), 0.9 * per_vertex)
         return self.cost_share[plan.vertices_kept] * (mask_ms + count_ms) / worker_count()
+
+    def modelled_ns(self, plan: AccuracyPlan) -> float:
+        """Cost by which plans are ordered: a model, since measured times differ each time."""
+        moving = 1.0 - self.facts.still_share
+        return modelled_ns(plan, self.trial.mesh.vertex_count, moving)
 
     def settings_changed(self, plan: AccuracyPlan) -> int:
         """Number of settings in which a plan differs from the base."""
@@ -190,7 +196,7 @@ _SLACK = 1.5
 """Errors of single settings add up to more than a plan's error; by this factor at most."""
 
 _WORTH_TAKING = 1.05
-_NEGLIGIBLE_MS = 0.002
+_NEGLIGIBLE_NS = 2000.0
 """Per frame: a millisecond for a clip of some hundred frames."""
 
 _USUAL_TOLERANCE = 0.02
@@ -212,7 +218,9 @@ def choose(
 
     Each setting is lowered alone on some frames, which gives the reasons and a
     forecast for every combination. The most promising ones are tried, on those frames
-    and on others, until one holds.
+    and on others, until one holds. Errors and a model of the cost decide between the plans
+    that hold a tolerance, so that the choice is the same each time; a budget is compared with
+    measured times.
 
     Parameters
     ----------
@@ -246,8 +254,9 @@ def choose(
     _check(tolerance, budget_ms)
     if survey is None:
         survey = survey_scene(mesh, sensor, check_options(mesh, options), progress)
+    tried: dict[AccuracyPlan, Errors] = {}
     if tolerance is not None:
-        plan, holds, errors = _by_tolerance(survey, tolerance, progress)
+        plan, holds, errors = _by_tolerance(survey, tolerance, tried, progress)
     else:
         assert budget_ms is not None
         plan, holds, errors = _by_budget(survey, budget_ms, dragging, progress)
@@ -257,7 +266,17 @@ def choose(
         errors=errors,
         cost_ms=survey.forecast_ms(plan),
         reasons=reasons_for(
-            plan, survey.base, survey.change, survey.facts, survey.trial.options.axis.v_max_mps
+            Chosen(
+                plan,
+                holds,
+                errors.l1,
+                tolerance,
+                lambda lower: _why_not(survey, plan, lower, tried),
+            ),
+            survey.base,
+            survey.change,
+            survey.facts,
+            survey.trial.options.axis.v_max_mps,
         ),
         tolerance=tolerance,
         budget_ms=budget_ms,
@@ -294,17 +313,20 @@ def _check(tolerance: float | None, budget_ms: float | None) -> None:
 
 
 def _by_tolerance(
-    survey: Survey, tolerance: float, progress: Progress
+    survey: Survey, tolerance: float, tried: dict[AccuracyPlan, Errors], progress: Progress
 ) -> tuple[AccuracyPlan, bool, Errors]:
-    """Cheapest tried plan that holds, else the one with the smallest error."""
+    """Cheapest tried plan that holds, else the one with the smallest error.
+
+    The errors of what was tried are put into ``tried``.
+    """
     plans = sorted(_candidates(survey, tolerance), key=lambda plan: _dearness(survey, plan))
     forecast = {plan: survey.forecast_error(plan) for plan in plans}
     safe = [plan for plan in plans if forecast[plan] <= tolerance]
     # What must hold if anything does.
-    safe.append(min(plans, key=forecast.__getitem__))
+    safe.append(min(plans, key=lambda plan: (forecast[plan], survey.settings_changed(plan))))
     failed: list[tuple[AccuracyPlan, Errors]] = []
     for plan in (*safe[: _MOST_TRIALS - 1], safe[-1]):
-        errors = _tried(survey, plan, tolerance, progress)
+        errors = tried[plan] = _tried(survey, plan, tolerance, progress)
         if errors.l1 <= tolerance:
             break
         failed.append((plan, errors))
@@ -318,7 +340,7 @@ def _by_tolerance(
         if tolerance < forecast[other] <= _SLACK * tolerance
     ]
     for other in sorted(cheaper, key=forecast.__getitem__)[:_MORE_TRIALS]:
-        found = _tried(survey, other, tolerance, progress)
+        found = tried[other] = _tried(survey, other, tolerance, progress)
         if found.l1 <= tolerance and plans.index(other) < plans.index(plan):
             plan, errors = other, found
     return plan, True, errors
@@ -346,8 +368,20 @@ def _by_budget(
 
 def _dearness(survey: Survey, plan: AccuracyPlan) -> tuple[int, int]:
     """Sort key: cost in steps of 5 %, then the number of settings that differ from the base."""
-    step = math.log(survey.forecast_ms(plan) + _NEGLIGIBLE_MS) / math.log(_WORTH_TAKING)
+    step = math.log(survey.modelled_ns(plan) + _NEGLIGIBLE_NS) / math.log(_WORTH_TAKING)
     return round(step), survey.settings_changed(plan)
+
+
+def _why_not(
+    survey: Survey,
+    plan: AccuracyPlan,
+    lower: AccuracyPlan,
+    tried: Mapping[AccuracyPlan, Errors],
+) -> float | None:
+    """Error that a plan with one setting lowered has, or is forecast; None if it saves nothing."""
+    if _dearness(survey, lower) >= _dearness(survey, plan):
+        return None
+    return tried[lower].l1 if lower in tried else survey.forecast_error(lower)
 
 
 def _reach_m(survey: Survey) -> float | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,7 +11,20 @@ import numpy as np
 from sd2core.accuracy.plans import AccuracyPlan
 from sd2core.accuracy.results import Reason, percent
 from sd2core.accuracy.trial import Trial
+from sd2core.doppler.options import Visibility
 from sd2core.progress import Progress, silent
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """Chosen plan, and what decided for it."""
+
+    plan: AccuracyPlan
+    holds: bool
+    error: float  # of its map, relative L1 after smoothing
+    tolerance: float | None  # None where a budget decided
+    lowered: Callable[[AccuracyPlan], float | None] = lambda lower: None
+    """Error of the plan with one setting lowered; None if that saves nothing."""
 
 
 @dataclass(frozen=True)
@@ -104,8 +117,26 @@ _SENTENCES = {
 }
 
 
+def _because(chosen: Chosen, modelled: bool, value: float, lower: AccuracyPlan | None) -> str:
+    """Clause for a change that alone would have decided the other way, else nothing."""
+    tolerance = chosen.tolerance
+    if tolerance is None or lower is None or modelled != (value <= tolerance):
+        return ""
+    if not modelled:
+        return f", but with the rest of the plan the map is off by {percent(chosen.error)} only"
+    held = f"the tolerance of {percent(tolerance)}"
+    if not chosen.holds:
+        return f", since no plan holds {held}"
+    error = chosen.lowered(lower)
+    if error is None:
+        return ", since less would save nothing"
+    if error > tolerance:
+        return f", since less would be over {held} with the rest of the plan: {percent(error)}"
+    return ", since of the plans with less none that was tried holds"
+
+
 def reasons_for(
-    plan: AccuracyPlan,
+    chosen: Chosen,
     base: AccuracyPlan,
     change: Mapping[AccuracyPlan, float],
     facts: SceneFacts,
@@ -113,13 +144,23 @@ def reasons_for(
 ) -> tuple[Reason, ...]:
     """Explain the settings of a chosen plan.
 
-    ``base`` and ``change`` are those of :class:`~sd2core.accuracy.choosing.Survey`;
-    ``v_max_mps`` is the end of the axis.
+    Where a setting alone would be within the tolerance and is not lowered, or the reverse, the
+    sentence says what decided. ``base`` and ``change`` are those of
+    :class:`~sd2core.accuracy.choosing.Survey`; ``v_max_mps`` is the end of the axis.
     """
     found: list[Reason] = []
+    plan = chosen.plan
 
-    def add(setting: str, modelled: bool, value: float, key: str, **numbers: object) -> None:
+    def add(
+        setting: str,
+        modelled: bool,
+        value: float,
+        key: str,
+        lower: AccuracyPlan | None = None,
+        **numbers: object,
+    ) -> None:
         text = _SENTENCES[key].format(value=percent(value), **numbers)
+        text += _because(chosen, modelled, value, lower)
         found.append(Reason(setting, modelled, value, text))
 
     def alone(**setting: Any) -> float:
@@ -137,12 +178,15 @@ def reasons_for(
             off = alone(visibility="depth", depth_resolution=pixels)
             numbers |= {"pixels": str(pixels), "off": percent(off)}
         occluded = plan.visibility in ("depth", "exact")
-        add("occlusion", occluded, needed, f"occlusion {plan.visibility}", **numbers)
+        less: Visibility = "facing" if facing <= every else "none"
+        lower = replace(plan, visibility=less, mask_stride=1, mask_reuse_m=0.0)
+        add("occlusion", occluded, needed, f"occlusion {plan.visibility}", lower, **numbers)
         if occluded and not plan.mask_reuse_m:
             stride = plan.mask_stride
             key = "mask of some frames" if stride > 1 else "mask of each frame"
             off = alone(mask_stride=stride if stride > 1 else 2)
-            add("mask_age", stride == 1, off, key, ordinal=_ordinal(stride))
+            lower = replace(plan, mask_stride=max(stride, 2))
+            add("mask_age", stride == 1, off, key, lower, ordinal=_ordinal(stride))
         reaches_m = [
             other.mask_reuse_m
             for other in change
@@ -164,23 +208,28 @@ def reasons_for(
             share = max(shares) if whole else plan.vertices_kept
             use = "the full mesh is used" if whole else "they are enough"
             off = alone(vertices_kept=share)
-            add("geometry", whole, off, "geometry", share=percent(share), use=use)
+            lower = replace(plan, vertices_kept=share)
+            add("geometry", whole, off, "geometry", lower, share=percent(share), use=use)
     if replace(base, range_law="frame") in change:
         modelled = plan.range_law == "vertex"
         use = "modelled" if modelled else "one range per frame"
         spread = percent(facts.range_spread)
-        add("range_law", modelled, alone(range_law="frame"), "range law", spread=spread, use=use)
+        off, lower = alone(range_law="frame"), replace(plan, range_law="frame")
+        add("range_law", modelled, off, "range law", lower, spread=spread, use=use)
     if facts.beyond_share <= 0:
         add("aliasing", False, 0.0, "no aliasing", v_max_mps=v_max_mps)
     else:
         wrapped = plan.beyond == "wrap"
-        use = "aliasing matters, wrapped" if wrapped else "aliasing is left out, dropped"
         beyond, off = percent(facts.beyond_share), alone(beyond="drop")
+        matters = chosen.tolerance is None or off > chosen.tolerance
+        use = "aliasing matters, wrapped" if matters else "wrapped, which costs nothing"
+        use = use if wrapped else "aliasing is left out, dropped"
         add("aliasing", wrapped, off, "aliasing", beyond=beyond, v_max_mps=v_max_mps, use=use)
     factor = plan.frame_rate_factor
     use = "one moment per frame is enough" if factor == 1 else f"frame rate raised {factor} times"
     off = alone(frame_rate_factor=1)
-    add("motion", factor > 1, off, "motion", bins=facts.motion_bins, use=use)
+    lower = replace(plan, frame_rate_factor=1)
+    add("motion", factor > 1, off, "motion", lower, bins=facts.motion_bins, use=use)
     return tuple(found)
 
 

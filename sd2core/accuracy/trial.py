@@ -46,8 +46,8 @@ def synthesizer_for(
     return Synthesizer(counted, plan.options(options), blocks_of=like)
 
 
-_ASIDE_M = 1e-7
-"""Offset that changes no velocity, but makes another place, whose masks are computed again."""
+_ASIDE_M = 1e-12
+"""Offset that changes no map, but makes another place, whose masks are computed again."""
 
 
 @dataclass(frozen=True, eq=False)

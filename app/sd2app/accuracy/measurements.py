@@ -146,6 +146,12 @@ def serves_at_rest(result: PlanResult) -> bool:
     return result.plan.mask_reuse_m == 0
 
 
+def cheapest_within(measurement: Measurement, tolerance: float) -> PlanResult | None:
+    """The cheapest plan for a sensor at rest whose measured error is within a tolerance."""
+    holding = (one for one in front_at_rest(measurement) if one.errors.l1 <= tolerance)
+    return next(holding, None)
+
+
 def front_at_rest(measurement: Measurement) -> tuple[PlanResult, ...]:
     """The Pareto front of the plans that serve at rest, cheapest first."""
     resting = tuple(result for result in measurement.results if serves_at_rest(result))

@@ -10,13 +10,13 @@ from PySide6.QtWidgets import QGridLayout, QLabel, QSizePolicy, QToolButton, QWi
 
 from sd2app.accuracy.model import PRESETS, AccuracyModel
 from sd2app.accuracy.plot import AccuracyPlot
-from sd2app.accuracy.text import deviation
+from sd2app.accuracy.text import chosen_sentence, legend
 from sd2app.session.display import DisplayModel
 from sd2app.widgets.inputs import Choice, NumberBox
 from sd2app.widgets.layouts import STRETCH, column_of, pane, row_of
-from sd2app.widgets.panel import outlined, rule, say, sentence, show_words, title
+from sd2app.widgets.panel import Fold, outlined, rule, say, sentence, show_words, title
 from sd2app.widgets.progress_bar import ProgressBar
-from sd2app.widgets.text import milliseconds, number, percent, seconds
+from sd2app.widgets.text import milliseconds, number, percent
 
 if TYPE_CHECKING:
     from sd2core.accuracy.results import Reason
@@ -55,9 +55,8 @@ class AccuracyPanel(QWidget):
     # --- building -------------------------------------------------------------------------
 
     def _use_part(self) -> QWidget:
-        self._figures, self._plan = sentence("", "title"), sentence("", "plan")
-        self._figures.setAccessibleName("Its error and cost")
-        self._plan.setAccessibleName("Plan in use")
+        self._chosen = sentence("", "plan")
+        self._chosen.setAccessibleName("Plan in use, its error and cost")
         self._warning = sentence("", "warning")
         self._by_tolerance = outlined(
             "Choose by tolerance",
@@ -66,11 +65,12 @@ class AccuracyPanel(QWidget):
             self,
         )
         below = row_of(self._by_tolerance, STRETCH)
-        return pane(self._figures, self._plan, self._warning, below, spacing_px=4)
+        return pane(self._chosen, self._warning, below, spacing_px=4)
 
     def _plot_part(self, display: DisplayModel, measure: QAction) -> QWidget:
         measured = self._accuracy.measured
-        self._empty, self._source = sentence(""), sentence("")
+        self._empty, self._legend, self._source = sentence(""), sentence(""), sentence("")
+        self._legend.setAccessibleName("Legend of the plot")
         self._plot = AccuracyPlot(self._accuracy, display)
         self._family = Choice(
             "Plans of which signal model", self, _FAMILY_TEXT, measured.set_family
@@ -79,11 +79,13 @@ class AccuracyPanel(QWidget):
         self._bar = ProgressBar("Progress of the measurement")
         self._cancel = outlined("Cancel", "Stop measuring", measured.cancel, self)
         controls = row_of(self._family, self._measure, self._bar, self._cancel, STRETCH)
-        return pane(self._empty, self._plot, controls, self._source, spacing_px=4)
+        return pane(self._empty, self._plot, self._legend, controls, self._source, spacing_px=4)
 
     def _reason_part(self) -> QWidget:
         self._reasons = ReasonList(self)
-        return pane(rule(), title("Why this plan"), self._reasons, spacing_px=4)
+        tip = "What this scene requires of the plan, setting by setting"
+        fold = Fold("Why this plan", tip, self._reasons, self)
+        return pane(rule(), row_of(fold, STRETCH), self._reasons, spacing_px=4)
 
     # --- showing --------------------------------------------------------------------------
 
@@ -106,15 +108,11 @@ class AccuracyPanel(QWidget):
         clicked = in_use is not None and in_use.origin == "clicked"
         warning = ""
         if in_use is None:
-            self._figures.setText(
-                "Choosing what this scene requires…" if accuracy.choosing else "–"
-            )
-            self._plan.setText("Until then occlusion is computed exactly.")
+            doing = "Choosing what this scene requires. " if accuracy.choosing else ""
+            self._chosen.setText(f"{doing}So far occlusion is computed exactly.")
         else:
-            off, cost = deviation(in_use.error), milliseconds(in_use.cost_ms)
-            clip = seconds(1e-3 * in_use.cost_ms * accuracy.frames)
-            self._figures.setText(f"{off} · {cost}/frame · {clip} the clip")
-            self._plan.setText(_unbroken(str(in_use.plan)))
+            self._chosen.setText(_unbroken(chosen_sentence(in_use, accuracy.frames)))
+            self._chosen.setToolTip(str(in_use.plan))
         if in_use is not None and clicked:
             warning = "You clicked this point; the tolerance is not applied."
             if in_use.elsewhere:
@@ -134,6 +132,11 @@ class AccuracyPanel(QWidget):
         self._measure.setText("Measure this scene" if measurement is None else "Measure again")
         self._plot.setVisible(measurement is not None)
         self._source.setVisible(measurement is not None)
+        words = ""
+        if measurement is not None:
+            in_use = self._accuracy.in_use is not None
+            words = legend(measurement, self._accuracy.tolerance, in_use=in_use)
+        show_words(self._legend, words)
         if measurement is not None:
             here = f"{len(measurement.frames)} frames, {measurement.machine}"
             text, role = f"Measured on {here}", "muted"

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, ClassVar
 
 from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPen
+from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPen, QPolygonF
 
-from sd2app.accuracy.measurements import front_at_rest, serves_at_rest
+from sd2app.accuracy.measurements import cheapest_within, front_at_rest, serves_at_rest
 from sd2app.accuracy.model import AccuracyModel
 from sd2app.accuracy.text import point_text
 from sd2app.session.display import DisplayModel
@@ -65,6 +65,7 @@ class AccuracyPlot(ChartView):
         """The tolerance in words, what is in use and what is pointed at."""
         if self._accuracy.measured.family == "histogram":
             self._paint_tolerance_text(painter)
+            self._paint_cheapest(painter)
         super().paint_marks(painter)
 
     def _tolerance_px(self) -> float:
@@ -90,6 +91,20 @@ class AccuracyPlot(ChartView):
         painter.fillRect(box, ground)
         painter.setPen(QColor(colours.accent))
         painter.drawText(box, Qt.AlignmentFlag.AlignCenter, text)
+
+    def _paint_cheapest(self, painter: QPainter) -> None:
+        """Draw a diamond around the cheapest point within the tolerance."""
+        measurement = self._accuracy.measured.measurement
+        if measurement is None:
+            return
+        result = cheapest_within(measurement, self._accuracy.tolerance)
+        mark = next((one for one in self.marks if one.of is result), None)
+        if mark is not None:
+            at, reach_px = self.tip_place(mark), 9.0
+            sides = ((0, -reach_px), (reach_px, 0), (0, reach_px), (-reach_px, 0))
+            painter.setPen(QPen(QColor(self._display.palette.accent), 1.5))
+            painter.setBrush(Qt.BrushStyle.NoBrush)
+            painter.drawPolygon(QPolygonF([at + QPointF(*side) for side in sides]))
 
     # --- pointer and keyboard -------------------------------------------------------------
 

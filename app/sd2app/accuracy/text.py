@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
+from sd2app.accuracy.measurements import cheapest_within, serves_at_rest
 from sd2app.widgets.text import milliseconds, percent, seconds
 
 if TYPE_CHECKING:
     from sd2core.accuracy.plans import AccuracyPlan
-    from sd2core.accuracy.results import PlanResult
+    from sd2core.accuracy.results import Measurement, PlanResult
 
 Origin = Literal["chosen", "clicked"]
 
@@ -37,6 +38,28 @@ class InUse:
 
     def __str__(self) -> str:
         return f"{self.plan} · {self.figures}"
+
+
+def chosen_sentence(in_use: InUse, frames: int) -> str:
+    """One sentence of the plan in use: its error, and its cost per frame and for the clip."""
+    way = "Clicked" if in_use.origin == "clicked" else "Chosen"
+    return (
+        f"{way}: {short(in_use.plan)}, whose map is {percent(in_use.error)} off the reference and"
+        f" costs {milliseconds(in_use.cost_ms)} per frame,"
+        f" {seconds(1e-3 * in_use.cost_ms * frames)} for the clip."
+    )
+
+
+def legend(measurement: Measurement, tolerance: float, *, in_use: bool) -> str:
+    """Signs of the plot and what they stand for, as far as they are there."""
+    signs = ["◉ in use"] if in_use else []
+    if measurement.family == "histogram":
+        signs = ["◉ chosen"] if in_use else []
+        if cheapest_within(measurement, tolerance) is not None:
+            signs.append("◇ cheapest measured within the tolerance")
+        if not all(map(serves_at_rest, measurement.results)):
+            signs.append("○ only while dragging")
+    return "   ".join(sign.replace(" ", "\N{NO-BREAK SPACE}") for sign in signs)
 
 
 def deviation(error: float) -> str:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QGridLayout, QToolButton, QWidget
+from PySide6.QtWidgets import QGridLayout, QWidget
 
 from sd2app.training.dialogs import TrainingDialogs
 from sd2app.training.model import TrainingModel
 from sd2app.training.text import MODEL_WORDS, division_text
 from sd2app.widgets.layouts import STRETCH, pane, row_of
-from sd2app.widgets.panel import ElidedLabel, outlined, sentence, title
+from sd2app.widgets.panel import ElidedLabel, Fold, outlined, sentence, title
 from sd2app.widgets.progress_bar import ProgressBar
 from sd2app.widgets.text import counted
 from sd2app.widgets.training_form import Field, TrainingForm, labelled
@@ -81,19 +80,10 @@ class TrainingSetupView(TrainingForm):
         for column, field in enumerate(_FIELDS):
             labelled(grid, (0, 2 * column), field, self.number(field))
             grid.setColumnStretch(2 * column + 1, 1)
-        self._more = QToolButton(self)
-        self._more.setObjectName("fold")
-        self._more.setCheckable(True)
-        self._more.setText("More settings")
-        self._more.setToolTip("Learning rate, early stopping, range, seed")
-        self._more.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
-        self._more.setArrowType(Qt.ArrowType.RightArrow)
-        self._more.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-        self._more.toggled.connect(self._unfold)
         tip = "Put all settings back to the paper's"
         self._reset = outlined("Reset", tip, self._pairs.reset, self)
-        self._rest = QWidget(self)
-        rest = QGridLayout(self._rest)
+        hidden = QWidget(self)
+        rest = QGridLayout(hidden)
         rest.setContentsMargins(0, 0, 0, 0)
         rest.setVerticalSpacing(4)
         rest.setColumnStretch(0, 1)
@@ -103,10 +93,10 @@ class TrainingSetupView(TrainingForm):
             labelled(rest, (at, 0), field, box)
         boxes[0].setSpecialValueText("never")
         boxes[2].setPrefix("× ")
-        self._rest.hide()
+        more = Fold("More settings", "Learning rate, early stopping, range, seed", hidden, self)
         self.column.addLayout(grid)
-        self.column.addLayout(row_of(self._more, STRETCH, self._reset))
-        self.column.addWidget(self._rest)
+        self.column.addLayout(row_of(more, STRETCH, self._reset))
+        self.column.addWidget(hidden)
 
     def _refresh(self) -> None:
         training, setup, maker = self._training, self._pairs, self._training.pair_maker
@@ -141,7 +131,3 @@ class TrainingSetupView(TrainingForm):
         make.setToolTip("Of one recording, or of all in a folder, that have a mesh and a radar")
         make.setEnabled(self._training.pair_maker.out is None)
         make.triggered.connect(self._dialogs.ask_recordings)
-
-    def _unfold(self, shown: bool) -> None:
-        self._rest.setVisible(shown)
-        self._more.setArrowType(Qt.ArrowType.DownArrow if shown else Qt.ArrowType.RightArrow)

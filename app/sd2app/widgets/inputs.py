@@ -91,8 +91,11 @@ class NumberBox(QDoubleSpinBox):
 
     def valueFromText(self, text: str) -> float:
         """Number that was typed, in the box's unit."""
-        # The box puts its own unit behind whatever is typed.
-        return parse_quantity(text.removesuffix(self.suffix()), self.suffix().strip())
+        if text and text == self.specialValueText():
+            return self.minimum()
+        # The box puts its own sign and unit around whatever is typed.
+        typed = text.removeprefix(self.prefix()).removesuffix(self.suffix())
+        return parse_quantity(typed, self.suffix().strip())
 
     def validate(self, text: str, position: int) -> tuple[QValidator.State, str, int]:
         """Let anything be typed; only a number within the range is taken."""

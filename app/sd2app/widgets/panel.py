@@ -76,6 +76,26 @@ def outlined(text: str, tip: str, run: Callable[[], object] | None, parent: QWid
     return button
 
 
+class Fold(QToolButton):
+    """Heading with an arrow that shows and hides what is below it; hidden at first."""
+
+    def __init__(self, text: str, tip: str, content: QWidget, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.setObjectName("fold")
+        self.setCheckable(True)
+        self.setText(text)
+        self.setToolTip(tip)
+        self.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
+        self.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+        self._content = content
+        self.toggled.connect(self._unfold)
+        self._unfold(False)
+
+    def _unfold(self, shown: bool) -> None:
+        self._content.setVisible(shown)
+        self.setArrowType(Qt.ArrowType.DownArrow if shown else Qt.ArrowType.RightArrow)
+
+
 def side_by_side(*widgets: QWidget, spacing_px: int = 8) -> QHBoxLayout:
     """Widgets in a row that begins at the left and leaves the rest empty."""
     return row_of(*widgets, STRETCH, spacing_px=spacing_px)

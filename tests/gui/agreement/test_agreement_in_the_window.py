@@ -56,9 +56,7 @@ def test_a_file_that_holds_no_labels_is_said(window, qtbot, monkeypatch, tmp_pat
 
 def test_editing_is_followed_and_nothing_of_theirs_is_changed(compared, qtbot) -> None:
     c, below = models_of(compared), compared.findChild(OtherTimeline)
-    qtbot.mouseClick(
-        below, LEFT, pos=QPoint(round(below.scale.x_of(1.5 + 0.5 / 30)), below.height() - 8)
-    )
+    qtbot.mouseClick(below, LEFT, pos=QPoint(round(below.scale.x_of(1.515)), below.height() - 8))
     assert c.playback.frame == 45
     assert not c.labels.selected
     qtbot.keyClick(compared, Qt.Key.Key_P)

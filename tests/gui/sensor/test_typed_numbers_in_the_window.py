@@ -130,3 +130,22 @@ def test_ranges_of_placements_have_units_too(active) -> None:
     QTest.keyClick(page, Qt.Key.Key_Return)
     window.bring_up("Sensor", "Sensor")
     c.document.undo_stack.setIndex(0)
+
+
+def test_signs_around_a_number_and_a_word_in_its_place(qtbot) -> None:
+    box = NumberBox(0.0, 10.0, " s", "How long")
+    qtbot.addWidget(box)
+    box.setPrefix("× ")
+    box.setSpecialValueText("never")
+    box.show()
+    assert box.text() == "never"
+    type_into(box, "1.5")
+    assert (box.value(), box.text()) == (1.5, "× 1.50 s")
+    type_into(box, "250ms")
+    assert box.value() == 0.25
+    QTest.keyClick(box, Qt.Key.Key_Up)
+    assert box.value() == pytest.approx(0.35)
+    type_into(box, "0")
+    assert box.text() == "never"
+    type_into(box, "")
+    assert box.value() == 0.0
