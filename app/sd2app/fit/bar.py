@@ -21,7 +21,7 @@ class FitBar(QFrame):
     """Offer, progress and end of a fit; hidden otherwise.
 
     ``begin`` asks for what a new fit needs, ``open_result`` opens the recording of a finished
-    fit, ``resume`` continues a stopped one.
+    fit, ``resume`` continues a stopped one, ``discard`` asks if it may be deleted.
     """
 
     def __init__(
@@ -31,6 +31,7 @@ class FitBar(QFrame):
         begin: Callable[[], None],
         open_result: Callable[[], None],
         resume: Callable[[], None],
+        discard: Callable[[], None],
     ) -> None:
         super().__init__()
         self.setObjectName("panel")
@@ -45,11 +46,12 @@ class FitBar(QFrame):
         self._left.setObjectName("muted")
         self._left.setMinimumWidth(self._left.fontMetrics().horizontalAdvance("about 55 min left"))
         self._buttons = {
+            # First, so that it never comes to where another button was.
+            "discard": self._button("Discard…", "Delete what was done", discard),
             "begin": self._button("Fit a body…", "Choose person, height and place", begin),
             "follow": self._button("Follow", "Show each frame as it is worked on", self._toggle),
             "cancel": self._button("Cancel", "Stop; what is done can be continued", fit.cancel),
             "resume": self._button("Resume", "Continue where it stopped", resume),
-            "discard": self._button("Discard", "Remove what was done", fit.discard),
             "open": self._button("Open", "Open the new recording", open_result),
             "close": self._button("✕", "Close this message", self._close),
         }
