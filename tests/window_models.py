@@ -40,8 +40,9 @@ def all_actions() -> tuple[Action, ...]:
 
 
 def menu_of(window: MainWindow, title: str) -> QMenu:
-    """Menu of a window by its title."""
-    return next(one for one in window.menuBar().findChildren(QMenu) if one.title() == title)
+    """Menu of a window by its title, whichever letter of it is underlined."""
+    menus = window.menuBar().findChildren(QMenu)
+    return next(one for one in menus if one.title().replace("&", "") == title)
 
 
 class NoShell:

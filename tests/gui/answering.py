@@ -22,10 +22,12 @@ def once_asked(kind: type[QDialog], work: Callable[[Any], object]) -> None:
     QTimer.singleShot(20, look)
 
 
-def answer(qtbot, text: str) -> None:
-    """Have the next question answered with the button of this text."""
+def answer(qtbot, text: str, asked: list[str] | None = None) -> None:
+    """Have the next question answered with the button of this text, and noted in a list."""
 
     def click(box: QMessageBox) -> None:
+        if asked is not None:
+            asked.append(box.text())
         found = next(one for one in box.buttons() if one.text().replace("&", "") == text)
         qtbot.mouseClick(found, Qt.MouseButton.LeftButton)
 

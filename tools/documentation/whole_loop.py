@@ -123,7 +123,8 @@ STEPS = (
     Step(
         "Find gestures in the sample",
         "sd2 classify apply swipes.sd2 --of denoised --model gestures.safetensors --out found.json",
-        "*Labels → Find gestures*: offered as suggestions, with a read-out while playing.",
+        "*Labels → Suggestions → Find gestures*: offered as suggestions, with a read-out while"
+        " playing.",
     ),
     Step(
         "What does synthetic data add?",

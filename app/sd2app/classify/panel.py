@@ -67,7 +67,7 @@ class ClassRunView(RunView[ClassRun]):
     def shown(self, run: ClassRun) -> Collection[str]:
         """Names of the buttons that are of use now."""
         if run.phase in UNDER_WAY:
-            return ("stop", "cancel")
+            return ("stop", "delete")
         useful = {
             "use": run.result is not None and not run.compares and not self._training.in_use,
             "show": run.result is not None and run.compares,

@@ -41,7 +41,7 @@ class FitBar(QFrame):
     """Progress and end of a fit; hidden otherwise.
 
     ``change`` asks again for what a fit needs, ``open_result`` opens the recording of a finished
-    fit, ``resume`` continues a stopped one.
+    fit, ``resume`` continues a stopped one, ``discard`` asks if it may be deleted.
     """
 
     def __init__(
@@ -51,6 +51,7 @@ class FitBar(QFrame):
         change: Callable[[], None],
         open_result: Callable[[], None],
         resume: Callable[[], None],
+        discard: Callable[[], None],
     ) -> None:
         super().__init__()
         self.setObjectName("panel")
@@ -65,11 +66,12 @@ class FitBar(QFrame):
         self._left.setObjectName("muted")
         self._left.setMinimumWidth(self._left.fontMetrics().horizontalAdvance("about 55 min left"))
         self._buttons = {
+            # First, so that it never comes to where another button was.
+            "discard": self._button("Discard…", "Delete what was done", discard),
             "change": self._button("Change…", "Choose person, height and place again", change),
             "follow": self._button("Follow", "Show each frame as it is worked on", self._toggle),
             "cancel": self._button("Cancel", "Stop; what is done can be continued", fit.cancel),
             "resume": self._button("Resume", "Continue where it stopped", resume),
-            "discard": self._button("Discard", "Remove what was done", fit.discard),
             "open": self._button("Open", "Open the new recording", open_result),
             "close": self._button("✕", "Close this message", fit.dismiss),
         }

@@ -18,7 +18,7 @@ from sd2app.fit.on_screen import FitOnScreen
 from sd2app.fit.request import FitRequest
 from sd2app.fit.setup import FitSetupModel
 from sd2app.session.session import Session
-from sd2app.widgets.dialogs import Answer, ask_file, confirmed
+from sd2app.widgets.dialogs import Answer, ask_file, confirmed, may_delete
 from sd2app.widgets.notices import Notice
 from sd2core.runs.command_folder import COMMAND_IN_FOLDER
 
@@ -66,6 +66,7 @@ class FitFeature(Feature):
                 change=self.new_from_video,
                 open_result=self._open_result,
                 resume=self._resume,
+                discard=self._discard,
             ),
         )
 
@@ -114,6 +115,18 @@ class FitFeature(Feature):
             return
         if not self._session.has_content() and self.model.busy and self.model.request:
             self._session.document.open([self.model.request.to_open])
+
+    def _discard(self) -> None:
+        request, progress = self.model.request, self.model.progress
+        if request is None:
+            return
+        reached = f" It had been {progress.text}." if progress and progress.stage else ""
+        what = (
+            f"What the fit of {request.video.name} has done is deleted and cannot be brought"
+            f" back.{reached} Resume would continue it from there."
+        )
+        if may_delete(self._shell.dialog_parent, "Discard this fit?", what):
+            self.model.discard()
 
     def _open_result(self) -> None:
         if self._shell.may_discard():

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
 
 from PySide6.QtGui import QAction, QKeySequence
-from PySide6.QtWidgets import QMainWindow, QMenu
+from PySide6.QtWidgets import QMainWindow, QMenu, QMenuBar
 
 from sd2app.feature import Action
 from sd2app.session.session import Session
@@ -36,18 +37,28 @@ LAYOUT: Mapping[str, tuple[str, ...]] = {
         "last_frame", "-", "slower", "faster", "loop",
     ),
     "Labels": (
-        "@label keys", "-", "end_marks", "carve_marks", "@reaction", "leave", "-",
-        "span_starts_here", "span_ends_here", "nudge_back", "nudge_on", "split_span",
-        "merge_spans", "delete_spans", "duplicate_spans", "meet_spans", "fill_gaps", "-",
-        "loop_span", "select_all", "-", "next_span", "previous_span", ">Tracks", "-", "suggest",
-        "accept_suggestion", "reject_suggestion", "accept_suggestions", "reject_suggestions",
-        "find_gestures", "-", "import_labels", "export_labels", "cut_out", "-", "restore_labels",
-        "edit_labels_here", "find_spans", "label_set", "-", "compare_labels", "next_disagreement",
-        "previous_disagreement", "end_comparison",
+        ">Mark", ">Edit spans", ">Go to spans", ">Tracks", ">Suggestions", ">Compare", "-",
+        "label_set", "import_labels", "export_labels", "cut_out", "-", "restore_labels",
+        "edit_labels_here",
+    ),
+    "Mark": ("@label keys", "-", "end_marks", "carve_marks", "@reaction", "leave"),
+    "Edit spans": (
+        "span_starts_here", "span_ends_here", "nudge_back", "nudge_on", "-", "split_span",
+        "merge_spans", "meet_spans", "duplicate_spans", "delete_spans", "fill_gaps",
+    ),
+    "Go to spans": (
+        "next_span", "previous_span", "loop_span", "-", "find_spans", "select_all",
     ),
     "Tracks": (
         "@tracks", "-", "previous_track", "next_track", "spans_up", "spans_down", "-", "add_track",
         "rename_track", "overlap", "track_up", "track_down", "remove_track",
+    ),
+    "Suggestions": (
+        "suggest", "find_gestures", "-", "accept_suggestion", "reject_suggestion",
+        "accept_suggestions", "reject_suggestions",
+    ),
+    "Compare": (
+        "compare_labels", "next_disagreement", "previous_disagreement", "end_comparison",
     ),
     "Model": (
         "@denoisers", "-", "open_model", "model_card", "-", "difference", "compare_models", "live",
@@ -59,9 +70,13 @@ LAYOUT: Mapping[str, tuple[str, ...]] = {
 """Order of the menus: ids of actions, ``-`` lines, ``@`` places that a feature fills, ``>`` menus
 within a menu."""
 
-_INNER = tuple(
-    entry[1:] for entries in LAYOUT.values() for entry in entries if entry.startswith(_SUBMENU)
-)
+_AROUND = {
+    entry[1:]: menu
+    for menu, entries in LAYOUT.items()
+    for entry in entries
+    if entry.startswith(_SUBMENU)
+}
+"""The menu that a menu stands in."""
 
 
 def in_order(actions: Iterable[Action]) -> tuple[Action, ...]:
@@ -70,20 +85,55 @@ def in_order(actions: Iterable[Action]) -> tuple[Action, ...]:
     Raises
     ------
     ValueError
-        Where an action stands in no menu or in another one than it says, or a place of the
-        menus has no action.
+        Where an action stands in no menu or in another one than it says (its own or the one
+        around that), or a place of the menus has no action.
     """
     known = {action.id: action for action in actions}
-    places = [
-        (menu, entry)
+    places = {
+        entry: menu
         for menu, entries in LAYOUT.items()
         for entry in entries
         if entry[0] not in (_LINE, _FILLED, _SUBMENU)
-    ]
-    wanted, given = set(places), {(action.menu, action.id) for action in known.values()}
-    if wanted != given:
-        raise ValueError(f"Menus and actions differ: {sorted(wanted ^ given)}")
-    return tuple(known[entry] for _, entry in places)
+    }
+    differ = places.keys() ^ known.keys()
+    for name, menu in places.items():
+        if name in known and known[name].menu not in (menu, _AROUND.get(menu)):
+            differ.add(name)
+    if differ:
+        raise ValueError(f"Menus and actions differ: {sorted(differ)}")
+    return tuple(known[entry] for entry in places)
+
+
+def menus_in(bar: QMenuBar | QMenu) -> Iterator[QMenu]:
+    """Menus of a menu bar, and those within them."""
+    for entry in bar.actions():
+        menu = QMenu.menuInAction(entry)
+        if menu is not None:
+            yield menu
+            yield from menus_in(menu)
+
+
+def give_mnemonics(menu: QMenu) -> None:
+    """Underline a letter of every entry that has none, of its own as far as letters go."""
+    entries = [entry for entry in menu.actions() if not entry.isSeparator()]
+    taken = {letter for entry in entries if (letter := _mnemonic(entry.text()))}
+    # Short texts first, which have the fewest letters to choose from.
+    for entry in sorted(entries, key=lambda one: len(set(one.text()))):
+        text = entry.text()
+        if _mnemonic(text):
+            continue
+        shown = text.split("\t")[0]
+        places = [place for place, letter in enumerate(shown) if letter.isalnum()]
+        # Beginnings of words first.
+        places.sort(key=lambda place: place > 0 and shown[place - 1].isalnum())
+        free = [place for place in places if shown[place].upper() not in taken] or places
+        if free:
+            entry.setText(f"{text[: free[0]]}&{text[free[0] :]}")
+            taken.add(shown[free[0]].upper())
+
+
+def _mnemonic(text: str) -> str:
+    return QKeySequence.mnemonic(text).toString()[-1:]
 
 
 class Menus:
@@ -114,8 +164,12 @@ class Menus:
         """Make the menus; ``fillers`` fill the places that are a feature's own."""
         bar = self._window.menuBar()
         for name in LAYOUT:
-            if name not in _INNER:
+            if name not in _AROUND:
                 self._fill(bar.addMenu(f"&{name}"), name, fillers)
+        for menu in menus_in(bar):
+            # Again when it is opened: what it lists may be others by then.
+            menu.aboutToShow.connect(partial(give_mnemonics, menu))
+            give_mnemonics(menu)
 
     def _fill(
         self, menu: QMenu, name: str, fillers: Mapping[str, Callable[[QMenu], object]]
@@ -141,11 +195,11 @@ class Menus:
             if row.checked is not None:
                 action.setChecked(row.checked())
         stack = self._session.document.undo_stack
-        self._actions["undo"].setText(f"Undo {stack.undoText().lower()}".rstrip())
-        self._actions["redo"].setText(f"Redo {stack.redoText().lower()}".rstrip())
+        self._actions["undo"].setText(f"&Undo {stack.undoText().lower()}".rstrip())
+        self._actions["redo"].setText(f"&Redo {stack.redoText().lower()}".rstrip())
         playing = self._session.playback.playing
-        if playing != (self._actions["play"].text() == "Pause"):
-            self._actions["play"].setText("Pause" if playing else "Play")
+        if playing != (self._actions["play"].text() == "&Pause"):
+            self._actions["play"].setText("&Pause" if playing else "&Play")
             self._set_icon("play", "pause" if playing else "play")
 
     def refresh_one(self, name: str) -> None:

@@ -102,10 +102,10 @@ class TrainingRunView(RunView[TrainingMonitor]):
     def shown(self, run: TrainingMonitor) -> Collection[str]:
         """Names of the buttons that are of use now."""
         if run.phase == "starting":
-            return ("cancel",)
+            return ("delete",)
         if run.phase in UNDER_WAY:
             paused = run.phase in ("pausing", "paused")
-            return ("go_on" if paused else "pause", "stop", "cancel")
+            return ("go_on" if paused else "pause", "stop", "delete")
         useful = {
             "use": run.has_model and self._adoption.run != run.path,
             "resume": run.resumable,

@@ -16,7 +16,7 @@ from sd2app.feature import Shell
 from sd2app.widgets.dialogs import may_delete
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
-from sd2app.widgets.panel import outlined, sentence, show_words, side_by_side, title
+from sd2app.widgets.panel import outlined, sentence, show_words, title
 from sd2app.widgets.progress_bar import ProgressBar
 
 _NEW = "New training"
@@ -104,11 +104,10 @@ class RunView(QWidget, Generic[Run]):
     def __init__(self, runs: Runs[Run], shell: Shell, buttons: Sequence[Button]) -> None:
         super().__init__()
         self._runs, self._shell = runs, shell
-        stop, cancel = partial(runs.tell, "stop"), partial(runs.tell, "cancel")
+        stop = partial(runs.tell, "stop")
         buttons = (
             *buttons,
             Button("stop", "Stop", "End it now and keep the best so far", stop),
-            Button("cancel", "Cancel", "End it now and delete what it made", cancel),
             Button("delete", "Delete…", "Delete this run with what it made", self._delete),
         )
         self._headline = title("", "How the training stands")
@@ -119,12 +118,14 @@ class RunView(QWidget, Generic[Run]):
         for one in buttons:
             if one.primary:
                 self._buttons[one.name].setObjectName("primary")
+        *harmless, delete = self._buttons.values()
         self.column = column_of(
             self._headline,
             self._bar,
             self._time,
-            # Above what subclasses add: they are to be at hand in a low window, too.
-            side_by_side(*self._buttons.values(), spacing_px=6),
+            # Above what subclasses add: they are to be at hand in a low window, too. The one that
+            # deletes stands at the end: it never comes to where another one was.
+            row_of(*harmless, STRETCH, delete, spacing_px=6),
             self._reason,
             self._note,
             spacing_px=6,
@@ -151,13 +152,27 @@ class RunView(QWidget, Generic[Run]):
 
     def _delete(self) -> None:
         run = self._runs.run
-        if run is not None and may_delete(
-            self._shell.dialog_parent,
-            "Delete this run?",
-            f"{run.path.name} is deleted with what it made. A model that was put to use stays"
-            " among your models.",
-        ):
-            self._runs.delete()
+        if run is None:
+            return
+        if under_way := run.phase in UNDER_WAY:
+            reached = ", ".join(filter(None, self.texts(run)[:2]))
+            what = (
+                f"{run.path.name} ends now, and all that it made is deleted ({reached})."
+                " Stop ends it too, but keeps the best so far."
+            )
+        else:
+            what = (
+                f"{run.path.name} is deleted with what it made. A model that was put to use stays"
+                " among your models."
+            )
+        if not may_delete(self._shell.dialog_parent, "Delete this run?", what):
+            return
+        # It may have ended while the question was open, which asked about something else then.
+        if self._runs.run is run and (run.phase in UNDER_WAY) == under_way:
+            if under_way:
+                self._runs.tell("cancel")
+            else:
+                self._runs.delete()
 
     def refresh(self) -> None:
         """Follow the run in view."""
@@ -174,7 +189,7 @@ class RunView(QWidget, Generic[Run]):
         shown, ending = self.shown(run), run.phase in ("stopping", "cancelling")
         for name, button in self._buttons.items():
             button.setVisible(name in shown)
-            if name == "cancel":
+            if name == "delete":
                 button.setEnabled(run.phase != "cancelling")
             elif name in ("pause", "go_on", "stop"):
                 button.setEnabled(not ending and not run.history.saving)

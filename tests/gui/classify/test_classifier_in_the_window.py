@@ -92,7 +92,7 @@ def test_a_file_is_chosen_and_the_strip_appears(window, fake_classes, qtbot, mon
     assert strip.isVisible()
     window.features.classify._classifiers.fill()
     entries = {
-        action.text().split("\t")[0]: action
+        action.text().replace("&", "").split("\t")[0]: action
         for action in window.features.classify._classifiers.actions()
     }
     assert entries["waves"].isChecked()

@@ -41,7 +41,9 @@ def choose(window, qtbot, button, words):
         if not isinstance(menu, ModelMenu) or not menu.isVisible():
             QTimer.singleShot(20, click)
             return
-        action = next(one for one in menu.actions() if one.text().startswith(words))
+        action = next(
+            one for one in menu.actions() if one.text().replace("&", "").startswith(words)
+        )
         qtbot.mouseClick(menu, Qt.MouseButton.LeftButton, pos=menu.actionGeometry(action).center())
 
     QTimer.singleShot(20, click)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from answering import once_asked
+from answering import answer, once_asked
 from fake_denoisers import FakeDenoisers
 from PySide6.QtCore import QCoreApplication, QEvent, QPoint, Qt
 from PySide6.QtWidgets import (
@@ -154,10 +154,22 @@ def test_landmarks_are_drawn_and_the_clock_goes_along_until_it_is_moved(made, qt
     assert c.playback.frame == 29
     click(window, qtbot, "Follow")
     assert c.fit_on_screen.following
+    bar = window.findChild(FitBar)
+    before = [one.geometry() for one in bar.findChildren(QToolButton) if one.isVisible()]
     click(window, qtbot, "Cancel")
     assert c.fit.state == "cancelling"
     qtbot.waitUntil(lambda: c.fit.state == "stopped", timeout=10_000)
-    click(window, qtbot, "Discard")
+    qtbot.waitUntil(lambda: not bar._buttons["follow"].isVisible())
+    QCoreApplication.processEvents()
+    discard = bar._buttons["discard"].geometry()
+    assert not any(discard.intersects(one) for one in before), "it came to where one was"
+    # What is lost is said, and nothing is deleted unless that is wanted.
+    asked: list[str] = []
+    for name in ("Cancel", "Discard"):
+        assert video.with_name("walk.sd2").exists()
+        answer(qtbot, name, asked)
+        click(window, qtbot, "Discard…")
+    assert video.name in asked[0]
     assert blue_and_orange() == (0, 0)
     assert not video.with_name("walk.sd2").exists()
 

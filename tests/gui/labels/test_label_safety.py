@@ -99,7 +99,7 @@ class TestAfterACrash:
         press(window, qtbot, "Restore")
         assert spans(window) == [THERE, LOST, BACK]
         assert bar(window).text == ""
-        assert window.action("undo").text() == "Undo restore labels"
+        assert window.action("undo").text() == "&Undo restore labels"
         qtbot.keyClick(window, Qt.Key.Key_Z, CONTROL)
         assert spans(window) == [THERE, BACK]
         qtbot.keyClick(window, Qt.Key.Key_Z, CONTROL | Qt.KeyboardModifier.ShiftModifier)

@@ -187,7 +187,7 @@ def test_marks_go_back_by_the_reaction_time_while_it_plays(labelled, qtbot) -> N
     key(labelled, "A", CONTROL)
     key(labelled, "Backspace")
     entry = next(
-        one for one in menu_of(labelled, "Reaction time").actions() if one.text() == "200 ms"
+        one for one in menu_of(labelled, "Reaction time").actions() if one.text() == "&200 ms"
     )
     entry.trigger()
     assert c.reaction.reaction_ms == 200

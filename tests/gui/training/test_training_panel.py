@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from answering import answer
-from PySide6.QtCore import QCoreApplication, QEvent, QObject, Qt, QTimer, Signal
+from PySide6.QtCore import QCoreApplication, QEvent, QObject, QRect, Qt, QTimer, Signal
 from PySide6.QtWidgets import (
     QApplication,
     QFileDialog,
@@ -31,7 +31,7 @@ from sd2app.settings import Settings
 from sd2app.shell.side_panel import SidePanel
 from sd2app.training.dialogs import TrainingDialogs
 from sd2app.training.model import TrainingModel
-from sd2app.training.panel import TrainingPanel
+from sd2app.training.panel import TrainingPanel, TrainingRunView
 from sd2app.training.result import ModelAdoption
 from sd2app.widgets.chart import ChartView
 from sd2app.widgets.inputs import Choice, NumberBox
@@ -310,10 +310,44 @@ def test_a_run_is_watched_paused_and_stopped(made, qtbot, pairs) -> None:
     assert button(window, "Start training").isVisible()
 
 
+def test_what_deletes_never_comes_to_where_another_button_was(made, qtbot, pairs) -> None:
+    window = made("--step-s", 0.05)
+    view = window.panel.findChild(TrainingRunView)
+    harmless, deleting = [], []
+
+    def look() -> None:
+        for name, one in view._buttons.items():
+            if one.isVisible():
+                (deleting if name == "delete" else harmless).append(QRect(one.geometry()))
+
+    begun(window, qtbot, pairs, "running", epochs=200)
+    qtbot.waitUntil(lambda: window.training.run.history.best is not None, timeout=15_000)
+    for text, phase, then in (
+        (None, "running", "pause"), ("Pause", "paused", "go_on"), ("Stop", "stopped", "use")
+    ):  # fmt: skip
+        if text:
+            click(window, qtbot, text)
+        qtbot.waitUntil(lambda phase=phase: window.training.run.phase == phase, timeout=15_000)
+        qtbot.waitUntil(view._buttons[then].isVisible, timeout=5_000)
+        for widget in (window.panel, view):
+            widget.layout().activate()
+        look()
+    assert len(deleting) == 3
+    assert not [(a, b) for a in deleting for b in harmless if a.intersects(b)]
+
+
 def test_cancelling_is_said_at_once(made, qtbot, pairs) -> None:
     window = made("--rest-at", 1)
     begun(window, qtbot, pairs, "running")
-    click(window, qtbot, "Cancel")
+    asked: list[str] = []
+    answer(qtbot, "Cancel", asked)
+    click(window, qtbot, "Delete…")
+    run = window.training.run
+    assert run.phase == "running", "the question was answered with no"
+    assert run.path.name in asked[0]
+    assert "deleted" in asked[0]
+    answer(qtbot, "Discard")
+    click(window, qtbot, "Delete…")
     assert "Cancelling…" in texts(window)
     assert not button(window, "Stop").isEnabled()
     # What becomes of it is decided.
