@@ -42,7 +42,7 @@ def all_actions() -> tuple[Action, ...]:
 def menu_of(window: MainWindow, title: str) -> QMenu:
     """Menu of a window by its title, whichever letter of it is underlined."""
     menus = window.menuBar().findChildren(QMenu)
-    return next(one for one in menus if one.title().replace("&", "") == title)
+    return next(one for one in menus if one.title().replace("&", "") == title.replace("&", ""))
 
 
 class NoShell:

@@ -119,13 +119,14 @@ class RunView(QWidget, Generic[Run]):
             if one.primary:
                 self._buttons[one.name].setObjectName("primary")
         *harmless, delete = self._buttons.values()
+        # At the top, where no text above them moves them; the one that deletes stands below, so that
+        # it never comes to where another one was.
         self.column = column_of(
+            row_of(*harmless, STRETCH, spacing_px=6),
             self._headline,
             self._bar,
             self._time,
-            # Above what subclasses add: they are to be at hand in a low window, too. The one that
-            # deletes stands at the end: it never comes to where another one was.
-            row_of(*harmless, STRETCH, delete, spacing_px=6),
+            row_of(delete, STRETCH, spacing_px=6),
             self._reason,
             self._note,
             spacing_px=6,

@@ -59,9 +59,12 @@ def test_menus_that_it_names_are_there(window, name) -> None:
     words = page_path(name).read_text("utf-8").replace("\n", " ")
     named = re.findall(r"\*(\w+) → ([^*]+)\*", words)
     assert named
-    for menu, text in named:
-        entries = [one.text().replace("&", "") for one in menu_of(window, f"&{menu}").actions()]
-        assert text in entries, (menu, text)
+    for menu, path in named:
+        within, at = path.split(" → "), menu_of(window, menu)
+        for text in within:
+            entries = {one.text().replace("&", ""): one.menu() for one in at.actions()}
+            assert text in entries, (menu, path)
+            at = entries[text]
 
 
 def test_links_lead_from_page_to_page_and_back(guide) -> None:
