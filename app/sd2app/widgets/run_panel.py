@@ -119,8 +119,8 @@ class RunView(QWidget, Generic[Run]):
             if one.primary:
                 self._buttons[one.name].setObjectName("primary")
         *harmless, delete = self._buttons.values()
-        # At the top, where no text above them moves them; the one that deletes stands below, so that
-        # it never comes to where another one was.
+        # At the top, where no text above moves them; the one that deletes stands below, so that it
+        # never comes to where another one was.
         self.column = column_of(
             row_of(*harmless, STRETCH, spacing_px=6),
             self._headline,
