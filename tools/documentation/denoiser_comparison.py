@@ -70,7 +70,7 @@ errors are is written in `sd2core/denoise/metrics.py`.
 
 ## Models at equal time
 
-Every model trained {seeds} times with different seeds for {minutes:g} minutes of processor time on
+Every model trained from {seeds} seed(s), for {minutes:g} minutes of processor time each on
 one thread, with a dropout of {dropout:g}. All have about as many parameters. Three
 also learn from the maps of five parts of the body (`limbs`). A run of {pilot} epochs tells the
 processor time of one, and so how many epochs fit: other work on the machine does not change what is
