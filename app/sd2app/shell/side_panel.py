@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 from typing import Protocol, runtime_checkable
 
@@ -56,9 +55,10 @@ class SidePanel(QFrame):
         self._fold = outlined("»", "Fold the panel away", lambda: self.set_folded(True), self)
         self._fold.setObjectName("")
         self._fold.setAccessibleName("Fold the panel away")
-        self._icons = [RailButton(name, self._step, self) for name in pages]
+        self._icons = [RailButton(name, self) for name in pages]
         for place, (icon, page) in enumerate(zip(self._icons, pages.values(), strict=True)):
             icon.clicked.connect(partial(self._click, place))
+            icon.stepped.connect(self._step)
             self._stack.addWidget(_scrolled(page))
         head = row_of((self._title, 1), self._fold, margins_px=(8, 4, 4, 0))
         self._open = QWidget(self)
@@ -131,12 +131,14 @@ class SidePanel(QFrame):
 class RailButton(QToolButton):
     """Icon of a panel, with a ring around it while something is being done there."""
 
-    def __init__(self, name: str, step: Callable[[int], None], parent: QWidget) -> None:
+    stepped = Signal(int)  # to the panels above and below, by the arrows
+
+    def __init__(self, name: str, parent: QWidget) -> None:
         super().__init__(parent)
         self.setObjectName("rail")
         self.setCheckable(True)
         self.setFixedSize(_BUTTON_PX, _BUTTON_PX)
-        self.name, self._step = name, step
+        self.name = name
         self.mark = ""
         self.share: float | None = None
         self._say()
@@ -159,7 +161,7 @@ class RailButton(QToolButton):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Go to the panels above and below with the arrows."""
         if event.key() in _STEPS:
-            self._step(_STEPS[Qt.Key(event.key())])
+            self.stepped.emit(_STEPS[Qt.Key(event.key())])
         else:
             super().keyPressEvent(event)
 
