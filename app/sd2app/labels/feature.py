@@ -61,6 +61,7 @@ class LabelsFeature(Feature):
         self._keys: LabelActions | None = None
         self.edits.done_at.connect(s.span.reveal_any)
         self.edits.failed.connect(shell.warn)
+        self.edits.restoring.connect(s.edits.restore)
         for model in (self.autosave, self.cut_out):
             model.failed.connect(shell.warn)
             model.noted.connect(shell.note)
@@ -206,7 +207,7 @@ class LabelsFeature(Feature):
                     lambda: import_labels(shell, edits), s.has_content,
                 ),
                 Action(
-                    "restore_labels", "Labels", "Restore labels that were not saved", (),
+                    "restore_labels", "Labels", "Restore edits that were not saved", (),
                     "Take over what an earlier session left behind; one undo takes that back",
                     edits.restore, lambda: autosave.offer is not None,
                 ),

@@ -30,7 +30,7 @@ from sd2core.labels.files import write_labels
 from sd2core.labels.recovery import Offer
 
 _SAID = (
-    "Edits of labels that were not saved when the program ended. Open a recording to see what"
+    "Edits that were not saved when the program ended. Open a recording to see what"
     " they change."
 )
 _NOTHING = "There is nothing to recover: all edits were saved or discarded."
@@ -61,7 +61,7 @@ class LabelBar(QFrame):
         for name, text, tip, run in (
             ("again", "Try again", "Edit them here, once the other window is closed",
              autosave.try_again),
-            ("restore", "Restore", "Use these labels; one undo takes that back", edits.restore),
+            ("restore", "Restore", "Use these edits; one undo takes that back", edits.restore),
             ("decline", "Discard", "Do not offer them again; File → Recover labels… lists them",
              autosave.decline),
             ("postpone", "Not now", "Offer them again when this recording is opened next",
@@ -93,7 +93,8 @@ class LabelBar(QFrame):
             said = "Labels are read-only", f"{autosave.refusal}."
             shown = {"again"}
         elif offer is not None:
-            said = "Labels were not saved", self._offered(offer)
+            others = self._autosave.changed_others(offer)
+            said = f"{'Edits' if others else 'Labels'} were not saved", self._offered(offer, others)
             shown = {"restore", "decline", "postpone"}
         elif autosave.notes:
             said, shown = ("Labels", ""), {"close"}
@@ -106,11 +107,12 @@ class LabelBar(QFrame):
             button.setVisible(name in shown)
         self.setVisible(bool(self._text.text()))
 
-    def _offered(self, offer: Offer) -> str:
-        """Offer, compared with the open labels."""
+    def _offered(self, offer: Offer, others: list[str]) -> str:
+        """Offer, compared with what is open."""
         holds, difference = offer.labels, compare(self._document.labels, offer.labels)
         spans = counted(len(holds.spans), "span")
-        return f"{_edits_text(offer)}. {spans}; against what is open: {difference}."
+        changes = ", ".join(filter(None, (str(difference), *(f"another {one}" for one in others))))
+        return f"{_edits_text(offer)}. {spans}; against what is open: {changes}."
 
     def _waiting(self) -> str:
         """Names of the recordings with unsaved labels; empty without any."""
