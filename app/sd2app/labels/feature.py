@@ -22,6 +22,7 @@ from sd2app.labels.model import LabelsModel
 from sd2app.labels.painting import map_overlay, strip_overlay
 from sd2app.labels.panel import LabelsPanel
 from sd2app.labels.recovery import LabelBar, recover
+from sd2app.labels.span_buttons import Decision, SpanButtons
 from sd2app.labels.timeline import LabelArea, LabelTimeline, TargetLine
 from sd2app.labels.tracks import LabelTracks, TrackMenu
 from sd2app.session.session import Session
@@ -328,7 +329,10 @@ class LabelsFeature(Feature):
         """The panel at the side, and the timeline below the maps."""
         s, shell = self._session, self._shell
         panel = LabelsPanel(s, self.edits, shell)
-        timeline = LabelTimeline(s, self.edits, self.dragging, self.loop)
+        signs = ("✓", "accept_suggestion"), ("✗", "reject_suggestion")
+        decisions = [Decision(sign, shell.action(name)) for sign, name in signs]
+        buttons = SpanButtons(self.model, decisions)
+        timeline = LabelTimeline(s, self.edits, self.dragging, self.loop, buttons)
         area = LabelArea(timeline, self.model)
         return {"Labels": panel, "labels": pane(TargetLine(self.model), area)}
 

@@ -30,8 +30,7 @@ from sd2core.labels.files import write_labels
 from sd2core.labels.recovery import Offer
 
 _SAID = (
-    "Edits that were not saved when the program ended. Open a recording to see what"
-    " they change."
+    "Edits that were not saved when the program ended. Open a recording to see what they change."
 )
 _NOTHING = "There is nothing to recover: all edits were saved or discarded."
 _ROW_PX, _MARGIN_PX, _BAR_PX = 24, 16, 40
