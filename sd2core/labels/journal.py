@@ -43,7 +43,7 @@ from sd2core.labels.entries import (
 from sd2core.labels.spans import Labels
 
 FORMAT: Literal["sd2-labels-journal"] = "sd2-labels-journal"
-VERSION = 1
+VERSION = 2
 
 _PREFIX_BYTES = 18
 
@@ -52,21 +52,24 @@ class Head(Entry):
     """First record of a part: the recording, and all its labels at that point.
 
     ``unsaved`` counts the edits up to here that the user's file does not hold; ``time_unix_s`` is
-    when the last of them was made.
+    when the last of them was made. ``others`` are other fields of the recording, where they were
+    edited since the file was saved (version 2).
     """
 
     format: Literal["sd2-labels-journal"]
-    version: Literal[1]
+    version: Literal[1, 2]
     recording: str
     unsaved: NonNegativeInt
     last: str
     time_unix_s: FiniteFloat
     labels: LabelsEntry
+    others: dict[str, Any] | None = None
 
 
 class Change(Entry):
     """Record of one edit: spans deleted (``gone``), new or changed (``put``), tracks, label set.
 
+    ``others`` are other fields of the recording, all of them where one was edited.
     A record without any of them says that the user's file was written (``saved``).
     """
 
@@ -77,6 +80,7 @@ class Change(Entry):
     put: tuple[SpanEntry, ...] = ()
     tracks: tuple[TrackEntry, ...] | None = None
     label_set: LabelSetEntry | None = None
+    others: dict[str, Any] | None = None
 
 
 @dataclass(frozen=True)
@@ -88,6 +92,7 @@ class Replayed:
     edits: int  # Number of unsaved edits.
     last: str  # Name of the last edit, such as "Move span".
     time_unix_s: float  # Time of the last edit.
+    others: dict[str, Any] | None  # Other fields of the recording, where they were edited.
 
 
 def packed(content: dict[str, Any]) -> bytes:
@@ -118,7 +123,12 @@ def unpacked(content: bytes) -> tuple[list[bytes], int]:
 
 
 def head(
-    recording: str, labels: Labels, unsaved: int, last: str, time_unix_s: float
+    recording: str,
+    labels: Labels,
+    unsaved: int,
+    last: str,
+    time_unix_s: float,
+    others: dict[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Return the content of the first record."""
     return {
@@ -129,6 +139,7 @@ def head(
         "last": last,
         "time_unix_s": time_unix_s,
         "labels": labels_entry(labels),
+        "others": others,
     }
 
 
@@ -162,6 +173,7 @@ def replay(records: list[bytes]) -> Replayed:
     spans = {span.id: span for span in first.labels.spans}
     tracks, label_set = first.labels.tracks, first.labels.label_set
     unsaved, last, time_unix_s = first.unsaved, first.last, first.time_unix_s
+    others = first.others
     for record in records[1:]:
         edit = Change.model_validate_json(record)
         for span_id in edit.gone:
@@ -169,11 +181,12 @@ def replay(records: list[bytes]) -> Replayed:
         spans.update((span.id, span) for span in edit.put)
         tracks = tracks if edit.tracks is None else edit.tracks
         label_set = label_set if edit.label_set is None else edit.label_set
+        others = None if edit.saved else edit.others or others
         unsaved = 0 if edit.saved else unsaved + 1
         last, time_unix_s = edit.name, edit.time_unix_s
     # Only the end is checked: what is between was whole when it was written.
     entry = LabelsEntry(label_set=label_set, tracks=tracks, spans=tuple(spans.values()))
-    return Replayed(Path(first.recording), entry.made(), unsaved, last, time_unix_s)
+    return Replayed(Path(first.recording), entry.made(), unsaved, last, time_unix_s, others)
 
 
 SUFFIX = ".journal"
@@ -187,8 +200,9 @@ class Journal:
 
     ``folder`` holds the parts, ``SESSION-PART.journal``; ``labels`` are those at the beginning of
     the session, with ``unsaved`` edits that the user's file does not hold by then, the last of them
-    called ``last``. Raises OSError when the first part cannot be written: editing may go on without
-    a journal, but tell the user.
+    called ``last``; ``others`` the other fields of the recording, where they were edited by then.
+    Raises OSError when the first part cannot be written: editing may go on without a journal, but
+    tell the user.
     """
 
     def __init__(
@@ -200,9 +214,11 @@ class Journal:
         *,
         unsaved: int = 0,
         last: str = "",
+        others: dict[str, Any] | None = None,
     ) -> None:
         self._folder, self._session, self._recording = folder, session, recording
         self._labels, self._unsaved, self._last = labels, unsaved, last
+        self._others = others
         self._parts: list[Path] = []
         self._part = 0
         self._stream: int | None = None
@@ -214,21 +230,25 @@ class Journal:
         """Number of edits since the user's file was last saved."""
         return self._unsaved
 
-    def write(self, name: str, labels: Labels) -> None:
+    def write(self, name: str, labels: Labels, others: dict[str, Any] | None = None) -> None:
         """Record an edit, an undo or a redo; on disk on return.
 
+        ``others`` are other fields of the recording, as JSON holds them, where they were edited.
         Raises OSError when it cannot be written. The next one is tried in a new part, with all
         labels.
         """
         now_s = time.time()
-        record = packed(change(name, now_s, self._labels, labels))
+        content = change(name, now_s, self._labels, labels)
+        if others is not None:
+            content["others"] = self._others = others
+        record = packed(content)
         self._labels, self._last = labels, name
         self._unsaved += 1
         self._append(record)
 
     def saved(self) -> None:
         """Record that the user's file holds the current labels."""
-        self._unsaved = 0
+        self._unsaved, self._others = 0, None
         self._append(packed({"name": self._last, "time_unix_s": time.time(), "saved": True}))
 
     def close(self) -> None:
@@ -260,7 +280,14 @@ class Journal:
         self._part += 1
         path = self._folder / f"{self._session:06d}-{self._part:06d}{SUFFIX}"
         record = packed(
-            head(str(self._recording), self._labels, self._unsaved, self._last, time.time())
+            head(
+                str(self._recording),
+                self._labels,
+                self._unsaved,
+                self._last,
+                time.time(),
+                self._others,
+            )
         )
         with atomic_write(path) as stream:
             stream.write(record)

@@ -250,6 +250,7 @@ class RecoveryPlace:
             labels,
             unsaved=recovered.edits if recovered else 0,
             last=recovered.last if recovered else "",
+            others=recovered.others if recovered else None,
         )
         self._begun.add(session)
         if recovered is not None:

@@ -1,10 +1,11 @@
-"""Session of the open labels: the lock against other windows, the journal, and recovery offers."""
+"""Session of the open recording: lock against other windows, journal, recovery offers."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 from PySide6.QtCore import QObject, Signal
 
@@ -16,15 +17,17 @@ from sd2core.errors import Sd2Error
 from sd2core.labels.journal import Journal
 from sd2core.labels.recovery import Found, Offer, RecoveryPlace, offers_in
 from sd2core.labels.spans import Labels
+from sd2core.recording.edited import differing, edited_fields
 from sd2core.recording.recording import Recording
 
 _NOTHING_OPEN = "Nothing is open: labels belong to a recording"
 
 
 class LabelAutosave(QObject):
-    """Labels of one recording in this window, from opening to closing.
+    """Edits of one recording in this window, from opening to closing.
 
-    One window edits; another is read-only and says why. A journal begins with the first edit.
+    One window edits the labels; another is read-only and says why. A journal begins with the first
+    edit, of labels or of what :mod:`sd2core.recording.edited` names.
     ``root`` is the recovery folder, shared by all windows.
     """
 
@@ -43,9 +46,13 @@ class LabelAutosave(QObject):
         self._refusal = ""
         self._offers: tuple[Offer, ...] = ()
         self._wanted: Offer | None = None
+        self._recording: Recording | None = None  # the one that the history is of
+        self._others: dict[str, Any] = {}  # its other fields, as they are saved or kept
+        self._step = 0  # of the history
         self.notes: tuple[str, ...] = ()  # on unreadable sessions, or edits that are not kept
         self.waiting = Found()  # at the start, until a recording is open
         document.saved.connect(self._follow_saving)
+        document.undo_stack.indexChanged.connect(self._keep_others)
 
     @property
     def refusal(self) -> str:
@@ -70,7 +77,9 @@ class LabelAutosave(QObject):
         if recording is not None and not self._document.goes_on:
             self.close()
             self.waiting = Found()
+            self._others = edited_fields(recording)
             self._begin_at(_labelled_path(recording), reread=True)
+        self._recording = recording
         self._labels.open(self._document.labels)
 
     def try_again(self) -> None:
@@ -107,7 +116,7 @@ class LabelAutosave(QObject):
                 self._document.read_labels_again()
         except OSError as error:
             # No journal is no reason not to edit.
-            self.notes = (f"Edits of labels are not kept until they are saved ({error}).",)
+            self.notes = (f"Edits are not kept until they are saved ({error}).",)
         except Sd2Error as error:
             place.release()
             self._refusal = str(error)
@@ -121,6 +130,7 @@ class LabelAutosave(QObject):
         if recording is None:
             return
         path = _labelled_path(recording)
+        self._recording, self._others = recording, edited_fields(recording)
         if self._place is None or self._place.recording != path.resolve():
             self.close()
             self._begin_at(path, reread=False)
@@ -132,19 +142,37 @@ class LabelAutosave(QObject):
     # --- every edit -----------------------------------------------------------------------
 
     def keep(self, name: str, before: Labels, after: Labels) -> None:
-        """Write an edit to disk before it is shown; report a failure."""
+        """Write an edit of labels to disk before it is shown; report a failure."""
+        self._write(name, before, after)
+
+    def _keep_others(self, step: int) -> None:
+        """Write an edit of anything else to disk, once it is in the history."""
+        recording, stack = self._document.recording, self._document.undo_stack
+        back, self._step = step < self._step, step
+        # The history of the recording before is cleared when another one is there already.
+        if recording is None or recording is not self._recording:
+            return
+        others = edited_fields(recording)
+        if others != self._others:
+            self._others = others
+            name = f"Undo {stack.redoText().lower()}" if back else stack.undoText()
+            self._write(name, self._labels.labels, self._labels.labels, others)
+
+    def _write(
+        self, name: str, before: Labels, after: Labels, others: dict[str, Any] | None = None
+    ) -> None:
         place = self._place
         try:
             if place is None or not place.take():
                 return
             if self._journal is None:
                 self._journal = place.begin(before)
-            self._journal.write(name, after)
+            self._journal.write(name, after, others)
         except OSError as error:
             self._tell_unkept(error)
         else:
             if not self._keeping:
-                self.noted.emit("Edits of labels are kept again.")
+                self.noted.emit("Edits are kept again.")
             self._keeping = True
 
     def _tell_unkept(self, error: OSError) -> None:
@@ -204,6 +232,13 @@ class LabelAutosave(QObject):
             self._look_for_offers(self._place)
             self.changed.emit()
 
+    def changed_others(self, offer: Offer) -> list[str]:
+        """Name what an offer changes besides labels, in words."""
+        recording = self._document.recording
+        if offer.others is None or recording is None:
+            return []
+        return differing(offer.others, edited_fields(recording))
+
     def take_offer(self) -> Labels:
         """Continue with the labels offered, in a journal of their own."""
         offer, place = self._offers[0], self._place
@@ -214,6 +249,7 @@ class LabelAutosave(QObject):
             self._tell_unkept(error)
         else:
             self._go_on_in(journal)
+            self._others = offer.others or self._others
         self.postpone()
         return offer.labels
 
@@ -245,9 +281,9 @@ class LabelAutosave(QObject):
         self.notes = found.notes
 
     def _other_than_open(self, place: RecoveryPlace, offers: Iterable[Offer]) -> Iterable[Offer]:
-        """Offers that differ from the open labels; the others are deleted as redundant."""
+        """Offers that differ from what is open; the others are deleted as redundant."""
         for offer in offers:
-            if offer.labels != self._document.labels:
+            if offer.labels != self._document.labels or self.changed_others(offer):
                 yield offer
             else:
                 with suppress(OSError):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import Literal
+from typing import Any, Literal
 
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QUndoCommand
@@ -17,6 +17,7 @@ from sd2core.labels import edits, field_edits
 from sd2core.labels.comparison import changed_stretch
 from sd2core.labels.edits import Change, Edit, Side, duplicate_together, nudge_together
 from sd2core.labels.spans import Labels, Span
+from sd2core.recording.edited import decoded_fields
 
 
 class _Step(QUndoCommand):
@@ -53,11 +54,13 @@ class LabelEdits(QObject):
     made (see :class:`sd2app.labels.autosave.LabelAutosave`). Times are frames of the clock.
     An impossible edit changes nothing, and ``failed`` says why. ``applying`` is emitted before an
     edit, so that a drag in progress ends first; ``done_at`` after an edit, an undo or a redo, with
-    the earliest start and latest end of changed spans.
+    the earliest start and latest end of changed spans; ``restoring`` with the other fields of the
+    recording that are restored with the labels, in the same step.
     """
 
     failed = Signal(str)
     applying = Signal()
+    restoring = Signal(dict)
     done_at = Signal(float, float)
 
     def __init__(
@@ -151,15 +154,25 @@ class LabelEdits(QObject):
             self.apply(lambda labels, base: edits.fill_gaps(labels, base, track, label))
 
     def restore(self) -> None:
-        """Take over the labels that an earlier session left unsaved."""
-        recording = self._document.recording
-        if recording is None or self._session.offer is None or self.refused():
+        """Take over what an earlier session left unsaved, as one step."""
+        recording, offer = self._document.recording, self._session.offer
+        if recording is None or offer is None or self.refused():
             return
         self.applying.emit()
         before = self.labels.labels
+        others: dict[str, Any] = {}
+        if offer.others is not None and self._session.changed_others(offer):
+            try:
+                others = decoded_fields(offer.others)
+            except Sd2Error as error:
+                self.failed.emit(str(error))
+        self.undo_stack.beginMacro("Restore edits" if others else "Restore labels")
         recording.labels = self._session.take_offer()  # on disk already, as a session of its own
         self.labels.set_labels(recording.labels)
         self.make(Edit("Restore labels", recording.labels), before)
+        if others:
+            self.restoring.emit(others)
+        self.undo_stack.endMacro()
 
     # --- finding one's way ----------------------------------------------------------------
 

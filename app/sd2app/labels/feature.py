@@ -22,6 +22,7 @@ from sd2app.labels.model import LabelsModel
 from sd2app.labels.painting import map_overlay, strip_overlay
 from sd2app.labels.panel import LabelsPanel
 from sd2app.labels.recovery import LabelNotice, recover
+from sd2app.labels.span_buttons import Decision, SpanButtons
 from sd2app.labels.timeline import LabelArea, LabelTimeline, TargetLine
 from sd2app.labels.tracks import LabelTracks, TrackMenu
 from sd2app.session.session import Session
@@ -62,6 +63,7 @@ class LabelsFeature(Feature):
         self._keys: LabelActions | None = None
         self.edits.done_at.connect(s.span.reveal_any)
         self.edits.failed.connect(shell.warn)
+        self.edits.restoring.connect(s.edits.restore)
         for model in (self.autosave, self.cut_out):
             model.failed.connect(shell.warn)
             model.noted.connect(shell.note)
@@ -207,7 +209,7 @@ class LabelsFeature(Feature):
                     lambda: import_labels(shell, edits), s.has_content,
                 ),
                 Action(
-                    "restore_labels", "Labels", "Restore labels that were not saved", (),
+                    "restore_labels", "Labels", "Restore edits that were not saved", (),
                     "Take over what an earlier session left behind; one undo takes that back",
                     edits.restore, lambda: autosave.offer is not None,
                 ),
@@ -328,7 +330,10 @@ class LabelsFeature(Feature):
         """The panel at the side, and the timeline below the maps."""
         s, shell = self._session, self._shell
         panel = LabelsPanel(s, self.edits, shell)
-        timeline = LabelTimeline(s, self.edits, self.dragging, self.loop)
+        signs = ("✓", "accept_suggestion"), ("✗", "reject_suggestion")
+        decisions = [Decision(sign, shell.action(name)) for sign, name in signs]
+        buttons = SpanButtons(self.model, decisions)
+        timeline = LabelTimeline(s, self.edits, self.dragging, self.loop, buttons)
         self._offer_places(timeline)
         area = LabelArea(timeline, self.model)
         return {"Labels": panel, "labels": pane(TargetLine(self.model), area)}

@@ -28,8 +28,7 @@ from sd2core.labels.files import write_labels
 from sd2core.labels.recovery import Offer
 
 _SAID = (
-    "Edits of labels that were not saved when the program ended. Open a recording to see what"
-    " they change."
+    "Edits that were not saved when the program ended. Open a recording to see what they change."
 )
 _NOTHING = "There is nothing to recover: all edits were saved or discarded."
 _ROW_PX, _MARGIN_PX = 24, 16
@@ -51,7 +50,7 @@ class LabelNotice(Notice):
         buttons = (
             ("again", "Try again", "Edit them here, once the other window is closed",
              autosave.try_again),
-            ("restore", "Restore", "Use these labels; one undo takes that back", edits.restore),
+            ("restore", "Restore", "Use these edits; one undo takes that back", edits.restore),
             ("decline", "Discard", "Do not offer them again; File → Recover labels… lists them",
              autosave.decline),
             ("postpone", "Not now", "Offer them again when this recording is opened next",
@@ -80,7 +79,9 @@ class LabelNotice(Notice):
         if autosave.read_only:
             head, text, shown = "Labels are read-only", f"{autosave.refusal}.", {"again"}
         elif offer is not None:
-            text, shown = self._offered(offer), {"restore", "decline", "postpone"}
+            others = self._autosave.changed_others(offer)
+            head = f"{'Edits' if others else 'Labels'} were not saved"
+            text, shown = self._offered(offer, others), {"restore", "decline", "postpone"}
         elif autosave.notes:
             head = "Labels"
         else:
@@ -89,11 +90,12 @@ class LabelNotice(Notice):
             button.setVisible(name in shown)
         self.show_words(head, "\n".join(filter(None, (text, *autosave.notes))))
 
-    def _offered(self, offer: Offer) -> str:
-        """Offer, compared with the open labels."""
+    def _offered(self, offer: Offer, others: list[str]) -> str:
+        """Offer, compared with what is open."""
         holds, difference = offer.labels, compare(self._document.labels, offer.labels)
         spans = counted(len(holds.spans), "span")
-        return f"{_edits_text(offer)}. {spans}; against what is open: {difference}."
+        changes = ", ".join(filter(None, (str(difference), *(f"another {one}" for one in others))))
+        return f"{_edits_text(offer)}. {spans}; against what is open: {changes}."
 
     def _waiting(self) -> str:
         """Names of the recordings with unsaved labels; empty without any."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal, NamedTuple
 
-from PySide6.QtCore import QEvent, QObject, QRectF, QSize, Qt, QTimer
+from PySide6.QtCore import QEvent, QObject, QPointF, QRectF, QSize, Qt, QTimer
 from PySide6.QtGui import QColor, QMouseEvent, QPainter, QResizeEvent, QWheelEvent
 from PySide6.QtWidgets import QFrame, QLabel, QScrollArea, QScrollBar, QSizePolicy
 
@@ -13,6 +13,7 @@ from sd2app.labels.edits import LabelEdits
 from sd2app.labels.loop import SpanLoop
 from sd2app.labels.model import LabelsModel
 from sd2app.labels.painting import ROW_PX, LabelRows, lane_box, paint_span, paint_tracks
+from sd2app.labels.span_buttons import Decision, SpanButtons
 from sd2app.session.session import Session
 from sd2app.widgets.canvas import AT_LEFT, TimePlot
 from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, paint_cursor, turn_wheel
@@ -48,16 +49,23 @@ class LabelTimeline(TimePlot):
     With Shift a new span is drawn over others, which it cuts. A click selects a span and goes to
     its start, with Ctrl it adds to the selection, with Shift it selects all up to it; a double
     click plays it in a loop. A click on the name of a track makes it the one for new spans; what
-    is drawn on that of the suggestions comes there too.
+    is drawn on that of the suggestions comes there too. ``buttons`` decide on a suggestion.
     """
 
     def __init__(
-        self, session: Session, edits: LabelEdits, dragging: LabelDragging, loop: SpanLoop
+        self,
+        session: Session,
+        edits: LabelEdits,
+        dragging: LabelDragging,
+        loop: SpanLoop,
+        buttons: SpanButtons,
     ) -> None:
         super().__init__(session.span)
         self._session, self._edits, self._dragging, self._loop = session, edits, dragging, loop
         self._labels = labels = edits.labels
         self._span, self._playback = session.span, session.playback
+        self._buttons = buttons
+        self._pressed: Decision | None = None
         self._target: HitTarget | None = None
         self._pointer_px = 0.0
         self._within_s, self._cutting = 0.0, False
@@ -101,6 +109,7 @@ class LabelTimeline(TimePlot):
             colour, palette = model.colour_of(mark.label), self._session.display.palette
             paint_span(painter, box, f"{mark.label} …", colour, palette, selected=True)
         paint_cursor(painter, plot, scale.x_of(self._playback.time_s))
+        self._buttons.paint(painter, scale, plot, rows, self._session.display.palette)
 
     def _paint_rows(self, painter: QPainter) -> None:
         """Paint the parts that do not move: names, rows, spans."""
@@ -152,8 +161,11 @@ class LabelTimeline(TimePlot):
         return HitTarget("nothing" if held is None else "span", x_px, row.name, held)
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        """Start a click or a drag."""
+        """Start a click or a drag, or press a button."""
         if event.button() == Qt.MouseButton.LeftButton:
+            self._pressed = self._button_at(event.position())
+            if self._pressed is not None:
+                return
             self._target = self.target_at(event.position().x(), event.position().y())
             self._cutting = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
 
@@ -162,7 +174,8 @@ class LabelTimeline(TimePlot):
         x = event.position().x()
         if self._target is None:
             if not event.buttons():
-                self._show_target(self.target_at(x, event.position().y()))
+                button = self._button_at(event.position())
+                self._show_target(self.target_at(x, event.position().y()), button)
             return
         if not self._dragging.dragging and (
             self._target.part == "name"
@@ -180,6 +193,11 @@ class LabelTimeline(TimePlot):
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         """End a drag, or take it as a click."""
         self._scroll.stop()
+        pressed, self._pressed = self._pressed, None
+        if pressed is not None:
+            if pressed is self._button_at(event.position()):
+                pressed.action.trigger()
+            return
         target, self._target = self._target, None
         if self._dragging.dragging:
             self._dragging.end_drag()
@@ -189,7 +207,8 @@ class LabelTimeline(TimePlot):
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         """Play a span in a loop."""
         target = self.target_at(event.position().x(), event.position().y())
-        if target is not None and target.span is not None:
+        on_button = self._button_at(event.position()) is not None
+        if target is not None and target.span is not None and not on_button:
             self._loop.play(target.span)
         else:
             self.mousePressEvent(event)
@@ -197,6 +216,9 @@ class LabelTimeline(TimePlot):
     def wheelEvent(self, event: QWheelEvent) -> None:
         """Zoom about the mouse, or pan."""
         turn_wheel(event, self._span, self.scale)
+
+    def _button_at(self, place: QPointF) -> Decision | None:
+        return self._buttons.at(place, self.scale, self.plot_rect(), self.rows)
 
     def _click(self, target: HitTarget, modifiers: Qt.KeyboardModifier) -> None:
         if target.part != "name" and modifiers & Qt.KeyboardModifier.ShiftModifier and target.span:
@@ -245,7 +267,11 @@ class LabelTimeline(TimePlot):
         self._target = self._target._replace(x_px=self._target.x_px - moved_px)
         self._drag()
 
-    def _show_target(self, target: HitTarget | None) -> None:
+    def _show_target(self, target: HitTarget | None, button: Decision | None) -> None:
+        if button is not None:
+            self.setCursor(Qt.CursorShape.ArrowCursor)
+            self.setToolTip(f"{button.action.text().replace('&', '')}\n{button.action.toolTip()}")
+            return
         shapes = {
             "start": Qt.CursorShape.SizeHorCursor,
             "end": Qt.CursorShape.SizeHorCursor,

@@ -106,6 +106,12 @@ class Edits:
         if recording is not None and before is not None and before[0] is recording:
             self._push_change("Plan placements", {"placements": before[1]})
 
+    def restore(self, fields: Mapping[str, Any]) -> None:
+        """Take over sensor, placements and offset of an earlier session."""
+        self.place_sensor(fields["sensor"], "Restore sensor")
+        rest = {name: value for name, value in fields.items() if name != "sensor"}
+        self._change("Restore placements and offset", rest)
+
     # --- alignment of the real capture ----------------------------------------------------
 
     def set_radar_offset(self, offset_s: float) -> None:

@@ -184,7 +184,7 @@ class TestEveryEdit:
         assert said.startswith("The edit is made, but could not be kept")
         assert "No space left" in said
         at.mark(70, 80)
-        assert at.said[1:] == ["Edits of labels are kept again."]
+        assert at.said[1:] == ["Edits are kept again."]
         assert left(root)[0].labels == at.labels.labels
         assert left(root)[0].edits == 4
 

@@ -7,7 +7,7 @@ import random
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from labelled import even, imported, many_spans, random_edit
 
@@ -76,6 +76,14 @@ def test_an_edit_writes_what_it_changed_and_no_more() -> None:
     assert record["gone"] == [2]
     assert len(packed(record)) < 300
     assert change("Nothing", 0.0, labels, labels) == {"name": "Nothing", "time_unix_s": 0.0}
+
+
+def test_a_journal_of_the_first_version_is_read() -> None:
+    content = head("/walk.sd2", START, 1, "Move span", 0.0) | {"version": 1}
+    del content["others"]
+    payloads, _ = unpacked(packed(content))
+    replayed = replay(payloads)
+    assert (replayed.labels, replayed.others) == (START, None)
 
 
 class TestJournal:
@@ -153,6 +161,27 @@ class TestJournal:
         (tmp_path / "000001-000001.journal").unlink()
         journal.write("Edit", Labels())
         assert self.read(tmp_path / "000001-000002.journal") == Labels()
+
+    @given(steps=st.lists(st.one_of(st.none(), st.integers(0, 3), st.just("saved")), max_size=20))
+    @settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
+    def test_other_fields_are_those_of_the_last_edit_of_them_since_the_file_was_saved(
+        self, steps: list[int | str | None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(journal_module, "SHORTEST_BYTES", 1)  # many parts
+        journal = Journal(tmp_path, 1, Path("/walk.sd2"), START)
+        expected = None
+        for step in steps:
+            if step == "saved":
+                journal.saved()
+                expected = None
+            elif step is None:
+                journal.write("Edit", START)
+            else:
+                expected = {"radar_offset_s": step}
+                journal.write("Align radar", START, expected)
+        payloads, _ = unpacked(max(tmp_path.iterdir()).read_bytes())
+        journal.close()
+        assert replay(payloads).others == expected
 
     def test_saved_edits_do_not_count(self, tmp_path: Path) -> None:
         journal = self.begun(tmp_path)

@@ -241,12 +241,12 @@ class TestDamage:
         self, taken: Take, root: Path, recording: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         with monkeypatch.context() as patch:
-            patch.setattr("sd2core.labels.journal.VERSION", 2)
+            patch.setattr("sd2core.labels.journal.VERSION", 3)
             crashed(root, recording, 1)
         place = taken(root, recording)
         found = place.offers()
         assert found.offers == ()
-        assert "version is 2" in found.notes[0]
+        assert "version is 3" in found.notes[0]
         place.begin(START).close()
         assert place.offers() == found
 

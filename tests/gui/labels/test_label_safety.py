@@ -21,6 +21,7 @@ from sd2app.labels.recovery import LabelNotice, RecoverLabelsDialog
 from sd2app.labels.timeline import ROW_PX, LabelTimeline
 from sd2core.labels.recovery import RecoveryPlace, offers_in, recovery_folder
 from sd2core.labels.spans import Span
+from sd2core.placements.placements import PlacementGrid
 from sd2core.recording.recording import open_recording
 
 NONE, CONTROL = Qt.KeyboardModifier.NoModifier, Qt.KeyboardModifier.ControlModifier
@@ -346,3 +347,86 @@ class TestLabelsOfARadarFile:
         assert labels.labels.spans == ()
         edits.set_radar_offset(0.5)
         assert labels.labels.spans == ()
+
+
+class TestOtherEditsAfterACrash:
+    """Sensor, placements and offset come back with the labels."""
+
+    def crash(self, window) -> None:
+        """What the end of a process does to the open recording."""
+        session = models_of(window).label_session
+        session._journal._close_stream()
+        session._place.release()
+        session._journal = session._place = None
+
+    def edited(self, on, qtbot, path):
+        """The window after a sensor moved and aimed, a plan and an offset, none of them saved."""
+        window = on(path)
+        c = models_of(window)
+        c.edits.begin_sensor_drag()
+        c.edits.drag_sensor((0.5, 0.2, 0.0))
+        c.edits.end_sensor_drag()
+        qtbot.keyClick(window, Qt.Key.Key_A)
+        c.edits.plan_placements(PlacementGrid((2.0,), azimuths_deg=(0.0, 45.0)))
+        c.edits.begin_offset_drag()
+        c.edits.drag_offset(0.25)
+        c.edits.end_offset_drag()
+        return window, self.state(window)
+
+    def state(self, window) -> tuple:
+        c = models_of(window)
+        recording = c.document.recording
+        return (c.sensor.sensor, recording.sensor, recording.placements, recording.radar_offset_s)
+
+    def test_they_are_offered_and_restored_in_one_step(self, on, qtbot, recording_copy) -> None:
+        before = self.state(on(recording_copy))
+        window, edited = self.edited(on, qtbot, recording_copy)
+        assert all(one != other for one, other in zip(before, edited, strict=True))
+        mark(window, qtbot, 24, 28)
+        self.crash(window)
+        window = on(recording_copy)
+        assert self.state(window) == before
+        said = bar(window).text
+        assert said.startswith("Edits were not saved: 5 edits until ")
+        assert said.endswith(
+            "1 span added, another sensor, another plan of placements, another offset of the radar."
+        )
+        press(window, qtbot, "Restore")
+        assert self.state(window) == edited
+        assert LOST in spans(window)
+        qtbot.keyClick(window, Qt.Key.Key_Z, CONTROL)
+        assert (self.state(window), spans(window)) == (before, [THERE, BACK])
+        qtbot.keyClick(window, Qt.Key.Key_Z, CONTROL | Qt.KeyboardModifier.ShiftModifier)
+        # What was restored is as safe as what was edited: it is offered after another crash.
+        self.crash(window)
+        window = on(recording_copy)
+        press(window, qtbot, "Restore")
+        assert self.state(window) == edited
+        qtbot.keyClick(window, Qt.Key.Key_S, CONTROL)
+        window = on(recording_copy)
+        assert bar(window).text == ""
+        assert self.state(window) == edited
+
+    def test_without_an_edit_of_labels_too(self, on, qtbot, recording_copy) -> None:
+        window, edited = self.edited(on, qtbot, recording_copy)
+        for _ in range(2):
+            qtbot.keyClick(window, Qt.Key.Key_Z, CONTROL)
+        self.crash(window)
+        window = on(recording_copy)
+        said = bar(window).text
+        assert said.endswith("2 spans; against what is open: another sensor.")
+        assert "the last “Undo plan placements”" in said
+        press(window, qtbot, "Restore")
+        assert self.state(window)[1] == edited[1]
+        assert self.state(window)[2] is None
+
+    def test_what_was_saved_or_taken_back_is_not_offered(self, on, qtbot, recording_copy) -> None:
+        window, edited = self.edited(on, qtbot, recording_copy)
+        qtbot.keyClick(window, Qt.Key.Key_S, CONTROL)
+        self.crash(window)
+        window = on(recording_copy)
+        assert (bar(window).text, self.state(window)) == ("", edited)
+        qtbot.keyClick(window, Qt.Key.Key_Home)
+        qtbot.keyClick(window, Qt.Key.Key_Z, CONTROL)
+        self.crash(window)
+        assert bar(on(recording_copy)).text == ""

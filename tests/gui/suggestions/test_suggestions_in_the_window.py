@@ -6,10 +6,11 @@ import label_hands as hands
 import numpy as np
 import pytest
 from kept_window import opened
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QPoint, QRect, QRectF, Qt
 from PySide6.QtWidgets import QToolButton
 from window_models import models_of
 
+from sd2app.labels.painting import lane_box
 from sd2app.labels.timeline import TargetLine
 from sd2app.suggestions.bar import SuggestionBar
 from sd2core.maps import DopplerMap
@@ -166,3 +167,74 @@ def test_with_suggestions_alone_accepting_makes_a_track_and_marking_says_what_to
     key(moving, qtbot, "Y")
     assert [track.name for track in c.labels.labels.tracks] == [own, "Suggestions"]
     assert c.labels.track == own
+
+
+def buttons_of(window) -> dict[str, QRect]:
+    """Places of the buttons on the selected suggestion, by their signs."""
+    view = hands.timeline(window)
+    placed = view._buttons.placed(view.scale, view.plot_rect(), view.rows)
+    return {one.sign: place.toAlignedRect() for place, one in placed}
+
+
+def boxes_of_others(window) -> list[QRectF]:
+    """Boxes of the spans that are not selected, on the timeline."""
+    view, c = hands.timeline(window), models_of(window)
+    arrays = c.labels.arrays
+    return [
+        lane_box(
+            view.rows.row_of(span.track),
+            lane,
+            view.scale.x_of(span.start_s),
+            view.scale.x_of(span.end_s),
+        )
+        for span, lane in zip(arrays.spans, arrays.lanes.tolist(), strict=True)
+        if not c.labels.is_selected(span.id)
+    ]
+
+
+def test_buttons_at_the_span_decide_on_it(moving, qtbot) -> None:
+    c, view = models_of(moving), hands.timeline(moving)
+    assert not buttons_of(moving)
+    asked(moving, qtbot)
+    first, second = c.suggestions.pending
+    assert c.labels.selected == (first,)
+    places = buttons_of(moving)
+    assert list(places) == ["✓", "✗"]
+    qtbot.mouseClick(view, Qt.MouseButton.LeftButton, pos=places["✗"].center())
+    assert c.suggestions.pending == (second,)
+    assert c.document.undo_stack.undoText() == "Reject suggestion"
+    qtbot.mouseClick(view, Qt.MouseButton.LeftButton, pos=buttons_of(moving)["✓"].center())
+    assert decided(moving) == [(c.labels.label, "person")]
+    assert not buttons_of(moving), "nothing is left to decide on"
+    for _ in range(2):
+        key(moving, qtbot, "Z", Qt.KeyboardModifier.ControlModifier)
+    assert len(c.suggestions.pending) == 2
+    # Let go elsewhere, nothing is decided; and a span of one's own has no buttons.
+    c.labels.select([first.id])
+    place = buttons_of(moving)["✓"].center()
+    qtbot.mousePress(view, Qt.MouseButton.LeftButton, pos=place)
+    qtbot.mouseRelease(view, Qt.MouseButton.LeftButton, pos=place + QPoint(120, 0))
+    assert len(c.suggestions.pending) == 2
+
+
+def test_the_buttons_follow_the_span_and_cover_no_other(moving, qtbot) -> None:
+    c, view = models_of(moving), hands.timeline(moving)
+    asked(moving, qtbot)
+    plot = view.plot_rect()
+    wide = seen = 0
+    for name, times in (("Plus", 6), ("BracketRight", 1), ("Minus", 8)):
+        for _ in range(times):
+            first = c.labels.selected[0]
+            places = buttons_of(moving).values()
+            left, right = (view.scale.x_of(one) for one in (first.start_s, first.end_s))
+            for place in places:
+                seen += 1
+                assert plot.left() <= place.left() <= place.right() <= plot.right() + 1
+                assert not any(box.intersects(QRectF(place)) for box in boxes_of_others(moving))
+                wide += left < place.left() < place.right() < right
+                near = min(abs(place.left() - right), abs(place.right() - left))
+                assert left <= place.center().x() <= right or near < 50
+            if name == "BracketRight":  # from here on the suggestion is a short one
+                c.playback.seek_frame(7)
+            key(moving, qtbot, name)
+    assert seen > wide > 0, "on the span and beside it"

@@ -1,0 +1,52 @@
+"""Other edits of a recording survive as JSON, and what differs is named."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sd2core.errors import Sd2Error
+from sd2core.placements.placements import PlacementGrid
+from sd2core.recording.edited import decoded_fields, differing, edited_fields
+from sd2core.recording.recording import Recording
+from sd2core.sensor import VirtualSensor
+
+metres = st.floats(-50, 50)
+angles = st.floats(-89, 89)
+recordings = st.builds(
+    Recording,
+    st.just(Path("walk.sd2")),
+    sensor=st.builds(
+        VirtualSensor,
+        position_m=st.tuples(metres, metres, metres),
+        azimuth_deg=angles,
+        elevation_deg=angles,
+        field_of_view_deg=st.floats(1, 179),
+    ),
+    placements=st.none()
+    | st.builds(PlacementGrid, st.lists(st.floats(0.1, 9), min_size=1, max_size=3).map(tuple)),
+    radar_offset_s=st.floats(-9, 9),
+)
+
+
+@given(recordings)
+def test_what_was_encoded_is_decoded(recording: Recording) -> None:
+    entry = edited_fields(recording)
+    fields = decoded_fields(json.loads(json.dumps(entry)))
+    assert fields == {name: getattr(recording, name) for name in fields}
+    assert not differing(entry, edited_fields(recording))
+
+
+def test_what_differs_is_named() -> None:
+    one, other = Recording(Path("a.sd2")), Recording(Path("a.sd2"), radar_offset_s=0.5)
+    assert differing(edited_fields(one), edited_fields(other)) == ["offset of the radar"]
+
+
+@pytest.mark.parametrize("entry", [{}, {"sensor": {"position_m": "there"}}, {"sensor": {}}])
+def test_something_else_is_refused(entry: dict) -> None:
+    with pytest.raises(Sd2Error, match="cannot be read"):
+        decoded_fields(entry)
