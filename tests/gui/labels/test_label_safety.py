@@ -426,7 +426,8 @@ class TestOtherEditsAfterACrash:
         self.crash(window)
         window = on(recording_copy)
         assert (bar(window).text, self.state(window)) == ("", edited)
-        qtbot.keyClick(window, Qt.Key.Key_Home)
+        qtbot.keyClick(window, Qt.Key.Key_Home, Qt.KeyboardModifier.ShiftModifier)
+        assert self.state(window) != edited
         qtbot.keyClick(window, Qt.Key.Key_Z, CONTROL)
         self.crash(window)
         assert bar(on(recording_copy)).text == ""

@@ -79,9 +79,7 @@ def test_opening_the_page_leaves_the_playhead_where_it_is(window, qtbot) -> None
     qtbot.waitUntil(window.isActiveWindow, timeout=5000)
     c = models_of(window)
     c.playback.seek_frame(47)
-    tabs = window.side.tabBar()
-    titles = [tabs.tabText(place) for place in range(tabs.count())]
-    QTest.mouseClick(tabs, LEFT, NONE, tabs.tabRect(titles.index("Labels")).center())
+    QTest.mouseClick(window.side.button("Labels"), LEFT)
     assert window.side.shown == "Labels"
     press(window, "L", SHIFT)
     assert QApplication.focusWidget() is table(window)
