@@ -7,7 +7,7 @@ import io
 import json
 import shutil
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -20,7 +20,7 @@ from sd2core.files.lock import FileLock
 from sd2core.io.mesh import save_mesh
 from sd2core.io.video import VideoReader, open_video
 from sd2core.io.video_writing import write_video
-from sd2core.labels.spans import Span
+from sd2core.labels.spans import ShownFrames, Span
 from sd2core.progress import Progress, silent
 
 State = Literal["new", "same", "other"]
@@ -29,8 +29,8 @@ _UNFINISHED = ".sd2-cut-"
 _LOCK = ".sd2-lock"
 _CRF, _PRESET = 16, "fast"
 _COLUMNS = (
-    "folder", "label", "track", "start_s", "end_s", "start_frame", "end_frame", "note", "author",
-    "confidence", "recording", "simulated",
+    "folder", "label", "track", "start_s", "end_s", "first_frame", "last_frame", "frames",
+    "note", "author", "confidence", "recording", "simulated",
 )  # fmt: skip
 
 
@@ -108,9 +108,8 @@ def write_index(folder: Path) -> None:
     writer = csv.writer(table, lineterminator="\n")
     writer.writerow(_COLUMNS)
     for one in entries:
-        flat = (
-            one | one["span"] | dict(zip(("start_frame", "end_frame"), one["frames"], strict=True))
-        )
+        first, last, count = (one["frames"][name] for name in ("first", "last", "count"))
+        flat = one | one["span"] | {"first_frame": first, "last_frame": last, "frames": count}
         writer.writerow(["" if flat[name] is None else flat[name] for name in _COLUMNS])
     atomic_write_text(folder / "index.csv", table.getvalue())
     kept = [{key: value for key, value in one.items() if key != "frame_times_s"} for one in entries]
@@ -217,7 +216,12 @@ def _read(path: Path) -> dict[str, Any] | None:
     except (OSError, ValueError):
         return None
     ours = isinstance(found, dict) and found.get("format") == FORMAT
-    return found if ours and {"span", "frames", "files"} <= found.keys() else None
+    if not ours or not {"span", "frames", "files"} <= found.keys():
+        return None
+    if isinstance(found["frames"], list):  # half-open, in cut-outs of before
+        first, stop = found["frames"]
+        found["frames"] = asdict(ShownFrames(first, stop - 1, stop - first))
+    return found
 
 
 def _text(described: dict[str, Any]) -> str:

@@ -68,12 +68,13 @@ class CutSource:
     def described(self, span: Span) -> dict[str, Any]:
         """Return the content of ``span.json``; the same for the same source and span."""
         first, stop = self.frames_of(span)
+        frames = span.frames(self.timebase)
         return {
             "format": FORMAT,
             "version": VERSION,
             "program": f"SD² Studio {__version__}",
             "span": asdict(span),
-            "frames": [first, stop],
+            "frames": frames and asdict(frames),
             "zero_s": self.zero_s(span),
             "frame_times_s": (self.timebase.times_s[first:stop] - self.zero_s(span)).tolist(),
             "recording": self.title,

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import asdict, fields
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, NonNegativeInt, ValidationError
 
 from sd2core.labels.label_set import Label, LabelSet
-from sd2core.labels.spans import Labels, LabelTrack, Origin, Overlap, Span
+from sd2core.labels.spans import Labels, LabelTrack, Origin, Overlap, ShownFrames, Span
 from sd2core.timebase import Timebase
 
 
@@ -45,14 +45,25 @@ class TrackEntry(Entry):
     overlap: Overlap = "exclusive"
 
 
+class FramesEntry(Entry):
+    """Entry of the :class:`ShownFrames` of a span."""
+
+    first: NonNegativeInt
+    last: NonNegativeInt
+    count: NonNegativeInt
+
+
 class SpanEntry(Entry):
-    """Entry of a :class:`Span`; ``frames`` are informative, the times count."""
+    """Entry of a :class:`Span`; ``frames`` are informative, the times count.
+
+    Files of before have a half-open pair of frames.
+    """
 
     id: int
     track: str
     start_s: FiniteFloat
     end_s: FiniteFloat
-    frames: tuple[NonNegativeInt, NonNegativeInt] | None = None
+    frames: FramesEntry | tuple[NonNegativeInt, NonNegativeInt] | None = None
     label: str
     note: str = ""
     author: str = ""
@@ -82,7 +93,7 @@ _SPAN_FIELDS = tuple(field.name for field in fields(Span))
 _SPAN_OPTIONAL = {"note": "", "author": "", "confidence": None, "origin": "person"}
 
 
-def span_entry(span: Span, frames: tuple[int, int] | None = None) -> dict[str, Any]:
+def span_entry(span: Span, frames: ShownFrames | None = None) -> dict[str, Any]:
     """Encode a span; fields at their defaults are left out."""
     entry: dict[str, Any] = {}
     for name in _SPAN_FIELDS:
@@ -90,7 +101,7 @@ def span_entry(span: Span, frames: tuple[int, int] | None = None) -> dict[str, A
         if name not in _SPAN_OPTIONAL or value != _SPAN_OPTIONAL[name]:
             entry[name] = value
         if name == "end_s" and frames is not None:
-            entry["frames"] = list(frames)
+            entry["frames"] = asdict(frames)
     return entry
 
 
@@ -108,14 +119,10 @@ def label_set_entry(label_set: LabelSet) -> dict[str, Any]:
 
 def labels_entry(labels: Labels, timebase: Timebase | None = None) -> dict[str, Any]:
     """Encode all labels of a recording; with the frames of every span, given the timebase."""
-
-    def frames(span: Span) -> tuple[int, int] | None:
-        return None if timebase is None else timebase.frames_between(span.start_s, span.end_s)
-
     return {
         "label_set": label_set_entry(labels.label_set),
         "tracks": track_entries(labels.tracks),
-        "spans": [span_entry(span, frames(span)) for span in labels.spans],
+        "spans": [span_entry(span, span.frames(timebase)) for span in labels.spans],
     }
 
 

@@ -10,6 +10,7 @@ from typing import Literal
 
 from sd2core.errors import Sd2Error
 from sd2core.labels.label_set import GESTURES, LabelSet, check_name, check_text
+from sd2core.timebase import Timebase
 
 Origin = Literal["person", "suggestion", "import"]
 Overlap = Literal["exclusive", "free"]
@@ -18,6 +19,19 @@ ORIGINS: tuple[Origin, ...] = ("person", "suggestion", "import")
 OVERLAPS: tuple[Overlap, ...] = ("exclusive", "free")
 
 _IN_ORDER = attrgetter("start_s", "end_s", "id")
+
+
+@dataclass(frozen=True)
+class ShownFrames:
+    """Frames on screen during a span, as people read them: both ends are among them."""
+
+    first: int
+    last: int
+    count: int
+
+    def words(self) -> str:
+        """First and last frame and their number, as in "48–83 (36)"."""
+        return f"{self.first}–{self.last} ({self.count})"
 
 
 @dataclass(frozen=True)
@@ -75,6 +89,13 @@ class Span:
     def overlaps(self, other: Span) -> bool:
         """True if the two spans share some instant; spans that only touch do not."""
         return self.start_s < other.end_s and other.start_s < self.end_s
+
+    def frames(self, timebase: Timebase | None) -> ShownFrames | None:
+        """Return the frames on screen; None where there are none or their times are not known."""
+        first, stop = (
+            (0, 0) if timebase is None else timebase.frames_between(self.start_s, self.end_s)
+        )
+        return ShownFrames(first, stop - 1, stop - first) if stop > first else None
 
     def words(self) -> str:
         """Name of the span in a sentence."""

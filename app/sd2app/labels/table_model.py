@@ -67,8 +67,8 @@ _TIMES = "seconds (1.5 or 1:02.5) or a frame (f48)"
 
 
 def _frames(span: Span, timebase: Timebase) -> str:
-    first, stop = timebase.frames_between(span.start_s, span.end_s)
-    return f"{first}–{stop - 1}" if stop > first else ""
+    frames = span.frames(timebase)
+    return "" if frames is None else frames.words()
 
 
 def _given(
@@ -116,8 +116,8 @@ COLUMNS: tuple[Column, ...] = (
         _DURATION.typed, number=True, edge=_DURATION,
     ),
     Column(
-        "frames", "Frames", "The first frame and the last one",
-        _frames, lambda span: span.start_s, wide="0000–0000", number=True,
+        "frames", "Frames", "The first frame, the last one, and their number",
+        _frames, lambda span: span.start_s, wide="000–000 (00)", number=True,
     ),
     Column(
         "track", "Track", "Track, for all selected spans",

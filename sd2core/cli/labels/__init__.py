@@ -101,13 +101,13 @@ def _show(options: argparse.Namespace) -> None:
         return
     rows = [("id", "start s", "end s", "frames", "label", "track", "note")]
     for span in labels.spans:
-        first, stop = (0, 0) if clock is None else clock.frames_between(span.start_s, span.end_s)
+        frames = span.frames(clock)
         rows.append(
             (
                 str(span.id),
                 f"{span.start_s:.3f}",
                 f"{span.end_s:.3f}",
-                f"{first}–{stop}" if stop > first else "",
+                "" if frames is None else frames.words(),
                 span.label,
                 span.track,
                 " ".join(span.note.split()),
@@ -133,13 +133,9 @@ def _described(labels: Labels, clock: Timebase | None) -> dict[str, Any]:
     return {
         "tracks": [{"name": track.name, "overlap": track.overlap} for track in labels.tracks],
         "spans": [
-            asdict(span)
-            | {
-                "frames": None
-                if clock is None
-                else list(clock.frames_between(span.start_s, span.end_s))
-            }
+            asdict(span) | {"frames": frames and asdict(frames)}
             for span in labels.spans
+            for frames in [span.frames(clock)]
         ],
         "labels": _statistics_of(labels, clock),
     }

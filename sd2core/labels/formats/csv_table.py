@@ -2,11 +2,12 @@
 
 RFC 4180, in UTF-8 without a byte order mark, with these columns::
 
-    id,track,overlap,label,start_s,end_s,start_frame,end_frame,note,author,confidence,origin
+    id,track,overlap,label,start_s,end_s,first_frame,last_frame,frames,note,author,confidence,origin
 
-``start_frame`` is the frame shown at ``start_s``, counted from 0; ``end_frame`` is the first one
-after the span, so that ``range(start_frame, end_frame)`` are its frames, none where it lies
-outside the video. Seconds are exact, and are what counts when a file has both.
+``first_frame`` is the frame shown at ``start_s``, counted from 0, ``last_frame`` the last one of
+the span, and ``frames`` their number; a span outside the video has none. Seconds are exact, and
+are what counts when a file has both. ``end_frame``, in tables of before, is the first one after
+the span.
 
 Tables of other programs are read by the names of their columns, whatever separates them.
 """
@@ -18,6 +19,7 @@ import io
 import math
 import re
 from collections.abc import Sequence
+from dataclasses import astuple
 from pathlib import Path
 
 from sd2core.errors import Sd2Error
@@ -40,11 +42,11 @@ FORMAT = LabelFormat(
     suffixes=(".csv", ".tsv"),
     made_for="spreadsheets, pandas, R",
     keeps=frozenset(ASPECTS) - {"empty tracks", "label set", "colours and keys"},
-    remark="Seconds and frames; the end frame is the first one after the span.",
+    remark="Seconds, and the first frame, the last one and their number.",
 )
 
 COLUMNS = (
-    "id", "track", "overlap", "label", "start_s", "end_s", "start_frame", "end_frame",
+    "id", "track", "overlap", "label", "start_s", "end_s", "first_frame", "last_frame", "frames",
     "note", "author", "confidence", "origin",
 )  # fmt: skip
 
@@ -61,7 +63,7 @@ _NAMES = {
     "end_s": ("end_s", "end_time_s", "end_time", "end", "stop_s", "stop", "offset_s", "offset",
               "end_time_ss_msec", "tmax"),
     "duration_s": ("duration_s", "duration", "duration_ss_msec"),
-    "start_frame": ("start_frame", "first_frame"),
+    "start_frame": ("first_frame", "start_frame"),
     "end_frame": ("end_frame",),
     "last_frame": ("last_frame",),
     "note": ("note", "notes", "comment", "comments", "comment_start"),
@@ -87,13 +89,13 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
     # Track by track, so that their order comes back.
     by_track = ((track, span) for track in held.tracks for span in held.of_track(track.name))
     for track, span in by_track:
-        first, end = timebase.frames_between(span.start_s, span.end_s)
-        shown = timebase.frame_at(span.start_s)
+        shown = span.frames(timebase)
+        frames = ("", "", 0) if shown is None else astuple(shown)
         known = span.confidence
         writer.writerow(
             (
                 *(span.id, span.track, track.overlap, span.label),
-                *(float(span.start_s), float(span.end_s), shown, end if end > first else shown),
+                *(float(span.start_s), float(span.end_s), *frames),
                 *(span.note, span.author, "" if known is None else float(known), span.origin),
             )
         )

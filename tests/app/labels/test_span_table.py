@@ -58,7 +58,8 @@ def table():
 
 def test_what_the_cells_show(table) -> None:
     assert [table.cell(0, column.id) for column in COLUMNS] == [
-        "1.000", "2.000", "left-to-right", "1.000", "30–59", "Gestures", "quick", "", "", "person",
+        "1.000", "2.000", "left-to-right", "1.000", "30–59 (30)", "Gestures", "quick",
+        "", "", "person",
     ]  # fmt: skip
     assert table.cell(1, "confidence") == "0.5"
     assert table.column("label") == ["left-to-right", "clap", "up-to-down"]

@@ -92,9 +92,9 @@ def test_a_damaged_file_is_a_sentence(sd2: Sd2, swing: Path, tmp_path: Path) -> 
 
 def test_its_labels_are_those_of_the_recording(sd2: Sd2, swing: Path, tmp_path: Path) -> None:
     data = json.loads(sd2("labels", "show", swing, "--json").out)
-    assert [span["frames"] for span in data["spans"]] == [[2, 5]]
+    assert [span["frames"] for span in data["spans"]] == [{"first": 2, "last": 4, "count": 3}]
     folder = tmp_path / "swing.sd2"
     assert sd2("import", folder, "--radar", swing, "--radar-offset-s", 1.5).code == 0
     moved = json.loads(sd2("labels", "show", folder, "--json").out)["spans"][0]
     assert moved["start_s"] == pytest.approx(1.5 + 2 * FRAME_S)
-    assert moved["frames"] == [2, 5]
+    assert moved["frames"] == {"first": 2, "last": 4, "count": 3}

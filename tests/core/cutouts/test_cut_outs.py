@@ -69,7 +69,7 @@ def test_the_very_frames_with_0_s_at_the_first(source, tmp_path) -> None:
     for part in (mesh, doppler):
         np.testing.assert_allclose(part.timebase.times_s, TIMES_S[5:15] - TIMES_S[5], atol=1e-9)
     said = json.loads((path / "span.json").read_text("utf-8"))
-    assert said["frames"] == [5, 15]
+    assert said["frames"] == {"first": 5, "last": 14, "count": 10}
     assert said["zero_s"] == WAVE.start_s
     assert said["files"] == ["video.mp4", "mesh.zarr", "synthetic.npz"]
     assert said["simulated"] is True
@@ -80,9 +80,10 @@ def test_the_index_lists_all_that_was_ever_cut_into_the_folder(source, tmp_path)
     cut(source.only(["maps"]), tmp_path, WAVE)
     with (tmp_path / "index.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
-    assert [(row["label"], row["start_frame"], row["end_frame"], row["note"]) for row in rows] == [
-        ("wave", "5", "15", 'a, "b"'),
-        ("push / pull", "20", "30", ""),
+    columns = ("label", "first_frame", "last_frame", "frames", "note")
+    assert [tuple(row[name] for name in columns) for row in rows] == [
+        ("wave", "5", "14", "10", 'a, "b"'),
+        ("push / pull", "20", "29", "10", ""),
     ]
     listed = json.loads((tmp_path / "index.json").read_text("utf-8"))["spans"]
     assert [one["files"] for one in listed] == [
@@ -201,3 +202,14 @@ cut(source, Path({str(tmp_path)!r}), WAVE, PUSH, progress=end)
     only = source.only(["video"])
     assert [path.name for path in cut(only, tmp_path, WAVE, PUSH)] == [folder_name(PUSH)]
     assert not list(tmp_path.glob(".sd2-cut-*"))
+
+
+def test_cut_outs_of_before_have_a_half_open_pair_of_frames(source, tmp_path) -> None:
+    (folder,) = cut(source.only(["maps"]), tmp_path, WAVE)
+    said = json.loads((folder / "span.json").read_text("utf-8"))
+    (folder / "span.json").write_text(json.dumps(said | {"frames": [5, 15]}), "utf-8")
+    (planned,) = plan_cuts(source.only(["maps"]), [WAVE], tmp_path)
+    assert planned.state == "same"
+    cut(source.only(["maps"]), tmp_path, PUSH)
+    with (tmp_path / "index.csv").open(encoding="utf-8", newline="") as file:
+        assert next(csv.DictReader(file))["last_frame"] == "14"

@@ -79,7 +79,8 @@ def test_frames_are_written_for_people(tmp_path: Path) -> None:
     write_labels(tmp_path / FILE_NAME, labels, timebase=timebase)
     entries = json.loads((tmp_path / FILE_NAME).read_text(encoding="utf-8"))["spans"]
     for entry, span in zip(entries, labels.spans, strict=True):
-        assert tuple(entry["frames"]) == timebase.frames_between(span.start_s, span.end_s)
+        first, stop = timebase.frames_between(span.start_s, span.end_s)
+        assert entry["frames"] == {"first": first, "last": stop - 1, "count": stop - first}
     write_labels(tmp_path / FILE_NAME, labels)
     assert "frames" not in (tmp_path / FILE_NAME).read_text(encoding="utf-8")
 

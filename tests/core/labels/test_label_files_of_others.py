@@ -88,18 +88,19 @@ def test_frames_in_a_table_are_those_shown(
     write_labels(path, Labels(spans=(span,)), timebase)
     heading, row = path.read_text(encoding="utf-8").splitlines()
     cell = dict(zip(heading.split(","), row.split(","), strict=True))
-    first, end = int(cell["start_frame"]), int(cell["end_frame"])
-    assert first == timebase.frame_at(span.start_s)
-    shown = timebase.frames_between(span.start_s, span.end_s)
-    assert (first, end) == shown if shown != (0, 0) else first == end
+    first, stop = timebase.frames_between(span.start_s, span.end_s)
+    shown = (first, stop - 1, stop - first) if stop > first else ("", "", 0)
+    columns = ("first_frame", "last_frame", "frames")
+    assert tuple(cell[name].strip('"') for name in columns) == tuple(map(str, shown))
 
 
 def test_a_table_as_it_is_documented(tmp_path: Path) -> None:
     path = tmp_path / "x.csv"
     write_labels(path, Labels(spans=(Span(7, "Gestures", 0.5, 1.5, "wave", 'a "b"'),)), TIMEBASE)
     assert path.read_text(encoding="utf-8") == (
-        "id,track,overlap,label,start_s,end_s,start_frame,end_frame,note,author,confidence,origin\n"
-        '7,"Gestures","exclusive","wave",0.5,1.5,5,15,"a ""b""","","","person"\n'
+        "id,track,overlap,label,start_s,end_s,first_frame,last_frame,frames,"
+        "note,author,confidence,origin\n"
+        '7,"Gestures","exclusive","wave",0.5,1.5,5,14,10,"a ""b""","","","person"\n'
     )
 
 
@@ -113,6 +114,7 @@ def test_a_table_as_it_is_documented(tmp_path: Path) -> None:
         "label|start|stop\n\nwave|+.5|15e-1\n\n",
         "gesture,start_frame,end_frame\nwave,5,15\n",
         "gesture,start_frame,last_frame\nwave,5,14\n",
+        "gesture,first_frame,last_frame,frames\nwave,5,14,10\n",
         "Observation id,Subject,Behavior,Behavior type,Start (s),Stop (s)\no,Gestures,wave,STATE,"
         ".5,1.5\n",
     ],
