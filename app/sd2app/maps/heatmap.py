@@ -33,6 +33,27 @@ HANDLE_PX = 22
 """Left end of the title row, which folds and moves the map."""
 
 
+def velocity_labels(
+    v_max_mps: float, height_px: float, line_px: float
+) -> list[tuple[float, float]]:
+    """Velocities written at the axis of a map, and how far below its top their middles are.
+
+    Labels at the ends are moved inwards, and there are only as many as do not overprint.
+    """
+    most = int(height_px / (1.8 * line_px))
+    end_px = line_px / 2 - 2
+    return [
+        (
+            velocity,
+            min(
+                max(height_px * (0.5 - velocity / (2.0 * v_max_mps)), end_px),
+                max(height_px - end_px, end_px),
+            ),
+        )
+        for velocity in (ticks(-v_max_mps, v_max_mps, most) if most >= 2 else (0.0,))
+    ]
+
+
 class HeatmapView(MapWidget):
     """Shows one track; click or drag seeks, wheel zooms, Shift+wheel pans.
 
@@ -245,13 +266,11 @@ class HeatmapView(MapWidget):
         painter.setPen(QPen(QColor(colours.border), 1))
         painter.drawRect(plot.adjusted(-0.5, -0.5, 0.5, 0.5))
         line_px = painter.fontMetrics().height()
-        room_px = plot.height() / (line_px * 1.8)
-        for velocity in ticks(-v_max, v_max, int(room_px)) if room_px >= 2 else (0.0,):
+        painter.setPen(QPen(QColor(colours.muted), 1))
+        for velocity, beside_px in velocity_labels(v_max, plot.height(), line_px):
             y = self.y_of(velocity)
-            painter.setPen(QPen(QColor(colours.muted), 1))
             painter.drawLine(QPointF(plot.left() - 4, y), QPointF(plot.left(), y))
-            y_text = min(max(y, plot.top() + line_px / 2 - 2), plot.bottom() - line_px / 2 + 2)
-            room = QRectF(0, y_text - line_px / 2, GUTTER_PX - 8, line_px)
+            room = QRectF(0, plot.top() + beside_px - line_px / 2, GUTTER_PX - 8, line_px)
             painter.drawText(room, AT_RIGHT, signed_text(velocity))
 
     def _paint_cursors(self, painter: QPainter, plot: QRectF) -> None:

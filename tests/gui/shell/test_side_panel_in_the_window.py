@@ -8,6 +8,7 @@ from PySide6.QtCore import QPoint, QRect, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QSplitterHandle, QWidget
 
+from sd2app.maps.arrangement import HEADER_PX
 from sd2app.settings import Settings
 from sd2app.shell.parts import Parts
 from sd2app.shell.status_bar import StatusLine
@@ -22,12 +23,12 @@ def place_of(widget: QWidget) -> QRect:
     return QRect(widget.mapToGlobal(QPoint(0, 0)), widget.size())
 
 
-def drag(handle: QSplitterHandle, by_px: int) -> None:
-    """Drag the handle of a splitter sideways."""
+def drag(handle: QSplitterHandle, right_px: int, down_px: int = 0) -> None:
+    """Drag the handle of a splitter."""
     start = handle.rect().center()
     QTest.mousePress(handle, LEFT, pos=start)
     # The handle follows, so that each way is from where it is now.
-    QTest.mouseMove(handle, start + QPoint(by_px, 0))
+    QTest.mouseMove(handle, start + QPoint(right_px, down_px))
     QTest.mouseRelease(handle, LEFT, pos=start)
 
 
@@ -137,3 +138,38 @@ def test_the_next_window_has_the_width_that_was_chosen(windows) -> None:
     assert folded.side.width() < 60
     QTest.keyClick(folded, Qt.Key.Key_F9)
     assert folded.side.width() == chosen_px
+
+
+def test_the_next_window_has_the_heights_that_were_chosen(windows, qtbot, small_recording) -> None:
+    def opened():
+        window = windows(1280, 1000)
+        window.open_paths([small_recording])
+        qtbot.waitUntil(
+            lambda: window.settled and window.maps.synthetic.isVisible(), timeout=60_000
+        )
+        return window
+
+    def heights(window):
+        QApplication.processEvents()
+        return window.maps.synthetic.height(), window.maps.real.height()
+
+    window = opened()
+    before_px = window.maps.height()
+    drag(window._rows.handle(1), 0, -60)
+    chosen_px = window.maps.height()
+    assert chosen_px == pytest.approx(before_px + 60, abs=2)
+    view = window.maps.synthetic
+    border = QPoint(200, view.height() - 2)
+    QTest.mousePress(view, LEFT, pos=border)
+    for step_px in (20, 50):
+        QTest.mouseMove(view, border + QPoint(0, step_px))
+        QApplication.processEvents()
+    QTest.mouseRelease(view, LEFT, pos=border + QPoint(0, 50))
+    chosen = heights(window)
+    assert chosen[0] > border.y() + 40
+    window = opened()
+    assert window.maps.height() == chosen_px
+    assert heights(window) == chosen
+    QTest.mouseClick(window.maps.real, LEFT, pos=QPoint(10, HEADER_PX // 2))
+    assert heights(window)[1] == HEADER_PX
+    assert heights(opened())[1] == HEADER_PX
