@@ -33,7 +33,8 @@ apply_theme(application, False)
 window = MainWindow(Settings.forgetful())
 window.show()
 window.populate()
-track, context = models_of(window).synthetic, models_of(window)
+session = window.session
+track = session.maps.synthetic
 
 def resident_mb():
     status = Path("/proc/self/status").read_text()
@@ -53,29 +54,29 @@ began = time.time()
 window.open_paths([Path(sys.argv[1])])
 spin(lambda: track.map is not None, 60)
 marks = {"opened_s": time.time() - began}
-context.span.set_span(1000, 1020)
+session.span.set_span(1000, 1020)
 began = time.time()
 spin(lambda: "±" in track.status and "final" not in track.status, 60)
 marks["view_exact_s"] = time.time() - began
 worst = 0.0
 for minute in range(0, 90, 3):
-    context.playback.seek(60.0 * minute)
-    context.span.set_span(60.0 * minute, 60.0 * minute + 30)
+    session.playback.seek(60.0 * minute)
+    session.span.set_span(60.0 * minute, 60.0 * minute + 30)
     worst = max(worst, spin(lambda: False, 0.15))
 marks["worst_stall_scrubbing_s"] = worst
 maps = []
 track.changed.connect(lambda: maps.append(1))
-context.edits.begin_sensor_drag()
+session.edits.begin_sensor_drag()
 began = time.time()
 while time.time() - began < 3:
-    context.edits.drag_sensor((time.time() - began, 0.0, 0.0))
+    session.edits.drag_sensor((time.time() - began, 0.0, 0.0))
     spin(lambda: False, 0.008)
 marks["maps_per_s_dragging"] = len(maps) / (time.time() - began)
-context.edits.end_sensor_drag()
+session.edits.end_sensor_drag()
 spin(lambda: False, 3)
 marks["peak_memory_mb"] = resident_mb()
 print(json.dumps(marks))
-context.document.undo_stack.clear()
+session.document.undo_stack.clear()
 window.close()
 """
 

@@ -56,14 +56,15 @@ def spin(until, limit_s=60):
         application.processEvents()
         time.sleep(0.001)
 
-spin(lambda: "skeleton_s" in marks)
-track, video = models_of(window).synthetic, models_of(window).video
+spin(lambda: window.ready)
+session = window.session
+track, video = session.maps.synthetic, session.video
 spin(lambda: track.map is not None and track.covered is None and video.picture is not None
      and window.features.scene.view is not None)
 mark("usable_s")
-spin(lambda: models_of(window).synthesis.complete)
+spin(lambda: window.features.maps.synthesis.complete)
 mark("exact_s")
-edits, dragged = models_of(window).edits, []
+edits, dragged = session.edits, []
 track.changed.connect(lambda: dragged.append(time.time()))
 moved = time.time()
 edits.begin_sensor_drag()
@@ -72,7 +73,7 @@ spin(lambda: dragged)
 marks["first_drag_s"] = dragged[0] - moved
 print(json.dumps(marks))
 edits.end_sensor_drag()
-models_of(window).document.undo_stack.clear()
+session.document.undo_stack.clear()
 window.close()
 """
 
@@ -128,9 +129,23 @@ def play(window, qtbot, every_tick=lambda: None):
 
 def test_playing_the_sample(benchmark, sample_window, qtbot):
     """Target: 25 pictures a second, painted in every view."""
-    rates = benchmark.pedantic(play, (sample_window, qtbot), rounds=1)
+    measure_playing(benchmark, sample_window, qtbot, "playing")
+
+
+@pytest.mark.parametrize("size", [(1600, 1000), (2560, 1440)])
+def test_playing_four_maps_in_a_large_window(benchmark, sample_window, qtbot, size):
+    """Target: 25 pictures a second, painted in every view, at 1600 × 1000."""
+    maps = sample_window.session.maps
+    maps.before.set_map(maps.synthetic.map)
+    sample_window.resize(*size)
+    qtbot.waitUntil(lambda: len(sample_window.maps.shown) == 4)
+    measure_playing(benchmark, sample_window, qtbot, "four maps at {} × {}".format(*size))
+
+
+def measure_playing(benchmark, window, qtbot, title):
+    rates = benchmark.pedantic(play, (window, qtbot), rounds=1)
     benchmark.extra_info.update(rates)
-    print("\nplaying:", {name: round(rate, 1) for name, rate in rates.items()})
+    print(f"\n{title}:", {name: round(rate, 1) for name, rate in rates.items()})
 
 
 def test_dragging_the_sensor_while_playing(benchmark, sample_window, qtbot):

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QEvent, QObject, Qt
+from PySide6.QtCore import QEvent, QObject, Qt, Signal
+from PySide6.QtGui import QPaintEvent
 from PySide6.QtWidgets import QFrame, QWidget
 
 from sd2app.background.latest import delayed
@@ -23,6 +24,8 @@ _PATIENCE_MS = 1000
 
 class LoadingCover(QFrame):
     """Covers its parent until something is open, or nothing is being read."""
+
+    painted = Signal()
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
@@ -70,6 +73,11 @@ class LoadingCover(QFrame):
         self.bar.show_count(reading.done, reading.total)
         self.raise_()
         self.show()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Say that it is on screen: what it covers is not painted."""
+        super().paintEvent(event)
+        self.painted.emit()
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         """Stay as large as the parent."""

@@ -15,7 +15,6 @@ from PySide6.QtGui import (
     QDragLeaveEvent,
     QDragMoveEvent,
     QDropEvent,
-    QPaintEvent,
 )
 from PySide6.QtWidgets import QAbstractButton, QApplication, QMainWindow, QWidget
 
@@ -67,7 +66,6 @@ class MainWindow(QMainWindow):
         self._settings = settings
         self._parts = parts or Parts()
         self._ready = False
-        self._painted = False
         self._tabbed: QWidget | None = None  # control that Tab has reached last
         self.setWindowTitle("SD² Studio")
         self.setAcceptDrops(True)
@@ -120,6 +118,7 @@ class MainWindow(QMainWindow):
         self._centre.setLayout(self._lines)
         self.setCentralWidget(self._centre)
         self._loading = LoadingCover(self._centre)
+        self._loading.painted.connect(self.first_painted, Qt.ConnectionType.SingleShotConnection)
 
     def populate(self) -> None:
         """Load what takes time to import, and fill the skeleton."""
@@ -316,13 +315,6 @@ class MainWindow(QMainWindow):
         if isinstance(focus, QAbstractButton) and focus is self._tabbed:
             return claims(event, (Qt.Key.Key_Space,)) or super().event(event)
         return super().event(event)
-
-    def paintEvent(self, event: QPaintEvent) -> None:
-        """Say when the skeleton is on screen."""
-        super().paintEvent(event)
-        if not self._painted:
-            self._painted = True
-            self.first_painted.emit()
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
         """Say what a drop of these files would do."""

@@ -5,7 +5,9 @@ from __future__ import annotations
 import threading
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel
@@ -13,6 +15,7 @@ from window_models import models_of
 
 from sd2app.session import document
 from sd2app.settings import Settings
+from sd2app.shell import app
 from sd2app.shell.loading import LoadingCover
 from sd2app.shell.parts import Parts
 from sd2app.shell.window import MainWindow
@@ -87,3 +90,10 @@ def test_an_open_recording_stays_in_view_while_another_is_read(window, qtbot, sm
     with qtbot.waitSignal(c.document.opened, timeout=20_000):
         window.open_paths([small_recording])
         assert not cover.isVisible()
+
+
+def test_the_window_fills_itself_once_its_skeleton_is_on_screen(qtbot, small_recording) -> None:
+    picture = small_recording.parent / "window.png"
+    assert app.run([small_recording], screenshot=picture) == 0
+    # An empty window has a few colours.
+    assert len(np.unique(np.asarray(Image.open(picture)).reshape(-1, 4), axis=0)) > 500
