@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.accuracy.model import AccuracyModel
-from sd2app.background.latest import delayed
+from sd2app.background.latest import Emit, delayed
 from sd2app.maps.partial_map import FINAL, Part, ShownMap, View
 from sd2app.maps.quality import (
     Companion,
@@ -45,7 +47,7 @@ class SynthesisModel(QObject):
     """Recomputes when the sensor moves: a preview at once, the final quality at rest.
 
     While the sensor is dragged, one sweep runs at a time and the newest
-    position follows it. At rest the plan in use is applied in the
+    position follows it at once. At rest the plan in use is applied in the
     background, the time window first; then a plan is chosen for the new
     place, applied if it is another, and at last one for the next drag. Any
     new move interrupts all of it. A map stays until it is replaced.
@@ -70,6 +72,8 @@ class SynthesisModel(QObject):
         self._synthesizers: SynthesizerCache | None = None
         self._prefetcher = MaskPrefetcher(self)
         self._prefetcher.failed.connect(lambda error: self.failed.emit(str(error)))
+        # Asked for by the window and taken by the thread.
+        self._next_sweep: deque[Callable[[], Part]] = deque(maxlen=1)
         self._forget()
         self._runner = ListedRunner("synthesis", session.jobs, self, self._finish, self._fail)
         self._runner.partial.connect(self._receive)
@@ -231,7 +235,7 @@ class SynthesisModel(QObject):
         self._plan: AccuracyPlan | None = None
         self._dragging_plan: AccuracyPlan | None = None
         self._prefetcher.forget()
-        self._again = False
+        self._next_sweep.clear()
         self._sweeping = False
 
     def _announce(self) -> None:
@@ -251,9 +255,7 @@ class SynthesisModel(QObject):
             self._rest.start()
             self._set_moving(self.moving or self._sensor != self._shown_map.partial.sensor)
             self._follow_clock()
-            if self._sweeping and self._runner.busy:
-                self._again = True
-            elif self.moving:
+            if self.moving:
                 self._sweep()
         else:
             self._settle()
@@ -265,20 +267,36 @@ class SynthesisModel(QObject):
             self.moving_changed.emit()
 
     def _sweep(self) -> None:
-        """One rough pass for the sensor where it is now, never interrupted."""
-        self._again, self._sweeping = False, True
-        sensor, level, (start, stop) = self._sensor, self._preview_quality(), self._swept()
+        """Ask for a rough pass for the sensor where it is now, after the one under way.
+
+        Passes follow each other in the background, so that none waits for the window, which
+        shows the one before meanwhile.
+        """
+        level, (start, stop) = self._preview_quality(), self._swept()
         companion = self._companion()
-        self._runner.submit(
-            lambda emit: compute_part(level, sensor, start, stop, companion=companion)
+        self._next_sweep.append(
+            functools.partial(compute_part, level, self._sensor, start, stop, companion=companion)
         )
+        if not (self._sweeping and self._runner.busy):
+            self._sweeping = True
+            self._runner.submit(self._sweep_on)
+
+    def _sweep_on(self, emit: Emit) -> None:
+        """Make passes in the background for as long as another is asked for."""
+        while True:
+            try:
+                sweep = self._next_sweep.pop()
+            except IndexError:
+                return
+            emit(sweep())
 
     def _settle(self) -> None:
         """Compute previews where nothing is known, then the final quality; time window first."""
         if self._synthesizers is None:
             return
         self._rest.stop()
-        self._again = self._sweeping = False
+        self._next_sweep.clear()
+        self._sweeping = False
         sensor = self._sensor
         self._accuracy.measured.rest_at(sensor)
         quality = self._shown_map.partial.quality_for(sensor)
@@ -352,7 +370,8 @@ class SynthesisModel(QObject):
     def _finish(self, result: Any) -> None:
         self._receive(result)
         self._sweeping = False
-        if self._again and self._session.sensor.dragging:
+        if self._next_sweep and self._session.sensor.dragging:
+            # It was asked for when the last one had just ended.
             self._sweep()
             return
         if self.complete:
