@@ -28,6 +28,9 @@ from tools.documentation.learning_screenshots import learning
 from tools.documentation.places import IMAGES, REPOSITORY, SHARED
 from tools.documentation.windows import LIMIT_S, opened, save, wait_for
 
+SIZES = (1280, 720), (1600, 1000), (2560, 1440)
+"""Windows of small, usual and large screens."""
+
 
 def sample(window: MainWindow) -> None:
     """The sample in the middle of a swipe."""
@@ -146,6 +149,21 @@ def comparison(application: QApplication) -> None:
         window.close()
 
 
+def sizes(application: QApplication) -> None:
+    """The window as small, usual and large screens show it, light and dark."""
+    window = opened(application, [resource_path("swipes.sd2")])
+    sample(window)
+    for width, height in SIZES:
+        window.resize(width, height)
+        for theme in ("light", "dark"):
+            window.features.program.set_dark(theme == "dark")
+            if not wait_until_settled(application, window, LIMIT_S):
+                sys.exit(f"The window was still busy after {LIMIT_S:.0f} s")
+            save(window, f"window-{width}x{height}-{theme}.png")
+    window.session.document.undo_stack.setClean()
+    window.close()
+
+
 def take(
     application: QApplication, name: str, paths: list[Path], arrange: Callable[[MainWindow], None]
 ) -> None:
@@ -173,6 +191,7 @@ def main() -> None:
     take(application, "sample.png", swipes, sample)
     take(application, "dark.png", swipes, far_in_the_dark)
     take(application, "accuracy.png", swipes, accuracy)
+    sizes(application)
     take(application, "labels.png", swipes, labels)
     take(application, "placements.png", swipes, placements)
     comparison(application)
