@@ -184,7 +184,7 @@ class _Search:
         for start, stop in self._runs():
             # Moved a little: what is visible from a place is kept, and would cost nothing.
             for place in (here, replace(here, position_m=(x + 1e-6, y, z))):
-                last_s = synthesizer.stretch(place, start, stop).processor_s
+                last_s = synthesizer.stretch(place, start, stop, shares=False).processor_s
             spent_s, count = spent_s + last_s, count + stop - start
         return spent_s / count
 

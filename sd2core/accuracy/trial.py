@@ -171,11 +171,11 @@ class Trial:
         synthesizer = self.synthesizer(plan, threads, progress=progress)
         frames = synthesizer.mesh.frame_count
         if plan.mask_reuse_m:
-            synthesizer.stretch(self.sensor, 0, frames, progress=progress)
+            synthesizer.stretch(self.sensor, 0, frames, progress=progress, shares=False)
         visibility: Visibility | None = "frozen" if plan.mask_reuse_m else None
         place = self._aside()
         start = time.perf_counter()
-        stretch = synthesizer.stretch(place, 0, frames, visibility, progress)
+        stretch = synthesizer.stretch(place, 0, frames, visibility, progress, shares=False)
         passed_s = time.perf_counter() - start
         return 1e3 * (stretch.processor_s if threads == 1 else passed_s) / frames
 
@@ -239,7 +239,8 @@ class Trial:
         """Columns with masks made for this place, or with the last masks."""
         visibility: Visibility | None = "frozen" if reused else None
         stretches = [
-            synthesizer.stretch(place, run.start, run.stop, visibility, progress) for run in runs
+            synthesizer.stretch(place, run.start, run.stop, visibility, progress, shares=False)
+            for run in runs
         ]
         frames = sum(len(run.frames) for run in runs)
         raws = [stretch.raw for stretch in stretches]

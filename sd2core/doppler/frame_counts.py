@@ -11,6 +11,7 @@ from sd2core.doppler import histogram, vid2doppler
 from sd2core.doppler.histogram import Counting, Counts, Scatterers
 from sd2core.doppler.kernels import CLIP, DROP, WRAP
 from sd2core.doppler.masks import Position, Quality, Visibility, VisibilityMasks
+from sd2core.doppler.moving import MovingPairs, count_moving, visible_counts
 from sd2core.doppler.prepared import Block, PreparedMesh
 from sd2core.numerics.compiled import kernels_ready
 from sd2core.scattering.amplitude import range_weight
@@ -49,13 +50,24 @@ class FrameCounts:
         into: Counts,
         totals: NDArray[np.float64],
         parts: NDArray[np.uint8] | None = None,
+        *,
+        shares: bool = True,
     ) -> Quality:
         """Count some of a block's frames; returns the visibility that was used.
 
-        Vertices of different ``parts`` (V,) are counted apart.
+        Vertices of different ``parts`` (V,) are counted apart. Without ``shares`` the number of
+        visible vertices may be left out.
         """
         place = self.prepared.sensor(position_m)
         totals[:] = self.totals(block, rows)
+        pairs = self.prepared.moving(block, self.counting)
+        if pairs is not None and np.isfinite(place.astype(pairs.middle.dtype) ** 2).all():
+            quality = self._count_moving(
+                pairs, block, rows, position_m, visibility, into, parts, shares
+            )
+            if self.options.range_law == "frame":
+                into.histogram[:] *= self.frame_law(block, rows, position_m)[:, None, None]
+            return quality
         scatterers, quality = self.scatterers(block, rows, position_m, visibility)
         scatterers = replace(scatterers, parts=parts)
         frames = block.frames.rows(rows)
@@ -68,6 +80,39 @@ class FrameCounts:
             count(frames, place, self.counting, scatterers, into)
         if self.options.range_law == "frame":
             into.histogram[:] *= self.frame_law(block, rows, position_m)[:, None, None]
+        return quality
+
+    def _count_moving(
+        self,
+        pairs: MovingPairs,
+        block: Block,
+        rows: slice,
+        position_m: Position,
+        visibility: Visibility,
+        into: Counts,
+        parts: NDArray[np.uint8] | None,
+        shares: bool,
+    ) -> Quality:
+        """Count the pairs that move only; the others lie in emptied bins."""
+        prepared, weight = self.prepared, self.options.weight
+        place = prepared.sensor(position_m)
+        mask, quality = self.masks.for_rows(block, rows, position_m, visibility)
+        facing = mask is None and quality == "facing"
+        scatterers = Scatterers(
+            normals=prepared.moving_normals(block, pairs) if facing else None,
+            mask=mask,
+            areas=prepared.moving_areas(block, pairs) if weight == "area" else None,
+            area_vectors=(
+                prepared.moving_area_vectors(block, pairs) if weight == "projected" else None
+            ),
+            vertex_counts=prepared.heads,
+            parts=parts,
+        )
+        frames = block.frames.rows(rows)
+        count_moving(pairs, rows, frames.duration_s, place, self.counting, scatterers, into)
+        if shares:
+            normals = prepared.normals(block)[rows] if facing else None
+            into.visible[:] = visible_counts(frames, place, mask, normals, prepared.heads)
         return quality
 
     def totals(self, block: Block, rows: slice) -> NDArray[np.float64]:

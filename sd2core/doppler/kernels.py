@@ -16,8 +16,8 @@ from sd2core.numerics.compiled import compiled
 from sd2core.scattering.amplitude import NEAREST_RANGE_M
 from sd2core.scattering.visibility import facing_kernel
 
-_RUN = 16384
-_TABLES = 8
+RUN = 16384
+TABLES = 8
 _NEAREST = np.float32(NEAREST_RANGE_M)
 
 ALL, FACING, MASK = 0, 1, 2
@@ -31,7 +31,7 @@ DROP, WRAP, CLIP = 0, 1, 2
 
 
 @compiled
-def _relative_ranges(x, y, z, sx, sy, sz, distance, ranges):  # type: ignore[no-untyped-def]
+def relative_ranges(x, y, z, sx, sy, sz, distance, ranges):  # type: ignore[no-untyped-def]
     """Compiled form of :func:`sd2core.doppler.histogram.relative_range` for one knot."""
     two = np.float32(2)
     for v in range(ranges.shape[0]):
@@ -43,7 +43,7 @@ def _relative_ranges(x, y, z, sx, sy, sz, distance, ranges):  # type: ignore[no-
 
 
 @compiled
-def _distance(sensor):  # type: ignore[no-untyped-def]
+def distance_of(sensor):  # type: ignore[no-untyped-def]
     """Distance of the sensor from the origin, in the sensor's precision."""
     away = np.sqrt(
         np.float64(sensor[0]) ** 2 + np.float64(sensor[1]) ** 2 + np.float64(sensor[2]) ** 2
@@ -56,7 +56,7 @@ def _extend(positions, sensor, distance, known, upto, ring):  # type: ignore[no-
     """Compute the knots from ``known`` to ``upto``; the ring keeps the newest few."""
     for knot in range(known, upto + 1):
         points = positions[knot]
-        _relative_ranges(
+        relative_ranges(
             points[0], points[1], points[2],
             sensor[0], sensor[1], sensor[2], distance, ring[knot % ring.shape[0]],
         )  # fmt: skip
@@ -64,14 +64,14 @@ def _extend(positions, sensor, distance, known, upto, ring):  # type: ignore[no-
 
 
 @compiled
-def _axis_positions(before, after, scale, offset, f):  # type: ignore[no-untyped-def]
+def axis_positions(before, after, scale, offset, f):  # type: ignore[no-untyped-def]
     """Position on the velocity axis, in bins."""
     for v in range(f.shape[0]):
         f[v] = offset + scale * (before[v] - after[v])
 
 
 @compiled
-def _slots(f, seen, bins, beyond, slot):  # type: ignore[no-untyped-def]
+def slots_of(f, seen, bins, beyond, slot):  # type: ignore[no-untyped-def]
     """Set the slot of each vertex: its bin, ``bins`` beyond the axis, ``bins + 1`` if hidden.
 
     Returns the number of visible vertices beyond the axis.
@@ -111,7 +111,7 @@ def _slots(f, seen, bins, beyond, slot):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _squared_ratios(ranges, distance, reference, weight):  # type: ignore[no-untyped-def]
+def squared_ratios(ranges, distance, reference, weight):  # type: ignore[no-untyped-def]
     """Squared ratios (R_ref / R)² of a run of vertices."""
     for v in range(weight.shape[0]):
         ratio = reference / max(ranges[v] + distance, _NEAREST)
@@ -119,7 +119,7 @@ def _squared_ratios(ranges, distance, reference, weight):  # type: ignore[no-unt
 
 
 @compiled
-def _raise_to(weight, exponent, spare):  # type: ignore[no-untyped-def]
+def raise_to(weight, exponent, spare):  # type: ignore[no-untyped-def]
     """Raise ratios, given squared, to the power of ``exponent``, in place."""
     if exponent != np.floor(exponent):
         power = np.float32(exponent * 0.5)
@@ -147,7 +147,7 @@ def _raise_to(weight, exponent, spare):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _projected(x, y, z, ax, ay, az, sx, sy, sz, weight):  # type: ignore[no-untyped-def]
+def projected(x, y, z, ax, ay, az, sx, sy, sz, weight):  # type: ignore[no-untyped-def]
     """Compiled form of :func:`sd2core.scattering.amplitude.projected_areas`."""
     for v in range(weight.shape[0]):
         qx, qy, qz = sx - x[v], sy - y[v], sz - z[v]
@@ -156,7 +156,7 @@ def _projected(x, y, z, ax, ay, az, sx, sy, sz, weight):  # type: ignore[no-unty
 
 
 @compiled
-def _heads_beyond(f, seen, heads, bins):  # type: ignore[no-untyped-def]
+def heads_beyond(f, seen, heads, bins):  # type: ignore[no-untyped-def]
     """Number of vertices that the visible ones beyond the axis stand for."""
     end, total = np.float32(bins), np.int32(0)
     for v in range(f.shape[0]):
@@ -166,7 +166,7 @@ def _heads_beyond(f, seen, heads, bins):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _heads_seen(seen, heads):  # type: ignore[no-untyped-def]
+def heads_seen(seen, heads):  # type: ignore[no-untyped-def]
     """Number of vertices that the visible ones stand for."""
     total = np.int32(0)
     for v in range(seen.shape[0]):
@@ -177,9 +177,9 @@ def _heads_seen(seen, heads):  # type: ignore[no-untyped-def]
 @compiled
 def _tally(slot, counts):  # type: ignore[no-untyped-def]
     """Add 1 per vertex; several tables in turn, so that equal slots do not wait."""
-    whole = slot.shape[0] // _TABLES * _TABLES
-    for v in range(0, whole, _TABLES):
-        for table in range(_TABLES):
+    whole = slot.shape[0] // TABLES * TABLES
+    for v in range(0, whole, TABLES):
+        for table in range(TABLES):
             counts[table, slot[v + table]] += np.int32(1)
     for v in range(whole, slot.shape[0]):
         counts[0, slot[v]] += np.int32(1)
@@ -187,9 +187,9 @@ def _tally(slot, counts):  # type: ignore[no-untyped-def]
 
 @compiled
 def _tally_weights(slot, weight, sums):  # type: ignore[no-untyped-def]
-    whole = slot.shape[0] // _TABLES * _TABLES
-    for v in range(0, whole, _TABLES):
-        for table in range(_TABLES):
+    whole = slot.shape[0] // TABLES * TABLES
+    for v in range(0, whole, TABLES):
+        for table in range(TABLES):
             sums[table, slot[v + table]] += np.float64(weight[v + table])
     for v in range(whole, slot.shape[0]):
         sums[0, slot[v]] += np.float64(weight[v])
@@ -198,9 +198,9 @@ def _tally_weights(slot, weight, sums):  # type: ignore[no-untyped-def]
 @compiled
 def _tally_parts(slot, base, counts):  # type: ignore[no-untyped-def]
     """Add 1 per vertex; the slots of its part of the body begin at ``base``."""
-    whole = slot.shape[0] // _TABLES * _TABLES
-    for v in range(0, whole, _TABLES):
-        for table in range(_TABLES):
+    whole = slot.shape[0] // TABLES * TABLES
+    for v in range(0, whole, TABLES):
+        for table in range(TABLES):
             counts[table, base[v + table] + slot[v + table]] += np.int32(1)
     for v in range(whole, slot.shape[0]):
         counts[0, base[v] + slot[v]] += np.int32(1)
@@ -208,9 +208,9 @@ def _tally_parts(slot, base, counts):  # type: ignore[no-untyped-def]
 
 @compiled
 def _tally_weights_of_parts(slot, weight, base, sums):  # type: ignore[no-untyped-def]
-    whole = slot.shape[0] // _TABLES * _TABLES
-    for v in range(0, whole, _TABLES):
-        for table in range(_TABLES):
+    whole = slot.shape[0] // TABLES * TABLES
+    for v in range(0, whole, TABLES):
+        for table in range(TABLES):
             sums[table, base[v + table] + slot[v + table]] += np.float64(weight[v + table])
     for v in range(whole, slot.shape[0]):
         sums[0, base[v] + slot[v]] += np.float64(weight[v])
@@ -231,21 +231,21 @@ def count_kernel(  # type: ignore[no-untyped-def]
     samples = before.shape[1]
     sx, sy, sz = sensor[0], sensor[1], sensor[2]
     offset = np.float32(0.5 * bins)
-    f = np.empty(_RUN, positions.dtype)
-    weight = np.empty(_RUN, np.float32)
-    spare = np.empty(_RUN, np.float32)
-    turned = np.empty(_RUN, np.float32)
-    seen = np.ones(_RUN, np.uint8)
-    slot = np.empty(_RUN, np.uint8)
+    f = np.empty(RUN, positions.dtype)
+    weight = np.empty(RUN, np.float32)
+    spare = np.empty(RUN, np.float32)
+    turned = np.empty(RUN, np.float32)
+    seen = np.ones(RUN, np.uint8)
+    slot = np.empty(RUN, np.uint8)
     parts, slots = histogram.shape[1], bins + 2
     split = part.shape[0] > 0
     base = part.astype(np.int32) * np.int32(slots)
-    counts = np.zeros((_TABLES, parts * slots), np.int32)
-    sums = np.zeros((_TABLES, parts * slots), np.float64)
+    counts = np.zeros((TABLES, parts * slots), np.int32)
+    sums = np.zeros((TABLES, parts * slots), np.float64)
     grouped = heads.shape[0] > 0
     weighted = weighting != HEADS or grouped
     weights = weighted or exponent != 0
-    distance = _distance(sensor)
+    distance = distance_of(sensor)
     ring = np.empty((samples + 2, vertices), positions.dtype)
     known = before[0, 0]
     for t in range(centre.shape[0]):
@@ -263,8 +263,8 @@ def count_kernel(  # type: ignore[no-untyped-def]
         measured = max(measured, 1)
         middle = positions[centre[t]]
         x, y, z = middle[0], middle[1], middle[2]
-        for v0 in range(0, vertices, _RUN):
-            v1 = min(v0 + _RUN, vertices)
+        for v0 in range(0, vertices, RUN):
+            v1 = min(v0 + RUN, vertices)
             n = v1 - v0
             sight = seen[:n]
             if which == FACING:
@@ -277,14 +277,14 @@ def count_kernel(  # type: ignore[no-untyped-def]
                 marks = mask[t]
                 sight = marks[v0:v1]
             if grouped:
-                seen_count += _heads_seen(sight, heads[v0:v1])
+                seen_count += heads_seen(sight, heads[v0:v1])
             else:
                 for v in range(n):
                     seen_count += np.int64(sight[v])
             if exponent != 0:
                 here = ring[centre[t] % ring.shape[0]]
-                _squared_ratios(here[v0:v1], distance, reference, weight[:n])
-                _raise_to(weight[:n], exponent, spare[:n])
+                squared_ratios(here[v0:v1], distance, reference, weight[:n])
+                raise_to(weight[:n], exponent, spare[:n])
             if weighted:
                 own = heads[v0:v1]
                 if weighting == AREA:
@@ -292,7 +292,7 @@ def count_kernel(  # type: ignore[no-untyped-def]
                 elif weighting == PROJECTED:
                     own = turned[:n]
                     ax, ay, az = vectors[t, 0], vectors[t, 1], vectors[t, 2]
-                    _projected(
+                    projected(
                         x[v0:v1], y[v0:v1], z[v0:v1], ax[v0:v1], ay[v0:v1], az[v0:v1],
                         sx, sy, sz, own,
                     )  # fmt: skip
@@ -306,12 +306,12 @@ def count_kernel(  # type: ignore[no-untyped-def]
                     continue
                 a = ring[before[t, sample] % ring.shape[0]]
                 b = ring[after[t, sample] % ring.shape[0]]
-                _axis_positions(a[v0:v1], b[v0:v1], scale[t, sample], offset, f[:n])
+                axis_positions(a[v0:v1], b[v0:v1], scale[t, sample], offset, f[:n])
                 if grouped:
-                    outside_count += _heads_beyond(f[:n], sight, heads[v0:v1], bins)
-                    _slots(f[:n], sight, bins, beyond, slot[:n])
+                    outside_count += heads_beyond(f[:n], sight, heads[v0:v1], bins)
+                    slots_of(f[:n], sight, bins, beyond, slot[:n])
                 else:
-                    outside_count += _slots(f[:n], sight, bins, beyond, slot[:n])
+                    outside_count += slots_of(f[:n], sight, bins, beyond, slot[:n])
                 if split and weights:
                     _tally_weights_of_parts(slot[:n], weight[:n], base[v0:v1], sums)
                 elif split:
@@ -323,7 +323,7 @@ def count_kernel(  # type: ignore[no-untyped-def]
         for number in range(parts):
             for bin_number in range(bins):
                 total, place = 0.0, number * slots + bin_number
-                for table in range(_TABLES):
+                for table in range(TABLES):
                     total += sums[table, place] if weights else counts[table, place]
                 histogram[t, number, bin_number] = total / measured
         visible[t] = seen_count
@@ -337,10 +337,10 @@ def needed_kernel(  # type: ignore[no-untyped-def]
     """Compiled :func:`sd2core.doppler.histogram.mark_needed`; ``needed`` starts as zeros."""
     vertices = positions.shape[2]
     offset = np.float32(0.5 * bins)
-    f = np.empty(_RUN, positions.dtype)
-    seen = np.ones(_RUN, np.uint8)
-    slot = np.empty(_RUN, np.uint8)
-    distance = _distance(sensor)
+    f = np.empty(RUN, positions.dtype)
+    seen = np.ones(RUN, np.uint8)
+    slot = np.empty(RUN, np.uint8)
+    distance = distance_of(sensor)
     ring = np.empty((before.shape[1] + 2, vertices), positions.dtype)
     known = before[0, 0]
     for t in range(needed.shape[0]):
@@ -350,11 +350,11 @@ def needed_kernel(  # type: ignore[no-untyped-def]
                 continue
             a = ring[before[t, sample] % ring.shape[0]]
             b = ring[after[t, sample] % ring.shape[0]]
-            for v0 in range(0, vertices, _RUN):
-                v1 = min(v0 + _RUN, vertices)
+            for v0 in range(0, vertices, RUN):
+                v1 = min(v0 + RUN, vertices)
                 n = v1 - v0
-                _axis_positions(a[v0:v1], b[v0:v1], scale[t, sample], offset, f[:n])
-                _slots(f[:n], seen[:n], bins, beyond, slot[:n])
+                axis_positions(a[v0:v1], b[v0:v1], scale[t, sample], offset, f[:n])
+                slots_of(f[:n], seen[:n], bins, beyond, slot[:n])
                 for v in range(n):
                     needed[t, v0 + v] |= live[slot[v]]
 

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.doppler import vid2doppler
-from sd2core.doppler.histogram import Frames
+from sd2core.doppler.histogram import Counting, Frames
+from sd2core.doppler.moving import MovingPairs, find_moving, still_bins
 from sd2core.doppler.options import STEEPEST_RANGE_LAW, SynthesisOptions
 from sd2core.mesh.sequence import MeshSequence, refuse_missing
 from sd2core.numerics.compiled import kernels_ready
@@ -194,6 +195,48 @@ class PreparedMesh:
     def area_vectors(self, block: Block) -> NDArray[np.float32]:
         """Vertex area vectors of a block's frames in m², float32 (n, 3, V)."""
         return self._kept("area vectors", block, self._area_vectors)
+
+    def moving(self, block: Block, counting: Counting) -> MovingPairs | None:
+        """Pairs of a block that can enter a kept bin; None where counting all is as fast."""
+        still = still_bins(counting.bins, self.options.null_bins)
+        if self._compatible or still <= 0 or not kernels_ready():
+            return None
+
+        def make() -> tuple[tuple[MovingPairs | None], int]:
+            found = find_moving(block.frames, counting, still)
+            return (found,), 0 if found is None else found.nbytes
+
+        # Blocks are shared by options with the same bin width.
+        kept = self.budget.get_or_make(("moving", still, block.index), make)
+        pairs: MovingPairs | None = kept[0]
+        return pairs
+
+    def moving_normals(self, block: Block, pairs: MovingPairs) -> NDArray[np.int8]:
+        """Normals of the moving pairs of a block, int8 (3, N)."""
+        return self._of_pairs("normals", block, pairs, self.normals)
+
+    def moving_areas(self, block: Block, pairs: MovingPairs) -> NDArray[np.float32]:
+        """Areas of the moving pairs of a block in m², float32 (N,)."""
+        return self._of_pairs("areas", block, pairs, self.areas)
+
+    def moving_area_vectors(self, block: Block, pairs: MovingPairs) -> NDArray[np.float32]:
+        """Area vectors of the moving pairs of a block in m², float32 (3, N)."""
+        return self._of_pairs("area vectors", block, pairs, self.area_vectors)
+
+    def _of_pairs(
+        self,
+        what: str,
+        block: Block,
+        pairs: MovingPairs,
+        every: Callable[[Block], NDArray[Any]],
+    ) -> NDArray[Any]:
+        def make() -> tuple[NDArray[Any], int]:
+            made = pairs.of(every(block))
+            return made, made.nbytes
+
+        still = still_bins(self.options.axis.bins, self.options.null_bins)
+        kept: NDArray[Any] = self.budget.get_or_make((f"moving {what}", still, block.index), make)
+        return kept
 
     def velocities_vid2doppler(
         self, block: Block, rows: slice, sensor: NDArray[np.float64]

@@ -39,12 +39,12 @@ class Stretch:
 
     values: NDArray[np.float32]  # (bins, n)
     raw: NDArray[np.float64]  # values before any smoothing, with nulled bins emptied
-    visible_share: NDArray[np.float32]
-    """Share of all vertices that the sensor sees, (n,); of a decimated mesh, of the vertices that
-    the kept ones stand for. Vertices that cannot change the map (in nulled bins) are judged by
-    the facing test."""
-    beyond_share: NDArray[np.float32]
-    """Share of the visible vertices whose velocity lies beyond the axis, (n,)."""
+    visible_share: NDArray[np.float32] | None
+    """Share of all vertices that the sensor sees, (n,), where it is asked for; of a decimated
+    mesh, of the vertices that the kept ones stand for. Vertices that cannot change the map (in
+    nulled bins) are judged by the facing test."""
+    beyond_share: NDArray[np.float32] | None
+    """Share of the visible vertices whose velocity lies beyond the axis, (n,), like that."""
     quality: Quality
     """The weakest visibility that was used: ``frozen`` falls back to facing where no depth or
     exact visibility is kept."""
@@ -292,6 +292,8 @@ class Synthesizer:
     ) -> DopplerMap:
         start, stop = frames or (0, self.mesh.frame_count)
         stretch = self.stretch(sensor, start, stop, visibility, progress, parts)
+        assert stretch.visible_share is not None
+        assert stretch.beyond_share is not None
         options = self.options
         unshared = stretch.quality in ("none", "facing")
         return DopplerMap(
@@ -326,18 +328,21 @@ class Synthesizer:
         visibility: Visibility | None = None,
         progress: Progress = silent,
         parts: VertexParts | None = None,
+        *,
+        shares: bool = True,
     ) -> Stretch:
         """Doppler values of frames ``start`` to ``stop`` (exclusive).
 
         They equal these columns of the whole map: smoothing over time also uses the frames
-        around them. With ``parts``, also those of each part of the body.
+        around them. With ``parts``, also those of each part of the body. Without ``shares``
+        only what moves is looked at, and the shares that are seen and beyond the axis are left out.
         """
         if not 0 <= start < stop <= self.mesh.frame_count:
             raise IndexError(f"frames {start} to {stop} of {self.mesh.frame_count}")
         options, times_s = self.options, self.mesh.times_s
         first, last = frames_within_reach(times_s, start, stop, options.time_sigma_s)
         counts, totals, quality, processor_s = self._count(
-            sensor, first, last, self._choose(visibility), progress, parts
+            sensor, first, last, self._choose(visibility), progress, parts, shares
         )
 
         def smoothed(counted: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
@@ -355,8 +360,8 @@ class Synthesizer:
         return Stretch(
             values.astype(np.float32),
             raw[:, inside],
-            (visible / self.mesh.represented_count).astype(np.float32),
-            (beyond / np.maximum(visible, 1)).astype(np.float32),
+            (visible / self.mesh.represented_count).astype(np.float32) if shares else None,
+            (beyond / np.maximum(visible, 1)).astype(np.float32) if shares else None,
             quality,
             None if limbs is None else limbs.astype(np.float32),
             processor_s,
@@ -457,6 +462,7 @@ class Synthesizer:
         visibility: Visibility,
         progress: Progress,
         parts: VertexParts | None = None,
+        shares: bool = True,
     ) -> tuple[Counts, NDArray[np.float64], Quality, float]:
         """Counts per frame, their totals, the visibility used, and processor seconds."""
         if not kernels_ready():
@@ -481,7 +487,13 @@ class Synthesizer:
                     into = counts.rows(target), totals[target]
                     qualities.add(
                         self._frames.count(
-                            block, rows, sensor.position_m, visibility, *into, numbers
+                            block,
+                            rows,
+                            sensor.position_m,
+                            visibility,
+                            *into,
+                            numbers,
+                            shares=shares,
                         )
                     )
                     ticket.advance(last - first)

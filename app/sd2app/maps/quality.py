@@ -175,8 +175,9 @@ def compute_part(
     """Compute frames ``start`` to ``stop``; ``proceed`` is called in between and may raise."""
     synthesizer = level.synthesizer()
     stretch = synthesizer.stretch(
-        sensor, start, stop, level.visibility, lambda *_: proceed(), level.parts_of(synthesizer)
-    )
+        sensor, start, stop, level.visibility, lambda *_: proceed(), level.parts_of(synthesizer),
+        shares=False,
+    )  # fmt: skip
     quality, words = level.quality, level.words
     if level.visibility == "frozen" and stretch.quality == "facing":
         # No mask is kept.

@@ -38,7 +38,7 @@ class MaskPrefetcher(LatestRunner):
 
         def work(emit: Emit) -> VirtualSensor:
             synthesizer = synthesizers.of(plan)
-            synthesizer.stretch(sensor, *frames, progress=lambda *_: emit(None))
+            synthesizer.stretch(sensor, *frames, progress=lambda *_: emit(None), shares=False)
             return sensor
 
         self.submit(work)

@@ -1,0 +1,182 @@
+"""Vertices that move: those of each frame that can enter a bin that is kept.
+
+A vertex cannot change its range faster than it moves, |v_radial| ≤ |v|. One whose displacement,
+in bins, stays below the distance from zero velocity to the nearest bin that is kept lies in an
+emptied bin for *every* place of the sensor. The others are found once per block, and kept as
+columns of their own, in the order of the vertices. Counting them alone gives every kept bin the
+same number, bit by bit: the same loops of :mod:`sd2core.doppler.kernels` go over them, and the
+same values are added up in the same order (docs/decisions/0057).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.doppler.histogram import Counting, Counts, Frames, Scatterers
+from sd2core.doppler.kernels import (
+    ALL,
+    AREA,
+    FACING,
+    HEADS,
+    MASK,
+    PROJECTED,
+)
+from sd2core.doppler.moving_kernels import (
+    add_moving_kernel,
+    facing_counts_kernel,
+    moving_kernel,
+)
+
+_LARGEST_SHARE = 0.33
+"""Share of moving pairs up to which they are counted faster than everything
+(``tests/benchmarks/test_moving_speed.py``)."""
+
+_ROUNDINGS = 48.0
+"""Bound of the error of the difference of two relative ranges, in roundings of the largest
+distance from the origin: 2 × 10 by the steps of ``relative_range``, doubled and more."""
+
+
+def still_bins(bins: int, null_bins: Collection[int]) -> float:
+    """Distance in bins from zero velocity to the nearest bin that is kept; 0 where zero is."""
+    below = above = bins // 2
+    while above in null_bins:
+        above += 1
+    while below - 1 in null_bins:
+        below -= 1
+    middle = 0.5 * bins
+    return max(min(middle - below, above - middle), 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class MovingPairs:
+    """Pairs of vertex and frame of a block that can enter a kept bin, frame after frame."""
+
+    vertex: NDArray[np.int32]  # (N,), ascending within a frame
+    first: NDArray[np.int64]  # (n + 1,): number of the first pair of every frame
+    middle: NDArray[Any]  # (3, N): place in the middle of the frame
+    before: NDArray[Any]  # (samples, 3, N): places between which each velocity is measured
+    after: NDArray[Any]
+    vertices: int  # V
+
+    @property
+    def nbytes(self) -> int:
+        """Size in memory."""
+        arrays = self.vertex, self.first, self.middle, self.before, self.after
+        return sum(one.nbytes for one in arrays)
+
+    def of(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Values of the pairs, (..., N), of what (n, ..., V) all vertices have."""
+        frame = np.repeat(np.arange(len(self.first) - 1), np.diff(self.first))
+        return np.ascontiguousarray(np.moveaxis(values[frame, ..., self.vertex], 0, -1))
+
+
+def find_moving(frames: Frames, counting: Counting, still: float) -> MovingPairs | None:
+    """Pairs that can enter a bin ``still`` bins or more from zero; None where most of them can.
+
+    The bound holds for what the kernels compute, roundings included, from any place.
+    """
+    precision = frames.positions.dtype
+    scale = counting.scale(frames.duration_s, precision).astype(np.float64)  # bins per metre
+    reach_m = np.sqrt(3.0) * float(max(frames.positions.max(), -frames.positions.min()))
+    rounding = 0.5 * float(np.finfo(precision).eps)
+    room = still - rounding * (_ROUNDINGS * reach_m * scale + 8.0 * counting.bins)
+    measured = scale > 0
+    if still <= 0 or not (room[measured] > 0).all():
+        return None
+    limit_m = np.divide(room, scale, out=np.full_like(scale, np.inf), where=measured)
+    vertices = frames.positions.shape[2]
+    marks = np.zeros((len(frames), vertices), np.bool_)
+    moving_kernel(frames.positions, frames.before, frames.after, limit_m, marks)
+    if np.count_nonzero(marks) > _LARGEST_SHARE * marks.size:
+        return None
+    frame, vertex = np.nonzero(marks)
+
+    def places(knots: NDArray[np.int64]) -> NDArray[Any]:
+        return np.ascontiguousarray(frames.positions[knots[frame], :, vertex].T)
+
+    samples = range(frames.before.shape[1])
+    return MovingPairs(
+        vertex.astype(np.int32),
+        np.searchsorted(frame, np.arange(len(frames) + 1)),
+        places(frames.centre),
+        np.stack([places(frames.before[:, sample]) for sample in samples]),
+        np.stack([places(frames.after[:, sample]) for sample in samples]),
+        vertices,
+    )
+
+
+def count_moving(
+    pairs: MovingPairs,
+    rows: slice,
+    duration_s: NDArray[np.float64],
+    sensor: NDArray[np.float64],
+    counting: Counting,
+    scatterers: Scatterers,
+    into: Counts,
+) -> None:
+    """Count the pairs of some frames, as :func:`sd2core.doppler.histogram.count` does.
+
+    Of ``scatterers`` normals and area vectors are those of the pairs, (3, N), areas (N,).
+    Bins that are not kept get less than their share, and ``into.visible`` nothing.
+    """
+    normals, mask, areas = scatterers.normals, scatterers.mask, scatterers.areas
+    vectors, heads, parts = scatterers.area_vectors, scatterers.vertex_counts, scatterers.parts
+    which = MASK if mask is not None else FACING if normals is not None else ALL
+    weighting = PROJECTED if vectors is not None else AREA if areas is not None else HEADS
+    precision = pairs.middle.dtype
+    add_moving_kernel(
+        pairs.vertex,
+        pairs.first[rows.start : rows.stop + 1],
+        pairs.middle,
+        pairs.before,
+        pairs.after,
+        counting.scale(duration_s, precision),
+        _NO_NORMALS if normals is None else normals,
+        _NO_MASK if mask is None else mask,
+        _NO_AREAS if areas is None else areas,
+        _NO_VECTORS if vectors is None else vectors,
+        _NO_AREAS if heads is None else heads,
+        _NO_PARTS if parts is None else parts,
+        pairs.vertices,
+        sensor.astype(precision),
+        which,
+        weighting,
+        counting.bins,
+        counting.beyond,
+        counting.range_exponent,
+        np.float32(counting.reference_range_m),
+        into.histogram,
+        into.beyond,
+    )
+
+
+def visible_counts(
+    frames: Frames,
+    sensor: NDArray[np.float64],
+    mask: NDArray[np.uint8] | None,
+    normals: NDArray[np.int8] | None,
+    heads: NDArray[np.float32] | None,
+) -> NDArray[np.float64]:
+    """Number of all visible vertices in each frame, (n,): marked, facing the sensor, or all."""
+    vertices = frames.positions.shape[2]
+    stands_for = np.ones(vertices) if heads is None else heads.astype(np.float64)
+    if mask is not None:
+        return (mask > 0) @ stands_for
+    visible = np.full(len(frames), stands_for.sum())
+    if normals is not None:
+        own = _NO_AREAS if heads is None else heads
+        place = sensor.astype(frames.positions.dtype)
+        facing_counts_kernel(frames.positions, frames.centre, normals, own, place, visible)
+    return visible
+
+
+_NO_NORMALS = np.empty((3, 0), np.int8)
+_NO_MASK = np.empty((0, 0), np.uint8)
+_NO_AREAS = np.empty(0, np.float32)
+_NO_VECTORS = np.empty((3, 0), np.float32)
+_NO_PARTS = np.empty(0, np.uint8)

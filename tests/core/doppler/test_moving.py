@@ -1,0 +1,154 @@
+"""Counting only what moves: the same numbers as counting everything."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sd2core.doppler import PRESETS, Synthesizer
+from sd2core.doppler.histogram import Counting, Frames, bins_plain
+from sd2core.doppler.kernels import DROP
+from sd2core.doppler.moving import find_moving, still_bins
+from sd2core.doppler.options import SynthesisOptions
+from sd2core.doppler.prepared import PreparedMesh
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.mesh.vertex_parts import VertexParts
+from sd2core.sensor import VirtualSensor
+from sd2core.timebase import Timebase
+
+FRAMES, RATE = 9, 30.0
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _compiled(compiled_kernels: None) -> None:
+    """The plain form counts everything."""
+
+
+def body(seed: int, share: float, away_m: float, counts: bool) -> MeshSequence:
+    """A ball of 162 vertices; a share of them moves, by up to 0.6 m/s, the others hardly."""
+    rng = np.random.default_rng(seed)
+    ball = trimesh.creation.icosphere(subdivisions=2, radius=0.4)
+    speed_mps = rng.uniform(0.0, 0.1, (FRAMES, len(ball.vertices), 1))
+    moves = rng.random((FRAMES, len(ball.vertices), 1)) < share
+    speed_mps = np.where(moves, rng.uniform(0.05, 0.6, speed_mps.shape), speed_mps)
+    way = rng.normal(size=(FRAMES, len(ball.vertices), 3))
+    way /= np.linalg.norm(way, axis=2, keepdims=True)
+    places = ball.vertices + np.cumsum(speed_mps * way / RATE, axis=0)
+    places[:, :, 2] += away_m
+    numbers = rng.integers(1, 4, len(ball.vertices)) if counts else None
+    return MeshSequence(
+        places.astype(np.float32),
+        np.asarray(ball.faces, np.int32),
+        Timebase(np.arange(FRAMES) / RATE),
+        vertex_counts=numbers,
+    )
+
+
+OPTIONS = st.builds(
+    lambda **changes: replace(PRESETS["paper"], **changes),
+    visibility=st.sampled_from(("none", "facing", "exact", "depth")),
+    weight=st.sampled_from(("count", "area", "projected")),
+    null_bins=st.sampled_from(((), (14, 15, 16), (15, 16), (16,), (12, 13, 14, 15, 16, 17))),
+    beyond=st.sampled_from(("drop", "wrap", "clip")),
+    oversampling=st.sampled_from((1, 2)),
+    trajectory_smoothing_s=st.sampled_from((0.0, 0.05)),
+    range_exponent=st.sampled_from((0.0, 2.0, 4.0, 3.3)),
+    range_law=st.sampled_from(("vertex", "frame")),
+    mask_stride=st.sampled_from((1, 3)),
+)
+
+
+def everything(mesh: MeshSequence, options: SynthesisOptions) -> Synthesizer:
+    """A synthesizer that counts all vertices."""
+
+    class Dense(PreparedMesh):
+        def moving(self, *_: object) -> None:
+            return None
+
+    made = Synthesizer(mesh, options)
+    made.prepared.__class__ = Dense
+    return made
+
+
+@settings(max_examples=60)
+@given(
+    seed=st.integers(0, 10**6),
+    share=st.sampled_from((0.0, 0.05, 0.2, 0.9)),
+    away_m=st.sampled_from((2.0, 30.0, 5000.0)),
+    counts=st.booleans(),
+    options=OPTIONS,
+    place=st.tuples(*[st.floats(-3.0, 3.0)] * 3) | st.just((1e9, -3e8, 2.0)),
+    split=st.booleans(),
+)
+def test_the_same_map_bit_by_bit(
+    seed: int,
+    share: float,
+    away_m: float,
+    counts: bool,
+    options: SynthesisOptions,
+    place: tuple[float, float, float],
+    split: bool,
+) -> None:
+    mesh, sensor = body(seed, share, away_m, counts), VirtualSensor(position_m=place)
+    numbers = np.random.default_rng(seed).integers(0, 3, mesh.vertex_count).astype(np.uint8)
+    parts = VertexParts(("a", "b", "c"), numbers) if split else None
+    whole, sparse = everything(mesh, options), Synthesizer(mesh, options)
+    wanted = whole.stretch(sensor, 0, FRAMES, parts=parts)
+    found = sparse.stretch(sensor, 0, FRAMES, parts=parts)
+    quick = sparse.stretch(sensor, 2, 7, parts=parts, shares=False)
+    for name in ("values", "raw", "visible_share", "beyond_share", *(["limbs"] if split else [])):
+        np.testing.assert_array_equal(getattr(found, name), getattr(wanted, name), name)
+    np.testing.assert_array_equal(quick.values, wanted.values[:, 2:7])
+    assert quick.visible_share is None
+
+
+@pytest.mark.parametrize("share", [0.0, 0.05, 0.2])
+def test_most_vertices_are_left_out_where_few_move(share: float) -> None:
+    made = Synthesizer(body(1, share, 2.0, counts=False), PRESETS["paper"])
+    block = made.prepared.block(0)
+    pairs = made.prepared.moving(block, made._frames.counting)
+    assert pairs is not None
+    # Velocities are differences over two frames, each of which may move.
+    assert len(pairs.vertex) <= 2.2 * share * FRAMES * made.mesh.vertex_count
+    restless = Synthesizer(body(1, 0.9, 2.0, counts=False), PRESETS["paper"])
+    assert restless.prepared.moving(restless.prepared.block(0), made._frames.counting) is None
+
+
+@settings(max_examples=200)
+@given(data=st.data(), precision=st.sampled_from((np.float32, np.float64)))
+def test_what_is_left_out_is_in_an_emptied_bin_from_any_place(data: Any, precision: Any) -> None:
+    """Vertices that move straight to or from the sensor at just about the limit."""
+    seed, extent_m = data.draw(st.integers(0, 10**6)), data.draw(st.sampled_from((0.5, 3.0, 60.0)))
+    rng = np.random.default_rng(seed)
+    counting = Counting(32, 2.0, DROP, 0.0, 2.2)
+    null_bins = data.draw(st.sampled_from(((14, 15, 16), (15, 16), (13, 14, 15, 16, 17, 18))))
+    limit_mps = still_bins(32, null_bins) * 0.125
+    sensor = rng.normal(size=3) * 10.0 ** data.draw(st.integers(-1, 6))
+    middle = rng.uniform(-extent_m, extent_m, (3, 400))
+    ray = (middle - sensor[:, None]) / np.linalg.norm(middle - sensor[:, None], axis=0)
+    off = 10.0 ** -data.draw(st.integers(1, 7)) * rng.uniform(-1, 1, 400)
+    half_m = 0.5 * limit_mps * (1.0 + off) * rng.choice((-1.0, 1.0), 400) * (2 / RATE) * ray
+    positions = np.stack([middle - half_m, middle, middle + half_m]).astype(precision)
+    frames = Frames(
+        positions, np.array([1]), np.array([[0]]), np.array([[2]]), np.array([[2 / RATE]])
+    )
+    pairs = find_moving(frames, counting, still_bins(32, null_bins))
+    if pairs is None:
+        return
+    number, _ = bins_plain(frames, 0, 0, sensor, counting)
+    left_out = np.setdiff1d(np.arange(400), pairs.vertex)
+    assert set(number[left_out]) <= set(null_bins)
+
+
+@pytest.mark.parametrize(
+    ("null_bins", "still"),
+    [((), 0.0), ((14, 15, 16), 1.0), ((15, 16), 1.0), ((16,), 0.0), ((3, 13, 14, 15, 16, 17), 2.0)],
+)
+def test_nearest_kept_bin(null_bins: tuple[int, ...], still: float) -> None:
+    assert still_bins(32, null_bins) == still
