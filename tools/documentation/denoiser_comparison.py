@@ -117,6 +117,7 @@ _REAL_S4 = ("s4", *settings({"dt_min": 0.2, "dt_max": 2.0}))
 REAL_MODELS = {
     "s4-map": (*_REAL_S4, "--inputs", "map"),
     "s4-limbs": (*_REAL_S4, "--inputs", "limbs"),
+    "s4-both-limbs": (*_REAL_S4, *settings({"bidirectional": "true"}), "--inputs", "limbs"),
     "gru-limbs": ("gru", "--inputs", "limbs"),
     "unet-limbs": ("unet", "--inputs", "limbs"),
 }
@@ -131,7 +132,7 @@ they learn from the other person, whose last fifth of the takes chooses the best
 from the map, as in the paper, the others from the maps of five parts of the body (`limbs`: trunk,
 upper arms, forearms, thighs, lower legs; [decision 52](decisions/0052-limb-maps.md)). As there are
 3 to 8 minutes to learn from, batches are of 16 segments and the dropout is 0.3; the S4's steps are
-longer. What a linear map makes of the same pairs is in [real-pairs.md](real-pairs.md).
+longer; `bidirectional` looks ahead as well. What a linear map makes of the same pairs is in [real-pairs.md](real-pairs.md).
 
 This section alone is made by `python -m tools.documentation.denoiser_comparison --only-real`, here
 with `--seeds {seeds} --real-minutes {real_minutes:g}`, on {machine}.

@@ -4,11 +4,13 @@
 
     python -m tools.documentation.real_pairs inputs FOLDER...
     python -m tools.documentation.real_pairs linear PAIRS
+    python -m tools.documentation.real_pairs ceiling FOLDER...
 
 The first compares ways to turn the Kinect's skeleton into synthetic Doppler: its mean
 velocity per frame with that of the radar's points, before any denoising. The second
 shows what the least denoiser makes of the pairs (made with ``--limbs``): a linear map of
-five frames, of the whole body or of its parts.
+five frames, of the whole body or of its parts. The third shows how far the radar's own
+points agree with one another, which no denoiser can exceed.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ from numpy.typing import NDArray
 
 from sd2core.denoise.card import DENOISER_PARTS
 from sd2core.doppler import Synthesizer
-from sd2core.io.radar.mars import MarsPart, mars_parts, read_mars
+from sd2core.io.radar.mars import MarsPart, MarsStretch, mars_parts, read_mars
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.vertex_parts import PARTS
 from sd2core.mocap.driving import KINECT_MARKERS, DrivenClip, SkeletonClip, puppet_of
@@ -44,6 +46,7 @@ Maps = list[NDArray[np.float32]]
 
 DEFAULT = MarsChoices()
 RIDGES = (10.0, 100.0)
+HALVINGS = 8
 Answers = tuple[NDArray[np.float64], NDArray[np.float64], float]
 
 
@@ -252,17 +255,62 @@ def own_minutes(pairs: PairSet) -> tuple[NDArray[np.float64], NDArray[np.float64
     return np.concatenate(found), np.concatenate(truth)
 
 
+def halves_mps(
+    stretch: MarsStretch, rng: np.random.Generator
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Mean velocity of either half of every frame's points, in frames where both have some."""
+    second = rng.integers(0, 2, len(stretch.point_rows)) > 0
+    means = []
+    for half in (~second, second):
+        rows, weight = stretch.point_rows[half], stretch.point_intensity[half]
+        count = len(stretch.frames)
+        moment = np.bincount(rows, weight * stretch.point_mps[half], count)
+        total = np.bincount(rows, weight, count)
+        means.append(np.divide(moment, total, out=np.full(count, np.nan), where=total > 0))
+    both = np.isfinite(means[0]) & np.isfinite(means[1])
+    return means[0][both], means[1][both]
+
+
+def agreement(stretches: Iterable[MarsStretch]) -> tuple[float, float, float]:
+    """Correlation of halves, that of all points with as many others, and the most possible.
+
+    The second is by C. Spearman's and W. Brown's formula (British Journal of Psychology 3, 1910),
+    the third its root: the correlation of what all points have in common with their mean.
+    """
+    rng = np.random.default_rng(0)
+    drawn = [halves_mps(one, rng) for one in stretches for _ in range(HALVINGS)]
+    halves = np.corrcoef(*map(np.concatenate, zip(*drawn, strict=True)))[0, 1]
+    whole = 2.0 * halves / (1.0 + halves)
+    return float(halves), float(whole), float(np.sqrt(max(whole, 0.0)))
+
+
+def ceiling(folders: list[Path]) -> None:
+    """Print how far the radar's points of a frame agree, person by person and take by take."""
+    print("| person | takes | halves | all points | at most |")
+    print("|---|---|---|---|---|")
+    for folder in folders:
+        parts = [read_mars(folder, name) for name in mars_parts(folder)]
+        every = [stretch for part in parts for stretch in part.stretches]
+        of_takes = sorted(agreement([one])[2] for one in every)
+        values = " | ".join(f"{value:.2f}" for value in agreement(every))
+        print(
+            f"| {parts[0].subject} | {len(every)} | {values}"
+            f" (takes: {of_takes[0]:.2f} to {of_takes[-1]:.2f}) |"
+        )
+
+
 def main() -> None:
     """Print one of the tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     tables = parser.add_subparsers(dest="table", metavar="TABLE", required=True)
     tables.add_parser("inputs").add_argument("paths", type=Path, nargs="+", metavar="FOLDER")
     tables.add_parser("linear").add_argument("paths", type=Path, nargs=1, metavar="PAIRS")
+    tables.add_parser("ceiling").add_argument("paths", type=Path, nargs="+", metavar="FOLDER")
     options = parser.parse_args()
-    if options.table == "inputs":
-        inputs(options.paths)
-    else:
+    if options.table == "linear":
         linear(options.paths[0])
+    else:
+        {"inputs": inputs, "ceiling": ceiling}[options.table](options.paths)
 
 
 if __name__ == "__main__":
