@@ -342,7 +342,23 @@ def _add_campaign(kinds: argparse._SubParsersAction) -> None:
         metavar="FILE",
         help="errors of fits to imitate (.json; default: those measured of `sd2 fit`)",
     )
+    parser.add_argument(
+        "--fit-error-sizes",
+        type=_sizes,
+        default=(1.0, 1.0),
+        metavar="LEAST,MOST",
+        help="how many times as large as those errors are, drawn anew for every take; 0,0: meshes"
+        " without errors (default: 1,1)",
+    )
     add_json(parser)
+
+
+def _sizes(text: str) -> tuple[float, float]:
+    try:
+        least, most = map(float, text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not LEAST,MOST, e.g. 0,1.5") from None
+    return least, most
 
 
 def _seed(text: str) -> int:
@@ -376,6 +392,7 @@ def _campaign(options: argparse.Namespace) -> None:
         options.placements,
         limbs=options.limbs,
         protocol=_protocol(options),
+        error_sizes=options.fit_error_sizes,
     )
     with progress_bar("Simulating", unit="take") as progress:
         made = make_campaign(

@@ -46,6 +46,7 @@ _SETTINGS = {
     "learning_rate": ("training", "learning_rate"),
     "ssm_learning_rate": ("training", "ssm_learning_rate"),
     "early_stopping": ("training", "early_stopping_epochs"),
+    "balanced": ("training", "balanced"),
     "select_by": ("training", "select_by"),
     "seed": ("training", "seed"),
     "device": ("machine", "device"),
@@ -152,6 +153,13 @@ def _add_learning(parser: argparse.ArgumentParser) -> None:
         type=positive_int,
         metavar="N",
         help="end after N epochs without a better one (default: never)",
+    )
+    group.add_argument(
+        "--balanced",
+        action="store_true",
+        default=None,
+        help="let frames of rare velocities count more, so that fast movements are not shown too"
+        " slow (default: all frames alike, as in the paper)",
     )
     group.add_argument(
         "--select-by",

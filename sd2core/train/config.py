@@ -148,6 +148,8 @@ class TrainingConfig:
     clip_norm: float = _setting(number(0.0, 1e6), 1.0)  # Gradients are clipped to it; 0 is off.
     # End after so many epochs without a better one.
     early_stopping_epochs: int | None = _setting(number(1, 1_000_000, whole=True), None)
+    # Frames of rare velocities count more, see :func:`sd2core.train.data.frame_weights`.
+    balanced: bool = _setting(flag, False)
     # The best epoch is that of the lowest validation error of this kind.
     select_by: str = _setting(choice("rmse", "mae"), "rmse")
     seed: int = _setting(number(0, 2**31 - 1, whole=True), 0)  # Of weights, order and dropout.

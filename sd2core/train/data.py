@@ -13,9 +13,13 @@ from numpy.typing import NDArray
 
 from sd2core.denoise.metrics import stands_out
 from sd2core.errors import Sd2Error
+from sd2core.maps import peak_velocity_mps
 from sd2core.pairs.segments import cut, segment_starts
 from sd2core.pairs.store import PairSet, Take, read_pairs
+from sd2core.sensor import VelocityAxis
 from sd2core.train.config import DataConfig
+
+_LARGEST_WEIGHT = 8.0
 
 RANGE_LAW = 4.0
 """Echo power falls with the fourth power of the range (radar equation)."""
@@ -237,6 +241,27 @@ def windows_of(takes: Sequence[Take], config: DataConfig, parts: Sequence[str] =
         latest=np.concatenate(latest),
         length=length,
     )
+
+
+def frame_weights(targets: NDArray[np.float32], axis: VelocityAxis) -> NDArray[np.float32]:
+    """Weights of frames by how rare the speed of their strongest bin is, (frames,).
+
+    Fast frames are few, and the mean square error over all of them is least for a model that shows
+    them too slow. The weight is the inverse square root of the number of frames of that speed,
+    smoothed over the neighbouring speeds, as in Y. Yang et al., "Delving into deep imbalanced
+    regression", ICML 2021. Empty frames are a speed of their own. The mean is 1 but for weights
+    above 8, which are 8.
+
+    ``targets`` are energies, (frames, bins).
+    """
+    speed_mps = np.abs(peak_velocity_mps(targets, axis))
+    empty = np.isnan(speed_mps)
+    ranks = np.where(empty, 0.0, speed_mps / axis.bin_width_mps).astype(np.intp)
+    counts = np.bincount(ranks[~empty], minlength=int(ranks.max(initial=0)) + 1).astype(float)
+    shares = np.convolve(np.pad(counts, 1, mode="edge"), [0.25, 0.5, 0.25], mode="valid")
+    of_frame = np.where(empty, np.count_nonzero(empty), shares[ranks])
+    weights = 1.0 / np.sqrt(np.maximum(of_frame, 1.0))
+    return np.minimum(weights / weights.mean(), _LARGEST_WEIGHT).astype(np.float32)
 
 
 def segments_of(

@@ -16,7 +16,7 @@ from lightning.pytorch import LightningModule
 from sd2core.denoise.model import Denoiser
 from sd2core.train.callbacks import TrainingCallbacks
 from sd2core.train.checkpoint import Checkpoint, moments_of, set_moments
-from sd2core.train.data import Windows
+from sd2core.train.data import Windows, frame_weights
 from sd2core.train.steps import Step, optimiser_of, set_rate
 
 
@@ -39,6 +39,9 @@ class DenoiserModule(LightningModule):
         # Not buffers: they belong to no checkpoint, and need not be broadcast.
         self._inputs = torch.from_numpy(callbacks.exam.scaling.input.compress(windows.inputs))
         self._targets = torch.from_numpy(callbacks.exam.scaling.target.compress(windows.targets))
+        balanced = callbacks.config.training.balanced
+        weights = frame_weights(windows.targets, callbacks.exam.axis) if balanced else None
+        self._weights = None if weights is None else torch.from_numpy(weights)  # (frames,)
         self._frames = torch.arange(windows.length)
         self._callbacks = callbacks
         self._moments = checkpoint.moments if checkpoint is not None else None
@@ -55,6 +58,8 @@ class DenoiserModule(LightningModule):
         """Bring all frames to the device: they are a few hundred MB at most."""
         for name in ("_inputs", "_targets", "_frames"):
             setattr(self, name, getattr(self, name).to(self.device))
+        if self._weights is not None:
+            self._weights = self._weights.to(self.device)
 
     def on_train_start(self) -> None:
         """Begin the run here, because Lightning has put its own signal handlers in place before."""
@@ -70,7 +75,7 @@ class DenoiserModule(LightningModule):
         torch.manual_seed(int(seed.generate_state(1, np.uint64)[0]))
 
     def training_step(self, batch: Step, batch_idx: int) -> torch.Tensor:
-        """Root mean square error of one batch."""
+        """Root mean square error of one batch, of weighted frames if the training is balanced."""
         callbacks = self._callbacks
         rows = batch.start[:, None] + self._frames  # (segments, length)
         inputs, targets = self._inputs[rows], self._targets[rows]
@@ -82,8 +87,11 @@ class DenoiserModule(LightningModule):
         difference = (self.network(inputs) - targets).float()
         if len(callbacks.exam.counted) < difference.shape[-1]:
             difference = difference.index_select(-1, callbacks.counted_on(difference.device))
-        square = difference.square().mean()
+        squares = difference.square()
+        square = squares.mean()
         callbacks.note(square.detach(), len(batch.index))
+        if self._weights is not None:
+            square = (squares * self._weights[rows][..., None]).mean()
         # At zero the root has no slope.
         return (square + 1e-12).sqrt()
 

@@ -132,7 +132,8 @@ they learn from the other person, whose last fifth of the takes chooses the best
 from the map, as in the paper, the others from the maps of five parts of the body (`limbs`: trunk,
 upper arms, forearms, thighs, lower legs; [decision 52](decisions/0052-limb-maps.md)). As there are
 3 to 8 minutes to learn from, batches are of 16 segments and the dropout is 0.3; the S4's steps are
-longer; `bidirectional` looks ahead as well. What a linear map makes of the same pairs is in [real-pairs.md](real-pairs.md).
+longer; `bidirectional` looks ahead as well. What a linear map makes of the same pairs is in
+[real-pairs.md](real-pairs.md).
 
 This section alone is made by `python -m tools.documentation.denoiser_comparison --only-real`, here
 with `--seeds {seeds} --real-minutes {real_minutes:g}`, on {machine}.

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -82,6 +82,11 @@ class ErrorFunction:
         waves = np.cos(features @ self.frequency.T + self.phase)
         shared = features @ self.gain[:, 1:].T + self.gain[:, 0]
         return np.asarray(shared + self.constant + waves @ self.size)
+
+    def scaled(self, factor: float) -> ErrorFunction:
+        """The same errors, so many times as large."""
+        larger = {name: factor * getattr(self, name) for name in ("gain", "constant", "size")}
+        return replace(self, **larger)
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,6 +168,11 @@ class Disturbance:
 
     shape_error: Floats
     functions: Mapping[tuple[Group, str], ErrorFunction]
+
+    def scaled(self, factor: float) -> Disturbance:
+        """The same errors, so many times as large; at 0 the fit is the truth."""
+        functions = {key: function.scaled(factor) for key, function in self.functions.items()}
+        return Disturbance(factor * self.shape_error, functions)
 
     def shape(self, true: BodyShape) -> BodyShape:
         """The shape that is found; the stature is known."""

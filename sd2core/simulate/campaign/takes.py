@@ -48,6 +48,8 @@ class Campaign:
     target: TargetOptions = field(default_factory=TargetOptions)
     limbs: bool = False  # The input is also split by the parts of the body.
     protocol: Protocol = VARIED
+    # Factor of the errors of a take's fit, drawn between these; 1: as measured, 0: none.
+    error_sizes: tuple[float, float] = (1.0, 1.0)
 
     def __post_init__(self) -> None:
         if self.seed < 0:
@@ -56,6 +58,9 @@ class Campaign:
             raise Sd2Error(f"A take of {self.take_seconds:g} s", "2 to 600 s")
         if self.placements < 1:
             raise Sd2Error(f"{self.placements} placements", "at least one")
+        least, most = self.error_sizes
+        if not 0.0 <= least <= most <= 10.0:
+            raise Sd2Error(f"Errors of fits {least:g} to {most:g} times as large", "0 to 10 times")
 
     @property
     def frames(self) -> int:
@@ -74,6 +79,8 @@ class Campaign:
             "surfaces": {"synthetic": FITTED, "radar": TRUE},
             "synthesis": asdict(OPTIONS),
             **self.protocol.provenance(),
+            # Campaigns of before say nothing: their errors were as measured.
+            **({} if self.error_sizes == (1.0, 1.0) else {"error_sizes": self.error_sizes}),
         }
 
 
@@ -170,6 +177,7 @@ class TakeMaker:
         if self._errors is None:
             return self._mesh(FITTED, shape, transforms, times_s)
         drawn = self._errors.draw(rng)
+        drawn = drawn.scaled(float(rng.uniform(*self._campaign.error_sizes)))
         found = drawn.shape(shape)
         held = drawn.transforms(
             self._space.skeleton(shape), transforms, self._space.skeleton(found)

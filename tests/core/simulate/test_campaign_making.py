@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ import pytest
 from sd2core.errors import Sd2Error
 from sd2core.pairs.store import PairSet, PairWriter, Take, read_pairs
 from sd2core.progress import Cancelled
+from sd2core.simulate.campaign.fit_errors import FitErrors
 from sd2core.simulate.campaign.making import make_campaign, take_numbers
 from sd2core.simulate.campaign.radar import TargetOptions
 from sd2core.simulate.campaign.takes import Campaign, TakeMaker
@@ -66,6 +68,25 @@ def test_another_look_and_a_perfect_fit_are_of_the_same_motion(whole: Path) -> N
     assert one.label.tobytes() == other.label.tobytes() == made.label.tobytes()
     # The same energy in the mean, but for speckle.
     assert 0.5 < one.radar.sum() / other.radar.sum() < 2.0
+
+
+def test_errors_of_fits_of_another_size(whole: Path) -> None:
+    """None at 0, as measured at 1; the radar's maps and the motion are the same at any size."""
+    bundled = FitErrors.load()
+    asked = replace(SHORT, error_sizes=(0.0, 0.0))
+    exact, perfect = TakeMaker(asked, bundled).make(0, 0)[0], TakeMaker(SHORT).make(0, 0)[0]
+    np.testing.assert_allclose(exact.synthetic, perfect.synthetic, atol=1e-6)
+    drawn = TakeMaker(replace(SHORT, error_sizes=(0.5, 1.5)), bundled).make(0, 0)[0]
+    made = read_pairs(whole).takes[0]
+    assert drawn.radar.tobytes() == exact.radar.tobytes() == made.radar.tobytes()
+    assert drawn.synthetic.tobytes() != made.synthetic.tobytes() != exact.synthetic.tobytes()
+    with pytest.raises(Sd2Error, match="0 to 10 times"):
+        replace(SHORT, error_sizes=(1.0, 0.5))
+
+
+def test_a_campaign_does_not_go_on_with_errors_of_another_size(whole: Path) -> None:
+    with pytest.raises(Sd2Error, match="error_sizes"):
+        make_campaign(whole, replace(SHORT, error_sizes=(0.0, 1.5)), subjects=2, minutes=1.0)
 
 
 @pytest.mark.slow

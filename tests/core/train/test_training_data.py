@@ -21,6 +21,7 @@ from sd2core.train.config import DataConfig, TrainingConfig
 from sd2core.train.data import (
     Order,
     Windows,
+    frame_weights,
     prepare,
     read_mixed,
     segments_of,
@@ -189,6 +190,41 @@ def windows(segments: int) -> Windows:
     starts = 6 * np.arange(segments) + 1
     frames = np.zeros((6 * segments, 8), np.float32)
     return Windows(frames, frames, starts - 1, starts + 1, 4)
+
+
+class TestFrameWeights:
+    AXIS = VelocityAxis(8, 2.0)
+
+    def frames(self, peaks: list[int | None]) -> np.ndarray:
+        """Frames with one full bin each, or empty."""
+        energies = np.zeros((len(peaks), self.AXIS.bins), np.float32)
+        for row, peak in enumerate(peaks):
+            if peak is not None:
+                energies[row, peak] = 1.0
+        return energies
+
+    @given(st.lists(st.none() | st.integers(0, 7), min_size=1, max_size=300))
+    def test_rarer_speeds_weigh_more_and_both_directions_alike(
+        self, peaks: list[int | None]
+    ) -> None:
+        weights = frame_weights(self.frames(peaks), self.AXIS)
+        mirrored = frame_weights(self.frames(peaks)[:, ::-1], self.AXIS)
+        np.testing.assert_array_equal(weights, mirrored)
+        assert weights.min() > 0.0
+        assert weights.max() <= 8.0
+        assert weights.mean() == pytest.approx(1.0) or weights.max() == 8.0
+
+    def test_the_root_of_how_rare(self) -> None:
+        # 90 frames without motion and 10 at bins far from one another: 90 and 10 · 1/2.
+        weights = frame_weights(self.frames([None] * 90 + [0] * 10), self.AXIS)
+        assert weights[-1] / weights[0] == pytest.approx(np.sqrt(90 / (0.75 * 10)), rel=1e-5)
+
+    def test_what_is_rare_is_kept_in_a_weighted_mean(self) -> None:
+        """Which is what a model answers that cannot tell frames apart."""
+        energies = self.frames([4] * 95 + [7] * 5)
+        weights = frame_weights(energies, self.AXIS)[:, None]
+        even, balanced = energies.mean(axis=0), (weights * energies).sum(axis=0) / weights.sum()
+        assert balanced[7] > 3 * even[7]
 
 
 class TestOrder:
