@@ -132,7 +132,7 @@ def _options() -> argparse.Namespace:
     )
     parser.add_argument("--protocols-only", action="store_true", help="the paper's experiment")
     parser.add_argument(
-        "--protocol-minutes", type=float, default=36.0, help="of its campaigns (default: 36)"
+        "--protocol-minutes", type=float, default=54.0, help="of its campaigns (default: 54)"
     )
     parser.add_argument("--seeds", type=int, default=5, help="default: 5")
     parser.add_argument("--shares", help="of the real data, as `sd2 classify table` has them")

@@ -1,7 +1,7 @@
 """Makes ``denoiser-comparison.md`` and its pictures: ``make denoiser-comparison``, hours.
 
-Campaign, pairs and runs stay in ``build/denoiser`` (or ``--folder``); what is there is not
-made again, a run that was broken off goes on. Runs are as many at once as the machine has
+Campaign, pairs and runs stay in ``build/denoiser-comparison`` (or ``--folder``); what is there is
+not made again, a run that was broken off goes on. Runs are as many at once as the machine has
 cores, one thread each. The real pairs are left out where the recordings are not there
 (``SD2_SHARED_DATA``).
 """
@@ -56,7 +56,8 @@ DROPOUT = 0.1
 PAGE = """\
 # Denoisers compared
 
-The bundled one is measured in [denoiser.md](denoiser.md), which also says what the campaign is.
+The bundled one is measured in [denoiser.md](denoiser.md), which also says what the campaign is;
+here the errors of its fits are as measured.
 This page is made by
 
 ```
@@ -202,7 +203,7 @@ def _epochs(jobs: Mapping[str, TimedJob]) -> str:
 
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--folder", type=Path, default=BUILD / "denoiser")
+    parser.add_argument("--folder", type=Path, default=BUILD / "denoiser-comparison")
     parser.add_argument("--campaign-minutes", type=float, default=168, help="of all people")
     parser.add_argument("--minutes", type=float, default=10.0, help="of training, each run")
     parser.add_argument("--seeds", type=int, default=3)

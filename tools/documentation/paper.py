@@ -194,7 +194,7 @@ def _options() -> argparse.Namespace:
         default=BUILD / "classifier" / "protocols",
         help="of campaigns and classifiers, as `make classifier` keeps them",
     )
-    parser.add_argument("--campaign-minutes", type=float, default=36.0, help="of all people")
+    parser.add_argument("--campaign-minutes", type=float, default=54.0, help="of all people")
     parser.add_argument("--minutes", type=float, default=2.0, help="of a denoiser's training")
     parser.add_argument("--seeds", type=int, default=3, help="of denoisers")
     parser.add_argument("--classifier-seeds", type=int, default=5)
