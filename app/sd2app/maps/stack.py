@@ -206,19 +206,17 @@ class MapStack(QScrollArea):
 
     def event(self, event: QEvent) -> bool:
         """Claim Escape while a map is enlarged."""
-        if event.type() == QEvent.Type.ShortcutOverride and self._ends(event):
+        if event.type() == QEvent.Type.ShortcutOverride and self.ends_enlarging(event):
             event.accept()
             return True
         return super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Show all maps again."""
-        if self._ends(event):
-            self.arrangement.enlarge(None)
-        else:
-            event.ignore()  # arrows belong to the playback
+        """Leave all keys to the window: arrows belong to the playback."""
+        event.ignore()
 
-    def _ends(self, event: QEvent) -> bool:
+    def ends_enlarging(self, event: QEvent) -> bool:
+        """True for the key that shows all maps again, while one stands for all."""
         escape = isinstance(event, QKeyEvent) and event.key() == Qt.Key.Key_Escape
         return escape and self.arrangement.enlarged is not None
 

@@ -266,7 +266,7 @@ class ChartView(Canvas):
             plot,
             self._display.palette,
             [
-                (self.place_of(value, upwards.low).x(), across.text(value))
+                (self.place_of(value, upwards.low).x(), across.text(value).replace("-", "−"))
                 for value in across.ticks(max(int(plot.width() / (44 if across.log else 52)), 2))
             ],
             [
