@@ -68,9 +68,14 @@ def _style_sheet(c: Palette) -> str:
         color: {c.warning}; border: 1px solid {c.warning}; border-radius: 4px; padding: 1px 6px;
     }}
     QToolButton {{ border: 1px solid transparent; border-radius: 4px; padding: 4px; }}
+    QToolButton[popupMode="2"] {{ padding-right: 18px; }}
+    QToolButton::menu-indicator {{
+        subcontrol-origin: padding; subcontrol-position: center right; right: 5px;
+    }}
     QToolButton:hover {{ background: {c.well}; }}
     QToolButton:checked {{ background: {c.well}; border-color: {c.border}; }}
     QToolButton#outlined {{ border-color: {c.border}; padding: 2px 8px; }}
+    QToolButton#outlined[popupMode="2"] {{ padding-right: 18px; }}
     QToolButton#model {{ border-color: {c.border}; padding: 1px 18px 1px 6px; }}
     QToolButton#primary {{
         background: {c.accent}; color: {c.accent_text}; border-color: {c.accent}; padding: 2px 10px;
