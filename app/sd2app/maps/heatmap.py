@@ -168,14 +168,20 @@ class HeatmapView(MapWidget):
     def _paint_map(self, painter: QPainter) -> None:
         colours = self._display.palette
         painter.fillRect(self.rect(), QColor(colours.panel))
-        if self._track.map is None:
-            painter.setPen(QColor(colours.muted))
-            painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, self._hint)
+        muted, centre = QColor(colours.muted), Qt.AlignmentFlag.AlignCenter
+        if self._track.map is None and not self._track.awaited:
+            painter.setPen(muted)
+            painter.drawText(self.rect(), centre, self._hint)
             return
         self._paint_header(painter)
         if self.folded:
             return
         plot = self.plot_rect()
+        if self._track.map is None:
+            painter.fillRect(plot, QColor(colours.well))
+            painter.setPen(muted)
+            painter.drawText(plot, centre, "This map is being made…")
+            return
         self.paint_map(painter, plot, self._span.start_s, self._span.end_s)
         self._paint_marked_bins(painter, plot)
         self.paint_gaps(painter, plot, self.scale)

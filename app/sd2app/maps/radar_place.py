@@ -33,13 +33,14 @@ class RadarPlaceBadge(QToolButton):
         away_m = math.hypot(*self._session.sensor.sensor.position_m)
         apart = maps.synthetic.map is not None and maps.real.map is not None and away_m >= _LEAST_M
         go = "Go to the radar's place"
-        words = (
+        words: tuple[str, ...] = (
             f"Synthetic: seen from {away_m:.1f} m beside the radar · {go}",
             f"Seen from {away_m:.1f} m beside the radar · {go}",
             f"{go}, {away_m:.1f} m away",
             go,
         )
-        words = words if apart else ()
+        if not apart:
+            words = ()
         if words == self._words:
             return False
         self._words = words

@@ -115,7 +115,7 @@ class MapStack(QScrollArea):
         has_any = maps.synthetic.map is not None or maps.real.map is not None
         with_content = {
             "synthetic": maps.synthetic.map is not None or not has_any,
-            "denoised": maps.denoised.map is not None,
+            "denoised": maps.denoised.map is not None or maps.denoised.awaited,
             "before": maps.before.map is not None,
             "real": maps.real.map is not None,
             "difference": self._difference.shown,
@@ -127,7 +127,8 @@ class MapStack(QScrollArea):
         before = self._with_content
         self._with_content = frozenset(name for name, there in with_content.items() if there)
         if self._offer is not None:
-            self._offer.setVisible(maps.synthetic.map is not None and maps.denoised.map is None)
+            denoised = with_content["denoised"]
+            self._offer.setVisible(maps.synthetic.map is not None and not denoised)
         self.overview.set_track(maps.synthetic if maps.synthetic.map is not None else maps.real)
         self.synthetic.set_hint(
             "Add a mesh to see its synthetic Doppler: File → Add to this recording…\n\n"
