@@ -112,6 +112,7 @@ def test_a_map_that_comes_later_moves_nothing(
     assert c.denoised.map is None
     views = (tracks.synthetic, tracks.denoised, tracks.real)
     assert all(view.isVisible() for view in views)
+    assert shown_button(window).text() != "No denoiser"
     before = [view.geometry() for view in views]
     if not fits:
         fake_models.failure = Sd2Error("The model is not for this map", "another")
