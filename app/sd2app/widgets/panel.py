@@ -135,6 +135,9 @@ class FactRows(QWidget):
                 label.setVisible(row < len(facts))
 
 
+_LEAST_LETTERS = 7
+
+
 class ElidedLabel(QLabel):
     """A label as narrow as need be; the whole text is in its tooltip and its accessible name."""
 
@@ -166,7 +169,9 @@ class ElidedLabel(QLabel):
             text = self.fontMetrics().elidedText(
                 self.text(), Qt.TextElideMode.ElideRight, self.width()
             )
-            painter.drawText(self.rect(), int(self.alignment()), text)
+            # A word cut short says less than nothing.
+            cut = text != self.text() and len(text) < _LEAST_LETTERS
+            painter.drawText(self.rect(), int(self.alignment()), "…" if cut else text)
 
 
 def panel(name: str) -> QFrame:
