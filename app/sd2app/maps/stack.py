@@ -134,7 +134,7 @@ class MapStack(QScrollArea):
             "Add a mesh to see its synthetic Doppler: File → Add to this recording…\n\n"
             "From a video alone: File → New from video… fits a body to the person in it."
             if document.content is not None
-            else "Drop a recording, video, mesh or radar capture here, or choose File → Open….\n\n"
+            else "Drop a recording, video, mesh or radar capture here, or choose File → Open…\n\n"
             "Help → Open the sample recording shows what it looks like."
         )
         self._arrange()

@@ -200,8 +200,9 @@ class SceneView(QWidget):
         self.scene.look_from("overview")
         self._frame = None
         self.scene.clear_mesh()
-        mesh = self._session.document.mesh
-        self.overlay.message = "No mesh in this recording" if mesh is None else ""
+        document = self._session.document
+        mesh, there = document.mesh, document.recording is not None
+        self.overlay.message = "No mesh in this recording" if there and mesh is None else ""
         if mesh is not None:
             frame = mesh.timebase.frame_at(self._session.playback.time_s)
             with self._explaining():

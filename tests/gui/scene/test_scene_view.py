@@ -174,7 +174,7 @@ def test_the_picture_becomes_smooth_at_rest(stage: Stage, qtbot: Any) -> None:
 
 def test_a_recording_without_a_mesh_shows_the_sensor_and_says_so(stage: Stage) -> None:
     stage.open(None)
-    assert "mesh" in stage.view.overlay.message
+    assert stage.view.overlay.message == "No mesh in this recording"
     stage.view.set_view("overview")
     stage.view.grab()
     sensor = stage.colour_at(stage.sensor.sensor.position_m)
