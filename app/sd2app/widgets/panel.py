@@ -136,6 +136,7 @@ class FactRows(QWidget):
 
 
 _LEAST_LETTERS = 7
+"""Of a text that is cut short; fewer say nothing."""
 
 
 class ElidedLabel(QLabel):
@@ -169,7 +170,6 @@ class ElidedLabel(QLabel):
             text = self.fontMetrics().elidedText(
                 self.text(), Qt.TextElideMode.ElideRight, self.width()
             )
-            # A word cut short says less than nothing.
             cut = text != self.text() and len(text) < _LEAST_LETTERS
             painter.drawText(self.rect(), int(self.alignment()), "…" if cut else text)
 

@@ -68,6 +68,7 @@ def _style_sheet(c: Palette) -> str:
         color: {c.warning}; border: 1px solid {c.warning}; border-radius: 4px; padding: 1px 6px;
     }}
     QToolButton {{ border: 1px solid transparent; border-radius: 4px; padding: 4px; }}
+    /* What opens a menu at once has room for the arrow. */
     QToolButton[popupMode="2"] {{ padding-right: 18px; }}
     QToolButton::menu-indicator {{
         subcontrol-origin: padding; subcontrol-position: center right; right: 5px;
