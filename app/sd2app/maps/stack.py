@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from functools import partial
 
 from PySide6.QtCore import QEvent, QObject, QPointF, Qt, Signal
-from PySide6.QtGui import QKeyEvent, QMouseEvent, QResizeEvent
+from PySide6.QtGui import QKeyEvent, QMouseEvent, QResizeEvent, QWheelEvent
 from PySide6.QtWidgets import QFrame, QMenu, QScrollArea, QScrollBar, QWidget
 
 from sd2app.maps.arrangement import BELOW_PX, HEADER_PX, LEAST_PX, Arrangement, heights_px
@@ -20,6 +20,8 @@ from sd2app.widgets.time_axis import MARGIN_PX
 
 _BORDER_PX = BELOW_PX + 2  # two pixels of the map, to be hit
 _MOVED_PX = 4
+_NOTCH = 120.0
+"""Angle of one notch of the wheel in Qt's units."""
 
 
 class MapStack(QScrollArea):
@@ -147,6 +149,12 @@ class MapStack(QScrollArea):
         arrangement.enlarge(None if arrangement.enlarged == name else name)
         self.view(name).setFocus(Qt.FocusReason.OtherFocusReason)
 
+    def scroll(self, angle: int) -> bool:
+        """Scroll by a turn of the wheel, in Qt's units; False where all maps are in view."""
+        bar = self.verticalScrollBar()
+        bar.setValue(bar.value() - round(angle / _NOTCH * LEAST_PX / 2))
+        return bar.maximum() > 0
+
     def under(self, name: str, y_px: float) -> tuple[str, bool] | None:
         """Map at a height of the stack, and if it is its lower half; None over the same map."""
         for other in self.shown:
@@ -239,7 +247,9 @@ class _Hands(QObject):
         view.installEventFilter(self)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Fold, enlarge, move, or change the height."""
+        """Fold, enlarge, move, change the height, or scroll."""
+        if isinstance(event, QWheelEvent):
+            return event.position().y() < HEADER_PX and self._stack.scroll(event.angleDelta().y())
         if not isinstance(event, QMouseEvent):
             return False
         place, kind = event.position(), event.type()

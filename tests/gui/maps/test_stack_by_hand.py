@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from answering import menu_at, pick
 from PySide6.QtCore import QPoint, QPointF, Qt
-from PySide6.QtGui import QCursor, QGuiApplication, QImage
+from PySide6.QtGui import QCursor, QGuiApplication, QImage, QWheelEvent
 from PySide6.QtWidgets import QApplication
 from window_models import models_of
 
@@ -45,6 +45,20 @@ def drag(qtbot, view, start, end):
         qtbot.mouseMove(view, start + (end - start) * step / 5)
         QApplication.processEvents()
     qtbot.mouseRelease(view, LEFT, pos=end)
+
+
+def turn_wheel(view, place, notches):
+    event = QWheelEvent(
+        QPointF(place),
+        QPointF(view.mapToGlobal(place)),
+        QPoint(),
+        QPoint(0, 120 * notches),
+        Qt.MouseButton.NoButton,
+        Qt.KeyboardModifier.NoModifier,
+        Qt.ScrollPhase.NoScrollPhase,
+        False,
+    )
+    QApplication.sendEvent(view, event)
 
 
 def test_maps_are_of_use_at_any_size(window, stack, qtbot):
@@ -99,6 +113,30 @@ def test_the_border_is_dragged(stack, qtbot):
     assert stack.arrangement.row("synthetic").wanted_px == view.height()
     qtbot.mouseDClick(view, LEFT, pos=QPoint(200, view.height() - 2))
     assert stack.arrangement.row("synthetic").wanted_px is None
+
+
+def test_what_does_not_fit_is_scrolled_by_bar_and_by_wheel(stack, qtbot):
+    view, below = stack.synthetic, stack.real
+    turn_wheel(view, TITLE, -1)
+    assert not stack.verticalScrollBar().value(), "all is in view"
+    stack.arrangement.set_height("synthetic", stack.viewport().height())
+    bar = stack._bar
+    assert bar.isVisible()
+    span_s = (stack._session.span.start_s, stack._session.span.end_s)
+    turn_wheel(view, TITLE, -1)
+    by_wheel = bar.value()
+    assert by_wheel > 0
+    turn_wheel(view, TITLE, 1)
+    assert bar.value() == 0
+    assert (stack._session.span.start_s, stack._session.span.end_s) == span_s
+    drag(qtbot, bar, QPoint(4, 20), QPoint(4, bar.height() - 4))
+    assert bar.value() == bar.maximum() == stack.verticalScrollBar().value()
+    bottom = below.mapTo(stack.viewport(), QPoint(0, below.height())).y()
+    assert bottom <= stack.viewport().height()
+    # Over the map itself it zooms, as ever.
+    turn_wheel(below, QPoint(300, HEADER_PX + 20), 1)
+    assert stack._session.span.duration_s < span_s[1] - span_s[0]
+    stack._session.span.fit()
 
 
 def test_a_title_is_dragged_to_another_place(window, stack, qtbot):
