@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from xml.etree import ElementTree
+
 import numpy as np
 import pytest
 from answering import menu_at, pick
@@ -198,8 +200,11 @@ def test_pictures_are_written(stack, tmp_path):
         assert (tmp_path / name).stat().st_size > 1000
     assert b"<svg" in (tmp_path / "map.svg").read_bytes()[:500]
     pick(menu_at(stack.synthetic, QPoint(300, 60)), "Copy as SVG")
-    copied = QGuiApplication.clipboard().mimeData().data("image/svg+xml")
-    assert bytes(copied.data()) == (tmp_path / "map.svg").read_bytes()
+    copied = QGuiApplication.clipboard().mimeData()
+    drawing = ElementTree.fromstring(bytes(copied.data("image/svg+xml").data()))
+    assert drawing.tag.endswith("svg")
+    assert drawing.get("viewBox") == f"0 0 {stack.synthetic.width()} {stack.synthetic.height()}"
+    assert ElementTree.fromstring(copied.text()).tag == drawing.tag
     with pytest.raises(Sd2Error, match=r"map\.bmp"):
         write_picture(stack.synthetic, tmp_path / "map.bmp")
     assert not (tmp_path / "map.bmp").exists()
