@@ -1,12 +1,14 @@
-"""Dialogs that stop everything until they are answered, answered by the tests."""
+"""Dialogs and context menus, answered by the tests."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
 
-from PySide6.QtCore import Qt, QTimer
-from PySide6.QtWidgets import QApplication, QDialog, QMessageBox
+from PySide6.QtCore import QPoint, Qt, QTimer
+from PySide6.QtGui import QContextMenuEvent
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QDialog, QMenu, QMessageBox, QWidget
 
 
 def once_asked(kind: type[QDialog], work: Callable[[Any], object]) -> None:
@@ -32,3 +34,27 @@ def answer(qtbot, text: str, asked: list[str] | None = None) -> None:
         qtbot.mouseClick(found, Qt.MouseButton.LeftButton)
 
     once_asked(QMessageBox, click)
+
+
+def menu_at(view: QWidget, place: QPoint) -> QMenu:
+    """Context menu that a right click on a widget brings up."""
+    QTest.mouseClick(view, Qt.MouseButton.RightButton, pos=place)
+    # Which follows a click in a window of the system, and not always in one of a test.
+    reason = QContextMenuEvent.Reason.Mouse
+    QApplication.sendEvent(view, QContextMenuEvent(reason, place, view.mapToGlobal(place)))
+    return view.findChildren(QMenu, options=Qt.FindChildOption.FindDirectChildrenOnly)[-1]
+
+
+def texts_of(menu: QMenu) -> list[str]:
+    """Entries of a menu, without letters and lines."""
+    return [one.text().replace("&", "") for one in menu.actions() if not one.isSeparator()]
+
+
+def pick(menu: QMenu, *texts: str) -> None:
+    """Choose an entry of a menu, or of a menu in it, and close the menu."""
+    within = menu
+    for text in texts:
+        action = next(one for one in within.actions() if one.text().replace("&", "") == text)
+        within = action.menu()
+    action.trigger()
+    menu.close()

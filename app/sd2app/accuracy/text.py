@@ -27,8 +27,8 @@ class InUse:
 
     @property
     def brief(self) -> str:
-        """Plan and error in few words."""
-        return f"{short(self.plan)}, {deviation(self.error)}"
+        """Error and plan in few words; the error is read where there is no room for all."""
+        return f"{deviation(self.error)} · {short(self.plan)}"
 
     @property
     def figures(self) -> str:

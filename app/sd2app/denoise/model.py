@@ -72,6 +72,8 @@ class DenoiseModel(QObject):
         synthesis.completed.connect(self._wake)
         synthesis.completed.connect(self._finish)
         self._synthetic.changed.connect(self._watch)
+        for signal in (self._synthetic.changed, self.changed):
+            signal.connect(self._keep_place)
 
     # --- what is known --------------------------------------------------------------------
 
@@ -231,6 +233,11 @@ class DenoiseModel(QObject):
         if self.path is not None and loaded != self.path:
             self._load()
         self.changed.emit()
+
+    def _keep_place(self) -> None:
+        """Have a map that comes later not move those below it."""
+        coming = self.path is not None and not self.problem and self._synthetic.map is not None
+        self.map.track.set_awaited(coming)
 
     # --- the model ------------------------------------------------------------------------
 

@@ -335,6 +335,8 @@ class LabelsFeature(Feature):
         buttons = SpanButtons(self.model, decisions)
         timeline = LabelTimeline(s, self.edits, self.dragging, self.loop, buttons)
         self._offer_places(timeline)
+        exports = [shell.action(name) for name in ("export_labels", "cut_out")]
+        timeline.menu_parts = (*timeline.menu_parts, lambda menu, _: menu.addActions(exports))
         area = LabelArea(timeline, self.model)
         return {"Labels": panel, "labels": pane(TargetLine(self.model), area)}
 
@@ -353,10 +355,17 @@ class LabelsFeature(Feature):
 
         def fill(menu: QMenu, place: QPointF) -> None:
             if view.plot_rect().contains(place):
-                time_s = view.scale.time_of(place.x())
-                fill_place_menu(menu, time_s, self.edits, self.marking, self.loop)
+                self._fill_menu(menu, view.scale.time_of(place.x()))
 
         view.menu_parts = (*view.menu_parts, fill)
+
+    def offer_frame(self, menu: QMenu, place: QPointF) -> None:
+        """Offer to label from the frame on screen, in the context menu of a view of it."""
+        self._fill_menu(menu, self._session.playback.time_s)
+
+    def _fill_menu(self, menu: QMenu, time_s: float) -> None:
+        if self._session.has_content():
+            fill_place_menu(menu, time_s, self.edits, self.marking, self.loop)
 
     # --- life -----------------------------------------------------------------------------
 

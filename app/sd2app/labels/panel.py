@@ -41,10 +41,12 @@ class SpanPage(QWidget):
         columns = outlined("…", "Which columns are shown", None, self)
         columns.setAccessibleName("Columns")
         columns.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
-        columns.setStyleSheet("QToolButton::menu-indicator { image: none; }")
+        columns.setStyleSheet(
+            "QToolButton { padding: 2px 8px; } QToolButton::menu-indicator { image: none; }"
+        )
         columns.setMenu(table.columns_menu)
         filters = row_of(
-            (self.search, 5), *((one, 4) for one in self._chosen.values()), columns, spacing_px=6
+            (self.search, 7), *((one, 4) for one in self._chosen.values()), columns, spacing_px=6
         )
         self.setLayout(column_of(filters, (table, 1), spacing_px=6, margins_px=0))
         self.search.textChanged.connect(self._filter)

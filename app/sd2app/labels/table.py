@@ -45,7 +45,7 @@ class SpanCells(FramedCells):
         return self.listed(choices, column.heading, parent)
 
 
-_PADDING_PX = 12
+_PADDING_PX = 8
 _HIDDEN = "span_table/hidden"
 _MENU = ("span_starts_here", "span_ends_here", "split_span", "merge_spans", "delete_spans")
 """Actions of the window that the context menu has too."""

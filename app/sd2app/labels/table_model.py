@@ -108,7 +108,7 @@ COLUMNS: tuple[Column, ...] = (
         "label", "Label", "Label of the set, given to all selected spans",
         lambda span, _: span.label, lambda span: span.label.casefold(),
         _given(field_edits.relabel, str), "label",
-        wide="■ right-to-left",
+        wide="■ right-to-left ",
     ),
     Column(
         "duration", "Length s", "Duration. Type seconds or frames (12 f): its end moves",
@@ -123,12 +123,12 @@ COLUMNS: tuple[Column, ...] = (
         "track", "Track", "Track, for all selected spans",
         lambda span, _: span.track, lambda span: span.track.casefold(),
         _given(field_edits.set_track, str), "track",
-        wide="Gestures ▾",
+        wide="Gestures",
     ),
     Column(
         "note", "Note", "Any text",
         lambda span, _: span.note, lambda span: span.note.casefold(), _given(field_edits.set_note),
-        wide="some words",
+        wide="Note",
     ),
     Column(
         "author", "Author", "Person who marked it",

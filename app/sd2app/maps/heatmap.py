@@ -19,7 +19,7 @@ from sd2app.session.session import Session
 from sd2app.widgets.canvas import AT_LEFT, AT_RIGHT, Overlay, clipped
 from sd2app.widgets.colour_maps import lookup_table
 from sd2app.widgets.time_axis import (
-    GUTTER_PX,
+    MARGIN_PX,
     paint_cursor,
     paint_readout,
     paint_title,
@@ -52,6 +52,14 @@ def velocity_labels(
         )
         for velocity in (ticks(-v_max_mps, v_max_mps, most) if most >= 2 else (0.0,))
     ]
+
+
+def paint_velocity_labels(painter: QPainter, plot: QRectF, v_max_mps: float) -> None:
+    """Write the velocities of an axis left of its plot."""
+    line_px = painter.fontMetrics().height()
+    for velocity, beside_px in velocity_labels(v_max_mps, plot.height(), line_px):
+        room = QRectF(0, plot.top() + beside_px - line_px / 2, plot.left() - 8, line_px)
+        painter.drawText(room, AT_RIGHT, signed_text(velocity))
 
 
 class HeatmapView(MapWidget):
@@ -160,14 +168,20 @@ class HeatmapView(MapWidget):
     def _paint_map(self, painter: QPainter) -> None:
         colours = self._display.palette
         painter.fillRect(self.rect(), QColor(colours.panel))
-        if self._track.map is None:
-            painter.setPen(QColor(colours.muted))
-            painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, self._hint)
+        muted, centre = QColor(colours.muted), Qt.AlignmentFlag.AlignCenter
+        if self._track.map is None and not self._track.awaited:
+            painter.setPen(muted)
+            painter.drawText(self.rect(), centre, self._hint)
             return
         self._paint_header(painter)
         if self.folded:
             return
         plot = self.plot_rect()
+        if self._track.map is None:
+            painter.fillRect(plot, QColor(colours.well))
+            painter.setPen(muted)
+            painter.drawText(plot, centre, "This map is being made…")
+            return
         self.paint_map(painter, plot, self._span.start_s, self._span.end_s)
         self._paint_marked_bins(painter, plot)
         self.paint_gaps(painter, plot, self.scale)
@@ -217,7 +231,8 @@ class HeatmapView(MapWidget):
             assert self._button is not None
             size = self._button.sizeHint()
             height = min(size.height(), HEADER_PX - 2)
-            self._button.setGeometry(left - 4, (HEADER_PX - height) // 2, size.width(), height)
+            width = max(min(size.width(), self.width() - left - MARGIN_PX), height)
+            self._button.setGeometry(left - 4, (HEADER_PX - height) // 2, width, height)
         return self._room_px
 
     def _paint_corner(self, painter: QPainter, box: QRectF, left: float) -> float:
@@ -267,11 +282,10 @@ class HeatmapView(MapWidget):
         painter.drawRect(plot.adjusted(-0.5, -0.5, 0.5, 0.5))
         line_px = painter.fontMetrics().height()
         painter.setPen(QPen(QColor(colours.muted), 1))
-        for velocity, beside_px in velocity_labels(v_max, plot.height(), line_px):
+        for velocity, _ in velocity_labels(v_max, plot.height(), line_px):
             y = self.y_of(velocity)
             painter.drawLine(QPointF(plot.left() - 4, y), QPointF(plot.left(), y))
-            room = QRectF(0, plot.top() + beside_px - line_px / 2, GUTTER_PX - 8, line_px)
-            painter.drawText(room, AT_RIGHT, signed_text(velocity))
+        paint_velocity_labels(painter, plot, v_max)
 
     def _paint_cursors(self, painter: QPainter, plot: QRectF) -> None:
         with clipped(painter, plot):

@@ -73,6 +73,8 @@ class Overview(MapWidget):
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         """Start to drag the frame or an edge; elsewhere seek."""
+        if event.button() != Qt.MouseButton.LeftButton:
+            return
         x = event.position().x()
         handle = self._handle_at(x)
         if handle == "centre":

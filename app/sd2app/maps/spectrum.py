@@ -9,16 +9,17 @@ import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QBrush, QColor, QFontMetrics, QPainter, QPen, QPolygonF
 
+from sd2app.maps.heatmap import paint_velocity_labels, velocity_labels
 from sd2app.maps.limbs import title_of
 from sd2app.maps.stack import MapStack
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
 from sd2app.widgets.canvas import AT_LEFT, Canvas, clipped
 from sd2app.widgets.plot import paint_axes
-from sd2app.widgets.time_axis import paint_title, signed_text, ticks
+from sd2app.widgets.time_axis import paint_title, ticks
 from sd2core.maps import DopplerMap
 
-_LEFT_PX, _TOP_PX, _RIGHT_PX, _BOTTOM_PX = 34, 30, 12, 40
+_LEFT_PX, _TOP_PX, _RIGHT_PX, _BOTTOM_PX = 48, 30, 12, 40
 _LEGEND_PX = 20
 
 
@@ -102,7 +103,7 @@ class SpectrumView(Canvas):
                 y = _y_of(plot, self._pointer.velocity_mps, v_max)
                 painter.setPen(QPen(QColor(colours.muted), 1, Qt.PenStyle.DotLine))
                 painter.drawLine(QPointF(plot.left(), y), QPointF(plot.right(), y))
-        self._paint_legend(painter, self._legend(painter.fontMetrics(), curves), plot)
+        self._paint_legend(painter, curves, plot)
 
     def _paint_axes(self, painter: QPainter, plot: QRectF, doppler_map: DopplerMap) -> None:
         colours, levels = self._display.palette, self._display.levels
@@ -116,22 +117,22 @@ class SpectrumView(Canvas):
         low, high, unit = levels.low_db, levels.high_db, "dB"
         if levels.scale == "linear":
             low, high, unit = 0.0, 100.0 * 10.0 ** (levels.high_db / 10.0), "%"
-        most = max(int(plot.height() / (2 * painter.fontMetrics().height())), 2)
         across = [
             (plot.left() + plot.width() * (level - low) / (high - low), f"{level:g}")
             for level in ticks(low, high, 4)
         ]
-        upwards = [(_y_of(plot, each, v_max), each) for each in ticks(-v_max, v_max, most)]
+        line_px = painter.fontMetrics().height()
+        upwards = velocity_labels(v_max, plot.height(), line_px)
         paint_axes(
             painter,
             plot,
             colours,
             [(x, "" if self._is_tight(plot) else text.replace("-", "−")) for x, text in across],
-            [(y, signed_text(velocity)) for y, velocity in upwards],
+            [(_y_of(plot, velocity, v_max), "") for velocity, _ in upwards],
             "" if self._is_tight(plot) else f"level ({unit} of the reference)",
         )
+        paint_velocity_labels(painter, plot, v_max)
         if self._is_tight(plot):
-            line_px = painter.fontMetrics().height()
             for x, text in across[:-1]:
                 box = QRectF(x + 3, plot.bottom() - line_px - 2, 60, line_px)
                 painter.drawText(box, AT_LEFT, f"{text} {unit}".replace("-", "−"))
@@ -166,38 +167,40 @@ class SpectrumView(Canvas):
         painter.setBrush(Qt.BrushStyle.NoBrush)
         painter.drawPolyline(QPolygonF(points))
 
-    def _paint_legend(
-        self, painter: QPainter, entries: list[tuple[float, int, str, QColor]], plot: QRectF
-    ) -> None:
-        rows = 1 + max(row for _, row, _, _ in entries)
-        first = plot.bottom() + _BOTTOM_PX
-        if first + _LEGEND_PX * rows > self.height():
-            first, indent = plot.top() + 2.0, plot.left()
-        else:
-            indent = 0.0
-        for left, row, text, colour in entries:
-            x = left + indent
-            top = first + _LEGEND_PX * row
+    def _paint_legend(self, painter: QPainter, curves: list[_Curve], plot: QRectF) -> None:
+        metrics, colours = painter.fontMetrics(), self._display.palette
+        top, width = plot.bottom() + _BOTTOM_PX, self.width()
+        entries, bottom = self._legend(metrics, curves, QRectF(8, top, width - 12, 0))
+        if bottom > self.height():
+            inside = plot.adjusted(8, 2, -2, 0)
+            entries, bottom = self._legend(metrics, curves, inside)
+            back = QColor(colours.panel)
+            back.setAlpha(215)  # read over the curves, which are still seen
+            painter.fillRect(
+                QRectF(plot.left() + 1, inside.top(), plot.width(), bottom - inside.top()), back
+            )
+        for place, text, colour in entries:
+            middle = place.y() + _LEGEND_PX / 2
             painter.setPen(QPen(colour, 2))
-            painter.drawLine(QPointF(x, top + 10), QPointF(x + 13, top + 10))
-            painter.setPen(QColor(self._display.palette.muted))
-            box = QRectF(x + 18, top, self.width() - x - 18, 20)
+            painter.drawLine(QPointF(place.x(), middle), QPointF(place.x() + 13, middle))
+            painter.setPen(QColor(colours.muted))
+            box = QRectF(place.x() + 18, place.y(), width - place.x() - 18, _LEGEND_PX)
             painter.drawText(box, Qt.AlignmentFlag.AlignVCenter, text)
 
     def _legend(
-        self, metrics: QFontMetrics, curves: list[_Curve]
-    ) -> list[tuple[float, int, str, QColor]]:
-        """Place, row, text and colour of every entry; what does not fit begins a new row."""
-        entries: list[tuple[float, int, str, QColor]] = []
-        x, row = 8.0, 0
+        self, metrics: QFontMetrics, curves: list[_Curve], room: QRectF
+    ) -> tuple[list[tuple[QPointF, str, QColor]], float]:
+        """Place, text and colour of every entry, and their bottom; rows are as long as fits."""
+        entries: list[tuple[QPointF, str, QColor]] = []
+        x, y = room.left(), room.top()
         for curve in curves:
             text = title_of(curve.track).lower() + (": no person" if curve.nobody else "")
             width = 20 + metrics.horizontalAdvance(text)
-            if entries and x + width > self.width() - 4:
-                x, row = 8.0, row + 1
-            entries.append((x, row, text, curve.colour))
+            if x > room.left() and x + width > room.right():
+                x, y = room.left(), y + _LEGEND_PX
+            entries.append((QPointF(x, y), text, curve.colour))
             x += width + 12
-        return entries
+        return entries, y + _LEGEND_PX
 
 
 def _fill(

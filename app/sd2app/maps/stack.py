@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from functools import partial
 
 from PySide6.QtCore import QEvent, QObject, QPointF, Qt, Signal
-from PySide6.QtGui import QKeyEvent, QMouseEvent, QResizeEvent
+from PySide6.QtGui import QKeyEvent, QMouseEvent, QResizeEvent, QWheelEvent
 from PySide6.QtWidgets import QFrame, QMenu, QScrollArea, QScrollBar, QWidget
 
 from sd2app.maps.arrangement import BELOW_PX, HEADER_PX, LEAST_PX, Arrangement, heights_px
@@ -20,6 +20,8 @@ from sd2app.widgets.time_axis import MARGIN_PX
 
 _BORDER_PX = BELOW_PX + 2  # two pixels of the map, to be hit
 _MOVED_PX = 4
+_NOTCH = 120.0
+"""Angle of one notch of the wheel in Qt's units."""
 
 
 class MapStack(QScrollArea):
@@ -115,7 +117,7 @@ class MapStack(QScrollArea):
         has_any = maps.synthetic.map is not None or maps.real.map is not None
         with_content = {
             "synthetic": maps.synthetic.map is not None or not has_any,
-            "denoised": maps.denoised.map is not None,
+            "denoised": maps.denoised.map is not None or maps.denoised.awaited,
             "before": maps.before.map is not None,
             "real": maps.real.map is not None,
             "difference": self._difference.shown,
@@ -127,13 +129,14 @@ class MapStack(QScrollArea):
         before = self._with_content
         self._with_content = frozenset(name for name, there in with_content.items() if there)
         if self._offer is not None:
-            self._offer.setVisible(maps.synthetic.map is not None and maps.denoised.map is None)
+            denoised = with_content["denoised"]
+            self._offer.setVisible(maps.synthetic.map is not None and not denoised)
         self.overview.set_track(maps.synthetic if maps.synthetic.map is not None else maps.real)
         self.synthetic.set_hint(
             "Add a mesh to see its synthetic Doppler: File → Add to this recording…\n\n"
             "From a video alone: File → New from video… fits a body to the person in it."
             if document.content is not None
-            else "Drop a recording, video, mesh or radar capture here, or choose File → Open….\n\n"
+            else "Drop a recording, video, mesh or radar capture here, or choose File → Open…\n\n"
             "Help → Open the sample recording shows what it looks like."
         )
         self._arrange()
@@ -145,6 +148,12 @@ class MapStack(QScrollArea):
         arrangement = self.arrangement
         arrangement.enlarge(None if arrangement.enlarged == name else name)
         self.view(name).setFocus(Qt.FocusReason.OtherFocusReason)
+
+    def scroll(self, angle: int) -> bool:
+        """Scroll by a turn of the wheel, in Qt's units; False where all maps are in view."""
+        bar = self.verticalScrollBar()
+        bar.setValue(bar.value() - round(angle / _NOTCH * LEAST_PX / 2))
+        return bar.maximum() > 0
 
     def under(self, name: str, y_px: float) -> tuple[str, bool] | None:
         """Map at a height of the stack, and if it is its lower half; None over the same map."""
@@ -206,19 +215,17 @@ class MapStack(QScrollArea):
 
     def event(self, event: QEvent) -> bool:
         """Claim Escape while a map is enlarged."""
-        if event.type() == QEvent.Type.ShortcutOverride and self._ends(event):
+        if event.type() == QEvent.Type.ShortcutOverride and self.ends_enlarging(event):
             event.accept()
             return True
         return super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Show all maps again."""
-        if self._ends(event):
-            self.arrangement.enlarge(None)
-        else:
-            event.ignore()  # arrows belong to the playback
+        """Leave all keys to the window: arrows belong to the playback."""
+        event.ignore()
 
-    def _ends(self, event: QEvent) -> bool:
+    def ends_enlarging(self, event: QEvent) -> bool:
+        """True for the key that shows all maps again, while one stands for all."""
         escape = isinstance(event, QKeyEvent) and event.key() == Qt.Key.Key_Escape
         return escape and self.arrangement.enlarged is not None
 
@@ -240,7 +247,9 @@ class _Hands(QObject):
         view.installEventFilter(self)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Fold, enlarge, move, or change the height."""
+        """Fold, enlarge, move, change the height, or scroll."""
+        if isinstance(event, QWheelEvent):
+            return event.position().y() < HEADER_PX and self._stack.scroll(event.angleDelta().y())
         if not isinstance(event, QMouseEvent):
             return False
         place, kind = event.position(), event.type()

@@ -148,7 +148,8 @@ class TimeRuler(TimePlot):
             painter.drawPolyline([QPointF(*corner) for corner in corners])
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        """Seek."""
-        self._playback.seek(self.scale.time_of(event.position().x()))
+        """Seek with the left button."""
+        if event.buttons() & Qt.MouseButton.LeftButton:
+            self._playback.seek(self.scale.time_of(event.position().x()))
 
     mouseMoveEvent = mousePressEvent

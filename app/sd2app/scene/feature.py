@@ -19,6 +19,7 @@ from sd2app.widgets.layouts import pane
 
 if TYPE_CHECKING:
     from sd2app.scene.view import SceneView
+    from sd2app.widgets.picture import MenuPart
 
 
 _COLOURS: tuple[tuple[MeshColour, str, str], ...] = (
@@ -38,7 +39,10 @@ _VIEWS: tuple[tuple[str, Preset, str, str], ...] = (
 
 
 class SceneFeature(Feature):
-    """Colour of the mesh, where one looks from, and the sensor to be dragged."""
+    """Colour of the mesh, where one looks from, and the sensor to be dragged.
+
+    ``offer_frame`` adds to the context menu what can be done with the frame on screen.
+    """
 
     def __init__(
         self,
@@ -46,8 +50,10 @@ class SceneFeature(Feature):
         shell: Shell,
         synthesis: SynthesisModel,
         placements: PlacementsModel,
+        offer_frame: MenuPart,
     ) -> None:
         self._session, self._shell = session, shell
+        self._offer_frame = offer_frame
         self._synthesis, self._placements = synthesis, placements
         self.view: SceneView | None = None
         self.changing = (session.display.mesh_changed,)
@@ -92,7 +98,13 @@ class SceneFeature(Feature):
         """The 3D view under its bar."""
         from sd2app.scene.view import SceneView
 
-        self.view = SceneView(self._session, self._synthesis, self._placements)
+        self.view = view = SceneView(self._session, self._synthesis, self._placements)
+        export = self._shell.action("export_strip")
+        view.menu_parts = (
+            view.offer_value,
+            self._offer_frame,
+            lambda menu, _: menu.addAction(export),
+        )
         return pane(SceneBar(self._session.display, self._shell.action), (self.view, 1))
 
     def close(self) -> None:

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 from PySide6.QtCore import QEvent, QObject, QPointF, QSize, Qt
-from PySide6.QtGui import QCloseEvent, QMouseEvent, QResizeEvent, QWheelEvent
-from PySide6.QtWidgets import QLabel, QWidget
+from PySide6.QtGui import QCloseEvent, QGuiApplication, QMouseEvent, QResizeEvent, QWheelEvent
+from PySide6.QtWidgets import QLabel, QMenu, QWidget
 
 from sd2app.scene.backend import Backend, NoOpenGL, chosen_backend
 from sd2app.scene.camera import Preset
@@ -19,7 +19,7 @@ from sd2app.scene.colours import SceneColours
 from sd2app.scene.navigation import Navigator
 from sd2app.scene.overlay import Overlay
 from sd2app.scene.scene import Scene
-from sd2app.widgets.picture import picture_menu
+from sd2app.widgets.picture import MenuPart, picture_menu
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
@@ -55,6 +55,7 @@ class SceneView(QWidget):
         super().__init__()
         self._session, self._synthesis, self._placements = session, synthesis, placements
         self._backend: Backend | None = None
+        self.menu_parts: Sequence[MenuPart] = ()
         self.setMinimumSize(200, 150)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         try:
@@ -153,7 +154,7 @@ class SceneView(QWidget):
         elif kind == QEvent.Type.MouseButtonRelease:
             self.navigator.release(*place, event.button())
             if event.button() == Qt.MouseButton.RightButton and self._clicked_at(place):
-                menu = picture_menu(self, (), QPointF(*place))
+                menu = picture_menu(self, self.menu_parts, QPointF(*place))
                 menu.popup(event.globalPosition().toPoint())
         elif kind == QEvent.Type.MouseButtonDblClick and not self._at_something(place):
             self.set_view("overview")
@@ -183,6 +184,12 @@ class SceneView(QWidget):
         seen = "seen by the sensor" if scattering.visible[vertex] else "hidden from the sensor"
         return f"{scattering.range_m[vertex]:.2f} m  ·  {velocity} m/s  ·  {seen}"
 
+    def offer_value(self, menu: QMenu, place: QPointF) -> None:
+        """Offer to copy what is read of the mesh at a place."""
+        words = self.reading_at(place.x(), place.y())
+        copy = menu.addAction("Copy &value", lambda: QGuiApplication.clipboard().setText(words))
+        copy.setEnabled(bool(words))
+
     def _at_something(self, place: tuple[float, float]) -> bool:
         at_marker = self.navigator.marker_at(*place) is not None
         return at_marker or self.navigator.sensor_at(*place)
@@ -193,8 +200,9 @@ class SceneView(QWidget):
         self.scene.look_from("overview")
         self._frame = None
         self.scene.clear_mesh()
-        mesh = self._session.document.mesh
-        self.overlay.message = "No mesh in this recording" if mesh is None else ""
+        document = self._session.document
+        mesh, there = document.mesh, document.recording is not None
+        self.overlay.message = "No mesh in this recording" if there and mesh is None else ""
         if mesh is not None:
             frame = mesh.timebase.frame_at(self._session.playback.time_s)
             with self._explaining():

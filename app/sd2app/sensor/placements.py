@@ -198,7 +198,9 @@ def limits_text(model: PlacementsModel) -> str:
     coverage, radar = model.planned.coverage, model.radar
     if coverage is None:
         return "Looking at what they see…" if model.planned.places else ""
-    where = f"{radar.name}: {radar.range_max_m:.1f} m, ±{radar.v_max_mps:.2f} m/s."
+    # Unbroken, or a line could end within the unit.
+    v_max = f"±{radar.v_max_mps:.2f}\N{NO-BREAK SPACE}m/\N{WORD JOINER}s"
+    where = f"{radar.name}: {radar.range_max_m:.1f} m, {v_max}."
     if not coverage.beyond(radar).any():
         return f"All within the limits of the radar. {where}"
     return f"Beyond the radar, part of the body is seen at another range or velocity. {where}"

@@ -44,7 +44,7 @@ _FIELDS: dict[Name, tuple[str, str]] = {
 _HOW: dict[Kind, str] = {
     "none": "",
     "grid": "Numbers such as 1, 2.5, or from:to:step",
-    "cloud": "from:to",
+    "cloud": "Ranges and angles as from:to",
 }
 _NOTHING = (
     "A map from every place around the body is more data to learn from. Plan a grid or a cloud of"

@@ -70,6 +70,7 @@ class MapModel(QObject):
         self.offset_s = 0.0  # start of the map's clock on the recording's clock
         self.reference = 1.0  # value shown as 0 dB
         self.part = ""  # part of the body that is shown alone, where its map is known
+        self.awaited = False  # is going to be made: its place is kept while it is not there
         self.status = ""  # quality of the map in a few words, e.g. "exact"
         self._gaps: tuple[tuple[int, int], ...] = ()
         self._strongest: float | None = None
@@ -131,6 +132,12 @@ class MapModel(QObject):
         self._gaps = () if present is None else runs(~present)
         self._strongest = None
         self.changed.emit()
+
+    def set_awaited(self, awaited: bool) -> None:
+        """Say if the map is going to be made."""
+        if awaited != self.awaited:
+            self.awaited = awaited
+            self.changed.emit()
 
     def set_uncertainty(self, uncertainty: CellUncertainty | None) -> None:
         """Set the uncertainty of the map's cells."""

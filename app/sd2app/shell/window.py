@@ -15,6 +15,7 @@ from PySide6.QtGui import (
     QDragLeaveEvent,
     QDragMoveEvent,
     QDropEvent,
+    QKeyEvent,
 )
 from PySide6.QtWidgets import QAbstractButton, QApplication, QMainWindow, QWidget
 
@@ -100,6 +101,9 @@ class MainWindow(QMainWindow):
             [self._panels["tracks"], self._panels["spectrum"]],
             (728, 200),
         )
+        # A wide window gives the video a part of its width, which its height lets it fill.
+        self._top.setStretchFactor(0, 1)
+        self._top.setStretchFactor(1, 3)
         self._rows = splitter(Qt.Orientation.Vertical, [self._top, self._bottom], (250, 470))
         # Of the room of a larger window, maps take most.
         self._rows.setStretchFactor(0, 1)
@@ -227,6 +231,7 @@ class MainWindow(QMainWindow):
         mark = " *" if document.modified else ""
         kind = " (simulated)" if document.simulated else ""
         name = f"{document.title}{mark}{kind} – " if document.title else ""
+        self.setWindowFilePath(document.file_name(""))  # names what is saved of it
         self.setWindowTitle(f"{name}SD² Studio")
 
     def _restyle(self) -> None:
@@ -308,6 +313,13 @@ class MainWindow(QMainWindow):
         reason = Qt.FocusReason
         self._tabbed.setFocus(reason.TabFocusReason if forward else reason.BacktabFocusReason)
         return True
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Show all maps again with Escape, wherever the keyboard is."""
+        if self._ready and self.maps.ends_enlarging(event):
+            self.maps.arrangement.enlarge(None)
+        else:
+            super().keyPressEvent(event)
 
     def event(self, event: QEvent) -> bool:
         """Leave Space to a button that was reached with Tab."""

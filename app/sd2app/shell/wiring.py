@@ -44,6 +44,7 @@ class Features:
     """All features, which follow the document."""
 
     # Others are made before these, and ask them later.
+    labels: LabelsFeature
     suggestions: SuggestionsFeature
     batch: BatchFeature
 
@@ -54,7 +55,13 @@ class Features:
         denoisers = parts.denoisers or core_denoisers(process)
         self.denoise = denoise = DenoiseFeature(session, shell, maps.synthesis, denoisers, parent)
         self.fit = FitFeature(session, shell, parts.fit_command, parent)
-        self.video = VideoFeature(session, shell, self.fit, parent)
+        self.video = VideoFeature(
+            session,
+            shell,
+            self.fit,
+            lambda menu, place: self.labels.offer_frame(menu, place),
+            parent,
+        )
         self.training = TrainingFeature(session, shell, denoise.model, parts.train_command, parent)
         self.labels = labels = LabelsFeature(
             session,
@@ -109,7 +116,9 @@ class Features:
         self.playback = PlaybackFeature(session)
         self.program = ProgramFeature(session, shell, labels)
         self.files = FilesFeature(session, shell, self.fit.model)
-        self.scene = SceneFeature(session, shell, maps.synthesis, self.sensor.placements)
+        self.scene = SceneFeature(
+            session, shell, maps.synthesis, self.sensor.placements, labels.offer_frame
+        )
         self._in_order: tuple[Feature, ...] = (
             self.mesh_comparison, self.sensor, self.suggestions, self.agreement,
             self.dataset_export, self.fit, self.batch, self.training, self.classify,

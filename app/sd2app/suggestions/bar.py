@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from PySide6.QtCore import QSignalBlocker
-from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QLabel, QWidget
+from PySide6.QtGui import QAction, QResizeEvent
+from PySide6.QtWidgets import QBoxLayout, QWidget
 
 from sd2app.suggestions.model import SuggestionsModel
 from sd2app.widgets.inputs import Choice, NumberBox, action_button
-from sd2app.widgets.layouts import row_of
+from sd2app.widgets.layouts import STRETCH, row_of
 from sd2app.widgets.panel import ElidedLabel, outlined
 
 _BUTTONS = (
@@ -19,18 +19,21 @@ _BUTTONS = (
     ("accept_suggestions", "Accept all"),
     ("reject_suggestions", "Reject all"),
 )
+_MARGINS_PX = 8, 2, 8, 2
 
 
 class SuggestionBar(QWidget):
-    """View of :class:`SuggestionsModel`; hidden until suggestions are asked for."""
+    """View of :class:`SuggestionsModel`; hidden until suggestions are asked for.
+
+    Where one row would cut its words short, what decides stands above what finds.
+    """
 
     def __init__(self, model: SuggestionsModel, action: Callable[[str], QAction]) -> None:
         super().__init__()
         self._model = model
         self._text = ElidedLabel(self)
         self._text.setAccessibleName("Suggestions")
-        self._as = QLabel(self)
-        self._as.setObjectName("muted")
+        self._as = ElidedLabel(self, "muted")
         self._source = Choice("The map in which suggestions are looked for", self)
         self._source.activated.connect(lambda at: model.set_source(model.finder.sources[at]))
         self._by = Choice("What suggests spans: motion in a map, or the classifier", self)
@@ -38,19 +41,32 @@ class SuggestionBar(QWidget):
         self._threshold = NumberBox(0.0, 100.0, "", "")
         self._threshold.valueChanged.connect(model.set_threshold)
         buttons = [action_button(action(name), text, outlined=True) for name, text in _BUTTONS]
-        finding = self._by, self._source, self._threshold
-        margins_px = 8, 2, 8, 2
-        layout = row_of(
-            (self._text, 1), self._as, *buttons, 8, *finding, spacing_px=6, margins_px=margins_px
+        self._rows = (
+            row_of((self._text, 1), *buttons, spacing_px=6),
+            row_of(self._as, STRETCH, self._by, self._source, self._threshold, spacing_px=6),
         )
-        self.setLayout(layout)
+        self._layout = row_of((self._rows[0], 1), self._rows[1], spacing_px=6)
+        self._layout.setContentsMargins(*_MARGINS_PX)
+        self.setLayout(self._layout)
         # The last one for the keyboard too.
         close = outlined("✕", "Close; the suggestions stay", model.stop, self)
         close.setObjectName("")
         close.setAccessibleName("Close the suggestions")
-        layout.addWidget(close)
+        self._rows[1].addWidget(close)
         model.changed.connect(self._refresh)
         self._refresh()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Stand in one row or in two."""
+        super().resizeEvent(event)
+        self._fold()
+
+    def _fold(self) -> None:
+        left_px, _, right_px, _ = _MARGINS_PX
+        needed_px = sum(row.sizeHint().width() for row in self._rows) + self._layout.spacing()
+        fits = needed_px <= self.width() - left_px - right_px
+        ways = QBoxLayout.Direction
+        self._layout.setDirection(ways.LeftToRight if fits else ways.TopToBottom)
 
     def _refresh(self) -> None:
         model = self._model
@@ -75,3 +91,4 @@ class SuggestionBar(QWidget):
         box.setToolTip(limits.tip)
         box.setAccessibleName(limits.tip)
         box.show_value(model.threshold)
+        self._fold()

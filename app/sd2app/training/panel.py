@@ -92,7 +92,7 @@ class TrainingRunView(RunView[TrainingMonitor]):
             _CLOSING_TEXT,
             self._training.set_closing,
         )
-        self._closing = pane(row_of(sentence("When closing:"), (self._choice, 1)))
+        self._closing = pane(row_of(sentence("When closing:"), (self._choice, 1), spacing_px=8))
         return self._closing
 
     def texts(self, run: TrainingMonitor) -> tuple[str, str, str]:

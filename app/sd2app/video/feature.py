@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QWidget
@@ -13,14 +14,26 @@ from sd2app.video.overlay_settings import OverlayModel
 from sd2app.video.view import Landmarks, VideoBar, VideoView
 from sd2app.widgets.layouts import pane
 
+if TYPE_CHECKING:
+    from sd2app.widgets.picture import MenuPart
+
 
 class VideoFeature(Feature):
-    """The picture with mesh and landmarks over it."""
+    """The picture with mesh and landmarks over it.
+
+    ``offer_frame`` adds to its context menu what can be done with the frame on screen.
+    """
 
     def __init__(
-        self, session: Session, shell: Shell, landmarks: Landmarks, parent: QObject
+        self,
+        session: Session,
+        shell: Shell,
+        landmarks: Landmarks,
+        offer_frame: MenuPart,
+        parent: QObject,
     ) -> None:
         self._session, self._shell, self._landmarks = session, shell, landmarks
+        self._offer_frame = offer_frame
         self.overlay = OverlayModel(session.settings, parent)
         session.video.failed.connect(shell.warn)
         self.changing = (self.overlay.changed,)
@@ -46,4 +59,6 @@ class VideoFeature(Feature):
     def panels(self) -> Mapping[str, QWidget]:
         """The video under its bar."""
         view = VideoView(self._session, self.overlay, self._landmarks)
+        export = self._shell.action("export_strip")
+        view.menu_parts = (self._offer_frame, lambda menu, _: menu.addAction(export))
         return {"video": pane(VideoBar(self.overlay, self._shell.action), (view, 1))}

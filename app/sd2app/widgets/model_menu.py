@@ -36,10 +36,6 @@ class Chosen(Protocol):
     def problem(self) -> str:
         """Reason why it cannot be used; empty where it can."""
 
-    @property
-    def busy(self) -> bool:
-        """True while it is being loaded or at work."""
-
     def available(self) -> Sequence[Any]:
         """Cards of the models that can be chosen, as they are on disk now."""
 
@@ -134,6 +130,6 @@ class ModelButton(QToolButton):
         if card is not None:
             title = model_title(card)
             return title, f"{title}: {words.kind(card)}, {words.origin(card)}"
-        if path is not None and chosen.busy:
-            return f"Loading {path.stem}…", str(path)
+        if path is not None:
+            return "Loading…", str(path)
         return f"No {words.role.lower()}", words.hint

@@ -135,6 +135,10 @@ class FactRows(QWidget):
                 label.setVisible(row < len(facts))
 
 
+_LEAST_LETTERS = 7
+"""Of a text that is cut short; fewer say nothing."""
+
+
 class ElidedLabel(QLabel):
     """A label as narrow as need be; the whole text is in its tooltip and its accessible name."""
 
@@ -166,7 +170,8 @@ class ElidedLabel(QLabel):
             text = self.fontMetrics().elidedText(
                 self.text(), Qt.TextElideMode.ElideRight, self.width()
             )
-            painter.drawText(self.rect(), int(self.alignment()), text)
+            cut = text != self.text() and len(text) < _LEAST_LETTERS
+            painter.drawText(self.rect(), int(self.alignment()), "…" if cut else text)
 
 
 def panel(name: str) -> QFrame:

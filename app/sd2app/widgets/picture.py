@@ -25,25 +25,42 @@ def copy_picture(widget: QWidget) -> None:
     QGuiApplication.clipboard().setPixmap(widget.grab())
 
 
-def write_picture(widget: QWidget, path: Path) -> None:
-    """Write a picture of a widget; raises Sd2Error for another ending than .png or .svg."""
+def copy_drawing(widget: QWidget) -> None:
+    """Put a drawing of a widget on the clipboard, as SVG."""
+    svg, clipboard = _drawing(widget), QGuiApplication.clipboard()
+    clipboard.setText(svg.decode())
+    # The clipboard's own: data made here would be deleted after Python, with a crash.
+    clipboard.mimeData().setData("image/svg+xml", svg)
+
+
+def _drawing(widget: QWidget) -> bytes:
+    """The widget as SVG."""
     buffer = QBuffer()
     buffer.open(QIODevice.OpenModeFlag.WriteOnly)
+    drawing = QSvgGenerator()
+    drawing.setOutputDevice(buffer)
+    drawing.setSize(widget.size())
+    drawing.setViewBox(QRect(QPoint(), widget.size()))
+    drawing.setTitle(widget.accessibleName())
+    widget.render(drawing)
+    return bytes(buffer.data().data())
+
+
+def write_picture(widget: QWidget, path: Path) -> None:
+    """Write a picture of a widget; raises Sd2Error for another ending than .png or .svg."""
     if path.suffix.lower() == ".svg":
-        drawing = QSvgGenerator()
-        drawing.setOutputDevice(buffer)
-        drawing.setSize(widget.size())
-        drawing.setViewBox(QRect(QPoint(), widget.size()))
-        drawing.setTitle(widget.accessibleName())
-        widget.render(drawing)
+        content = _drawing(widget)
     elif path.suffix.lower() == ".png":
+        buffer = QBuffer()
+        buffer.open(QIODevice.OpenModeFlag.WriteOnly)
         widget.grab().save(buffer, "PNG")
+        content = bytes(buffer.data().data())
     else:
         raise Sd2Error(
             f"{path.name} is no picture that can be written", "a name that ends in .png or .svg"
         )
     with atomic_write(path) as stream:
-        stream.write(bytes(buffer.data().data()))
+        stream.write(content)
 
 
 def save_picture(widget: QWidget, name: str) -> None:
@@ -65,6 +82,17 @@ def picture_menu(widget: QWidget, parts: Sequence[MenuPart], place: QPointF) -> 
         part(menu, place)
         menu.addSeparator()
     menu.addAction("&Copy picture", lambda: copy_picture(widget))
-    name = widget.accessibleName().lower().replace(" ", "-") or "plot"
-    menu.addAction("&Save picture…", lambda: save_picture(widget, f"{name}.png"))
+    menu.addAction("Copy as S&VG", lambda: copy_drawing(widget))
+    menu.addAction("&Save picture…", lambda: save_picture(widget, _file_name(widget)))
     return menu
+
+
+def _file_name(widget: QWidget) -> str:
+    """Proposed name of a picture: of the recording that its window shows, and of the widget."""
+    window: QWidget | None = widget.window()
+    while window is not None and not window.windowFilePath():
+        parent = window.parentWidget()  # of a dialog
+        window = parent.window() if parent is not None else None
+    about = Path(window.windowFilePath()).name if window is not None else ""
+    kind = widget.accessibleName().lower().replace(" ", "-") or "plot"
+    return "-".join(filter(None, (about, kind))) + ".png"

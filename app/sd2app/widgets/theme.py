@@ -68,9 +68,15 @@ def _style_sheet(c: Palette) -> str:
         color: {c.warning}; border: 1px solid {c.warning}; border-radius: 4px; padding: 1px 6px;
     }}
     QToolButton {{ border: 1px solid transparent; border-radius: 4px; padding: 4px; }}
+    /* What opens a menu at once has room for the arrow. */
+    QToolButton[popupMode="2"] {{ padding-right: 18px; }}
+    QToolButton::menu-indicator {{
+        subcontrol-origin: padding; subcontrol-position: center right; right: 5px;
+    }}
     QToolButton:hover {{ background: {c.well}; }}
     QToolButton:checked {{ background: {c.well}; border-color: {c.border}; }}
     QToolButton#outlined {{ border-color: {c.border}; padding: 2px 8px; }}
+    QToolButton#outlined[popupMode="2"] {{ padding-right: 18px; }}
     QToolButton#model {{ border-color: {c.border}; padding: 1px 18px 1px 6px; }}
     QToolButton#primary {{
         background: {c.accent}; color: {c.accent_text}; border-color: {c.accent}; padding: 2px 10px;
@@ -96,6 +102,15 @@ def _style_sheet(c: Palette) -> str:
     QHeaderView::up-arrow, QHeaderView::down-arrow {{
         subcontrol-position: top center; width: 9px; height: 6px;
     }}
+    QScrollBar {{ background: transparent; margin: 0; }}
+    QScrollBar:vertical {{ width: 8px; }}
+    QScrollBar:horizontal {{ height: 8px; }}
+    QScrollBar::handle {{ background: {c.hatch}; border-radius: 3px; margin: 1px; }}
+    QScrollBar::handle:vertical {{ min-height: 24px; }}
+    QScrollBar::handle:horizontal {{ min-width: 24px; }}
+    QScrollBar::handle:hover {{ background: {c.muted}; }}
+    QScrollBar::add-line, QScrollBar::sub-line {{ width: 0; height: 0; }}
+    QScrollBar::add-page, QScrollBar::sub-page {{ background: transparent; }}
     QScrollArea {{ border: none; background: transparent; }}
     QScrollArea > QWidget > QWidget#page {{ background: transparent; }}
     QFrame#rule {{ border: none; background: {c.border}; max-height: 1px; }}

@@ -53,3 +53,7 @@ def test_no_values_give_an_axis_all_the_same():
 @pytest.mark.parametrize(("value", "text"), [(0.01, "0.01"), (1.0, "1"), (500.0, "500")])
 def test_ticks_are_written_without_exponents(value, text):
     assert tick_text(value) == text
+
+
+def test_below_zero_there_is_a_minus_and_no_hyphen():
+    assert [Scale(-4.0, 4.0).text(value) for value in (-2.0, 0.0, 2.0)] == ["−2", "0", "2"]

@@ -210,7 +210,7 @@ def test_a_click_uses_a_point_until_the_tolerance_rules_again(plot, panel, windo
     assert trade.in_use.plan == FACING
     assert "You clicked this point" in texts(panel)
     qtbot.waitUntil(lambda: done(window), timeout=10_000)
-    assert models_of(window).synthetic.status == "visibility facing, ±13 %"
+    assert models_of(window).synthetic.status == "±13 % · visibility facing"
     qtbot.mouseClick(button(panel, "Choose by tolerance"), Qt.MouseButton.LeftButton)
     assert trade.in_use.plan == EXACT
     assert "You clicked" not in texts(panel)

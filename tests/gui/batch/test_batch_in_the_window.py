@@ -226,7 +226,8 @@ def test_a_batch_begins_with_planned_places_and_the_model_in_use(
 ):
     own = tmp_path / "hall.safetensors"
     own.write_bytes(b"weights")
-    fake_models.add(own, 3.0, parts=("trunk",))
+    fake_models.add(own, 3.0)
+    fake_models.add(Path("/models/limbs.safetensors"), 3.0, parts=("trunk",))
     window = opened()
     c = models_of(window)
     c.denoise.use(own)
@@ -239,10 +240,16 @@ def test_a_batch_begins_with_planned_places_and_the_model_in_use(
     assert plan.plan().denoise.model == next(
         name for name, card in c.denoise.by_name().items() if card.path == own
     )
-    # This one takes the map of each part of the body.
-    assert plan.plan().synthesise.limbs
     choice = window.findChild(BatchWindow)._setup._model
     assert choice.currentText() == plan.value("model")
+    assert not plan.plan().synthesise.limbs
+    # One that takes the map of each part of the body has them made.
+    QTest.keyClick(choice, Qt.Key.Key_Home)
+    while "limbs" not in choice.currentText():
+        before = choice.currentIndex()
+        QTest.keyClick(choice, Qt.Key.Key_Down)
+        assert choice.currentIndex() > before
+    assert plan.plan().synthesise.limbs
 
 
 @pytest.mark.slow

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from answering import once_asked
@@ -17,6 +19,8 @@ from sd2app.maps.readout import reading_lines
 from sd2app.maps.spectrum import SpectrumView
 from sd2app.widgets.model_card_dialog import ModelCardDialog
 from sd2app.widgets.model_menu import ModelButton, ModelMenu
+from sd2core.denoise.files import LIMBS_MODEL, MAP_MODEL
+from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
 
 
@@ -92,6 +96,33 @@ def test_a_click_chooses_a_model_and_the_track_appears(window, qtbot):
     choose(window, qtbot, shown_button(window), "No model")
     assert c.denoised.map is None
     assert not tracks.denoised.isVisible()
+
+
+@pytest.mark.parametrize("fits", [True, False])
+def test_a_map_that_comes_later_moves_nothing(
+    empty_window, fake_models, qtbot, small_recording, fits
+):
+    window, c, tracks = empty_window, models_of(empty_window), empty_window.maps
+    fake_models.add(Path(f"/models/{MAP_MODEL}.safetensors"), 2.0)
+    fake_models.add(Path(f"/models/{LIMBS_MODEL}.safetensors"), 7.0, parts=("trunk", "forearm.R"))
+    fake_models.gate.clear()
+    with qtbot.waitSignal(c.document.opened, timeout=20_000):
+        window.open_paths([small_recording])
+    qtbot.waitUntil(lambda: bool(fake_models.asked), timeout=20_000)
+    assert c.denoised.map is None
+    views = (tracks.synthetic, tracks.denoised, tracks.real)
+    assert all(view.isVisible() for view in views)
+    assert shown_button(window).text() != "No denoiser"
+    before = [view.geometry() for view in views]
+    if not fits:
+        fake_models.failure = Sd2Error("The model is not for this map", "another")
+    fake_models.gate.set()
+    wait(window, qtbot)
+    if fits:
+        assert is_of(c, 2.0)
+        assert [view.geometry() for view in views] == before
+    else:
+        qtbot.waitUntil(lambda: not tracks.denoised.isVisible(), timeout=5_000)
 
 
 def test_a_model_file_that_is_dropped_is_used(window, fake_models, qtbot, tmp_path):

@@ -250,6 +250,22 @@ def test_the_panel_is_as_wide_as_its_table_needs_and_others_are_as_before(labell
     assert labelled.side.width() == chosen
 
 
+@pytest.mark.parametrize("size", [(1280, 720), (1600, 1000), (2560, 1440)])
+def test_the_usual_columns_need_no_scrolling(labelled, size) -> None:
+    labelled.resize(*size)
+    labelled.side.bring_up("Sensor")
+    labelled.side.bring_up("Labels", "Spans")
+    QApplication.processEvents()
+    spans = table(labelled)
+    assert spans.horizontalScrollBar().maximum() == 0
+    header, metrics = spans.horizontalHeader(), spans.fontMetrics()
+    for place in range(header.count()):
+        text = spans.model().headerData(place, Qt.Orientation.Horizontal)
+        if not header.isSectionHidden(place):
+            assert header.sectionSize(place) >= metrics.horizontalAdvance(text) + 4
+    labelled.resize(1280, 800)
+
+
 def test_columns_are_chosen_and_remembered(labelled) -> None:
     assert table(labelled).isColumnHidden(AT["author"])
     menu = table(labelled).columns_menu

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from xml.etree import ElementTree
+
+import numpy as np
 import pytest
+from answering import menu_at, pick
 from PySide6.QtCore import QPoint, QPointF, Qt
-from PySide6.QtGui import QContextMenuEvent, QGuiApplication
-from PySide6.QtWidgets import QApplication, QMenu
+from PySide6.QtGui import QCursor, QGuiApplication, QImage, QWheelEvent
+from PySide6.QtWidgets import QApplication
 from window_models import models_of
 
 from sd2app.maps.arrangement import HEADER_PX, LEAST_PX
 from sd2app.maps.radar_place import RadarPlaceBadge
 from sd2app.maps.spectrum import SpectrumView
+from sd2app.video.view import VideoView
 from sd2app.widgets.picture import write_picture
 from sd2core.errors import Sd2Error
 from sd2core.sensor import VirtualSensor
@@ -29,6 +34,13 @@ def stack(window, qtbot):
     window.maps.arrangement.enlarge(None)
 
 
+def as_array(view) -> np.ndarray:
+    """Picture of a widget, (H, W, 4)."""
+    image = view.grab().toImage().convertToFormat(QImage.Format.Format_RGB32)
+    pixels = np.frombuffer(image.constBits(), np.uint8)
+    return pixels.reshape(image.height(), image.width(), 4).copy()
+
+
 def drag(qtbot, view, start, end):
     qtbot.mousePress(view, LEFT, pos=start)
     for step in range(1, 6):
@@ -37,17 +49,18 @@ def drag(qtbot, view, start, end):
     qtbot.mouseRelease(view, LEFT, pos=end)
 
 
-def menu_at(view, place):
-    QApplication.sendEvent(
-        view, QContextMenuEvent(QContextMenuEvent.Reason.Mouse, place, view.mapToGlobal(place))
+def turn_wheel(view, place, notches):
+    event = QWheelEvent(
+        QPointF(place),
+        QPointF(view.mapToGlobal(place)),
+        QPoint(),
+        QPoint(0, 120 * notches),
+        Qt.MouseButton.NoButton,
+        Qt.KeyboardModifier.NoModifier,
+        Qt.ScrollPhase.NoScrollPhase,
+        False,
     )
-    return view.findChildren(QMenu, options=Qt.FindChildOption.FindDirectChildrenOnly)[-1]
-
-
-def chosen(menu, text):
-    action = next(one for one in menu.actions() if one.text().replace("&", "") == text)
-    action.trigger()
-    menu.close()
+    QApplication.sendEvent(view, event)
 
 
 def test_maps_are_of_use_at_any_size(window, stack, qtbot):
@@ -82,12 +95,15 @@ def test_the_handle_folds_and_opens(stack, qtbot):
 
 def test_a_double_click_on_the_title_enlarges_and_escape_goes_back(window, stack, qtbot):
     for view, other in ((stack.synthetic, stack.real), (stack.real, stack.synthetic)):
-        qtbot.mouseDClick(view, LEFT, pos=TITLE)
-        assert view.height() == stack.viewport().height()
-        assert other.isHidden()
-        qtbot.keyClick(view, Qt.Key.Key_Escape)
-        assert stack.arrangement.enlarged is None
-        assert other.isVisible()
+        # Wherever the keyboard is meanwhile.
+        for elsewhere in (view, window.findChild(VideoView), window.side.button("Labels")):
+            qtbot.mouseDClick(view, LEFT, pos=TITLE)
+            assert view.height() == stack.viewport().height()
+            assert other.isHidden()
+            elsewhere.setFocus()
+            qtbot.keyClick(elsewhere, Qt.Key.Key_Escape)
+            assert stack.arrangement.enlarged is None
+            assert other.isVisible()
 
 
 def test_the_border_is_dragged(stack, qtbot):
@@ -99,6 +115,30 @@ def test_the_border_is_dragged(stack, qtbot):
     assert stack.arrangement.row("synthetic").wanted_px == view.height()
     qtbot.mouseDClick(view, LEFT, pos=QPoint(200, view.height() - 2))
     assert stack.arrangement.row("synthetic").wanted_px is None
+
+
+def test_what_does_not_fit_is_scrolled_by_bar_and_by_wheel(stack, qtbot):
+    view, below = stack.synthetic, stack.real
+    turn_wheel(view, TITLE, -1)
+    assert not stack.verticalScrollBar().value(), "all is in view"
+    stack.arrangement.set_height("synthetic", stack.viewport().height())
+    bar = stack._bar
+    assert bar.isVisible()
+    span_s = (stack._session.span.start_s, stack._session.span.end_s)
+    turn_wheel(view, TITLE, -1)
+    by_wheel = bar.value()
+    assert by_wheel > 0
+    turn_wheel(view, TITLE, 1)
+    assert bar.value() == 0
+    assert (stack._session.span.start_s, stack._session.span.end_s) == span_s
+    drag(qtbot, bar, QPoint(4, 20), QPoint(4, bar.height() - 4))
+    assert bar.value() == bar.maximum() == stack.verticalScrollBar().value()
+    bottom = below.mapTo(stack.viewport(), QPoint(0, below.height())).y()
+    assert bottom <= stack.viewport().height()
+    # Over the map itself it zooms, as ever.
+    turn_wheel(below, QPoint(300, HEADER_PX + 20), 1)
+    assert stack._session.span.duration_s < span_s[1] - span_s[0]
+    stack._session.span.fit()
 
 
 def test_a_title_is_dragged_to_another_place(window, stack, qtbot):
@@ -137,20 +177,20 @@ def test_the_context_menu_reads_sets_and_plays(window, stack, qtbot):
     time_s = c.synthetic.map.timebase.time_of(frame) + 1e-3
     velocity_mps = c.synthetic.map.axis.centres_mps[bin_]
     place = QPoint(round(view.scale.x_of(time_s)), round(view.y_of(velocity_mps)))
-    chosen(menu_at(view, place), "Copy value")
+    pick(menu_at(view, place), "Copy value")
     words = QGuiApplication.clipboard().text()
     assert f"frame {frame}" in words
     assert "body at" in words
     before = c.synthetic.reference
-    chosen(menu_at(view, place), "0 dB here")
+    pick(menu_at(view, place), "0 dB here")
     assert c.synthetic.reference == pytest.approx(values.max())
     c.synthetic.set_reference(before)
-    chosen(menu_at(view, place), "Play what is in view in a loop")
+    pick(menu_at(view, place), "Play what is in view in a loop")
     assert c.playback.playing
     assert c.playback.stretch_s == (window.session.span.start_s, window.session.span.end_s)
     c.playback.pause()
     c.playback.set_stretch(None)
-    chosen(menu_at(view, place), "Copy picture")
+    pick(menu_at(view, place), "Copy picture")
     assert QGuiApplication.clipboard().image().width() >= view.width()
 
 
@@ -159,6 +199,12 @@ def test_pictures_are_written(stack, tmp_path):
         write_picture(stack.synthetic, tmp_path / name)
         assert (tmp_path / name).stat().st_size > 1000
     assert b"<svg" in (tmp_path / "map.svg").read_bytes()[:500]
+    pick(menu_at(stack.synthetic, QPoint(300, 60)), "Copy as SVG")
+    copied = QGuiApplication.clipboard().mimeData()
+    drawing = ElementTree.fromstring(bytes(copied.data("image/svg+xml").data()))
+    assert drawing.tag.endswith("svg")
+    assert drawing.get("viewBox") == f"0 0 {stack.synthetic.width()} {stack.synthetic.height()}"
+    assert ElementTree.fromstring(copied.text()).tag == drawing.tag
     with pytest.raises(Sd2Error, match=r"map\.bmp"):
         write_picture(stack.synthetic, tmp_path / "map.bmp")
     assert not (tmp_path / "map.bmp").exists()
@@ -170,9 +216,37 @@ def test_a_badge_says_that_the_sensor_is_elsewhere(window, stack, qtbot):
     window.session.edits.place_sensor(VirtualSensor(position_m=(1.0, 0.0, 0.5)))
     qtbot.waitUntil(badge.isVisible)
     assert "1.1 m beside the radar" in badge.text()
+    assert badge.text().endswith("Go to the radar's place")
+    for width in (2560, 960, 1280):
+        window.resize(width, 800)
+        QApplication.processEvents()
+        assert badge.geometry().right() < stack.real.width()
+        assert badge.fontMetrics().horizontalAdvance(badge.text()) < badge.width()
     qtbot.mouseClick(badge, LEFT)
     assert window.session.sensor.sensor.position_m == (0.0, 0.0, 0.0)
     assert badge.isHidden()
     window.action("undo").trigger()
     assert window.session.sensor.sensor.position_m == (1.0, 0.0, 0.5)
     window.action("undo").trigger()
+
+
+def test_the_reading_stands_beside_the_crosshair(stack, qtbot):
+    view = stack.synthetic
+    plot = view.plot_rect().toRect()
+    for share_x, share_y in ((0.1, 0.9), (0.5, 0.5), (0.95, 0.1)):
+        place = plot.topLeft() + QPoint(
+            round(share_x * plot.width()), round(share_y * plot.height())
+        )
+        without = as_array(view)
+        QCursor.setPos(view.mapToGlobal(place))
+        qtbot.mouseMove(view, place)
+        assert view.underMouse()
+        changed = np.abs(as_array(view).astype(int) - without).sum(axis=2) > 0
+        # The crosshair goes through the whole map: what is left is the box.
+        changed[place.y() - 4 : place.y() + 5] = changed[:, place.x() - 4 : place.x() + 5] = False
+        rows, columns = np.nonzero(changed)
+        assert rows.size > 1000
+        assert min(abs(rows - place.y())) <= 12
+        assert min(abs(columns - place.x())) <= 16
+        QCursor.setPos(view.mapToGlobal(QPoint(4, 4)))
+        qtbot.mouseMove(view, QPoint(4, 4))

@@ -29,6 +29,7 @@ class Document(QObject):
     def __init__(self) -> None:
         super().__init__()
         self.mesh: MeshSequence | None = None
+        self.recording: Any = None
 
 
 class Synthesis(QObject):
@@ -96,7 +97,7 @@ class Stage:
 
     def open(self, mesh: MeshSequence | None) -> None:
         """Show another recording."""
-        self.document.mesh = mesh
+        self.document.mesh, self.document.recording = mesh, "a recording"
         if mesh is not None:
             self.playback.set_timebase(mesh.timebase)
         self.document.opened.emit()

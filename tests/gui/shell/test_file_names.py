@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from answering import menu_at, pick
 from PySide6.QtWidgets import QFileDialog
 from window_models import models_of
 
@@ -24,6 +25,12 @@ def test_exports_and_save_as_are_named_as_the_recording(window, proposed):
     window.action("save_as").trigger()
     window.action("export_map").trigger()
     assert proposed == ["ball.sd2", "ball-synthetic.npz"]
+
+
+def test_pictures_are_named_as_the_recording(window, proposed):
+    for view in (window.maps.synthetic, window.maps.real):
+        pick(menu_at(view, view.rect().center()), "Save picture…")
+    assert proposed == ["ball-synthetic-map.png", "ball-real-map.png"]
 
 
 def test_placements_are_named_as_the_recording(labelled, proposed):

@@ -31,7 +31,7 @@ def test_opening_shows_every_part(window):
     assert window.windowTitle().startswith("ball (simulated)")
     assert c.video.picture.shape == (120, 160, 3)
     assert c.synthetic.map.values.max() > 0
-    assert c.synthetic.status == "visibility exact, ±0 %"
+    assert c.synthetic.status == "±0 % · visibility exact"
     assert c.real.map.kind == "simulated"
     assert c.real.title == "Radar (simulated)"
     assert all(view.isVisible() for view in heatmaps(window))
@@ -354,8 +354,8 @@ def test_a_drag_shows_a_preview_and_becomes_exact(window, qtbot):
     c.edits.drag_sensor((0.2, 0.0, 0.0))
     c.edits.end_sensor_drag()
     qtbot.waitUntil(lambda: c.synthesis.complete, timeout=10_000)
-    assert c.synthetic.status == "visibility exact, ±0 %"
-    assert seen[0] == "while dragging: visibility facing, ±13 %"
+    assert c.synthetic.status == "±0 % · visibility exact"
+    assert seen[0] == "while dragging: ±13 % · visibility facing"
 
 
 def test_dragging_the_sensor_in_3d_follows_the_mouse_in_one_step(window, qtbot):
@@ -412,7 +412,7 @@ def test_a_point_cloud_counts_every_point(empty_window, fake, tmp_path, qtbot):
     with qtbot.waitSignal(c.document.opened, timeout=10_000):
         empty_window.open_paths([tmp_path / "cloud.npz"])
     qtbot.waitUntil(lambda: c.synthesis.complete, timeout=10_000)
-    assert c.synthetic.status == "all vertices, ±0 %"
+    assert c.synthetic.status == "±0 % · all vertices"
     assert c.synthesis.readout().visible_share == 1.0
     assert np.nanmean(c.synthetic.map.mean_velocity_mps()) == pytest.approx(0.9, abs=0.15)
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import label_hands as hands
 import numpy as np
 import pytest
 from kept_window import opened
 from PySide6.QtCore import QPoint, QRect, QRectF, Qt
-from PySide6.QtWidgets import QToolButton
+from PySide6.QtWidgets import QApplication, QToolButton, QWidget
 from window_models import models_of
 
 from sd2app.labels.painting import lane_box
@@ -76,6 +78,22 @@ def test_the_bar_does_the_same(moving, qtbot) -> None:
     assert bar.findChildren(QToolButton)[-1].accessibleName() == "Close the suggestions"
     qtbot.mouseClick(buttons["✕"], Qt.MouseButton.LeftButton)
     assert not bar.isVisible()
+
+
+@pytest.mark.parametrize("size", [(1280, 720), (1600, 1000), (2560, 1440)])
+def test_no_word_of_the_bar_is_cut_short(moving, qtbot, size) -> None:
+    moving.resize(*size)
+    asked(moving, qtbot)
+    QApplication.processEvents()
+    bar = moving.findChild(SuggestionBar)
+    shown = [one for one in bar.findChildren(QWidget) if one.parent() is bar and one.isVisible()]
+    for one in shown:
+        assert one.width() >= one.sizeHint().width()
+        assert bar.rect().contains(one.geometry())
+    assert not any(
+        one.geometry().intersects(other.geometry()) for one, other in combinations(shown, 2)
+    )
+    moving.resize(1280, 800)
 
 
 def test_suggestions_are_saved_with_the_labels(moving, qtbot, tmp_path) -> None:
