@@ -7,8 +7,8 @@
 Without ``--campaign`` one is made: six people, 36 minutes, three places of the sensor, of
 another seed than the bundled denoiser's, so of other people. ``--large`` is the denoiser's
 (``make denoiser`` leaves it in ``build/denoiser``); only its radar is used. What was trained
-before is not trained again: the folder ``--out`` keeps every run. ``--protocols-only`` measures
-the section on the paper's experiment alone, and puts it into the page that is there.
+before is not trained again: the folder ``--out`` keeps every run. ``--only`` measures
+one section on the paper's experiment, and puts it into the page that is there.
 """
 
 from __future__ import annotations
@@ -21,7 +21,12 @@ import sys
 from pathlib import Path
 
 from sd2core.accuracy.cache import this_machine
-from tools.documentation.classifier_protocols import HEADING, protocols_section
+from tools.documentation.classifier_protocols import (
+    FULL_HEADING,
+    HEADING,
+    full_size_section,
+    protocols_section,
+)
 from tools.documentation.places import BUILD, DOCS, IMAGES
 from tools.documentation.runs import campaign_of, sd2
 
@@ -90,11 +95,17 @@ Its simulated radar has noise in every cell, which a campaign's targets do not h
 def main() -> None:
     """Measure and write."""
     options = _options()
-    page = PAGE.read_text("utf-8") if options.protocols_only else _page(options)
-    section = protocols_section(options.out / "protocols", options.protocol_minutes, options.seeds)
+    page = PAGE.read_text("utf-8") if options.only else _page(options)
     before, _, after = page.partition(REAL_HEADING)
-    before = before.partition(HEADING)[0]
-    PAGE.write_text(f"{before}{section}{REAL_HEADING}{after.rstrip()}\n", "utf-8")
+    before, _, full = before.partition(FULL_HEADING)
+    before, _, protocols = before.partition(HEADING)
+    protocols, full = f"{HEADING}{protocols}", f"{FULL_HEADING}{full}"
+    if options.only != "full-size":
+        folder = options.out / "protocols"
+        protocols = protocols_section(folder, options.protocol_minutes, options.seeds)
+    if options.only != "protocols":
+        full = full_size_section(options.out / "full-size", options.seeds)
+    PAGE.write_text(f"{before}{protocols}{full}{REAL_HEADING}{after.rstrip()}\n", "utf-8")
 
 
 def _page(options: argparse.Namespace) -> str:
@@ -130,9 +141,13 @@ def _options() -> argparse.Namespace:
     parser.add_argument(
         "--large-minutes", type=float, default=168.0, help="of that one (default: 168)"
     )
-    parser.add_argument("--protocols-only", action="store_true", help="the paper's experiment")
     parser.add_argument(
-        "--protocol-minutes", type=float, default=54.0, help="of its campaigns (default: 54)"
+        "--only",
+        choices=("protocols", "full-size"),
+        help="the paper's experiment, in all its variants or with as many frames as the paper's",
+    )
+    parser.add_argument(
+        "--protocol-minutes", type=float, default=18.0, help="of its campaigns (default: 18)"
     )
     parser.add_argument("--seeds", type=int, default=5, help="default: 5")
     parser.add_argument("--shares", help="of the real data, as `sd2 classify table` has them")

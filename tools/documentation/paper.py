@@ -31,6 +31,7 @@ from sd2core.simulate.campaign.protocol import PAPER
 from sd2core.timebase import Timebase
 from tools.documentation.classifier_protocols import (
     ADDED,
+    FULL_MINUTES,
     RANDOM,
     SEED,
     confusion_table,
@@ -192,9 +193,15 @@ def _options() -> argparse.Namespace:
         "--protocols",
         type=Path,
         default=BUILD / "classifier" / "protocols",
-        help="of campaigns and classifiers, as `make classifier` keeps them",
+        help="of campaigns, as `make classifier` keeps them",
     )
-    parser.add_argument("--campaign-minutes", type=float, default=54.0, help="of all people")
+    parser.add_argument(
+        "--full-size",
+        type=Path,
+        default=BUILD / "classifier" / "full-size",
+        help="of larger campaigns and classifiers, as `make classifier` keeps them",
+    )
+    parser.add_argument("--campaign-minutes", type=float, default=18.0, help="of all people")
     parser.add_argument("--minutes", type=float, default=2.0, help="of a denoiser's training")
     parser.add_argument("--seeds", type=int, default=3, help="of denoisers")
     parser.add_argument("--classifier-seeds", type=int, default=5)
@@ -344,12 +351,12 @@ def _spread(values: Mapping[str, Any]) -> str:
 
 def _classifiers(options: argparse.Namespace) -> str:
     """Tables 2 and 3."""
-    out: Path = options.protocols
-    known = {one: protocol_clips(out, one, options.campaign_minutes) for one in (PAPER, RANDOM)}
+    out: Path = options.full_size
+    known = {one: protocol_clips(out, one, FULL_MINUTES) for one in (PAPER, RANDOM)}
     tables = protocol_tables(out, known, options.classifier_seeds)
     text = CLASSIFIERS.format(
         machine=this_machine(),
-        campaign_minutes=options.campaign_minutes,
+        campaign_minutes=FULL_MINUTES,
         seeds=options.classifier_seeds,
     )
     text += means_table(tables)
