@@ -145,6 +145,13 @@ class PreparedMesh:
         return other
 
     @property
+    def closed(self) -> bool:
+        """True if the mesh is a closed surface; computed when a depth buffer first needs it."""
+        faces = self._faces()
+        closed: bool = self.budget.get_or_make("closed", lambda: (visibility.encloses(faces), 0))
+        return closed
+
+    @property
     def block_count(self) -> int:
         """Number of blocks in the clip."""
         return -(-self.mesh.frame_count // self.block_frames)

@@ -45,9 +45,14 @@ def velocity_kernel(bins: int, sigma_bins: float) -> NDArray[np.float64]:
     """Smoothing matrix along velocity, (bins, bins), reflecting at the axis's ends."""
     kernel: NDArray[np.float64] = np.eye(bins)
     if sigma_bins > 0:
-        from scipy.ndimage import gaussian_filter1d
-
-        kernel = gaussian_filter1d(kernel, sigma_bins, axis=0)
+        reach = int(_REACH * sigma_bins + 0.5)
+        bell = np.exp(-0.5 / (sigma_bins * sigma_bins) * np.arange(-reach, reach + 1) ** 2)
+        bell /= bell.sum()
+        around = np.pad(kernel, ((reach, reach), (0, 0)), "symmetric")
+        kernel *= bell[reach]
+        for away in range(reach, 0, -1):
+            sides = around[reach - away :][:bins] + around[reach + away :][:bins]
+            kernel += bell[reach + away] * sides
     kernel.flags.writeable = False
     return kernel
 
