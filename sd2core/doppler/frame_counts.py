@@ -61,7 +61,7 @@ class FrameCounts:
         place = self.prepared.sensor(position_m)
         totals[:] = self.totals(block, rows)
         pairs = self.prepared.moving(block, self.counting)
-        if pairs is not None and np.isfinite(place.astype(pairs.middle.dtype) ** 2).all():
+        if pairs is not None and np.isfinite(place.astype(pairs.places.dtype) ** 2).all():
             quality = self._count_moving(
                 pairs, block, rows, position_m, visibility, into, parts, shares
             )

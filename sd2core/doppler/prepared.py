@@ -213,10 +213,18 @@ class PreparedMesh:
             found = find_moving(block.frames, counting, still)
             return (found,), 0 if found is None else found.nbytes
 
-        # Blocks are shared by options with the same bin width.
-        kept = self.budget.get_or_make(("moving", still, block.index), make)
+        kept = self.budget.get_or_make(self._moving_key("pairs", block.index), make)
         pairs: MovingPairs | None = kept[0]
         return pairs
+
+    def pairs_moving(self, index: int) -> int | None:
+        """Number of moving pairs of a block; None where that is not known yet, or all count."""
+        kept = self.budget.get(self._moving_key("pairs", index))
+        return None if kept is None or kept[0] is None else len(kept[0].vertex)
+
+    def _moving_key(self, what: str, index: int) -> Hashable:
+        # Blocks are shared by options with the same bin width.
+        return what, "moving", self.options.axis.bins, self.options.null_bins, index
 
     def moving_normals(self, block: Block, pairs: MovingPairs) -> NDArray[np.int8]:
         """Normals of the moving pairs of a block, int8 (3, N)."""
@@ -241,8 +249,7 @@ class PreparedMesh:
             made = pairs.of(every(block))
             return made, made.nbytes
 
-        still = still_bins(self.options.axis.bins, self.options.null_bins)
-        kept: NDArray[Any] = self.budget.get_or_make((f"moving {what}", still, block.index), make)
+        kept: NDArray[Any] = self.budget.get_or_make(self._moving_key(what, block.index), make)
         return kept
 
     def velocities_vid2doppler(

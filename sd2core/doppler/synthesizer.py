@@ -98,6 +98,8 @@ _MEMORY_BUDGET_BYTES = 512 << 20
 _FAST_FRAMES = 64
 _EXACT_FRAMES = 4
 _EXACT_JOB_FRAMES = 8
+_LIGHT_PAIRS = 500_000
+"""Moving vertices, frames together, that are counted before other threads would have woken."""
 
 
 class Synthesizer:
@@ -477,7 +479,7 @@ class Synthesizer:
 
         def job(index: int, low: int, high: int) -> Callable[[Ticket], None]:
             def work(ticket: Ticket) -> None:
-                step = _FAST_FRAMES if quick else _EXACT_FRAMES
+                step = high - low if quick else _EXACT_FRAMES
                 ticket.advance(0)
                 block = self.prepared.block(index)
                 for first in range(low, high, step):
@@ -501,13 +503,17 @@ class Synthesizer:
             return work
 
         jobs = []
-        for index, low, high in self._frames.blocks_between(start, stop):
+        blocks = self._frames.blocks_between(start, stop)
+        pairs = [self.prepared.pairs_moving(index) for index, *_ in blocks]
+        light = quick and None not in pairs and sum(pair or 0 for pair in pairs) <= _LIGHT_PAIRS
+        for index, low, high in blocks:
             # A block that must be read first is one job: its readers would wait.
             size = _FAST_FRAMES if quick else _EXACT_JOB_FRAMES
-            pieces = -(-(high - low) // size) if self.prepared.has(index) else 1
+            pieces = -(-(high - low) // size) if self.prepared.has(index) and not light else 1
             cuts = np.linspace(low, high, pieces + 1).astype(int).tolist()
             jobs += [job(index, a, b) for a, b in pairwise(cuts)]
-        processor_s = run_jobs(jobs, stop - start, progress, self._threads)
+        threads = 1 if light else self._threads
+        processor_s = run_jobs(jobs, stop - start, progress, threads)
         if visibility == "frozen":
             quality: Quality = "frozen" if qualities == {"frozen"} else "facing"
         else:
