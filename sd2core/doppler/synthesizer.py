@@ -96,8 +96,8 @@ def map_notes(prepared: PreparedMesh, sensor: VirtualSensor, start: int, stop: i
 
 _MEMORY_BUDGET_BYTES = 512 << 20
 _FAST_FRAMES = 64
-_EXACT_FRAMES = 4
-_EXACT_JOB_FRAMES = 8
+_EXACT_VERTICES = 60_000
+"""Vertices times frames whose occlusion is found at once, in a few ms: then a cancel is obeyed."""
 _LIGHT_PAIRS = 500_000
 """Moving vertices, frames together, that are counted before other threads would have woken."""
 
@@ -476,10 +476,11 @@ class Synthesizer:
         totals = np.empty(stop - start)
         qualities: set[Quality] = set()
         quick = visibility not in ("depth", "exact") and kernels_ready()
+        at_once = max(_EXACT_VERTICES // self.mesh.vertex_count, 1) if kernels_ready() else 1
 
         def job(index: int, low: int, high: int) -> Callable[[Ticket], None]:
             def work(ticket: Ticket) -> None:
-                step = high - low if quick else _EXACT_FRAMES
+                step = high - low if quick else at_once
                 ticket.advance(0)
                 block = self.prepared.block(index)
                 for first in range(low, high, step):
@@ -508,7 +509,7 @@ class Synthesizer:
         light = quick and None not in pairs and sum(pair or 0 for pair in pairs) <= _LIGHT_PAIRS
         for index, low, high in blocks:
             # A block that must be read first is one job: its readers would wait.
-            size = _FAST_FRAMES if quick else _EXACT_JOB_FRAMES
+            size = _FAST_FRAMES if quick else 2 * at_once
             pieces = -(-(high - low) // size) if self.prepared.has(index) and not light else 1
             cuts = np.linspace(low, high, pieces + 1).astype(int).tolist()
             jobs += [job(index, a, b) for a, b in pairwise(cuts)]
