@@ -68,6 +68,7 @@ class FrameCounts:
             if self.options.range_law == "frame":
                 into.histogram[:] *= self.frame_law(block, rows, position_m)[:, None, None]
             return quality
+        block = self.prepared.whole(block)
         scatterers, quality = self.scatterers(block, rows, position_m, visibility)
         scatterers = replace(scatterers, parts=parts)
         frames = block.frames.rows(rows)

@@ -482,7 +482,11 @@ class Synthesizer:
             def work(ticket: Ticket) -> None:
                 step = high - low if quick else at_once
                 ticket.advance(0)
-                block = self.prepared.block(index)
+                block = None
+                if quick and not shares:
+                    block = self.prepared.light(index, self._frames.counting)
+                if block is None:
+                    block = self.prepared.block(index)
                 for first in range(low, high, step):
                     last = min(first + step, high)
                     rows = slice(first - block.start, last - block.start)
