@@ -97,12 +97,12 @@ def find_moving(frames: Frames, counting: Counting, still: float) -> MovingPairs
     frame, vertex = np.nonzero(marks)
 
     first = np.searchsorted(frame, np.arange(len(frames) + 1))
-    vertex = vertex.astype(np.int32)
+    number = vertex.astype(np.int32)
     places = np.empty((1 + 2 * frames.before.shape[1]) * 3 * len(vertex), precision)
     places_kernel(
-        frames.positions, frames.centre, frames.before, frames.after, vertex, first, places
+        frames.positions, frames.centre, frames.before, frames.after, number, first, places
     )
-    return MovingPairs(vertex, first, places, vertices)
+    return MovingPairs(number, first, places, vertices)
 
 
 def count_moving(

@@ -15,7 +15,7 @@ from sd2core.doppler.frame_counts import FrameCounts
 from sd2core.doppler.histogram import Counts
 from sd2core.doppler.masks import Occlusion, Quality, Visibility
 from sd2core.doppler.options import PRESETS, SynthesisOptions
-from sd2core.doppler.parallel import Ticket, run_jobs
+from sd2core.doppler.parallel import Ticket, run_jobs, run_light_jobs
 from sd2core.doppler.prepared import Block, ByteBudget, PreparedMesh
 from sd2core.doppler.smoothing import frames_within_reach, smooth
 from sd2core.errors import Sd2Error
@@ -99,7 +99,7 @@ _FAST_FRAMES = 64
 _EXACT_VERTICES = 60_000
 """Vertices times frames whose occlusion is found at once, in a few ms: then a cancel is obeyed."""
 _LIGHT_PAIRS = 500_000
-"""Moving vertices, frames together, that are counted before other threads would have woken."""
+"""Moving vertices, frames together, that are counted about as soon as other threads wake."""
 
 
 class Synthesizer:
@@ -514,11 +514,14 @@ class Synthesizer:
         for index, low, high in blocks:
             # A block that must be read first is one job: its readers would wait.
             size = _FAST_FRAMES if quick else 2 * at_once
-            pieces = -(-(high - low) // size) if self.prepared.has(index) and not light else 1
+            size = max(size, (stop - start) // 2) if light else size
+            pieces = -(-(high - low) // size) if self.prepared.has(index) else 1
             cuts = np.linspace(low, high, pieces + 1).astype(int).tolist()
             jobs += [job(index, a, b) for a, b in pairwise(cuts)]
-        threads = 1 if light else self._threads
-        processor_s = run_jobs(jobs, stop - start, progress, threads)
+        if light and self._threads is None:
+            processor_s = run_light_jobs(jobs, stop - start, progress)
+        else:
+            processor_s = run_jobs(jobs, stop - start, progress, self._threads)
         if visibility == "frozen":
             quality: Quality = "frozen" if qualities == {"frozen"} else "facing"
         else:

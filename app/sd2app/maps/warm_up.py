@@ -78,10 +78,10 @@ class CompilerModel(QObject):
 
     def start(self) -> None:
         """Compile what is not compiled: a map waits for it."""
-        self._process = compile_in_background(awaited=True)
-        if self.busy and self._job is None:
+        self._process = process = compile_in_background(awaited=True)
+        if process is not None and self.busy and self._job is None:
             self._job = self._jobs.start(
-                "Compiling, once after installing", self._process.terminate
+                "Compiling the numerical kernels, once after installing", process.terminate
             )
             self._poll.start()
 
