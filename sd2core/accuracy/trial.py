@@ -47,7 +47,7 @@ def synthesizer_for(
 
 
 _REFERENCE_FRAMES = 5
-"""At once: an eighth of a second of a large mesh, so that a cancelled choice soon ends."""
+"""At once: some 50 ms of a large mesh, so that a cancelled choice soon ends."""
 
 _ASIDE_M = 1e-12
 """Offset that changes no map, but makes another place, whose masks are computed again."""

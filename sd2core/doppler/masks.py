@@ -248,6 +248,7 @@ class VisibilityMasks:
         faces = self._prepared.faces
         assert faces is not None  # the Synthesizer refuses to ask it of a point cloud
         points, pixels = view.points, self._prepared.options.depth_resolution
+        closed = occlusion == "depth" and self._prepared.closed
         if kernels_ready():
             for first, last in view.stretches():
                 place = view.places_m[first]
@@ -255,15 +256,7 @@ class VisibilityMasks:
                     exact_visibility_kernel(points, faces, place, needed, first, last, visible)
                 else:
                     depth_visibility_kernel(
-                        points,
-                        faces,
-                        self._prepared.closed,
-                        place,
-                        pixels,
-                        needed,
-                        first,
-                        last,
-                        visible,
+                        points, faces, closed, place, pixels, needed, first, last, visible
                     )
             return
         for t in np.flatnonzero(needed.any(axis=1)):
@@ -271,9 +264,7 @@ class VisibilityMasks:
             if occlusion == "exact":
                 seen = exact_plain.exact_visibility(points[t], faces, place, wanted)
             else:
-                seen = depth_plain.depth_visibility(
-                    points[t], faces, self._prepared.closed, place, pixels, wanted
-                )
+                seen = depth_plain.depth_visibility(points[t], faces, closed, place, pixels, wanted)
             visible[t][wanted] = seen[wanted]
 
 

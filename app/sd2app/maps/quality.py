@@ -33,7 +33,8 @@ of the time left to drawing."""
 AT_ONCE = 12_000_000
 """Vertices times frames that are swept roughly in one go: a few ms up to some 20 ms."""
 _BUDGET_BYTES = 256 << 20
-"""For prepared frames: twice a clip that is swept in one go. Of a longer one, what is in view."""
+"""For prepared frames: more than a clip takes that is swept in one go; of a longer one, what is in
+view."""
 _EXACT_PARTS = 16
 _KEPT = 3
 """Number of kept synthesizers: for the rest, for dragging, and the one before."""
