@@ -49,6 +49,20 @@ class Survey:
     cost_share: dict[float, float] = field(default_factory=lambda: {1.0: 1.0})
     """Cost of a share of the vertices, as a share of the cost of all."""
 
+    def try_kept_masks(self, progress: Progress = silent) -> None:
+        """Add the changes by masks that are kept while the sensor moves: only a drag asks."""
+        if self.base.visibility != "exact":
+            return
+        kept = [replace(self.base, mask_reuse_m=reach_m) for reach_m in MASK_REUSE_M]
+        runs = self.trial.sample.chosen_on
+        against = None
+        for done, plan in enumerate(kept):
+            progress(done, len(kept))
+            if plan not in self.change:
+                against = against or self.trial.columns(self.base, runs, progress=progress).twice()
+                found = self.trial.columns(plan, runs, progress=progress)
+                self.change[plan] = relative_l1(found.smooth, against.smooth)
+
     def forecast_error(self, plan: AccuracyPlan) -> float:
         """Sum of the errors of a plan's settings: more than their error together."""
         rate = _with(self.base, "frame_rate_factor", plan.frame_rate_factor)
@@ -112,11 +126,9 @@ def survey_scene(
     if options.range_exponent:
         single.append(replace(base, range_law="frame"))
     single.append(replace(base, beyond="drop"))
-    if surface:
-        single += [replace(base, mask_reuse_m=reach_m) for reach_m in MASK_REUSE_M]
     single = [plan for plan in single if plan != base]
     rates = [replace(base, frame_rate_factor=factor) for factor in FRAME_RATE_FACTORS]
-    total = len(single) + 2 * len(rates) + 2
+    total = len(single) + len(rates) + 3
     done = 0
 
     def step() -> None:
@@ -133,9 +145,10 @@ def survey_scene(
     survey = Survey(trial, base, scene_facts(trial, within))
     trial.load_kernels(within)
     step()
+    at_rate = {}
     for plan in rates:
-        found = trial.columns(plan, runs, progress=within)
-        survey.change[plan] = relative_l1(found.smooth, reference.smooth)
+        at_rate[plan] = trial.columns(plan, runs, progress=within)
+        survey.change[plan] = relative_l1(at_rate[plan].smooth, reference.smooth)
         step()
     # Counting alone, over many frames at once: it is too quick for a few. In turns, so that a
     # busy machine slows all alike; the first time prepares what only this plan needs.
@@ -148,13 +161,12 @@ def survey_scene(
         # More moments take longer, whatever a clock says of microseconds.
         survey.count_ms[more] = max(survey.count_ms[fewer], survey.count_ms[more])
     step()
-    against = trial.columns(base, runs, progress=within)
+    against = at_rate[base]
     quick_ms = survey.count_ms[base]
     survey.mask_ms[base] = max(against.milliseconds - quick_ms, 0.0)
     for plan in single:
         found = trial.columns(plan, runs, progress=within)
-        truth = against.twice() if plan.mask_reuse_m else against
-        survey.change[plan] = relative_l1(found.smooth, truth.smooth)
+        survey.change[plan] = relative_l1(found.smooth, against.smooth)
         survey.mask_ms[plan] = max(found.milliseconds - quick_ms, 0.0)
         if plan.vertices_kept < 1:
             # The first time prepares what only this mesh needs.
@@ -350,6 +362,8 @@ def _by_budget(
     survey: Survey, budget_ms: float, dragging: bool, progress: Progress
 ) -> tuple[AccuracyPlan, bool, Errors]:
     plans = _candidates(survey, _USUAL_TOLERANCE)
+    if dragging:
+        survey.try_kept_masks(progress)
     reach_m = _reach_m(survey) if dragging else None
     if reach_m is not None:
         plans += [

@@ -46,6 +46,9 @@ def synthesizer_for(
     return Synthesizer(counted, plan.options(options), blocks_of=like)
 
 
+_REFERENCE_FRAMES = 5
+"""At once: some 50 ms of a large mesh, so that a cancelled choice soon ends."""
+
 _ASIDE_M = 1e-12
 """Offset that changes no map, but makes another place, whose masks are computed again."""
 
@@ -115,17 +118,18 @@ class Trial:
         options = reference_plan("histogram", self.options.weight).options(self._unsmoothed)
         mesh = self._sampled(1.0)
 
-        def work(frame: int) -> NDArray[np.float64]:
-            return reference_stretch(mesh, self.sensor, options, frame, frame + 1)
+        def work(start: int, stop: int) -> NDArray[np.float64]:
+            return reference_stretch(mesh, self.sensor, options, start, stop)
 
         for run in runs:
             if run in self._references:
                 continue
-            frames = range(run.start, run.stop)
+            starts = range(run.start, run.stop, _REFERENCE_FRAMES)
+            stops = (min(start + _REFERENCE_FRAMES, run.stop) for start in starts)
             columns = []
-            for number, column in enumerate(workers().map(work, frames)):
+            for number, column in enumerate(workers().map(work, starts, stops)):
                 columns.append(column)
-                progress(number + 1, len(frames))
+                progress(number + 1, len(starts))
             raw = np.concatenate(columns, axis=1)
             self._references[run] = Columns(raw, self._smoothed(raw, run))
         return _joined([self._references[run] for run in runs])

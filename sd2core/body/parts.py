@@ -16,9 +16,6 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components, dijkstra
-from scipy.spatial import cKDTree
 
 from sd2core.body.limbs import LIMBS, vertex_limbs
 from sd2core.body.model import Body, Resolution, own_resolution
@@ -31,6 +28,8 @@ from sd2core.progress import Progress, silent
 from sd2core.sensor import VirtualSensor
 
 if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
+
     from sd2core.doppler import Synthesizer
 
 _PART_OF = {
@@ -116,6 +115,9 @@ def parts_by_shape(points_m: Floats, faces: NDArray[np.int32]) -> NDArray[np.uin
     ``points_m`` (V, 3) is in a right-handed frame, faces (F, 3) run counter-clockwise seen from
     outside. None if the surface has no body's shape.
     """
+    # Imported where a surface is searched: the bundled body's are not, and a window starts sooner.
+    from scipy.spatial import cKDTree
+
     surface = _Surface.of(points_m, faces)
     if surface is None:
         return None
@@ -155,6 +157,9 @@ class _Surface:
     @classmethod
     def of(cls, points_m: Floats, faces: NDArray[np.int32]) -> _Surface | None:
         """None if the surface is in pieces, or its points are not finite."""
+        from scipy.sparse import csr_array
+        from scipy.sparse.csgraph import connected_components, dijkstra
+
         ends = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
         ends = np.unique(np.sort(ends, axis=1), axis=0)
         lengths_m = np.linalg.norm(points_m[ends[:, 0]] - points_m[ends[:, 1]], axis=1)
@@ -208,6 +213,8 @@ class _Template(NamedTuple):
 
 @lru_cache(maxsize=1)
 def _template() -> _Template:
+    from scipy.spatial import cKDTree
+
     body = Body.load("medium")
     surface = _Surface.of(body.vertices_m, body.faces)
     assert surface is not None

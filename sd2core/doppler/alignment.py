@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d
 
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
@@ -174,6 +173,8 @@ def _best_of(offsets_s: Floats, evidence: Floats, moments: Floats, longest: floa
 
 def _series(doppler: DopplerMap) -> tuple[Floats, float]:
     """Mean velocity and motion in even steps, (2, N), smoothed; and the start."""
+    from scipy.ndimage import gaussian_filter1d
+
     values = doppler.values.astype(np.float64)
     if doppler.present is not None:
         values *= doppler.present

@@ -61,13 +61,14 @@ class FrameCounts:
         place = self.prepared.sensor(position_m)
         totals[:] = self.totals(block, rows)
         pairs = self.prepared.moving(block, self.counting)
-        if pairs is not None and np.isfinite(place.astype(pairs.middle.dtype) ** 2).all():
+        if pairs is not None and np.isfinite(place.astype(pairs.places.dtype) ** 2).all():
             quality = self._count_moving(
                 pairs, block, rows, position_m, visibility, into, parts, shares
             )
             if self.options.range_law == "frame":
                 into.histogram[:] *= self.frame_law(block, rows, position_m)[:, None, None]
             return quality
+        block = self.prepared.whole(block)
         scatterers, quality = self.scatterers(block, rows, position_m, visibility)
         scatterers = replace(scatterers, parts=parts)
         frames = block.frames.rows(rows)

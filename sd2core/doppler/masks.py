@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Hashable
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -18,7 +17,7 @@ from sd2core.numerics.compiled import kernels_ready
 from sd2core.scattering import depth_plain, exact_plain
 from sd2core.scattering.depth import depth_visibility_kernel
 from sd2core.scattering.exact import exact_visibility_kernel
-from sd2core.scattering.visibility import encloses, facing_kernel, facing_mask
+from sd2core.scattering.visibility import facing_kernel, facing_mask
 
 Visibility = Literal["none", "facing", "depth", "exact", "frozen"]
 """``frozen``: depth or exact visibility of the nearest place that is kept, while dragging."""
@@ -64,11 +63,6 @@ class VisibilityMasks:
         self._stride = prepared.options.mask_stride
         # Newest first, per block.
         self._kept_at: dict[int, tuple[tuple[Occlusion, Position], ...]] = {}
-
-    @cached_property
-    def _closed(self) -> bool:
-        """True if the mesh is a closed surface; computed when a depth buffer first needs it."""
-        return self._prepared.faces is not None and encloses(self._prepared.faces)
 
     def for_rows(
         self, block: Block, rows: slice, position_m: Position, visibility: Visibility
@@ -254,6 +248,7 @@ class VisibilityMasks:
         faces = self._prepared.faces
         assert faces is not None  # the Synthesizer refuses to ask it of a point cloud
         points, pixels = view.points, self._prepared.options.depth_resolution
+        closed = occlusion == "depth" and self._prepared.closed
         if kernels_ready():
             for first, last in view.stretches():
                 place = view.places_m[first]
@@ -261,7 +256,7 @@ class VisibilityMasks:
                     exact_visibility_kernel(points, faces, place, needed, first, last, visible)
                 else:
                     depth_visibility_kernel(
-                        points, faces, self._closed, place, pixels, needed, first, last, visible
+                        points, faces, closed, place, pixels, needed, first, last, visible
                     )
             return
         for t in np.flatnonzero(needed.any(axis=1)):
@@ -269,9 +264,7 @@ class VisibilityMasks:
             if occlusion == "exact":
                 seen = exact_plain.exact_visibility(points[t], faces, place, wanted)
             else:
-                seen = depth_plain.depth_visibility(
-                    points[t], faces, self._closed, place, pixels, wanted
-                )
+                seen = depth_plain.depth_visibility(points[t], faces, closed, place, pixels, wanted)
             visible[t][wanted] = seen[wanted]
 
 

@@ -30,6 +30,7 @@ from sd2core.doppler.moving_kernels import (
     add_moving_kernel,
     facing_counts_kernel,
     moving_kernel,
+    places_kernel,
 )
 
 _LARGEST_SHARE = 0.33
@@ -58,16 +59,15 @@ class MovingPairs:
 
     vertex: NDArray[np.int32]  # (N,), ascending within a frame
     first: NDArray[np.int64]  # (n + 1,): number of the first pair of every frame
-    middle: NDArray[Any]  # (3, N): place in the middle of the frame
-    before: NDArray[Any]  # (samples, 3, N): places between which each velocity is measured
-    after: NDArray[Any]
+    places: NDArray[Any]
+    """Frame after frame, so that memory is read from front to back: x, y and z of its n pairs in
+    the middle of the frame, then before and after each velocity sample, (1 + 2 samples, 3, n)."""
     vertices: int  # V
 
     @property
     def nbytes(self) -> int:
         """Size in memory."""
-        arrays = self.vertex, self.first, self.middle, self.before, self.after
-        return sum(one.nbytes for one in arrays)
+        return self.vertex.nbytes + self.first.nbytes + self.places.nbytes
 
     def of(self, values: NDArray[Any]) -> NDArray[Any]:
         """Values of the pairs, (..., N), of what (n, ..., V) all vertices have."""
@@ -96,18 +96,13 @@ def find_moving(frames: Frames, counting: Counting, still: float) -> MovingPairs
         return None
     frame, vertex = np.nonzero(marks)
 
-    def places(knots: NDArray[np.int64]) -> NDArray[Any]:
-        return np.ascontiguousarray(frames.positions[knots[frame], :, vertex].T)
-
-    samples = range(frames.before.shape[1])
-    return MovingPairs(
-        vertex.astype(np.int32),
-        np.searchsorted(frame, np.arange(len(frames) + 1)),
-        places(frames.centre),
-        np.stack([places(frames.before[:, sample]) for sample in samples]),
-        np.stack([places(frames.after[:, sample]) for sample in samples]),
-        vertices,
+    first = np.searchsorted(frame, np.arange(len(frames) + 1))
+    number = vertex.astype(np.int32)
+    places = np.empty((1 + 2 * frames.before.shape[1]) * 3 * len(vertex), precision)
+    places_kernel(
+        frames.positions, frames.centre, frames.before, frames.after, number, first, places
     )
+    return MovingPairs(number, first, places, vertices)
 
 
 def count_moving(
@@ -128,13 +123,11 @@ def count_moving(
     vectors, heads, parts = scatterers.area_vectors, scatterers.vertex_counts, scatterers.parts
     which = MASK if mask is not None else FACING if normals is not None else ALL
     weighting = PROJECTED if vectors is not None else AREA if areas is not None else HEADS
-    precision = pairs.middle.dtype
+    precision = pairs.places.dtype
     add_moving_kernel(
         pairs.vertex,
         pairs.first[rows.start : rows.stop + 1],
-        pairs.middle,
-        pairs.before,
-        pairs.after,
+        pairs.places,
         counting.scale(duration_s, precision),
         _NO_NORMALS if normals is None else normals,
         _NO_MASK if mask is None else mask,

@@ -43,34 +43,60 @@ def moving_kernel(positions, before, after, limit_m, marks):  # type: ignore[no-
 
 
 @compiled
-def _add(slot, weight, table, base, sums):  # type: ignore[no-untyped-def]
+def places_kernel(positions, centre, before, after, vertex, first, places):  # type: ignore[no-untyped-def]
+    """Write the places of the pairs as :class:`sd2core.doppler.moving.MovingPairs` has them."""
+    at = 0
+    for t in range(centre.shape[0]):
+        for knot_number in range(1 + 2 * before.shape[1]):
+            knot = centre[t]
+            if knot_number > 0:
+                sample = (knot_number - 1) // 2
+                knot = before[t, sample] if knot_number % 2 == 1 else after[t, sample]
+            for axis in range(3):
+                for p in range(first[t], first[t + 1]):
+                    places[at] = positions[knot, axis, vertex[p]]
+                    at += 1
+
+
+@compiled
+def _add(slot, weight, row, sums):  # type: ignore[no-untyped-def]
     for i in range(slot.shape[0]):
-        sums[table[i], base[i] + slot[i]] += np.float64(weight[i])
+        sums[row[i] + np.int32(slot[i])] += np.float64(weight[i])
+
+
+@compiled
+def _total(sums, total):  # type: ignore[no-untyped-def]
+    """Sum of the tables, each place in the order of the tables."""
+    total[:] = 0
+    for table in range(TABLES):
+        first = table * total.shape[0]
+        for place in range(total.shape[0]):
+            total[place] += sums[first + place]
 
 
 @compiled
 def add_moving_kernel(  # type: ignore[no-untyped-def]
-    vertex, first, middle, before, after, scale, normals, mask, areas, vectors, heads, part,
+    vertex, first, places, scale, normals, mask, areas, vectors, heads, part,
     vertices, sensor, which, weighting, bins, beyond, exponent, reference, histogram, outside,
 ):  # fmt: skip
     """Count pairs as :func:`sd2core.doppler.kernels.count_kernel` counts all vertices.
 
     Each goes to the table that it has there, run by run, so that the sums have the same order.
     """
-    samples = before.shape[0]
+    samples = scale.shape[1]
     sx, sy, sz = sensor[0], sensor[1], sensor[2]
     offset, distance = np.float32(0.5 * bins), distance_of(sensor)
-    f = np.empty(RUN, middle.dtype)
-    near, far = np.empty(RUN, middle.dtype), np.empty(RUN, middle.dtype)
+    f = np.empty(RUN, places.dtype)
+    near, far = np.empty(RUN, places.dtype), np.empty(RUN, places.dtype)
     weight, spare = np.ones(RUN, np.float32), np.empty(RUN, np.float32)
     own, seen = np.ones(RUN, np.float32), np.ones(RUN, np.uint8)
-    slot, table = np.empty(RUN, np.uint8), np.empty(RUN, np.int64)
-    base = np.zeros(RUN, np.int32)
+    slot, row = np.empty(RUN, np.uint8), np.empty(RUN, np.int32)
     parts, width = histogram.shape[1], bins + 2
-    sums = np.zeros((TABLES, parts * width), np.float64)
+    sums, total = np.zeros(TABLES * parts * width), np.empty(parts * width)
+    slots = np.int32(parts * width)
     split, grouped = part.shape[0] > 0, heads.shape[0] > 0
     weighted = weighting != HEADS or grouped
-    whole = vertices // TABLES * TABLES
+    whole = np.int32(vertices // TABLES * TABLES)
     for t in range(first.shape[0] - 1):
         sums[:] = 0
         outside_count = np.int64(0)
@@ -79,20 +105,25 @@ def add_moving_kernel(  # type: ignore[no-untyped-def]
             if scale[t, sample] > 0:
                 measured += 1
         measured = max(measured, 1)
-        p = first[t]
+        p, pairs = first[t], first[t + 1] - first[t]
+        stretch = 3 * (1 + 2 * samples)
+        here = places[stretch * first[t] : stretch * first[t + 1]].reshape((stretch, pairs))
         while p < first[t + 1]:
             end = (vertex[p] // RUN + 1) * RUN
-            q = p
-            while q < first[t + 1] and vertex[q] < end:
-                q += 1
+            q = first[t + 1]
+            if vertex[q - 1] >= end:
+                q = p
+                while vertex[q] < end:
+                    q += 1
             n = q - p
-            x, y, z = middle[0, p:q], middle[1, p:q], middle[2, p:q]
+            i0, i1 = p - first[t], q - first[t]
+            x, y, z = here[0, i0:i1], here[1, i0:i1], here[2, i0:i1]
             for i in range(n):
                 v = vertex[p + i]
-                table[i] = v % TABLES if v < whole else 0
+                row[i] = (v & np.int32(TABLES - 1)) * slots if v < whole else np.int32(0)
             if split:
                 for i in range(n):
-                    base[i] = np.int32(part[vertex[p + i]]) * np.int32(width)
+                    row[i] += np.int32(part[vertex[p + i]]) * np.int32(width)
             if which == FACING:
                 facing_kernel(
                     x, y, z, normals[0, p:q], normals[1, p:q], normals[2, p:q],
@@ -129,23 +160,25 @@ def add_moving_kernel(  # type: ignore[no-untyped-def]
             for sample in range(samples):
                 if scale[t, sample] <= 0:
                     continue
-                a, b = before[sample], after[sample]
-                relative_ranges(a[0, p:q], a[1, p:q], a[2, p:q], sx, sy, sz, distance, near[:n])
-                relative_ranges(b[0, p:q], b[1, p:q], b[2, p:q], sx, sy, sz, distance, far[:n])
+                a, b = here[3 + 6 * sample :], here[6 + 6 * sample :]
+                relative_ranges(
+                    a[0, i0:i1], a[1, i0:i1], a[2, i0:i1], sx, sy, sz, distance, near[:n]
+                )
+                relative_ranges(
+                    b[0, i0:i1], b[1, i0:i1], b[2, i0:i1], sx, sy, sz, distance, far[:n]
+                )
                 axis_positions(near[:n], far[:n], scale[t, sample], offset, f[:n])
                 if grouped:
                     outside_count += heads_beyond(f[:n], seen[:n], own[:n], bins)
                     slots_of(f[:n], seen[:n], bins, beyond, slot[:n])
                 else:
                     outside_count += slots_of(f[:n], seen[:n], bins, beyond, slot[:n])
-                _add(slot[:n], weight[:n], table[:n], base[:n], sums)
+                _add(slot[:n], weight[:n], row[:n], sums)
             p = q
+        _total(sums, total)
         for number in range(parts):
             for bin_number in range(bins):
-                total, place = 0.0, number * width + bin_number
-                for which_table in range(TABLES):
-                    total += sums[which_table, place]
-                histogram[t, number, bin_number] = total / measured
+                histogram[t, number, bin_number] = total[number * width + bin_number] / measured
         outside[t] = outside_count / measured
 
 
@@ -175,10 +208,11 @@ def compile_kernels() -> None:
     vectors, heads = np.ones((3, 4), np.float32), np.ones(4, np.float32)
     vertex, part = np.arange(4, dtype=np.int32), np.zeros(4, np.uint8)
     for precision in (np.float32, np.float64):
-        moving_kernel(np.ones((1, 3, 4), precision), knots, knots, np.ones((1, 1)), marks)
+        positions = np.ones((1, 3, 4), precision)
+        moving_kernel(positions, knots, knots, np.ones((1, 1)), marks)
+        places_kernel(positions, knots[0], knots, knots, vertex, first, np.empty(36, precision))
         add_moving_kernel(
-            vertex, first, np.ones((3, 4), precision), np.ones((1, 3, 4), precision),
-            np.ones((1, 3, 4), precision), np.ones((1, 1), precision), normals,
+            vertex, first, np.ones(36, precision), np.ones((1, 1), precision), normals,
             np.zeros((1, 4), np.uint8), heads, vectors, heads, part, 4,
             np.zeros(3, precision), ALL, HEADS, 32, DROP, 4.0, np.float32(2.2),
             np.zeros((1, 1, 32)), np.zeros(1),

@@ -6,7 +6,7 @@ import copy
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -145,6 +145,13 @@ class PreparedMesh:
         return other
 
     @property
+    def closed(self) -> bool:
+        """True if the mesh is a closed surface; computed when a depth buffer first needs it."""
+        faces = self._faces()
+        closed: bool = self.budget.get_or_make("closed", lambda: (visibility.encloses(faces), 0))
+        return closed
+
+    @property
     def block_count(self) -> int:
         """Number of blocks in the clip."""
         return -(-self.mesh.frame_count // self.block_frames)
@@ -159,8 +166,8 @@ class PreparedMesh:
         return start, min(start + self.block_frames, self.mesh.frame_count)
 
     def has(self, index: int) -> bool:
-        """True if a block is in memory."""
-        return self.budget.get(("block", index)) is not None
+        """True if a block is in memory, or what moves of it."""
+        return self.pairs_moving(index) is not None or self.budget.get(("block", index)) is not None
 
     def block(self, index: int) -> Block:
         """Prepared positions, from memory or read now."""
@@ -171,6 +178,30 @@ class PreparedMesh:
 
         block: Block = self.budget.get_or_make(("block", index), make)
         return block
+
+    def light(self, index: int, counting: Counting) -> Block | None:
+        """Block without positions, where counting what moves needs a fraction of them only.
+
+        Everything that is asked of it besides is made of positions that are read again.
+        """
+
+        def make() -> tuple[tuple[Block | None], int]:
+            whole: Block = self.budget.get(("block", index)) or self._prepare(index)
+            pairs = self.moving(whole, counting)
+            if pairs is None:
+                self.budget.put(("block", index), whole, whole.frames.positions.nbytes)
+                return (None,), 0
+            if self.faces is not None:
+                self.moving_normals(whole, pairs)
+            frames = replace(whole.frames, positions=whole.frames.positions[:0].copy())
+            return (replace(whole, frames=frames),), 0
+
+        kept: tuple[Block | None] = self.budget.get_or_make(self._moving_key("light", index), make)
+        return kept[0]
+
+    def whole(self, block: Block) -> Block:
+        """Block with its positions."""
+        return block if len(block.frames.positions) else self.block(block.index)
 
     def normals(self, block: Block) -> NDArray[np.int8]:
         """Vertex normals of a block's frames, int8 (n, 3, V)."""
@@ -203,25 +234,33 @@ class PreparedMesh:
             return None
 
         def make() -> tuple[tuple[MovingPairs | None], int]:
-            found = find_moving(block.frames, counting, still)
+            found = find_moving(self.whole(block).frames, counting, still)
             return (found,), 0 if found is None else found.nbytes
 
-        # Blocks are shared by options with the same bin width.
-        kept = self.budget.get_or_make(("moving", still, block.index), make)
+        kept = self.budget.get_or_make(self._moving_key("pairs", block.index), make)
         pairs: MovingPairs | None = kept[0]
         return pairs
 
+    def pairs_moving(self, index: int) -> int | None:
+        """Number of moving pairs of a block; None where that is not known yet, or all count."""
+        kept = self.budget.get(self._moving_key("pairs", index))
+        return None if kept is None or kept[0] is None else len(kept[0].vertex)
+
+    def _moving_key(self, what: str, index: int) -> Hashable:
+        # Blocks are shared by options with the same bin width.
+        return what, "moving", self.options.axis.bins, self.options.null_bins, index
+
     def moving_normals(self, block: Block, pairs: MovingPairs) -> NDArray[np.int8]:
         """Normals of the moving pairs of a block, int8 (3, N)."""
-        return self._of_pairs("normals", block, pairs, self.normals)
+        return self._of_pairs("normals", block, pairs, self._normals)
 
     def moving_areas(self, block: Block, pairs: MovingPairs) -> NDArray[np.float32]:
         """Areas of the moving pairs of a block in m², float32 (N,)."""
-        return self._of_pairs("areas", block, pairs, self.areas)
+        return self._of_pairs("areas", block, pairs, self._areas)
 
     def moving_area_vectors(self, block: Block, pairs: MovingPairs) -> NDArray[np.float32]:
         """Area vectors of the moving pairs of a block in m², float32 (3, N)."""
-        return self._of_pairs("area vectors", block, pairs, self.area_vectors)
+        return self._of_pairs("area vectors", block, pairs, self._area_vectors)
 
     def _of_pairs(
         self,
@@ -231,11 +270,11 @@ class PreparedMesh:
         every: Callable[[Block], NDArray[Any]],
     ) -> NDArray[Any]:
         def make() -> tuple[NDArray[Any], int]:
-            made = pairs.of(every(block))
+            known = self.budget.get((what, block.index))
+            made = pairs.of(every(self.whole(block)) if known is None else known)
             return made, made.nbytes
 
-        still = still_bins(self.options.axis.bins, self.options.null_bins)
-        kept: NDArray[Any] = self.budget.get_or_make((f"moving {what}", still, block.index), make)
+        kept: NDArray[Any] = self.budget.get_or_make(self._moving_key(what, block.index), make)
         return kept
 
     def velocities_vid2doppler(
@@ -257,7 +296,7 @@ class PreparedMesh:
         """Derived array of a block, from memory or computed now."""
 
         def sized() -> tuple[NDArray[Any], int]:
-            made = make(block)
+            made = make(self.whole(block))
             return made, made.nbytes
 
         kept: NDArray[Any] = self.budget.get_or_make((what, block.index), sized)

@@ -7,6 +7,8 @@ visibility, which decides in double precision.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -42,16 +44,16 @@ def reference_stretch(
     middle = 0.5 * (first.min(axis=0) + first.max(axis=0))
     middle = middle.astype(mesh.vertices.dtype).astype(np.float64)
     raw = np.zeros((options.axis.bins, stop - start))
-    for column, frame in enumerate(range(start, stop)):
-        velocities, points = _at_frame(mesh, place, options, frame)
+    for column, (velocities, points) in enumerate(_at_frames(mesh, place, options, start, stop)):
         weight, total = _weights(mesh, options, points, place)
         if total == 0 or not len(velocities):
             continue
         weight = weight * _range_law(mesh, options, points, place)
-        weight = weight * _visible(mesh, points, place, middle)
+        seen = _visible(mesh, points, place, middle)
+        weight = weight[seen]
         edges_mps = options.axis.edges_mps
         for velocity in velocities:
-            folded = _on_axis(velocity, edges_mps, options)
+            folded = _on_axis(velocity[seen], edges_mps, options)
             ends_mps = float(edges_mps[0]), float(edges_mps[-1])
             raw[:, column] += np.histogram(folded, options.axis.bins, ends_mps, weights=weight)[0]
         raw[:, column] /= len(velocities) * total
@@ -67,38 +69,48 @@ def reference_velocities(
     Shape (moments, V), m/s, positive when approaching; only moments that lie within the
     clip.
     """
-    return _at_frame(mesh, np.asarray(sensor.position_m, np.float64), options, frame)[0]
+    place = np.asarray(sensor.position_m, np.float64)
+    return next(_at_frames(mesh, place, options, frame, frame + 1))[0]
 
 
-def _at_frame(
-    mesh: MeshSequence, place: NDArray[np.float64], options: SynthesisOptions, frame: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Velocities (moments, V) and positions (3, V) of one frame."""
+def _at_frames(
+    mesh: MeshSequence,
+    place: NDArray[np.float64],
+    options: SynthesisOptions,
+    start: int,
+    stop: int,
+) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """Yield velocities (moments, V) and positions (3, V), frame by frame."""
     every = options.oversampling
     trajectory = Trajectory(mesh.times_s, every, options.trajectory_smoothing_s, mesh.presence)
-    centre_knot = np.array([frame * every])
-    between = moments(trajectory.knot_times_s, centre_knot, every, mesh.presence)
-    before, after = between.before[0], between.after[0]
-    low, high = int(before.min()), int(after.max()) + 1
+    centre = np.arange(start, stop) * every
+    between = moments(trajectory.knot_times_s, centre, every, mesh.presence)
+    low, high = int(between.before.min()), int(between.after.max()) + 1
     if options.velocity == "vid2doppler":
-        low = max(frame - vid2doppler.REACH_BEFORE, 0)
-        high = min(frame + vid2doppler.REACH_AFTER + 1, mesh.frame_count)
+        low = max(start - vid2doppler.REACH_BEFORE, 0)
+        high = min(stop + vid2doppler.REACH_AFTER, mesh.frame_count)
     first, last = trajectory.frames_needed(low, high)
     knots = trajectory.knots(mesh.read(first, last).astype(np.float64), first, low, high)
     points = np.ascontiguousarray(knots.transpose(0, 2, 1))
-    centre = points[frame * every - low]
-    if options.velocity == "vid2doppler" and between.duration_s.any():
-        frames, rate = mesh.frame_count, mesh.timebase.frames_per_s
-        theirs = vid2doppler.velocities(
-            points, low, frame, frame + 1, frames, place, rate, mesh.presence
-        )
-        return theirs, centre
-    found = [
-        radial_velocity(points[one - low], points[two - low], place, duration_s)
-        for one, two, duration_s in zip(before, after, between.duration_s[0], strict=True)
-        if duration_s > 0
-    ]
-    return np.array(found).reshape(-1, mesh.vertex_count), centre
+    for row, frame in enumerate(range(start, stop)):
+        moments_s = between.duration_s[row]
+        if options.velocity == "vid2doppler" and moments_s.any():
+            frames, rate = mesh.frame_count, mesh.timebase.frames_per_s
+            yield (
+                vid2doppler.velocities(
+                    points, low, frame, frame + 1, frames, place, rate, mesh.presence
+                ),
+                points[centre[row] - low],
+            )
+            continue
+        found = [
+            radial_velocity(points[one - low], points[two - low], place, duration_s)
+            for one, two, duration_s in zip(
+                between.before[row], between.after[row], moments_s, strict=True
+            )
+            if duration_s > 0
+        ]
+        yield np.array(found).reshape(-1, mesh.vertex_count), points[centre[row] - low]
 
 
 def _range_law(

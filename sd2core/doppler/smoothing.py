@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import deque
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,9 +47,14 @@ def velocity_kernel(bins: int, sigma_bins: float) -> NDArray[np.float64]:
     """Smoothing matrix along velocity, (bins, bins), reflecting at the axis's ends."""
     kernel: NDArray[np.float64] = np.eye(bins)
     if sigma_bins > 0:
-        from scipy.ndimage import gaussian_filter1d
-
-        kernel = gaussian_filter1d(kernel, sigma_bins, axis=0)
+        reach = int(_REACH * sigma_bins + 0.5)
+        bell = np.exp(-0.5 / (sigma_bins * sigma_bins) * np.arange(-reach, reach + 1) ** 2)
+        bell /= bell.sum()
+        around = np.pad(kernel, ((reach, reach), (0, 0)), "symmetric")
+        kernel *= bell[reach]
+        for away in range(reach, 0, -1):
+            sides = around[reach - away :][:bins] + around[reach + away :][:bins]
+            kernel += bell[reach + away] * sides
     kernel.flags.writeable = False
     return kernel
 
@@ -79,19 +86,55 @@ def smooth_time(
     ``first`` on. Times and presence are of all frames, so that the result does not depend
     on how a recording is cut; the mean does not cross frames without a person.
     """
-    frames = np.arange(start, stop)
     if sigma_s == 0:
-        return values[..., frames - first]
-    last = first + values.shape[-1]
+        return values[..., start - first : stop - first].copy()
+    clock = _Clock(times_s, first, first + values.shape[-1], start, stop, sigma_s, presence)
+    neighbours, weights = _bells(clock)
+    total = np.zeros((*values.shape[:-1], stop - start))
+    occupied = values.any(axis=-1)
+    some, sums = values[occupied], total[occupied]
+    for inside, from_frame, bell in neighbours:
+        sums[..., inside] += bell * some[..., from_frame : from_frame + len(bell)]
+    sums /= weights
+    total[occupied] = sums
+    return total
+
+
+class _Clock(NamedTuple):
+    """What the Gaussian on time depends on besides the map."""
+
+    times_s: NDArray[np.float64]
+    first: int
+    last: int
+    start: int
+    stop: int
+    sigma_s: float
+    presence: Presence | None
+
+
+_Bells = tuple[list[tuple[slice, int, NDArray[np.float64]]], NDArray[np.float64]]
+
+_known: deque[tuple[_Clock, _Bells]] = deque(maxlen=4)
+"""Of the newest clocks: while a sensor is dragged it stays the same."""
+
+
+def _bells(clock: _Clock) -> _Bells:
+    """Weights of the neighbours of frames, offset by offset, and their sums (n,).
+
+    Each with the frames whose neighbours they are, and the first of these in the map.
+    """
+    times_s, first, last, start, stop, sigma_s, presence = clock
+    for other, bells in tuple(_known):
+        same_clip = other.times_s is times_s and other.presence is presence
+        if same_clip and other[1:-1] == clock[1:-1]:
+            return bells
+    frames = np.arange(start, stop)
     centres = times_s[frames]
     reach = _REACH * sigma_s + _SLACK_S
     slack = reach + _SLACK_S
     before = int((frames - np.searchsorted(times_s, centres - slack)).max())
     after = int((np.searchsorted(times_s, centres + slack, side="right") - frames).max())
-    total = np.zeros((*values.shape[:-1], len(frames)))
-    weights = np.zeros(len(frames))
-    occupied = values.any(axis=-1)
-    some, sums = values[occupied], total[occupied]
+    neighbours, weights = [], np.zeros(len(frames))
     for offset in range(-before, after):
         inside = slice(max(0, first - start - offset), min(len(frames), last - start - offset))
         neighbour = frames[inside] + offset
@@ -100,8 +143,7 @@ def smooth_time(
         bell[np.abs(distance) > reach] = 0
         if presence is not None and not presence.whole:
             bell[presence.first[neighbour] != presence.first[frames[inside]]] = 0
-        begin = inside.start + start + offset - first
-        sums[..., inside] += bell * some[..., begin : begin + len(bell)]
+        neighbours.append((inside, inside.start + start + offset - first, bell))
         weights[inside] += bell
-    total[occupied] = sums / weights
-    return total
+    _known.append((clock, (neighbours, weights)))
+    return neighbours, weights

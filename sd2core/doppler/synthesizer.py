@@ -15,7 +15,7 @@ from sd2core.doppler.frame_counts import FrameCounts
 from sd2core.doppler.histogram import Counts
 from sd2core.doppler.masks import Occlusion, Quality, Visibility
 from sd2core.doppler.options import PRESETS, SynthesisOptions
-from sd2core.doppler.parallel import Ticket, run_jobs
+from sd2core.doppler.parallel import Ticket, run_jobs, run_light_jobs
 from sd2core.doppler.prepared import Block, ByteBudget, PreparedMesh
 from sd2core.doppler.smoothing import frames_within_reach, smooth
 from sd2core.errors import Sd2Error
@@ -96,8 +96,10 @@ def map_notes(prepared: PreparedMesh, sensor: VirtualSensor, start: int, stop: i
 
 _MEMORY_BUDGET_BYTES = 512 << 20
 _FAST_FRAMES = 64
-_EXACT_FRAMES = 4
-_EXACT_JOB_FRAMES = 8
+_EXACT_VERTICES = 60_000
+"""Vertices times frames whose occlusion is found at once, in a few ms: then a cancel is obeyed."""
+_LIGHT_PAIRS = 500_000
+"""Moving vertices, frames together, that are counted about as soon as other threads wake."""
 
 
 class Synthesizer:
@@ -474,12 +476,17 @@ class Synthesizer:
         totals = np.empty(stop - start)
         qualities: set[Quality] = set()
         quick = visibility not in ("depth", "exact") and kernels_ready()
+        at_once = max(_EXACT_VERTICES // self.mesh.vertex_count, 1) if kernels_ready() else 1
 
         def job(index: int, low: int, high: int) -> Callable[[Ticket], None]:
             def work(ticket: Ticket) -> None:
-                step = _FAST_FRAMES if quick else _EXACT_FRAMES
+                step = high - low if quick else at_once
                 ticket.advance(0)
-                block = self.prepared.block(index)
+                block = None
+                if quick and not shares:
+                    block = self.prepared.light(index, self._frames.counting)
+                if block is None:
+                    block = self.prepared.block(index)
                 for first in range(low, high, step):
                     last = min(first + step, high)
                     rows = slice(first - block.start, last - block.start)
@@ -501,13 +508,20 @@ class Synthesizer:
             return work
 
         jobs = []
-        for index, low, high in self._frames.blocks_between(start, stop):
+        blocks = self._frames.blocks_between(start, stop)
+        pairs = [self.prepared.pairs_moving(index) for index, *_ in blocks]
+        light = quick and None not in pairs and sum(pair or 0 for pair in pairs) <= _LIGHT_PAIRS
+        for index, low, high in blocks:
             # A block that must be read first is one job: its readers would wait.
-            size = _FAST_FRAMES if quick else _EXACT_JOB_FRAMES
+            size = _FAST_FRAMES if quick else 2 * at_once
+            size = max(size, (stop - start) // 2) if light else size
             pieces = -(-(high - low) // size) if self.prepared.has(index) else 1
             cuts = np.linspace(low, high, pieces + 1).astype(int).tolist()
             jobs += [job(index, a, b) for a, b in pairwise(cuts)]
-        processor_s = run_jobs(jobs, stop - start, progress, self._threads)
+        if light and self._threads is None:
+            processor_s = run_light_jobs(jobs, stop - start, progress)
+        else:
+            processor_s = run_jobs(jobs, stop - start, progress, self._threads)
         if visibility == "frozen":
             quality: Quality = "frozen" if qualities == {"frozen"} else "facing"
         else:

@@ -12,7 +12,6 @@ from functools import cache, cached_property
 from typing import Literal, get_args
 
 import numpy as np
-import scipy.fft
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
@@ -112,6 +111,8 @@ class FrameChain:
 
         The signal, without clutter, is overwritten.
         """
+        import scipy.fft
+
         signal *= self._fast
         profiles = scipy.fft.rfft(signal, axis=3)[..., self.gates] * self._slow
         spectra: NDArray[np.complex64] = scipy.fft.fft(profiles, n=self.doppler_bins, axis=2)

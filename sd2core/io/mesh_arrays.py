@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+import threading
 import zipfile
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -40,6 +41,8 @@ SMALL_NAMES = (
 
 _CHUNK_BYTES = 2 * 2**20
 _LARGEST_CHUNK_BYTES = 64 * 2**20
+_KEPT_BYTES = 32 * 2**20
+"""Chunks that were read last: all of a short clip, which several threads read at once."""
 _FORMAT = "sd2-mesh"
 
 
@@ -65,7 +68,8 @@ class StoredVertices:
     def __init__(self, array: Any, source: str) -> None:
         self._array = array
         self._source = source
-        self._last: tuple[int, NDArray[Any]] | None = None  # chunk number, its frames
+        self._kept: dict[int, NDArray[Any]] = {}  # frames by chunk number, newest last
+        self._reading = threading.Lock()
         self.scale = 1.0
         self.shift_m = np.zeros(3, np.float32)
         self.shape: tuple[int, ...] = tuple(array.shape)
@@ -122,13 +126,19 @@ class StoredVertices:
         return part
 
     def _chunk(self, number: int) -> NDArray[Any]:
-        """One chunk; the last one is kept, because frames are played one by one."""
-        kept = self._last
-        if kept is None or kept[0] != number:
-            step = self.frames_per_chunk
-            kept = (number, self._read(slice(number * step, (number + 1) * step)))
-            self._last = kept
-        return kept[1]
+        """One chunk; the last ones are kept, because frames are played one by one."""
+        kept = self._kept.get(number)
+        if kept is not None:
+            return kept
+        with self._reading:
+            chunk = self._kept.get(number)
+            if chunk is None:
+                step = self.frames_per_chunk
+                chunk = self._read(slice(number * step, (number + 1) * step))
+                while self._kept and (len(self._kept) + 1) * self.chunk_bytes > _KEPT_BYTES:
+                    del self._kept[next(iter(self._kept))]
+                self._kept[number] = chunk
+        return chunk
 
     def _read(self, key: Any) -> NDArray[Any]:
         try:

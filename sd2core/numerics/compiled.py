@@ -45,6 +45,7 @@ KERNEL_MODULES = (
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 _MARKER = "complete"
+_LOW_PRIORITY = "--low-priority"
 _lock = threading.Lock()
 _ready = False
 _background: subprocess.Popen[bytes] | None = None
@@ -151,21 +152,31 @@ def kernels_ready() -> bool:
 def warm_up(progress: Progress = silent) -> None:
     """Compile every kernel that is not on disk yet (about half a minute the first time)."""
     global _ready
+    directory = cache_directory()
     for done, name in enumerate(KERNEL_MODULES):
         progress(done, len(KERNEL_MODULES))
         importlib.import_module(name).compile_kernels()
-    directory = cache_directory()
+        if directory is not None:
+            (directory / name).touch()
     if directory is not None:
         (directory / _MARKER).touch()
     _ready = True
     progress(len(KERNEL_MODULES), len(KERNEL_MODULES))
 
 
-def compile_in_background() -> subprocess.Popen[bytes] | None:
-    """Start compiling in another process, at low priority; None if it is done or impossible.
+def modules_compiled() -> tuple[int, int]:
+    """Number of modules whose machine code is on disk, and of all."""
+    directory = cache_directory()
+    there = [name for name in KERNEL_MODULES if directory and (directory / name).exists()]
+    return len(there), len(KERNEL_MODULES)
+
+
+def compile_in_background(*, awaited: bool = False) -> subprocess.Popen[bytes] | None:
+    """Start compiling in another process; None if it is done or impossible.
 
     A process, because the compiler holds the GIL: in a thread it would freeze
-    the window. After a failure it is not started again.
+    the window. At low priority unless it is ``awaited``: on a busy machine it would never end.
+    After a failure it is not started again.
     """
     global _background
     with _lock:
@@ -173,6 +184,7 @@ def compile_in_background() -> subprocess.Popen[bytes] | None:
         if kernels_ready() or directory is None:
             return None
         if _background is None:
+            options = [] if awaited else [_LOW_PRIORITY]
             paths = [str(_PACKAGE.parent), os.environ.get("PYTHONPATH", "")]
             environment = {
                 **os.environ,
@@ -181,7 +193,7 @@ def compile_in_background() -> subprocess.Popen[bytes] | None:
             }
             try:
                 _background = subprocess.Popen(
-                    [sys.executable, "-m", "sd2core.numerics.compiled", "--quiet"],
+                    [sys.executable, "-m", "sd2core.numerics.compiled", *options],
                     env=environment,
                     stdin=subprocess.DEVNULL,
                     stdout=subprocess.DEVNULL,
@@ -215,15 +227,9 @@ def workers() -> ThreadPoolExecutor:
 def _main() -> None:
     from sd2core.numerics import compiled as module
 
-    quiet = "--quiet" in sys.argv[1:]
-    if quiet and hasattr(os, "nice"):
+    if _LOW_PRIORITY in sys.argv[1:] and hasattr(os, "nice"):
         os.nice(10)
-
-    def report(done: int, total: int) -> None:
-        if not quiet:
-            print(f"Compiling kernels: {done} of {total}", file=sys.stderr)
-
-    module.warm_up(report)
+    module.warm_up()
 
 
 if __name__ == "__main__":

@@ -135,6 +135,27 @@ def _proposed(  # type: ignore[no-untyped-def]
 
 
 @compiled
+def _outcodes(image, depth, near, xmin, xmax, ymin, ymax, dmax, code):  # type: ignore[no-untyped-def]
+    """Set a bit for each side on which a vertex lies outside of bounds.
+
+    Three corners outside on one side: so is the triangle. Vertices that ``near`` cuts off, and
+    those so far out that the triangle's own edge tolerance exceeds their rounding, have no bits.
+    """
+    widest = max(max(abs(xmin), abs(xmax)), max(abs(ymin), abs(ymax)))
+    for v in range(code.shape[0]):
+        x, y = image[0, v], image[1, v]
+        size = max(max(abs(x), abs(y)), widest)
+        reach = np.float32(4) * _ROUNDING * size
+        sides = np.uint8(x + reach < xmin) | np.uint8(x - reach > xmax) << np.uint8(1)
+        sides |= np.uint8(y + reach < ymin) << np.uint8(2) | np.uint8(y - reach > ymax) << np.uint8(
+            3
+        )
+        sides |= np.uint8(depth[v] > dmax) << np.uint8(4)
+        plain = (depth[v] > near) & (size <= np.float32(1000) * widest)
+        code[v] = sides if plain else np.uint8(0)
+
+
+@compiled
 def search_view(  # type: ignore[no-untyped-def]
     x, y, z, faces, g, axes, near, contact, owned, owned_count, image, depth, cell, start,
     order, sorted_image, sorted_depth, hidden,
@@ -147,13 +168,18 @@ def search_view(  # type: ignore[no-untyped-def]
     ``near`` cuts off triangles behind it. Sorted arrays have room for :data:`LANES` more.
     """
     vertices = depth.shape[0]
-    xmin = ymin = dmin = np.float32(np.inf)
+    xmin = ymin = np.float32(np.inf)
     xmax = ymax = dmax = np.float32(-np.inf)
+    own = np.empty(owned_count, np.int32)
+    at = 0
     for v in range(vertices):
         if owned[v]:
-            xmin, xmax = min(xmin, image[0, v]), max(xmax, image[0, v])
-            ymin, ymax = min(ymin, image[1, v]), max(ymax, image[1, v])
-            dmin, dmax = min(dmin, depth[v]), max(dmax, depth[v])
+            own[at] = v
+            at += 1
+    for v in own:
+        xmin, xmax = min(xmin, image[0, v]), max(xmax, image[0, v])
+        ymin, ymax = min(ymin, image[1, v]), max(ymax, image[1, v])
+        dmax = max(dmax, depth[v])
     # Each axis has its own cell size: a standing body is narrow and tall.
     columns = min(_MOST_COLUMNS, max(4, int(_COLUMNS_PER_ROOT * np.sqrt(owned_count))))
     rows = min(_MOST_ROWS, max(4, int(_ROWS_PER_ROOT * np.sqrt(owned_count))))
@@ -162,31 +188,33 @@ def search_view(  # type: ignore[no-untyped-def]
     yscale = np.float32(rows) / high if high > 0 else np.float32(0)
 
     start[: columns * rows + 1] = 0
-    for v in range(vertices):
-        if owned[v]:
-            column = min(int((image[0, v] - xmin) * xscale), columns - 1)
-            row = min(int((image[1, v] - ymin) * yscale), rows - 1)
-            cell[v] = row * columns + column
-            start[cell[v] + 1] += 1
+    for v in own:
+        column = min(int((image[0, v] - xmin) * xscale), columns - 1)
+        row = min(int((image[1, v] - ymin) * yscale), rows - 1)
+        cell[v] = row * columns + column
+        start[cell[v] + 1] += 1
     for c in range(columns * rows):
         start[c + 1] += start[c]
-    for v in range(vertices - 1, -1, -1):
-        if owned[v]:
-            # Filling each cell from its end leaves start one cell ahead; see below.
-            start[cell[v] + 1] -= 1
-            at = start[cell[v] + 1]
-            order[at] = v
-            sorted_image[0, at], sorted_image[1, at] = image[0, v], image[1, v]
-            sorted_depth[at] = depth[v]
-            hidden[at] = 0
+    for v in own[::-1]:
+        # Filling each cell from its end leaves start one cell ahead; see below.
+        start[cell[v] + 1] -= 1
+        at = start[cell[v] + 1]
+        order[at] = v
+        sorted_image[0, at], sorted_image[1, at] = image[0, v], image[1, v]
+        sorted_depth[at] = depth[v]
+        hidden[at] = 0
     start[columns * rows + 1] = owned_count
     sorted_depth[owned_count : owned_count + LANES] = -np.inf
 
     sorted_x, sorted_y = sorted_image[0], sorted_image[1]
     corners = np.empty((3, 3), np.float64)
     bounds = np.empty(4, np.float64)
+    code = np.empty(vertices, np.uint8)
+    _outcodes(image, depth, near, xmin, xmax, ymin, ymax, dmax, code)
     for f in range(faces.shape[0]):
         i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
+        if code[i] & code[j] & code[k]:
+            continue
         d0, d1, d2 = depth[i], depth[j], depth[k]
         nearest = min(d0, d1, d2)
         if nearest > dmax:

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.accuracy.library import AccuracyLibrary
 from sd2app.accuracy.measurements import MeasuredModel, serves_at_rest
 from sd2app.accuracy.text import InUse
+from sd2app.background.latest import Emit
 from sd2app.session.tasks import ListedRunner, TaskList
 from sd2app.settings import Settings
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.progress import Progress
 from sd2core.sensor import VirtualSensor
 
 if TYPE_CHECKING:
@@ -68,6 +67,7 @@ class AccuracyModel(QObject):
         self.tolerance = settings.tolerance  # relative L1 after smoothing that the user accepts
         self._scene: tuple[MeshSequence, SynthesisOptions] | None = None
         self._runner = ListedRunner("choose", jobs, self, self._decide, self._fail)
+        self._runner.partial.connect(self._receive)
         self._runner.cancelled.connect(self._decide)
         self._runner.idle_changed.connect(self.changed)
         self._forget()
@@ -163,9 +163,7 @@ class AccuracyModel(QObject):
         self._asking = wish
         mesh, options = self._scene
         self._runner.submit(
-            lambda emit: self._compute(
-                mesh, options, wish, lambda done, total: emit((done, total))
-            ),
+            lambda emit: self._compute(mesh, options, wish, emit),
             "Choosing what the scene requires",
         )
 
@@ -216,35 +214,51 @@ class AccuracyModel(QObject):
     # --- choosing -------------------------------------------------------------------------
 
     def _compute(
-        self, mesh: MeshSequence, options: SynthesisOptions, wish: _Wish, progress: Progress
-    ) -> list[Choice]:
-        """In the background: the choices for a wish; a place is surveyed once."""
+        self, mesh: MeshSequence, options: SynthesisOptions, wish: _Wish, emit: Emit
+    ) -> Choice:
+        """In the background: the choices for a wish, that at rest first; a place is surveyed once.
+
+        The last is the result.
+        """
+
+        def progress(done: int, total: int) -> None:
+            emit((done, total))
+
         known = self._surveyed
         if known is None or known.mesh is not mesh or known.sensor != wish.sensor:
             like = known.survey if known is not None and known.mesh is mesh else None
             survey = self.library.survey(mesh, wish.sensor, options, progress, like)
             self._surveyed = known = _Surveyed(mesh, wish.sensor, survey)
-        limits = [{"budget_ms": wish.budget_ms}]
-        if wish.tolerance is not None:
-            limits.insert(0, {"tolerance": wish.tolerance})
-        return [
-            self.library.choose(
+
+        def within(**limit: float) -> Choice:
+            return self.library.choose(
                 mesh, wish.sensor, options=options, survey=known.survey, progress=progress, **limit
             )
-            for limit in limits
-        ]
 
-    def _decide(self, choices: Sequence[Choice] = ()) -> None:
-        """Use the chosen plans, or keep those in use; the same place is not asked for again."""
+        if wish.tolerance is not None:
+            emit(within(tolerance=wish.tolerance))
+        return within(budget_ms=wish.budget_ms)
+
+    def _receive(self, result: Any) -> None:
+        if not isinstance(result, tuple):  # how far it is
+            self._take(result)
+
+    def _take(self, choice: Choice) -> None:
+        """Use a plan that is chosen."""
         before = self.in_use, self.while_dragging
-        for choice in choices:
-            if choice.tolerance is not None:
-                self.choice = choice
-            else:
-                self._dragging = choice
-        self._decided_for = self._asking
+        if choice.tolerance is not None:
+            self.choice = choice
+        else:
+            self._dragging = choice
         if before != (self.in_use, self.while_dragging):
             self.plan_changed.emit()
+        self.changed.emit()
+
+    def _decide(self, choice: Choice | None = None) -> None:
+        """End a choice, which is the last of a wish: the same place is not asked for again."""
+        self._decided_for = self._asking
+        if choice is not None:
+            self._take(choice)
         self.changed.emit()
         self.decided.emit()
 

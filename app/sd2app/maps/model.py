@@ -78,7 +78,7 @@ class SynthesisModel(QObject):
         self._runner = ListedRunner("synthesis", session.jobs, self, self._finish, self._fail)
         self._runner.partial.connect(self._receive)
         self._runner.cancelled.connect(self._say_quality)
-        self._compiler = CompilerModel(self)
+        self._compiler = CompilerModel(session.jobs, self)
         self._compiler.finished.connect(self._follow)
         self._rest = delayed(self._settle, _REST_MS, self)
         session.sensor.changed.connect(self._follow)

@@ -32,6 +32,9 @@ of the time left to drawing."""
 
 AT_ONCE = 12_000_000
 """Vertices times frames that are swept roughly in one go: a few ms up to some 20 ms."""
+_BUDGET_BYTES = 256 << 20
+"""For prepared frames: more than a clip takes that is swept in one go; of a longer one, what is in
+view."""
 _EXACT_PARTS = 16
 _KEPT = 3
 """Number of kept synthesizers: for the rest, for dragging, and the one before."""
@@ -56,7 +59,7 @@ class SynthesizerCache:
     ) -> None:
         self.mesh = mesh
         self.options = options
-        self.full = Synthesizer(mesh, options)
+        self.full = Synthesizer(mesh, options, memory_budget_bytes=_BUDGET_BYTES)
         self.limbs = False  # True: maps are also split by the parts of the body
         self._library = library
         self._made: OrderedDict[AccuracyPlan, Synthesizer] = OrderedDict()

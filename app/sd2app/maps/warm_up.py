@@ -10,7 +10,8 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from sd2app.background.latest import Emit, LatestRunner
 from sd2app.maps.partial_map import View
 from sd2app.maps.quality import SynthesizerCache
-from sd2core.numerics.compiled import compile_in_background, kernels_ready
+from sd2app.session.tasks import Job, TaskList
+from sd2core.numerics.compiled import compile_in_background, kernels_ready, modules_compiled
 from sd2core.sensor import VirtualSensor
 
 if TYPE_CHECKING:
@@ -53,13 +54,15 @@ class MaskPrefetcher(LatestRunner):
 
 
 class CompilerModel(QObject):
-    """Starts the compiler where there is no machine code yet, and says when it is over."""
+    """Starts the compiler where there is no machine code yet, and says how far it is."""
 
     finished = Signal()
 
-    def __init__(self, parent: QObject) -> None:
+    def __init__(self, jobs: TaskList, parent: QObject) -> None:
         super().__init__(parent)
         self._process: subprocess.Popen[bytes] | None = None
+        self._jobs = jobs
+        self._job: Job | None = None
         self._poll = QTimer(self, interval=_POLL_MS)
         self._poll.timeout.connect(self._watch)
 
@@ -74,16 +77,24 @@ class CompilerModel(QObject):
         return not self.ready and self._process is not None and self._process.poll() is None
 
     def start(self) -> None:
-        """Compile what is not compiled."""
-        self._process = compile_in_background()
-        if self.busy:
+        """Compile what is not compiled: a map waits for it."""
+        self._process = process = compile_in_background(awaited=True)
+        if process is not None and self.busy and self._job is None:
+            self._job = self._jobs.start(
+                "Compiling the numerical kernels, once after installing", process.terminate
+            )
             self._poll.start()
 
     def stop(self) -> None:
         """Stop waiting."""
         self._poll.stop()
+        if self._job is not None:
+            self._jobs.finish(self._job)
+            self._job = None
 
     def _watch(self) -> None:
         if not self.busy:
-            self._poll.stop()
+            self.stop()
             self.finished.emit()
+        elif self._job is not None:
+            self._jobs.report(self._job, *modules_compiled())

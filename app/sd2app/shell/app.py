@@ -56,12 +56,15 @@ def run(paths: Sequence[Path] = (), *, screenshot: Path | None = None) -> int:
 
 
 def wait_until_settled(application: QApplication, window: MainWindow, limit_s: float) -> bool:
-    """Run the event loop until nothing is under way; False when that takes too long."""
-    deadline = time.monotonic() + limit_s
-    calm_since = None
+    """Run the event loop until nothing is under way; False when nothing gets on for so long."""
+    deadline, calm_since, before = time.monotonic() + limit_s, None, None
     while time.monotonic() < deadline:
         application.processEvents()
         time.sleep(0.005)
+        jobs = window.session.jobs.jobs if window.ready else ()
+        reached = [(job.title, job.done) for job in jobs]
+        if reached != before:
+            deadline, before = time.monotonic() + limit_s, reached
         if not (window.ready and window.settled):
             calm_since = None
         elif calm_since is None:
@@ -84,7 +87,7 @@ def _take_screenshot(
         print(f"{path} cannot be written.", file=sys.stderr)
         return 1
     if not settled:
-        print(f"The window was still busy after {limit_s:.0f} s; {path} shows it.", file=sys.stderr)
+        print(f"The window got no further for {limit_s:.0f} s; {path} shows it.", file=sys.stderr)
         return 1
     if failure:
         print(failure, file=sys.stderr)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+
 import numpy as np
 import pytest
 from fake_accuracy import (
@@ -75,6 +77,27 @@ def test_a_choice_gives_the_plans_for_rest_and_for_dragging(desk, qtbot):
     assert not trade.is_decided(THERE, BUDGET_MS)
     assert not trade.is_decided(HERE, 2 * BUDGET_MS)
     assert desk.jobs.jobs == ()
+
+
+def test_the_plan_at_rest_is_used_before_that_for_dragging_is_chosen(desk, qtbot):
+    began = threading.Event()
+
+    def choose(*where, tolerance=None, **parts):
+        if tolerance is None:
+            began.set()
+            desk.fake.gate.clear()
+        return FakeAccuracy.choose(desk.fake, *where, tolerance=tolerance, **parts)
+
+    desk.fake.choose = choose
+    with qtbot.waitSignal(desk.trade.plan_changed):
+        desk.trade.choose(HERE, BUDGET_MS)
+    qtbot.waitUntil(began.is_set)
+    assert desk.trade.in_use.plan == AccuracyPlan(mask_stride=5)
+    assert desk.trade.while_dragging is None
+    assert desk.trade.choosing
+    with qtbot.waitSignal(desk.trade.decided):
+        desk.fake.gate.set()
+    assert desk.trade.while_dragging.plan == FACING
 
 
 def test_the_tolerance_is_kept_from_one_start_to_the_next(desk, qtbot):

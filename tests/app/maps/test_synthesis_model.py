@@ -132,14 +132,27 @@ def test_another_recording_replaces_work_under_way(context, qtbot, ball, tmp_pat
 
 
 def test_without_machine_code_exact_waits_for_the_compiler(context, qtbot, ball, monkeypatch):
-    state = {"ready": False, "exit": None}
-    compiler = SimpleNamespace(poll=lambda: state["exit"])
+    state = {"ready": False, "exit": None, "compiled": (0, 11)}
+    compiler = SimpleNamespace(poll=lambda: state["exit"], terminate=lambda: None)
+    asked = []
     monkeypatch.setattr(map_warm_up, "kernels_ready", lambda: state["ready"])
-    monkeypatch.setattr(map_warm_up, "compile_in_background", lambda: compiler)
+    monkeypatch.setattr(map_warm_up, "modules_compiled", lambda: state["compiled"])
+    monkeypatch.setattr(
+        map_warm_up, "compile_in_background", lambda **how: asked.append(how) or compiler
+    )
     open_ball(context, qtbot, ball)
     qtbot.waitUntil(lambda: "compiling" in context.synthetic.status, timeout=10_000)
     assert not context.synthesis.complete
+    assert asked == [{"awaited": True}]
+
+    def compiling():
+        return [(job.done, job.total) for job in context.jobs.jobs if "Compiling" in job.title]
+
+    for done in (0, 4):
+        state["compiled"] = (done, 11)
+        qtbot.waitUntil(lambda: compiling() == [state["compiled"]], timeout=10_000)
     state.update(ready=True, exit=0)
+    qtbot.waitUntil(lambda: not compiling(), timeout=10_000)
     qtbot.waitUntil(lambda: context.synthesis.complete, timeout=10_000)
     qtbot.waitUntil(lambda: context.synthetic.status == "±0 % · visibility exact", timeout=10_000)
 
@@ -147,7 +160,7 @@ def test_without_machine_code_exact_waits_for_the_compiler(context, qtbot, ball,
 def test_a_compiler_that_fails_does_not_keep_exact_away(context, qtbot, ball, monkeypatch):
     compiler = SimpleNamespace(poll=lambda: 1)
     monkeypatch.setattr(map_warm_up, "kernels_ready", lambda: False)
-    monkeypatch.setattr(map_warm_up, "compile_in_background", lambda: compiler)
+    monkeypatch.setattr(map_warm_up, "compile_in_background", lambda **_: compiler)
     open_ball(context, qtbot, ball)
     qtbot.waitUntil(lambda: context.synthesis.complete, timeout=30_000)
 

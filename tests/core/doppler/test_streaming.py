@@ -16,7 +16,7 @@ from doppler_scenes import CAMERA, options, sensor_at, wobbling
 
 from sd2core.doppler import PRESETS, Synthesizer, parallel
 from sd2core.doppler.masks import VisibilityMasks
-from sd2core.doppler.parallel import run_jobs
+from sd2core.doppler.parallel import run_jobs, run_light_jobs
 from sd2core.doppler.prepared import ByteBudget
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
@@ -228,6 +228,39 @@ def test_a_failing_job_stops_the_others_and_is_heard() -> None:
     with pytest.raises(ValueError, match="no"):
         run_jobs([failing, endless], 2, silent)
     assert stopped == ([True] if started.is_set() else [])
+
+
+def test_light_jobs_do_not_wait_for_a_busy_pool(monkeypatch: pytest.MonkeyPatch) -> None:
+    pool, busy, free = ThreadPoolExecutor(1), threading.Event(), threading.Event()
+    monkeypatch.setattr(parallel, "workers", lambda: pool)
+    monkeypatch.setattr(parallel, "worker_count", lambda: 3)
+    pool.submit(lambda: (busy.set(), free.wait(10)))
+    assert busy.wait(10)
+    done: list[int] = []
+    reports: list[int] = []
+    jobs = [lambda ticket, number=number: done.append(number) for number in range(5)]
+    run_light_jobs(jobs, 5, lambda one, total: reports.append(one))
+    assert done == list(range(5))
+    assert reports == [0, 5]
+    free.set()
+    pool.shutdown()
+
+
+def test_a_light_job_that_fails_elsewhere_is_heard(monkeypatch: pytest.MonkeyPatch) -> None:
+    pool, taken = ThreadPoolExecutor(1), threading.Event()
+    monkeypatch.setattr(parallel, "workers", lambda: pool)
+    monkeypatch.setattr(parallel, "worker_count", lambda: 2)
+    here = threading.current_thread()
+
+    def job(ticket: Any) -> None:
+        if threading.current_thread() is not here:
+            taken.set()
+            raise ValueError("no")
+        taken.wait(10)
+
+    with pytest.raises(ValueError, match="no"):
+        run_light_jobs([job] * 2, 2, silent)
+    pool.shutdown()
 
 
 @pytest.mark.parametrize("visibility", ["exact", "facing"])

@@ -182,6 +182,34 @@ def test_a_zarr_mesh_stays_on_disk(
     assert mesh.vertices.frames_per_chunk == 10
 
 
+def test_chunks_are_read_once_while_there_is_room(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(mesh_arrays, "_CHUNK_BYTES", 42 * 12 * 10)  # ten frames a chunk
+    monkeypatch.setattr(mesh_arrays, "_KEPT_BYTES", 3 * 42 * 12 * 10)
+    vertices, faces = body(60)
+    save_mesh(MeshSequence(vertices, faces, Timebase(times(60))), tmp_path / "m.zarr")
+    mesh = load_mesh(tmp_path / "m.zarr")
+    read: list[int] = []
+    original = mesh_arrays.StoredVertices._read
+
+    def counted(self: Any, key: slice) -> Any:
+        read.append(key.start)
+        return original(self, key)
+
+    monkeypatch.setattr(mesh_arrays.StoredVertices, "_read", counted)
+    mesh.read(0, 30)
+    read.clear()
+    for start in (20, 5, 10, 15, 0):
+        np.testing.assert_array_equal(mesh.read(start, start + 5), vertices[start : start + 5])
+    assert read == []
+    mesh.read(30, 40)  # in place of the oldest
+    mesh.read(10, 30)
+    assert read == [30]
+    np.testing.assert_array_equal(mesh.read(0, 10), vertices[:10])
+    assert read == [30, 0]
+
+
 def test_zarr_2_groups_are_read(tmp_path: Path) -> None:
     vertices, faces = body()
     group = zarr.open_group(str(tmp_path / "old.zarr"), mode="w", zarr_format=2)

@@ -117,13 +117,20 @@ def test_every_kernel_module_compiles_its_own() -> None:
     assert with_kernels == set(compiled.KERNEL_MODULES)
 
 
-def test_warm_up_makes_ready_and_reports(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_warm_up_makes_ready_and_reports(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(compiled, "_ready", False)
+    monkeypatch.setattr(compiled, "cache_directory", lambda: tmp_path)
     reports: list[tuple[int, int]] = []
-    compiled.warm_up(lambda done, total: reports.append((done, total)))
+    on_disk: list[tuple[int, int]] = []
+
+    def report(done: int, total: int) -> None:
+        reports.append((done, total))
+        on_disk.append(compiled.modules_compiled())
+
+    compiled.warm_up(report)
     assert compiled.kernels_ready()
     count = len(compiled.KERNEL_MODULES)
-    assert reports == [(done, count) for done in range(count + 1)]
+    assert reports == on_disk == [(done, count) for done in range(count + 1)]
     assert compiled.compile_in_background() is None
 
 
@@ -163,8 +170,9 @@ print(sum(count for _, count in misses))
     assert run(code, PACKAGE.parent) == ["0"]
 
 
+@pytest.mark.parametrize(("awaited", "options"), [(True, []), (False, ["--low-priority"])])
 def test_compiling_in_the_background_runs_once(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    awaited: bool, options: list[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     started: list[list[str]] = []
 
@@ -177,10 +185,10 @@ def test_compiling_in_the_background_runs_once(
     monkeypatch.setattr(compiled, "cache_directory", lambda: tmp_path)
     monkeypatch.setattr(compiled.subprocess, "Popen", Process)
     monkeypatch.setattr(compiled.atexit, "register", lambda *_: None)
-    first = compiled.compile_in_background()
+    first = compiled.compile_in_background(awaited=awaited)
     assert first is not None
     assert compiled.compile_in_background() is first
-    assert started == [[sys.executable, "-m", "sd2core.numerics.compiled", "--quiet"]]
+    assert started == [[sys.executable, "-m", "sd2core.numerics.compiled", *options]]
     # Once the marker is there, everyone knows.
     (tmp_path / "complete").touch()
     assert compiled.kernels_ready()
