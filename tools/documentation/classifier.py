@@ -8,7 +8,7 @@ Without ``--campaign`` one is made: six people, 36 minutes, three places of the 
 another seed than the bundled denoiser's, so of other people. ``--large`` is the denoiser's
 (``make denoiser`` leaves it in ``build/denoiser``); only its radar is used. What was trained
 before is not trained again: the folder ``--out`` keeps every run. ``--only`` measures
-one section on the paper's experiment, and puts it into the page that is there.
+a part, and puts it into the page that is there.
 """
 
 from __future__ import annotations
@@ -95,15 +95,16 @@ Its simulated radar has noise in every cell, which a campaign's targets do not h
 def main() -> None:
     """Measure and write."""
     options = _options()
-    page = PAGE.read_text("utf-8") if options.only else _page(options)
-    before, _, after = page.partition(REAL_HEADING)
+    before, _, after = PAGE.read_text("utf-8").partition(REAL_HEADING)
     before, _, full = before.partition(FULL_HEADING)
     before, _, protocols = before.partition(HEADING)
     protocols, full = f"{HEADING}{protocols}", f"{FULL_HEADING}{full}"
-    if options.only != "full-size":
+    if options.only in (None, "campaign"):
+        before, _, after = _page(options).partition(REAL_HEADING)
+    if options.only in (None, "protocols"):
         folder = options.out / "protocols"
         protocols = protocols_section(folder, options.protocol_minutes, options.seeds)
-    if options.only != "protocols":
+    if options.only in (None, "full-size"):
         full = full_size_section(options.out / "full-size", options.seeds)
     PAGE.write_text(f"{before}{protocols}{full}{REAL_HEADING}{after.rstrip()}\n", "utf-8")
 
@@ -143,8 +144,9 @@ def _options() -> argparse.Namespace:
     )
     parser.add_argument(
         "--only",
-        choices=("protocols", "full-size"),
-        help="the paper's experiment, in all its variants or with as many frames as the paper's",
+        choices=("campaign", "protocols", "full-size"),
+        help="everything but the paper's experiment; that one in all its variants; or that with as"
+        " many frames as the paper's",
     )
     parser.add_argument(
         "--protocol-minutes", type=float, default=18.0, help="of its campaigns (default: 18)"
