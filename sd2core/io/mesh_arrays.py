@@ -13,6 +13,17 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_folder, atomic_write
+from sd2core.files.stores import (
+    COPY_AGAIN,
+    Damage,
+    Depth,
+    StoredArray,
+    array_in,
+    create_array,
+    create_group,
+    open_group,
+    unreadable,
+)
 from sd2core.mesh.sequence import MeshSequence, VertexArray, refuse_missing
 from sd2core.progress import Progress, silent
 
@@ -40,6 +51,8 @@ SMALL_NAMES = (
 
 _CHUNK_BYTES = 2 * 2**20
 _LARGEST_CHUNK_BYTES = 64 * 2**20
+_WHOLE_CHECK_BYTES = 128 * 2**20
+"""Size of the vertices on disk up to which all are checked when a mesh is opened."""
 _FORMAT = "sd2-mesh"
 
 
@@ -60,21 +73,26 @@ class RawMesh:
 
 
 class StoredVertices:
-    """Vertices (T, V, 3) that stay on disk; scaled, moved and checked when they are read."""
+    """Vertices (T, V, 3) that stay on disk; scaled, moved and checked when they are read.
 
-    def __init__(self, array: Any, source: str) -> None:
+    Frames in ``damaged`` chunks hold the last pose before them (at the start, the next after them).
+    """
+
+    def __init__(self, array: StoredArray, damaged: tuple[Damage, ...] = ()) -> None:
         self._array = array
-        self._source = source
+        self._source = str(array.path)
         self._last: tuple[int, NDArray[Any]] | None = None  # chunk number, its frames
+        self.damaged = damaged
+        self._lost = {one.start // self.frames_per_chunk for one in damaged}  # chunk numbers
         self.scale = 1.0
         self.shift_m = np.zeros(3, np.float32)
-        self.shape: tuple[int, ...] = tuple(array.shape)
+        self.shape: tuple[int, ...] = array.shape
         self.dtype = real_type(array.dtype)
 
     @property
     def frames_per_chunk(self) -> int:
         """Frames that come from the disk together."""
-        return int(self._array.chunks[0])
+        return self._array.chunks[0]
 
     @property
     def chunk_bytes(self) -> int:
@@ -111,7 +129,8 @@ class StoredVertices:
 
     def _stretch(self, start: int, stop: int) -> NDArray[Any]:
         """Frames ``start`` to ``stop``, chunk by chunk: Zarr is slower on many at once."""
-        if self.chunk_bytes > _LARGEST_CHUNK_BYTES or stop <= start:
+        large = self.chunk_bytes > _LARGEST_CHUNK_BYTES and not self._lost
+        if large or stop <= start:
             return self._read(slice(start, stop))
         part = np.empty((stop - start, *self.shape[1:]), self.dtype)
         step = self.frames_per_chunk
@@ -126,19 +145,30 @@ class StoredVertices:
         kept = self._last
         if kept is None or kept[0] != number:
             step = self.frames_per_chunk
-            kept = (number, self._read(slice(number * step, (number + 1) * step)))
+            frames = slice(number * step, min((number + 1) * step, self.shape[0]))
+            if number in self._lost:
+                pose = self._read(self._pose_frame(number))
+                read = np.broadcast_to(pose, (frames.stop - frames.start, *pose.shape))
+            else:
+                read = self._read(frames)
+            kept = (number, read)
             self._last = kept
         return kept[1]
+
+    def _pose_frame(self, lost: int) -> int:
+        """Frame whose pose stands in for those of a lost chunk."""
+        step = self.frames_per_chunk
+        before = next((n for n in range(lost - 1, -1, -1) if n not in self._lost), None)
+        if before is not None:
+            return (before + 1) * step - 1
+        return next(n for n in range(lost + 1, self.shape[0]) if n not in self._lost) * step
 
     def _read(self, key: Any) -> NDArray[Any]:
         try:
             return np.asarray(self._array[key], dtype=self.dtype)
-        except Exception as error:  # a damaged chunk fails in the codec's own ways
-            raise Sd2Error(
-                f"{self._source}: {_where(key)} cannot be read ({type(error).__name__}: {error})",
-                "complete chunks",
-                "Copy the recording again from where it came",
-            ) from error
+        except Sd2Error as error:
+            remedy = f"{error.remedy}; without its file, a chunk's frames are left out"
+            raise Sd2Error(error.found, error.expected, remedy) from error
 
 
 def read_npz(path: Path) -> RawMesh:
@@ -192,36 +222,80 @@ def named_arrays(arrays: dict[str, Any], names: list[str], source: str) -> RawMe
 
 
 def read_zarr(path: Path) -> RawMesh:
-    """Open a Zarr folder or ``.zarr.zip``; the vertices stay on disk."""
-    import zarr
-    from zarr.storage import ZipStore
+    """Open a Zarr folder or ``.zarr.zip``; the vertices stay on disk.
 
-    try:
-        store = ZipStore(path, mode="r") if path.is_file() else str(path)
-        group = zarr.open_group(store, mode="r")
-        names = sorted(group.array_keys())
-        arrays: dict[str, Any] = {name: group[name][...] for name in names if name in SMALL_NAMES}
-        arrays.update({name: group[name] for name in names if name in VERTEX_NAMES})
-        if "limbs" in group.attrs:
-            arrays["limbs"] = group.attrs["limbs"]
-    except (OSError, ValueError, KeyError, zipfile.BadZipFile, RuntimeError) as error:
-        raise Sd2Error(
-            f"{path} cannot be read as a Zarr group ({error})",
-            "a .zarr folder or .zarr.zip with the arrays vertices, faces and times_s",
-            "Copy it again with all its files, or write it again",
-        ) from error
+    Frames of damaged chunks are left out, as if nobody had been there.
+    """
+    group = open_group(path)
+    names = _names(group, path)
+    small = [name for name in names if name in SMALL_NAMES]
+    arrays: dict[str, Any] = {name: array_in(group, path, name, "rows")[...] for name in small}
+    stored = _vertices(group, path, names)
+    if stored is not None:
+        arrays["vertices"] = stored
+    if "limbs" in group.attrs:
+        arrays["limbs"] = group.attrs["limbs"]
     raw = named_arrays(arrays, names, str(path))
     if raw.faces is not None and not len(raw.faces):
         raw.faces = None
-    stored = StoredVertices(raw.vertices, str(path))
-    if len(stored.shape) == 3 and stored.chunk_bytes > _LARGEST_CHUNK_BYTES:
+    assert stored is not None
+    damaged: tuple[Damage, ...] = ()
+    if len(stored.shape) == 3:
+        thorough: Depth = "checksums" if stored.checksums else "values"
+        whole = stored.file_bytes <= _WHOLE_CHECK_BYTES
+        damaged = stored.damage(thorough if whole else "lengths")
+    raw.vertices = StoredVertices(stored, damaged)
+    if damaged:
+        _leave_out(raw, damaged, path)
+    if len(stored.shape) == 3 and raw.vertices.chunk_bytes > _LARGEST_CHUNK_BYTES:
         raw.notes.append(
-            f"The vertices are stored in chunks of {stored.frames_per_chunk:,} frames "
-            f"({stored.chunk_bytes / 2**20:,.0f} MiB), which are read whole for every frame shown. "
-            "Saving the mesh again makes it fast."
+            f"The vertices are stored in chunks of {raw.vertices.frames_per_chunk:,} frames "
+            f"({raw.vertices.chunk_bytes / 2**20:,.0f} MiB), which are read whole for every frame "
+            "shown. Saving the mesh again makes it fast."
         )
-    raw.vertices = stored
     return raw
+
+
+def stored_arrays(path: Path) -> list[StoredArray]:
+    """Arrays of a mesh in Zarr, not yet read."""
+    group = open_group(path)
+    names = _names(group, path)
+    vertices = _vertices(group, path, names)
+    small = [array_in(group, path, name, "rows") for name in names if name in SMALL_NAMES]
+    return small if vertices is None else [vertices, *small]
+
+
+def _names(group: Any, path: Path) -> list[str]:
+    """Names of the arrays in a group; Sd2Error if a description is damaged."""
+    try:
+        return sorted(group.array_keys())
+    except Exception as error:  # damaged descriptions fail in many ways
+        raise Sd2Error(
+            f"{path} cannot be read as a Zarr group ({type(error).__name__}: {error})",
+            "a .zarr folder or .zarr.zip with the arrays vertices, faces and times_s",
+            COPY_AGAIN,
+        ) from error
+
+
+def _vertices(group: Any, path: Path, names: list[str]) -> StoredArray | None:
+    """Vertices among the arrays of a group; None if there are none."""
+    name = next((name for name in VERTEX_NAMES if name in names), None)
+    return None if name is None else array_in(group, path, name, "frames", sparse=False)
+
+
+def _leave_out(raw: RawMesh, damaged: tuple[Damage, ...], path: Path) -> None:
+    """Mark the frames of damaged chunks as frames without a person."""
+    frames = raw.vertices.shape[0]
+    present = np.ones(frames, bool) if raw.present is None else np.array(raw.present, bool)
+    lost = np.zeros(frames, bool)
+    for one in damaged:
+        lost[one.start : one.stop] = True
+    if lost.all():
+        raise unreadable(path, damaged)
+    if len(present) == frames:
+        raw.present = present & ~lost
+    said = "; ".join(map(str, damaged))
+    raw.notes.append(f"Damaged, and left out as if nobody had been there: {said}. {COPY_AGAIN}.")
 
 
 def write_npz(mesh: MeshSequence, path: Path, progress: Progress = silent) -> None:
@@ -261,11 +335,8 @@ def write_zarr(mesh: MeshSequence, path: Path, progress: Progress = silent) -> N
 
 
 def _write_group(mesh: MeshSequence, folder: Path, progress: Progress) -> None:
-    import zarr
-
     step = frames_per_chunk(mesh.vertices.shape, mesh.vertices.dtype)
-    group = zarr.open_group(str(folder), mode="w")
-    group.attrs.update({"format": _FORMAT, "version": 1, "unit": "m"})
+    group = create_group(folder, {"format": _FORMAT, "version": 1, "unit": "m"})
     vertices = create_vertices(group, mesh.vertices.shape, mesh.vertices.dtype)
     for start in range(0, mesh.frame_count, step):
         progress(start, mesh.frame_count)
@@ -291,7 +362,7 @@ def small_arrays(mesh: MeshSequence) -> dict[str, NDArray[Any]]:
 def write_small(mesh: MeshSequence, group: Any) -> None:
     """Write everything of a mesh but its vertices into a Zarr group."""
     for name, array in small_arrays(mesh).items():
-        group.create_array(name, data=array)
+        create_array(group, name, data=array)
     if mesh.uncertainty is not None:
         group.attrs["limbs"] = list(mesh.uncertainty.limbs)
 
@@ -306,12 +377,13 @@ def create_vertices(group: Any, shape: tuple[int, ...], dtype: Any) -> Any:
     """Create an array for vertices (T, V, 3) in a Zarr group, to be filled chunk by chunk."""
     from zarr.codecs import BloscCodec
 
-    return group.create_array(
+    return create_array(
+        group,
         "vertices",
         shape=shape,
         chunks=(frames_per_chunk(shape, dtype), *shape[1:]),
         dtype=np.dtype(dtype).newbyteorder("<"),
-        compressors=BloscCodec(cname="lz4", clevel=5, shuffle="shuffle"),
+        compressor=BloscCodec(cname="lz4", clevel=5, shuffle="shuffle"),
         # A chunk that goes missing is then found, not read as zeros.
         fill_value=float("nan"),
     )

@@ -18,7 +18,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
+from sd2core.files.atomic import atomic_folder
+from sd2core.files.stores import (
+    StoredArray,
+    array_in,
+    create_array,
+    create_group,
+    growing,
+    open_group,
+)
 from sd2core.maps import LimbMaps
+from sd2core.pairs.rows import INDEX_NAME, read_rows
 from sd2core.sensor import VelocityAxis
 
 PairKind = Literal["simulated", "real"]
@@ -26,7 +36,6 @@ PairKind = Literal["simulated", "real"]
 
 FORMAT = "sd2-pairs"
 VERSION = 1
-INDEX_NAME = "takes.jsonl"
 
 _ARRAYS = ("synthetic", "radar", "times_s", "label")
 _CHUNK_FRAMES = 2250
@@ -191,10 +200,11 @@ class PairWriter:
             "provenance": json.loads(json.dumps(provenance)),
             "parts": list(parts),
         }
-        if (self._path / "zarr.json").exists():
-            self._group = _reopened(self._path, header)
-        else:
-            self._group = _begun(self._path, header)
+        if not (self._path / "zarr.json").exists() or _stillborn(self._path):
+            _begin(self._path, header)
+        self._group = _reopened(self._path, header)
+        names = (*_ARRAYS, *(["limbs"] if parts else []))
+        self._arrays = {name: growing(self._group, self._path, name) for name in names}
         index = _read_takes(self._path, provenance)
         _drop_torn_line(self._path, len(index))
         self._done = {_key(entry) for entry in index}
@@ -234,7 +244,7 @@ class PairWriter:
         if take.limbs is not None:
             written["limbs"] = take.limbs.values.transpose(2, 0, 1)
         for name, values in written.items():
-            array: Any = self._group[name]
+            array = self._arrays[name]
             # What a killed writer left beyond the last line is written over.
             if array.shape[0] < stop:
                 array.resize((stop, *array.shape[1:]))
@@ -274,8 +284,7 @@ def read_pairs(path: Path) -> PairSet:
     """
     path = Path(path)
     header, index, lazily = open_takes(path)
-    frames = max(entry["stop"] for entry in index)
-    arrays = {name: array[:frames] for name, array in lazily.items()}
+    arrays = read_rows(path, lazily, index)
     limbs, parts = arrays.pop("limbs", None), tuple(header.get("parts", ()))
 
     def split(start: int, stop: int) -> LimbMaps | None:
@@ -308,26 +317,25 @@ def read_pairs(path: Path) -> PairSet:
         ) from None
 
 
-def open_takes(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]], dict[str, Any]]:
+def open_takes(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]], dict[str, StoredArray]]:
     """Open a store: header, lines of takes, and arrays not yet read.
 
     Raises Sd2Error when it holds no pairs, of a newer version, empty or damaged.
     """
-    import zarr
-
     path = Path(path)
     header, index = read_description(path)
-    group = zarr.open_group(str(path), mode="r")
-    arrays: dict[str, Any] = {}
+    group = open_group(path)
+    arrays: dict[str, StoredArray] = {}
     frames = max(entry["stop"] for entry in index)
     for name in (*_ARRAYS, *(["limbs"] if header.get("parts") else [])):
-        if name not in group or group[name].shape[0] < frames:
+        found = array_in(group, path, name, "frames") if name in group else None
+        if found is None or found.shape[:1] < (frames,):
             raise Sd2Error(
                 f"{path}: the array {name} is missing or shorter than {INDEX_NAME} says",
                 f"{frames} frames",
                 _REMAKE,
             )
-        arrays[name] = group[name]
+        arrays[name] = found
     return header, index, arrays
 
 
@@ -360,32 +368,35 @@ def read_description(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     return header, takes
 
 
-def _begun(path: Path, header: dict[str, Any]) -> Any:
-    import zarr
+def _stillborn(path: Path) -> bool:
+    """True for pairs whose writer ended before it had made all arrays; no take is in them."""
+    if not is_pair_store(path) or (path / INDEX_NAME).exists():
+        return False
+    return not all((path / name / "zarr.json").exists() for name in _ARRAYS)
 
-    if path.exists() and (not path.is_dir() or any(path.iterdir())):
+
+def _begin(path: Path, header: dict[str, Any]) -> None:
+    """Make a store without takes, which takes its name when it is whole."""
+    if path.exists() and not is_pair_store(path) and (not path.is_dir() or any(path.iterdir())):
         raise Sd2Error(f"{path} is there and holds no pairs", "a new or empty folder")
-    group = zarr.open_group(str(path), mode="w", attributes=header)
     bins, parts = header["bins"], len(header["parts"])
-    for name, shape, kind in (
-        ("synthetic", (0, bins), "float32"),
-        ("radar", (0, bins), "float32"),
-        ("times_s", (0,), "float64"),
-        ("label", (0,), "int8"),
-        *([("limbs", (0, parts, bins), "float32")] if parts else []),
-    ):
-        group.create_array(
-            name, shape=shape, dtype=kind, chunks=(_CHUNK_FRAMES, *shape[1:]), fill_value=0
-        )
-    return group
+    with atomic_folder(path) as folder:
+        group = create_group(folder, header)
+        for name, shape, kind in (
+            ("synthetic", (0, bins), "float32"),
+            ("radar", (0, bins), "float32"),
+            ("times_s", (0,), "float64"),
+            ("label", (0,), "int8"),
+            *([("limbs", (0, parts, bins), "float32")] if parts else []),
+        ):
+            chunks = (_CHUNK_FRAMES, *shape[1:])
+            create_array(group, name, shape=shape, dtype=kind, chunks=chunks, fill_value=0)
 
 
 def _reopened(path: Path, header: dict[str, Any]) -> Any:
-    import zarr
-
     if not is_pair_store(path):
         raise Sd2Error(f"{path} is there and holds no pairs", "a new or empty folder")
-    group = zarr.open_group(str(path), mode="r+")
+    group = open_group(path, "r+")
     there = dict(group.attrs)
     for name, value in header.items():
         if there.get(name, []) != value:

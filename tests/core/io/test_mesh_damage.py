@@ -65,25 +65,6 @@ def chunks_of(path: Path) -> list[Path]:
     return sorted(entry for entry in (path / "vertices" / "c").rglob("*") if entry.is_file())
 
 
-def test_a_missing_chunk_is_missed(tmp_path):
-    path = tmp_path / "mesh.zarr"
-    save_mesh(long_mesh(), path)
-    chunks = chunks_of(path)
-    assert len(chunks) > 1
-    chunks[-1].unlink()
-    with pytest.raises(Sd2Error, match=r"mesh\.zarr.*\(nan, nan, nan\)"):
-        load_mesh(path).read(2990, 3000)
-
-
-def test_a_cut_chunk_is_named(tmp_path):
-    path = tmp_path / "mesh.zarr"
-    save_mesh(long_mesh(), path)
-    chunk = chunks_of(path)[-1]
-    chunk.write_bytes(chunk.read_bytes()[:100])
-    with pytest.raises(Sd2Error, match=r"mesh\.zarr.*cannot be read"):
-        load_mesh(path).read(2990, 3000)
-
-
 def test_no_faces_at_all_make_a_point_cloud(tmp_path):
     path = tmp_path / "cloud.npz"
     mesh = long_mesh(4)
