@@ -7,6 +7,8 @@ end the process.
 from __future__ import annotations
 
 import itertools
+import os
+import stat
 import zipfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -109,9 +111,9 @@ class StoredArray:
         self, depth: Depth, rows: range | None = None, progress: Progress = silent
     ) -> tuple[Damage, ...]:
         """Return what is damaged of the chunks that hold some rows, all by default."""
-        if not self.shape or 0 in self.shape:
+        rows = range(self.shape[0] if self.shape else 0) if rows is None else rows
+        if not rows or 0 in self.shape:
             return ()
-        rows = range(self.shape[0]) if rows is None else rows
         step = self.chunks[0]
         pairs = zip(self.shape[1:], self.chunks[1:], strict=True)
         across = [range(-(-size // chunk)) for size, chunk in pairs]
@@ -129,14 +131,15 @@ class StoredArray:
 
     def _reason(self, files: _ChunkFiles, place: tuple[int, ...], depth: Depth) -> str | None:
         """What is wrong with a chunk; None: nothing."""
-        from google_crc32c import value as crc32c
-
-        from sd2core.files.chunk_codecs import DamagedChunkError, check_blosc_frame
-
         key = f"{self._array.path}/{self._array.metadata.encode_chunk_key(place)}".lstrip("/")
         size = files.size(key)
         if size is None or depth == "presence":
             return None if self._sparse or size is not None else f"{key} is missing"
+
+        from google_crc32c import value as crc32c
+
+        from sd2core.files.chunk_codecs import DamagedChunkError, check_blosc_frame
+
         tail = 4 if self.checksums else 0
         summed = tail > 0 and depth != "lengths"
         try:
@@ -172,8 +175,11 @@ class _ChunkFiles:
         pass
 
     def size(self, key: str) -> int | None:
-        file = self._folder / key
-        return file.stat().st_size if file.is_file() else None
+        try:
+            found = os.stat(f"{self._folder}/{key}")
+        except OSError:
+            return None
+        return found.st_size if stat.S_ISREG(found.st_mode) else None
 
     def read(self, key: str, most: int = -1) -> bytes:
         with (self._folder / key).open("rb") as file:

@@ -295,7 +295,10 @@ def _leave_out(raw: RawMesh, damaged: tuple[Damage, ...], path: Path) -> None:
     if len(present) == frames:
         raw.present = present & ~lost
     said = "; ".join(map(str, damaged))
-    raw.notes.append(f"Damaged, and left out as if nobody had been there: {said}. {COPY_AGAIN}.")
+    raw.notes.append(
+        f"{path.name} is damaged: {said}. These frames are left out, as if nobody had been there. "
+        f"{COPY_AGAIN}."
+    )
 
 
 def write_npz(mesh: MeshSequence, path: Path, progress: Progress = silent) -> None:
