@@ -23,6 +23,7 @@ from sd2core.datasets.layout import (
     CHUNK_SEGMENTS,
     FORMAT,
     Header,
+    check_arrays,
     check_format,
     chunk_of,
     row_shapes,
@@ -69,7 +70,7 @@ class SegmentStore:
         self._arrays: dict[str, Any] = {
             name: growing(self._group, path, name)
             for name in dict.fromkeys(names)
-            if name in self._group
+            if (path / name / _DESCRIPTION).exists()
         }
         _drop_torn_line(path / SOURCES_NAME)
         self._pending: list[tuple[int, Arrays]] = []
@@ -216,24 +217,26 @@ def open_arrays(path: Path) -> tuple[Header, dict[str, StoredArray]]:
             "Run the command that made it once more: it goes on where it was",
         )
     header = Header.from_dict(attributes, path)
-    missing = [name for name in row_shapes(header) if name not in group]
+    missing = [name for name in row_shapes(header) if not (path / name / _DESCRIPTION).exists()]
     if missing:
         raise Sd2Error(f"{path} lacks {', '.join(missing)}", "a data set that is whole")
-    return header, {name: array_in(group, path, name, "segments") for name in row_shapes(header)}
+    arrays = {name: array_in(group, path, name, "segments") for name in row_shapes(header)}
+    check_arrays(header, arrays, path)
+    return header, arrays
 
 
 def read_sources(path: Path) -> Iterator[dict[str, Any]]:
     """Yield the lines of sources; an incomplete last line is left out."""
     if not path.exists():
         return
-    with path.open(encoding="utf-8") as lines:
+    with path.open(encoding="utf-8", errors="replace") as lines:
         for number, line in enumerate(lines, start=1):
             if not line.endswith("\n"):
                 return
             try:
                 entry = json.loads(line)
                 entry["subject"], entry["recording"], entry["placement"], entry["stop"]
-            except (ValueError, KeyError, TypeError):
+            except (ValueError, KeyError, TypeError, RecursionError):
                 raise Sd2Error(
                     f"{path}: line {number} cannot be read: {line[:80]!r}", "one source, as JSON"
                 ) from None

@@ -49,7 +49,7 @@ def check_blosc_frame(
         raise DamagedChunkError(f"its header says {decoded} bytes in blocks of {block}")
 
 
-class _CheckedBlosc(Blosc):  # type: ignore[misc]
+class _CheckedBlosc(Blosc):
     """Blosc of arrays of Zarr's version 2."""
 
     codec_id = "blosc"
@@ -59,7 +59,7 @@ class _CheckedBlosc(Blosc):  # type: ignore[misc]
         return super().decode(buf, out)
 
 
-class _CheckedBloscCodec(BloscCodec):  # type: ignore[misc]
+class _CheckedBloscCodec(BloscCodec):
     """Blosc of arrays of Zarr's version 3."""
 
     def _decode_sync(self, chunk_bytes: Any, chunk_spec: Any) -> Any:
@@ -83,26 +83,28 @@ def checksummed(compressor: Any = None) -> tuple[Any, ...]:
 
 def codecs_of(array: Any) -> tuple[str, ...]:
     """Names of the codecs of an array's chunks, in the order in which they are encoded."""
-    meta = array.metadata
-    if meta.zarr_format == 2:
-        kept = (*(meta.filters or ()), *([meta.compressor] if meta.compressor else []))
-        return tuple(str(one.codec_id) for one in kept)
-    return _names(one.to_dict() for one in meta.codecs)
-
-
-def _names(codecs: Any) -> tuple[str, ...]:
-    names: list[str] = []
-    for one in codecs:
-        names.append(str(one["name"]))
-        inside = one.get("configuration") or {}
-        names += _names([*inside.get("codecs", ()), *inside.get("index_codecs", ())])
-    return tuple(names)
+    return tuple(str(one["name"]) for one in _described(array))
 
 
 def unsafe_codecs(array: Any) -> list[str]:
-    """Codecs of an array that may run what a file says, or that are not known to refuse damage."""
+    """Codecs of an array, within shards too, that are not known to refuse damage."""
     safe = _SAFE_V2 if array.metadata.zarr_format == 2 else _SAFE_V3
-    return [name for name in codecs_of(array) if name not in safe]
+    unsafe, left = [], _described(array)
+    while left:
+        one = left.pop()
+        inside = one.get("configuration") or {}
+        left += [*inside.get("codecs", ()), *inside.get("index_codecs", ())]
+        if one["name"] not in safe:
+            unsafe.append(str(one["name"]))
+    return unsafe
+
+
+def _described(array: Any) -> list[dict[str, Any]]:
+    """Codecs of an array, with ``name`` and ``configuration``."""
+    meta = array.metadata
+    if meta.zarr_format == 3:
+        return [one.to_dict() for one in meta.codecs]
+    return [{"name": one.codec_id} for one in (*(meta.filters or ()), meta.compressor) if one]
 
 
 numcodecs.register_codec(_CheckedBlosc)

@@ -75,7 +75,10 @@ class StoredArray:
         self._sparse = not self.checksums if sparse is None else sparse
         self.shape: tuple[int, ...] = tuple(array.shape)
         self.dtype: np.dtype[Any] = np.dtype(array.dtype)
-        self.chunks: tuple[int, ...] = tuple(array.chunks)
+        # What is one file: a shard is one of several chunks.
+        self.chunks: tuple[int, ...] = tuple(array.shards or array.chunks)
+        if 0 in self.chunks:
+            raise Sd2Error(f"{path}: {name} has chunks of {self.chunks}", "one row at least")
 
     @property
     def checksums(self) -> bool:
@@ -237,9 +240,8 @@ def array_in(
 
 def growing(group: Any, path: Path, name: str) -> Any:
     """Array of an open group, to be written to."""
-    array = group[name]
-    _refuse_unsafe(array, path, name)
-    return array.with_config(_EVERY_CHUNK)
+    array_in(group, path, name, "rows")
+    return group[name].with_config(_EVERY_CHUNK)
 
 
 def create_group(path: Path, attributes: Mapping[str, Any] | None = None) -> Any:

@@ -1,18 +1,101 @@
-"""Rows of a store of pairs, where they are not damaged."""
+"""Checks of a store of pairs, and its rows where they are not damaged."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel, Field, ValidationError
 
 from sd2core.errors import Sd2Error
 from sd2core.files.stores import Damage, StoredArray
 
 INDEX_NAME = "takes.jsonl"
+REMAKE = "Make the pairs again with `sd2 simulate campaign` or `sd2 pairs`"
+
+_Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class _Header(BaseModel):
+    bins: Annotated[int, Field(ge=1, le=1 << 16)]
+    v_max_mps: Annotated[_Finite, Field(gt=0)]
+    null_bins: tuple[int, ...]
+    frame_rate_hz: Annotated[_Finite, Field(gt=0)]
+    labels: Annotated[tuple[str, ...], Field(min_length=1)]
+    provenance: dict[str, Any]
+    parts: tuple[str, ...] = ()
+
+
+class _Entry(BaseModel):
+    subject: str
+    name: str
+    placement: Annotated[int, Field(ge=0)]
+    start: Annotated[int, Field(ge=0)]
+    stop: Annotated[int, Field(le=1 << 40)]
+    sensor_position_m: tuple[_Finite, _Finite, _Finite]
+
+
+def check_header(path: Path, header: Mapping[str, Any]) -> None:
+    """Raise Sd2Error for a header that is damaged."""
+    try:
+        known = _Header.model_validate(header, strict=False)
+        if any(not 0 <= number < known.bins for number in known.null_bins):
+            raise ValueError(f"null_bins are {list(known.null_bins)}")
+    except ValueError as error:
+        raise Sd2Error(
+            f"{path}: its header is damaged ({reason_of(error)})", "one as it was written", REMAKE
+        ) from error
+
+
+def read_entry(line: str) -> dict[str, Any]:
+    """Return the take that a line describes; ValueError if it is none."""
+    try:
+        entry: dict[str, Any] = json.loads(line)
+    except RecursionError:
+        raise ValueError("nested too deeply") from None
+    known = _Entry.model_validate(entry)
+    if known.stop <= known.start:
+        raise ValueError(f"its frames are {known.start} to {known.stop}")
+    return entry
+
+
+def reason_of(error: ValueError) -> str:
+    """Place and reason of what pydantic refused, or what else was said."""
+    if isinstance(error, ValidationError):
+        first = error.errors(include_url=False)[0]
+        return f"{'.'.join(map(str, first['loc']))}: {first['msg']}"
+    return str(error)
+
+
+def check_array(array: StoredArray, frames: int, row: tuple[int, ...], kind: str) -> None:
+    """Raise Sd2Error for an array that is not of this type, or has too few frames."""
+    if array.shape[:1] < (frames,):
+        raise Sd2Error(
+            f"{array.path}: the array {array.name} is missing or shorter than {INDEX_NAME} says",
+            f"{frames} frames",
+            REMAKE,
+        )
+    if array.shape[1:] != row or array.dtype != np.dtype(kind):
+        raise Sd2Error(
+            f"{array.path}: rows of {array.name} are {array.dtype} of shape {array.shape[1:]}",
+            f"{kind} of shape {row}",
+            REMAKE,
+        )
+
+
+def row_kinds(bins: int, parts: int) -> dict[str, tuple[tuple[int, ...], str]]:
+    """Shape of a row and type of every array, by the number of bins and of parts of the body."""
+    kinds: dict[str, tuple[tuple[int, ...], str]] = {
+        "synthetic": ((bins,), "float32"),
+        "radar": ((bins,), "float32"),
+        "times_s": ((), "float64"),
+        "label": ((), "int8"),
+    }
+    return kinds | ({"limbs": ((parts, bins), "float32")} if parts else {})
 
 
 def read_rows(

@@ -28,7 +28,16 @@ from sd2core.files.stores import (
     open_group,
 )
 from sd2core.maps import LimbMaps
-from sd2core.pairs.rows import INDEX_NAME, read_rows
+from sd2core.pairs.rows import (
+    INDEX_NAME,
+    REMAKE,
+    check_array,
+    check_header,
+    read_entry,
+    read_rows,
+    reason_of,
+    row_kinds,
+)
 from sd2core.sensor import VelocityAxis
 
 PairKind = Literal["simulated", "real"]
@@ -39,7 +48,6 @@ VERSION = 1
 
 _ARRAYS = ("synthetic", "radar", "times_s", "label")
 _CHUNK_FRAMES = 2250
-_REMAKE = "Make the pairs again with `sd2 simulate campaign` or `sd2 pairs`"
 
 
 class TakeKey(NamedTuple):
@@ -203,7 +211,7 @@ class PairWriter:
         if not (self._path / "zarr.json").exists() or _stillborn(self._path):
             _begin(self._path, header)
         self._group = _reopened(self._path, header)
-        names = (*_ARRAYS, *(["limbs"] if parts else []))
+        names = row_kinds(axis.bins, len(parts))
         self._arrays = {name: growing(self._group, self._path, name) for name in names}
         index = _read_takes(self._path, provenance)
         _drop_torn_line(self._path, len(index))
@@ -270,7 +278,7 @@ def is_pair_store(path: Path) -> bool:
     try:
         header = json.loads((Path(path) / "zarr.json").read_text(encoding="utf-8"))
         return bool(header["attributes"]["format"] == FORMAT)
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return False
 
 
@@ -290,31 +298,38 @@ def read_pairs(path: Path) -> PairSet:
     def split(start: int, stop: int) -> LimbMaps | None:
         return None if limbs is None else LimbMaps(parts, limbs[start:stop].transpose(1, 2, 0))
 
-    takes = tuple(
-        Take(
-            subject=entry["subject"],
-            name=entry["name"],
-            placement=entry["placement"],
-            sensor_position_m=np.array(entry["sensor_position_m"], np.float64),
-            limbs=split(entry["start"], entry["stop"]),
-            **{name: array[entry["start"] : entry["stop"]] for name, array in arrays.items()},
-        )
-        for entry in index
-    )
     try:
-        return PairSet(
-            kind=header["kind"],
-            axis=VelocityAxis(int(header["bins"]), float(header["v_max_mps"])),
-            null_bins=tuple(header["null_bins"]),
-            frame_rate_hz=float(header["frame_rate_hz"]),
-            labels=tuple(header["labels"]),
-            takes=takes,
-            provenance=header["provenance"],
+        takes = tuple(
+            Take(
+                subject=entry["subject"],
+                name=entry["name"],
+                placement=entry["placement"],
+                sensor_position_m=np.array(entry["sensor_position_m"], np.float64),
+                limbs=split(entry["start"], entry["stop"]),
+                **{name: array[entry["start"] : entry["stop"]] for name, array in arrays.items()},
+            )
+            for entry in index
         )
-    except KeyError as error:
-        raise Sd2Error(
-            f"{path}: its header lacks {error}", f"{FORMAT} {VERSION}", _REMAKE
-        ) from None
+    except Sd2Error as error:
+        raise Sd2Error(f"{path}: {error.found}", error.expected, REMAKE) from error
+    labels = tuple(header["labels"])
+    for take in takes:
+        if not 0 <= take.label.min() <= take.label.max() < len(labels):
+            raise Sd2Error(
+                f"{path}: take {take.title} has labels from {take.label.min()} to"
+                f" {take.label.max()}",
+                f"0 to {len(labels) - 1}",
+                REMAKE,
+            )
+    return PairSet(
+        kind=header["kind"],
+        axis=VelocityAxis(int(header["bins"]), float(header["v_max_mps"])),
+        null_bins=tuple(header["null_bins"]),
+        frame_rate_hz=float(header["frame_rate_hz"]),
+        labels=labels,
+        takes=takes,
+        provenance=header["provenance"],
+    )
 
 
 def open_takes(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]], dict[str, StoredArray]]:
@@ -327,15 +342,9 @@ def open_takes(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]], dict[s
     group = open_group(path)
     arrays: dict[str, StoredArray] = {}
     frames = max(entry["stop"] for entry in index)
-    for name in (*_ARRAYS, *(["limbs"] if header.get("parts") else [])):
-        found = array_in(group, path, name, "frames") if name in group else None
-        if found is None or found.shape[:1] < (frames,):
-            raise Sd2Error(
-                f"{path}: the array {name} is missing or shorter than {INDEX_NAME} says",
-                f"{frames} frames",
-                _REMAKE,
-            )
-        arrays[name] = found
+    for name, (row, kind) in row_kinds(header["bins"], len(header.get("parts", ()))).items():
+        arrays[name] = array_in(group, path, name, "frames")
+        check_array(arrays[name], frames, row, kind)
     return header, index, arrays
 
 
@@ -352,13 +361,14 @@ def read_description(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     header = json.loads((path / "zarr.json").read_text(encoding="utf-8"))["attributes"]
     if header.get("version") != VERSION:
         raise Sd2Error(
-            f"{path} is of version {header.get('version')}", f"version {VERSION}", _REMAKE
+            f"{path} is of version {header.get('version')}", f"version {VERSION}", REMAKE
         )
     if header.get("kind") not in get_args(PairKind):
         raise Sd2Error(
-            f"{path}: its kind is {header.get('kind')!r}", f"one of {get_args(PairKind)}", _REMAKE
+            f"{path}: its kind is {header.get('kind')!r}", f"one of {get_args(PairKind)}", REMAKE
         )
-    takes = _read_takes(path, header.get("provenance"))
+    check_header(path, header)
+    takes = _read_takes(path, header["provenance"])
     if not takes:
         raise Sd2Error(
             f"{path} holds no take yet",
@@ -382,15 +392,9 @@ def _begin(path: Path, header: dict[str, Any]) -> None:
     bins, parts = header["bins"], len(header["parts"])
     with atomic_folder(path) as folder:
         group = create_group(folder, header)
-        for name, shape, kind in (
-            ("synthetic", (0, bins), "float32"),
-            ("radar", (0, bins), "float32"),
-            ("times_s", (0,), "float64"),
-            ("label", (0,), "int8"),
-            *([("limbs", (0, parts, bins), "float32")] if parts else []),
-        ):
-            chunks = (_CHUNK_FRAMES, *shape[1:])
-            create_array(group, name, shape=shape, dtype=kind, chunks=chunks, fill_value=0)
+        for name, (row, kind) in row_kinds(bins, parts).items():
+            chunks = (_CHUNK_FRAMES, *row)
+            create_array(group, name, shape=(0, *row), dtype=kind, chunks=chunks, fill_value=0)
 
 
 def _reopened(path: Path, header: dict[str, Any]) -> Any:
@@ -414,15 +418,14 @@ def _read_takes(path: Path, provenance: Any) -> list[dict[str, Any]]:
     index = path / INDEX_NAME
     if not index.exists():
         return []
-    lines = index.read_text(encoding="utf-8").split("\n")
+    lines = index.read_text(encoding="utf-8", errors="replace").split("\n")
     entries = []
     for number, line in enumerate(lines[:-1], start=1):
         try:
-            entry = json.loads(line)
-            _key(entry), entry["stop"] - entry["start"], entry["sensor_position_m"]
-        except (ValueError, KeyError, TypeError):
+            entry = read_entry(line)
+        except ValueError as error:
             raise Sd2Error(
-                f"{index}: line {number} cannot be read: {line[:80]!r}",
+                f"{index}: line {number} cannot be read ({reason_of(error)}): {line[:80]!r}",
                 "one take, as JSON",
                 "Delete the line to lose that take alone",
             ) from None

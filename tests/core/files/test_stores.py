@@ -20,6 +20,7 @@ from zarr.codecs import BloscCodec
 from sd2core.errors import Sd2Error
 from sd2core.files.chunk_codecs import DamagedChunkError, check_blosc_frame
 from sd2core.files.stores import StoredArray, array_in, create_array, create_group, open_group
+from tests.damaged_files import change
 
 ROWS, CHUNK = 40, 10
 COMPRESSORS: dict[str, Any] = {
@@ -175,6 +176,19 @@ def test_old_stores_stay_readable(tmp_path: Path) -> None:
         assert not array.damage("values")
 
 
+def test_shards_are_verified_as_files(tmp_path: Path) -> None:
+    group = zarr.open_group(str(tmp_path / "s.zarr"), mode="w")
+    group.create_array("a", data=values(), chunks=(5, 500), shards=(CHUNK, 500))
+    assert not opened(tmp_path / "s.zarr").damage("values")
+    change(chunk(tmp_path / "s.zarr", 2))
+    array = opened(tmp_path / "s.zarr")
+    assert np.array_equal(array[:20], values()[:20])
+    chunk(tmp_path / "s.zarr", 2).write_bytes(b"cut")
+    assert [(one.start, one.stop) for one in array.damage("values")] == [(20, 30)]
+    with pytest.raises(Sd2Error, match="frames 20 to 29 of a"):
+        array[25]
+
+
 def test_a_zip_that_changed_is_named(tmp_path: Path) -> None:
     path, packed = store(tmp_path / "new.zarr"), tmp_path / "new.zarr.zip"
     with zipfile.ZipFile(packed, "w") as archive:
@@ -207,3 +221,16 @@ def test_a_damaged_description_is_refused(tmp_path: Path, name: str, text: str) 
     (path / name).write_text(text)
     with pytest.raises(Sd2Error, match=r"new\.zarr.*cannot be read as a Zarr group"):
         opened(path)
+
+
+def test_nobody_opens_zarr_another_way() -> None:
+    root = Path(__file__).parents[3]
+    files = [file for room in ("sd2core", "app", "tools") for file in (root / room).rglob("*.py")]
+    assert len(files) > 500
+    opening = ("zarr.open", "zarr.create", "zarr.group", "zarr.load", ".create_array(")
+    ways = {
+        str(file.relative_to(root))
+        for file in files
+        if any(word in file.read_text(encoding="utf-8") for word in opening)
+    }
+    assert ways == {"sd2core/files/stores.py"}
