@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -32,11 +33,13 @@ def states_of(folder: Path, keep: Path) -> Iterator[list[Path]]:
     """Copies of a folder before each file takes its name, as a kill there would leave it."""
     kept: list[Path] = []
     replace_file = Path.replace
+    one_at_a_time = threading.Lock()  # Zarr writes in several threads.
 
     def copy_and_replace(self: Path, target: Any) -> Path:
-        kept.append(keep / f"state-{len(kept)}")
-        shutil.copytree(folder, kept[-1])
-        return replace_file(self, target)
+        with one_at_a_time:
+            kept.append(keep / f"state-{len(kept)}")
+            shutil.copytree(folder, kept[-1])
+            return replace_file(self, target)
 
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(Path, "replace", copy_and_replace)

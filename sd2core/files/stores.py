@@ -226,6 +226,20 @@ def open_group(path: Path, mode: Literal["r", "r+"] = "r") -> Any:
         raise _no_group(path, error) from error
 
 
+def array_names(path: Path) -> list[str]:
+    """Names of the arrays in a store."""
+    if path.is_file():
+        with zipfile.ZipFile(path) as archive:
+            found = [Path(name) for name in archive.namelist()]
+    else:
+        found = [file.relative_to(path) for file in path.glob("*/*") if file.is_file()]
+    return sorted(
+        str(one.parent)
+        for one in found
+        if len(one.parts) == 2 and one.name in ("zarr.json", ".zarray")
+    )
+
+
 def array_in(
     group: Any, path: Path, name: str, unit: str, *, sparse: bool | None = None
 ) -> StoredArray:

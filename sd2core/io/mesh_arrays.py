@@ -19,11 +19,13 @@ from sd2core.files.stores import (
     Depth,
     StoredArray,
     array_in,
+    array_names,
     create_array,
     create_group,
     open_group,
     unreadable,
 )
+from sd2core.io.stored_vertices import StoredVertices
 from sd2core.mesh.sequence import MeshSequence, VertexArray, refuse_missing
 from sd2core.progress import Progress, silent
 
@@ -50,7 +52,6 @@ SMALL_NAMES = (
 )
 
 _CHUNK_BYTES = 2 * 2**20
-_LARGEST_CHUNK_BYTES = 64 * 2**20
 _WHOLE_CHECK_BYTES = 128 * 2**20
 """Size of the vertices on disk up to which all are checked when a mesh is opened."""
 _FORMAT = "sd2-mesh"
@@ -70,105 +71,6 @@ class RawMesh:
     limbs: tuple[str, ...] = ()  # names, in the order in which arrays number them
     uncertainty: tuple[NDArray[Any], ...] | None = None  # as UNCERTAINTY_NAMES has them
     frame_numbers: NDArray[np.int64] | None = None  # (T,), of the video, when some are missing
-
-
-class StoredVertices:
-    """Vertices (T, V, 3) that stay on disk; scaled, moved and checked when they are read.
-
-    Frames in ``damaged`` chunks hold the last pose before them (at the start, the next after them).
-    """
-
-    def __init__(self, array: StoredArray, damaged: tuple[Damage, ...] = ()) -> None:
-        self._array = array
-        self._source = str(array.path)
-        self._last: tuple[int, NDArray[Any]] | None = None  # chunk number, its frames
-        self.damaged = damaged
-        self._lost = {one.start // self.frames_per_chunk for one in damaged}  # chunk numbers
-        self.scale = 1.0
-        self.shift_m = np.zeros(3, np.float32)
-        self.shape: tuple[int, ...] = array.shape
-        self.dtype = real_type(array.dtype)
-
-    @property
-    def frames_per_chunk(self) -> int:
-        """Frames that come from the disk together."""
-        return self._array.chunks[0]
-
-    @property
-    def chunk_bytes(self) -> int:
-        """Memory of those frames."""
-        return self.frames_per_chunk * int(np.prod(self.shape[1:])) * self.dtype.itemsize
-
-    def __getitem__(self, key: Any) -> NDArray[Any]:
-        first = None
-        if isinstance(key, int | np.integer):
-            first = range(self.shape[0])[key]
-            part = self._stretch(first, first + 1)[0]
-        elif isinstance(key, slice) and key.step in (None, 1):
-            first, stop, _ = key.indices(self.shape[0])
-            part = self._stretch(first, stop)
-        else:
-            part = self._read(key)
-        # A sum is finite only when its terms are, and costs next to nothing
-        # beside the reading; a sum that overflowed is looked at again.
-        with np.errstate(all="ignore"):
-            suspect = not np.isfinite(part.sum())
-        if suspect and first is not None:
-            refuse_missing(part.reshape(-1, *self.shape[1:]), first, self._source)
-        if suspect and not np.isfinite(part).all():
-            raise Sd2Error(
-                f"{self._source}: vertices that are NaN or infinite in {_where(key)}",
-                "finite coordinates in metres in every frame",
-                "Fill or leave out those frames where the file is written",
-            )
-        if self.scale != 1.0:
-            part = part * part.dtype.type(self.scale)
-        if self.shift_m.any():
-            part = part + self.shift_m.astype(part.dtype)
-        return part
-
-    def _stretch(self, start: int, stop: int) -> NDArray[Any]:
-        """Frames ``start`` to ``stop``, chunk by chunk: Zarr is slower on many at once."""
-        large = self.chunk_bytes > _LARGEST_CHUNK_BYTES and not self._lost
-        if large or stop <= start:
-            return self._read(slice(start, stop))
-        part = np.empty((stop - start, *self.shape[1:]), self.dtype)
-        step = self.frames_per_chunk
-        for number in range(start // step, (stop - 1) // step + 1):
-            first, last = max(start, number * step), min(stop, (number + 1) * step)
-            chunk = self._chunk(number)
-            part[first - start : last - start] = chunk[first - number * step :][: last - first]
-        return part
-
-    def _chunk(self, number: int) -> NDArray[Any]:
-        """One chunk; the last one is kept, because frames are played one by one."""
-        kept = self._last
-        if kept is None or kept[0] != number:
-            step = self.frames_per_chunk
-            frames = slice(number * step, min((number + 1) * step, self.shape[0]))
-            if number in self._lost:
-                pose = self._read(self._pose_frame(number))
-                read = np.broadcast_to(pose, (frames.stop - frames.start, *pose.shape))
-            else:
-                read = self._read(frames)
-            kept = (number, read)
-            self._last = kept
-        return kept[1]
-
-    def _pose_frame(self, lost: int) -> int:
-        """Frame whose pose stands in for those of a lost chunk."""
-        step = self.frames_per_chunk
-        before = next((n for n in range(lost - 1, -1, -1) if n not in self._lost), None)
-        if before is not None:
-            return (before + 1) * step - 1
-        return next(n for n in range(lost + 1, self.shape[0]) if n not in self._lost) * step
-
-    def _read(self, key: Any) -> NDArray[Any]:
-        try:
-            return np.asarray(self._array[key], dtype=self.dtype)
-        except Sd2Error as error:
-            remedy = f"{error.remedy}; without its file, a chunk's frames are left out"
-            raise Sd2Error(error.found, error.expected, remedy) from error
 
 
 def read_npz(path: Path) -> RawMesh:
@@ -227,7 +129,7 @@ def read_zarr(path: Path) -> RawMesh:
     Frames of damaged chunks are left out, as if nobody had been there.
     """
     group = open_group(path)
-    names = _names(group, path)
+    names = array_names(path)
     small = [name for name in names if name in SMALL_NAMES]
     arrays: dict[str, Any] = {name: array_in(group, path, name, "rows")[...] for name in small}
     stored = _vertices(group, path, names)
@@ -247,7 +149,7 @@ def read_zarr(path: Path) -> RawMesh:
     raw.vertices = StoredVertices(stored, damaged)
     if damaged:
         _leave_out(raw, damaged, path)
-    if len(stored.shape) == 3 and raw.vertices.chunk_bytes > _LARGEST_CHUNK_BYTES:
+    if len(stored.shape) == 3 and raw.vertices.large_chunks:
         raw.notes.append(
             f"The vertices are stored in chunks of {raw.vertices.frames_per_chunk:,} frames "
             f"({raw.vertices.chunk_bytes / 2**20:,.0f} MiB), which are read whole for every frame "
@@ -259,22 +161,10 @@ def read_zarr(path: Path) -> RawMesh:
 def stored_arrays(path: Path) -> list[StoredArray]:
     """Arrays of a mesh in Zarr, not yet read."""
     group = open_group(path)
-    names = _names(group, path)
+    names = array_names(path)
     vertices = _vertices(group, path, names)
     small = [array_in(group, path, name, "rows") for name in names if name in SMALL_NAMES]
     return small if vertices is None else [vertices, *small]
-
-
-def _names(group: Any, path: Path) -> list[str]:
-    """Names of the arrays in a group; Sd2Error if a description is damaged."""
-    try:
-        return sorted(group.array_keys())
-    except Exception as error:  # damaged descriptions fail in many ways
-        raise Sd2Error(
-            f"{path} cannot be read as a Zarr group ({type(error).__name__}: {error})",
-            "a .zarr folder or .zarr.zip with the arrays vertices, faces and times_s",
-            COPY_AGAIN,
-        ) from error
 
 
 def _vertices(group: Any, path: Path, names: list[str]) -> StoredArray | None:
@@ -414,14 +304,3 @@ def _zip_folder(folder: Path, stream: Any) -> None:
 
 def _first(arrays: dict[str, Any], names: tuple[str, ...]) -> Any | None:
     return next((arrays[name] for name in names if name in arrays), None)
-
-
-def real_type(dtype: Any) -> np.dtype[Any]:
-    """Single precision where it holds every number of this type, otherwise double."""
-    return np.dtype(np.float32 if np.can_cast(dtype, np.float32) else np.float64)
-
-
-def _where(key: Any) -> str:
-    if isinstance(key, slice):
-        return f"frames {key.start or 0} to {(key.stop or 0) - 1}"
-    return f"frame {key}"

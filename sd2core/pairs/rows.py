@@ -1,11 +1,11 @@
-"""Checks of a store of pairs, and its rows where they are not damaged."""
+"""Lines and rows of a store of pairs, checked as they are read."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,15 @@ from sd2core.files.stores import Damage, StoredArray
 
 INDEX_NAME = "takes.jsonl"
 REMAKE = "Make the pairs again with `sd2 simulate campaign` or `sd2 pairs`"
+
+
+class TakeKey(NamedTuple):
+    """Key of a take, unique in a set."""
+
+    subject: str
+    name: str
+    placement: int
+
 
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
 
@@ -47,11 +56,11 @@ def check_header(path: Path, header: Mapping[str, Any]) -> None:
             raise ValueError(f"null_bins are {list(known.null_bins)}")
     except ValueError as error:
         raise Sd2Error(
-            f"{path}: its header is damaged ({reason_of(error)})", "one as it was written", REMAKE
+            f"{path}: its header is damaged ({_reason_of(error)})", "one as it was written", REMAKE
         ) from error
 
 
-def read_entry(line: str) -> dict[str, Any]:
+def _read_entry(line: str) -> dict[str, Any]:
     """Return the take that a line describes; ValueError if it is none."""
     try:
         entry: dict[str, Any] = json.loads(line)
@@ -63,7 +72,7 @@ def read_entry(line: str) -> dict[str, Any]:
     return entry
 
 
-def reason_of(error: ValueError) -> str:
+def _reason_of(error: ValueError) -> str:
     """Place and reason of what pydantic refused, or what else was said."""
     if isinstance(error, ValidationError):
         first = error.errors(include_url=False)[0]
@@ -142,3 +151,46 @@ def _undamaged(array: StoredArray, frames: int, damaged: Sequence[Damage]) -> ND
 
 def _overlap(take: Mapping[str, Any], damage: Damage) -> bool:
     return bool(take["start"] < damage.stop and damage.start < take["stop"])
+
+
+def read_takes(path: Path, provenance: Any) -> list[dict[str, Any]]:
+    """Read the lines of takes; an incomplete last line is left out."""
+    by_part = isinstance(provenance, Mapping) and provenance.get("made_by") == "sd2 pairs mars"
+    index = path / INDEX_NAME
+    if not index.exists():
+        return []
+    lines = index.read_text(encoding="utf-8", errors="replace").split("\n")
+    entries = []
+    for number, line in enumerate(lines[:-1], start=1):
+        try:
+            entry = _read_entry(line)
+        except ValueError as error:
+            raise Sd2Error(
+                f"{index}: line {number} cannot be read ({_reason_of(error)}): {line[:80]!r}",
+                "one take, as JSON",
+                "Delete the line to lose that take alone",
+            ) from None
+        if by_part and entry["name"].startswith("stretch-"):
+            # Written when the parts of one person were subjects of their own: "1-test".
+            entry["subject"], _, part = entry["subject"].rpartition("-")
+            entry["name"] = f"{part}-{entry['name']}"
+        entries.append(entry)
+    return entries
+
+
+def drop_torn_line(path: Path, lines: int) -> None:
+    """Cut an incomplete last line off."""
+    index = path / INDEX_NAME
+    if not index.exists():
+        return
+    content = index.read_bytes()
+    if not content.endswith(b"\n"):
+        whole = content[: content.rfind(b"\n") + 1]
+        assert whole.count(b"\n") == lines
+        with index.open("r+b") as file:
+            file.truncate(len(whole))
+
+
+def key_of(entry: dict[str, Any]) -> TakeKey:
+    """Key of the take that a line describes."""
+    return TakeKey(entry["subject"], entry["name"], entry["placement"])

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Mapping, Sequence, Set
+from collections.abc import Iterable, Sequence, Set
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,11 +31,13 @@ from sd2core.maps import LimbMaps
 from sd2core.pairs.rows import (
     INDEX_NAME,
     REMAKE,
+    TakeKey,
     check_array,
     check_header,
-    read_entry,
+    drop_torn_line,
+    key_of,
     read_rows,
-    reason_of,
+    read_takes,
     row_kinds,
 )
 from sd2core.sensor import VelocityAxis
@@ -48,14 +50,6 @@ VERSION = 1
 
 _ARRAYS = ("synthetic", "radar", "times_s", "label")
 _CHUNK_FRAMES = 2250
-
-
-class TakeKey(NamedTuple):
-    """Key of a take, unique in a set."""
-
-    subject: str
-    name: str
-    placement: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,9 +207,9 @@ class PairWriter:
         self._group = _reopened(self._path, header)
         names = row_kinds(axis.bins, len(parts))
         self._arrays = {name: growing(self._group, self._path, name) for name in names}
-        index = _read_takes(self._path, provenance)
-        _drop_torn_line(self._path, len(index))
-        self._done = {_key(entry) for entry in index}
+        index = read_takes(self._path, provenance)
+        drop_torn_line(self._path, len(index))
+        self._done = {key_of(entry) for entry in index}
         self._frames = max((entry["stop"] for entry in index), default=0)
 
     @property
@@ -368,7 +362,7 @@ def read_description(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
             f"{path}: its kind is {header.get('kind')!r}", f"one of {get_args(PairKind)}", REMAKE
         )
     check_header(path, header)
-    takes = _read_takes(path, header["provenance"])
+    takes = read_takes(path, header["provenance"])
     if not takes:
         raise Sd2Error(
             f"{path} holds no take yet",
@@ -410,44 +404,3 @@ def _reopened(path: Path, header: dict[str, Any]) -> Any:
                 "Go on with the same settings, or choose another folder",
             )
     return group
-
-
-def _read_takes(path: Path, provenance: Any) -> list[dict[str, Any]]:
-    """Read the lines of takes; an incomplete last line is left out."""
-    by_part = isinstance(provenance, Mapping) and provenance.get("made_by") == "sd2 pairs mars"
-    index = path / INDEX_NAME
-    if not index.exists():
-        return []
-    lines = index.read_text(encoding="utf-8", errors="replace").split("\n")
-    entries = []
-    for number, line in enumerate(lines[:-1], start=1):
-        try:
-            entry = read_entry(line)
-        except ValueError as error:
-            raise Sd2Error(
-                f"{index}: line {number} cannot be read ({reason_of(error)}): {line[:80]!r}",
-                "one take, as JSON",
-                "Delete the line to lose that take alone",
-            ) from None
-        if by_part and entry["name"].startswith("stretch-"):
-            # Written when the parts of one person were subjects of their own: "1-test".
-            entry["subject"], _, part = entry["subject"].rpartition("-")
-            entry["name"] = f"{part}-{entry['name']}"
-        entries.append(entry)
-    return entries
-
-
-def _drop_torn_line(path: Path, lines: int) -> None:
-    index = path / INDEX_NAME
-    if not index.exists():
-        return
-    content = index.read_bytes()
-    if not content.endswith(b"\n"):
-        whole = content[: content.rfind(b"\n") + 1]
-        assert whole.count(b"\n") == lines
-        with index.open("r+b") as file:
-            file.truncate(len(whole))
-
-
-def _key(entry: dict[str, Any]) -> TakeKey:
-    return TakeKey(entry["subject"], entry["name"], entry["placement"])
