@@ -98,6 +98,8 @@ class Header:
             # Before there were limb maps, headers did not have parts.
             content = {name: ({"parts": ()} | entry)[name] for name in names}
             return _HEADER.validate_python({**content, "axis": axis})
+        except Sd2Error as error:
+            raise Sd2Error(f"{path}: {error.found}", error.expected) from error
         except (KeyError, TypeError, ValueError, OverflowError) as error:
             raise Sd2Error(
                 f"{path}: its description is damaged ({error!r})", f"{FORMAT} {VERSION}"

@@ -274,7 +274,7 @@ def is_begun(path: Path) -> bool:
     try:
         attributes = json.loads((path / _DESCRIPTION).read_text(encoding="utf-8"))["attributes"]
         return bool(attributes["format"] == _BEGUN)
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return False
 
 

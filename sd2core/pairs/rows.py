@@ -30,7 +30,7 @@ _Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
 class _Header(BaseModel):
-    bins: Annotated[int, Field(ge=1, le=1 << 16)]
+    bins: Annotated[int, Field(ge=2, le=1 << 16)]
     v_max_mps: Annotated[_Finite, Field(gt=0)]
     null_bins: tuple[int, ...]
     frame_rate_hz: Annotated[_Finite, Field(gt=0)]

@@ -69,7 +69,7 @@ def _verified(path: Path, arrays: Sequence[Any], rows: range | None) -> dict[str
 def in_words(verified: dict[str, Any]) -> str:
     """Result of :func:`verify` as a fact."""
     if not verified:
-        return "nothing: it is not stored in chunks, and was read whole"
+        return "nothing: it is not stored in chunks"
     bare = verified["without_checksums"]
     if not bare:
         return "every chunk has its checksum"
