@@ -12,7 +12,7 @@ COMPILED := .venv/.compiled
 # Among them every module in KERNEL_MODULES of sd2core/numerics/compiled.py.
 KERNELS := $(wildcard sd2core/numerics/*.py sd2core/body/*.py sd2core/scattering/*.py sd2core/doppler/*.py sd2core/fmcw/*.py)
 
-.PHONY: help setup demo test test-slow lint format bench wheel screenshots accuracy fitting denoiser denoiser-comparison range-synthesis scale classifier real-gestures whole-loop paper clean
+.PHONY: help setup demo test test-slow lint format bench fuzz wheel screenshots accuracy fitting denoiser denoiser-comparison range-synthesis scale classifier real-gestures whole-loop paper clean
 
 help:
 	@echo "make demo         set up, and open the sample recording in the window"
@@ -22,6 +22,7 @@ help:
 	@echo "make format       let ruff format the code"
 	@echo "make test-slow    the slow tests"
 	@echo "make bench        the benchmarks"
+	@echo "make fuzz         10,000 damaged meshes, pairs and data sets, each read or refused (half an hour)"
 	@echo "make wheel        dist/*.whl"
 	@echo "make screenshots  the pictures in docs/"
 	@echo "make accuracy     docs/accuracy-and-speed.md, measured (some five minutes)"
@@ -80,6 +81,9 @@ format: $(INSTALLED)
 
 bench: system-packages-for-tests setup
 	scripts/on_display.sh $(BIN)/python -m pytest tests/benchmarks --benchmark-only --timeout=0 --capture=no
+
+fuzz: $(INSTALLED)
+	$(BIN)/python -m tests.mutants --count 10000
 
 wheel: $(INSTALLED)
 	$(BIN)/python -m build --wheel --no-isolation

@@ -32,6 +32,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text, replace_folder
 from sd2core.files.lock import FileLock
 from sd2core.files.resources import resource_path
+from sd2core.files.stores import open_group
 from sd2core.io.mesh import save_mesh
 from sd2core.io.video import VideoReader, open_video
 from sd2core.progress import Progress
@@ -287,9 +288,7 @@ def _write(
 def _describe(mesh: Path, about: Mapping[str, Any]) -> None:
     """Write provenance into a mesh file."""
     if mesh.is_dir():
-        import zarr
-
-        zarr.open_group(str(mesh), mode="r+").attrs["fit"] = dict(about)
+        open_group(mesh, "r+").attrs["fit"] = dict(about)
         return
     with (
         zipfile.ZipFile(mesh, "a", zipfile.ZIP_DEFLATED) as archive,

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sd2core.datasets.layout import (
     FORMAT,
@@ -22,6 +23,7 @@ from sd2core.datasets.layout import (
 )
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
+from sd2core.files.stores import Damage, Depth, unreadable
 from sd2core.progress import Progress, silent
 
 NPZ_LIMIT_BYTES = 1 << 30
@@ -60,6 +62,43 @@ def write_packed(
         _write_hdf5(out, header, arrays, sources, progress)
 
 
+class Hdf5Rows:
+    """Array of an HDF5 data set that stays on disk; Sd2Error names what is damaged."""
+
+    def __init__(self, array: Any, path: Path, name: str) -> None:
+        self._array = array
+        self.path, self.name = path, name
+        self.checksums = bool(array.fletcher32)
+        self.shape: tuple[int, ...] = tuple(array.shape)
+        self.dtype: np.dtype[Any] = np.dtype(array.dtype)
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __getitem__(self, key: Any) -> NDArray[Any]:
+        try:
+            return np.asarray(self._array[key])
+        except (OSError, RuntimeError, ValueError) as error:
+            found = self.damage("values") or f"{self.name} ({error})"
+            raise unreadable(self.path, found) from error
+
+    def damage(
+        self, depth: Depth, rows: range | None = None, progress: Progress = silent
+    ) -> tuple[Damage, ...]:
+        """Return the chunks of rows that cannot be read; HDF5 looks at all at every depth."""
+        rows = range(self.shape[0]) if rows is None else rows
+        step = (self._array.chunks or self.shape)[0]
+        found = []
+        for start in range(rows.start // step * step, rows.stop, step):
+            progress(start - rows.start, len(rows))
+            stop = min(start + step, self.shape[0])
+            try:
+                self._array[start:stop]
+            except (OSError, RuntimeError, ValueError) as error:
+                found.append(Damage(self.name, start, stop, "segments", str(error)))
+        return tuple(found)
+
+
 def open_hdf5(path: Path) -> tuple[Header, dict[str, Any], Any]:
     """Open an HDF5 data set: header, arrays and the open file."""
     import h5py
@@ -74,7 +113,8 @@ def open_hdf5(path: Path) -> tuple[Header, dict[str, Any], Any]:
         if META not in file:
             raise Sd2Error(f"{path} holds no data set", "one that `sd2 export` made")
         header = Header.from_dict(_json(file[META][()].decode("utf-8"), path), path)
-        return header, {name: file[name] for name in _whole(header, file.keys(), path)}, file
+        names = _whole(header, file.keys(), path)
+        return header, {name: Hdf5Rows(file[name], path, name) for name in names}, file
     except BaseException:
         file.close()
         raise
@@ -131,7 +171,7 @@ def _write_hdf5(
             chunk = (min(chunk_of(row)[0], rows), *row)
             target = file.create_dataset(
                 name, shape=(rows, *row), dtype=kind, chunks=chunk, compression="gzip",
-                compression_opts=1, shuffle=True,
+                compression_opts=1, shuffle=True, fletcher32=True,
             )  # fmt: skip
             step = 16 * chunk_of(row)[0]
             for start in range(0, rows, step):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Literal
@@ -97,7 +98,9 @@ class Header:
             # Before there were limb maps, headers did not have parts.
             content = {name: ({"parts": ()} | entry)[name] for name in names}
             return _HEADER.validate_python({**content, "axis": axis})
-        except (KeyError, TypeError, ValueError) as error:
+        except Sd2Error as error:
+            raise Sd2Error(f"{path}: {error.found}", error.expected) from error
+        except (KeyError, TypeError, ValueError, OverflowError) as error:
             raise Sd2Error(
                 f"{path}: its description is damaged ({error!r})", f"{FORMAT} {VERSION}"
             ) from error
@@ -136,6 +139,22 @@ def row_shapes(header: Header) -> dict[str, tuple[str, tuple[int, ...]]]:
     if header.parts:
         maps["limbs"] = ("float32", (header.length, len(header.parts), header.axis.bins))
     return maps | {"label": ("int16", (header.length,))} | COLUMNS
+
+
+def check_arrays(header: Header, arrays: Mapping[str, Any], path: Path) -> None:
+    """Refuse arrays that are not as the header says, or do not have the same rows."""
+    rows = {array.shape[:1] for array in arrays.values()}
+    wrong = [
+        name
+        for name, (kind, row) in row_shapes(header).items()
+        if arrays[name].shape[1:] != row or arrays[name].dtype != kind
+    ]
+    if wrong or len(rows) != 1 or rows == {()}:
+        raise Sd2Error(
+            f"{path}: its arrays do not fit its description ({', '.join(wrong) or 'rows differ'})",
+            "a data set that is whole",
+            "Copy it again from where it came, or write it again",
+        )
 
 
 def chunk_of(row: tuple[int, ...]) -> tuple[int, ...]:

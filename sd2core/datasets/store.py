@@ -12,6 +12,7 @@ import os
 import shutil
 import time
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -20,14 +21,23 @@ import numpy as np
 from sd2core.datasets.cutting import Arrays
 from sd2core.datasets.layout import (
     CHUNK_SEGMENTS,
+    FORMAT,
     Header,
+    check_arrays,
     check_format,
     chunk_of,
     row_shapes,
 )
 from sd2core.datasets.source import KINDS
 from sd2core.errors import Sd2Error
-from sd2core.files.atomic import atomic_write
+from sd2core.files.atomic import atomic_write, atomic_write_text, is_leftover
+from sd2core.files.stores import (
+    StoredArray,
+    array_in,
+    create_array,
+    growing,
+    open_group,
+)
 from sd2core.io.kinds import is_dataset
 
 SOURCES_NAME = "sources.jsonl"
@@ -38,6 +48,9 @@ _TOGETHER = 16 * CHUNK_SEGMENTS
 """Segments that are written together."""
 _TORN = "*.partial"
 """Files that a killed Zarr leaves of a chunk that it was writing."""
+_BEGUN = f"{FORMAT}-begun"
+"""Format of a store that does not have all its arrays yet."""
+_DESCRIPTION = "zarr.json"
 
 
 class SegmentStore:
@@ -47,17 +60,17 @@ class SegmentStore:
     """
 
     def __init__(self, path: Path) -> None:
-        import zarr
-
         self.path = path
         for left in path.rglob(_TORN):
             left.unlink(missing_ok=True)
-        self._group = zarr.open_group(str(path), mode="r+")
+        self._group = open_group(path, "r+")
         self.header = Header.from_dict(dict(self._group.attrs), path)
         # Asked for by name: Zarr complains when it lists a folder with other files in it.
         names = [*KINDS, *row_shapes(self.header)]
         self._arrays: dict[str, Any] = {
-            name: self._group[name] for name in dict.fromkeys(names) if name in self._group
+            name: growing(self._group, path, name)
+            for name in dict.fromkeys(names)
+            if (path / name / _DESCRIPTION).exists()
         }
         _drop_torn_line(path / SOURCES_NAME)
         self._pending: list[tuple[int, Arrays]] = []
@@ -72,9 +85,9 @@ class SegmentStore:
     @classmethod
     def begin(cls, path: Path, header: Header) -> SegmentStore:
         """Make an empty store in a folder; an earlier store there is deleted."""
-        group = _emptied(path, header)
-        for name, (kind, row) in row_shapes(header).items():
-            _create(group, name, kind, row, 0)
+        with _new_group(path, header) as group:
+            for name, (kind, row) in row_shapes(header).items():
+                _create(group, name, kind, row, 0)
         return cls(path)
 
     @classmethod
@@ -82,17 +95,16 @@ class SegmentStore:
         cls, path: Path, header: Header, arrays: Any, sources: Iterable[dict[str, Any]]
     ) -> SegmentStore:
         """Rebuild the store that a file was packed from."""
-        group = _emptied(path, header)
-        for name, (kind, row) in row_shapes(header).items():
-            rows = arrays[name].shape[0]
-            target: Any = _create(group, name, kind, row, rows)
-            step = 16 * chunk_of(row)[0]
-            for start in range(0, rows, step):
-                target[start : start + step] = arrays[name][start : start + step]
-        # Last, and in one step: without it the store is as if it had not been begun.
-        with atomic_write(path / SOURCES_NAME) as index:
-            for entry in sources:
-                index.write(_line(entry).encode("utf-8"))
+        with _new_group(path, header) as group:
+            for name, (kind, row) in row_shapes(header).items():
+                rows = arrays[name].shape[0]
+                target: Any = _create(group, name, kind, row, rows)
+                step = 16 * chunk_of(row)[0]
+                for start in range(0, rows, step):
+                    target[start : start + step] = arrays[name][start : start + step]
+            with atomic_write(path / SOURCES_NAME) as index:
+                for entry in sources:
+                    index.write(_line(entry).encode("utf-8"))
         return cls(path)
 
     @property
@@ -174,7 +186,9 @@ class SegmentStore:
         for kind in KINDS:
             if kind not in self._arrays and any(kind in block for _, block in pending):
                 row = (self.header.length, self.header.axis.bins)
-                self._arrays[kind] = _create(self._group, kind, "float32", row, start)
+                array = self._arrays[kind] = _create(self._group, kind, "float32", row, start)
+                for first in range(0, start, _TOGETHER):
+                    array[first : first + _TOGETHER] = 0.0
         for name, array in self._arrays.items():
             values = np.zeros((stop - start, *array.shape[1:]), array.dtype)
             for at, block in pending:
@@ -189,13 +203,11 @@ class SegmentStore:
         array[start:stop] = values
 
 
-def open_arrays(path: Path) -> tuple[Header, dict[str, Any]]:
+def open_arrays(path: Path) -> tuple[Header, dict[str, StoredArray]]:
     """Open the header and arrays of a finished store."""
-    import zarr
-
     if not is_dataset(path):
         raise Sd2Error(f"{path} holds no data set", "one that `sd2 export` made")
-    group: Any = zarr.open_group(str(path), mode="r")
+    group = open_group(path)
     attributes = dict(group.attrs)
     check_format(attributes, path)
     if not attributes.get("complete"):
@@ -205,42 +217,65 @@ def open_arrays(path: Path) -> tuple[Header, dict[str, Any]]:
             "Run the command that made it once more: it goes on where it was",
         )
     header = Header.from_dict(attributes, path)
-    missing = [name for name in row_shapes(header) if name not in group]
+    missing = [name for name in row_shapes(header) if not (path / name / _DESCRIPTION).exists()]
     if missing:
         raise Sd2Error(f"{path} lacks {', '.join(missing)}", "a data set that is whole")
-    return header, {name: group[name] for name in row_shapes(header)}
+    arrays = {name: array_in(group, path, name, "segments") for name in row_shapes(header)}
+    check_arrays(header, arrays, path)
+    return header, arrays
 
 
 def read_sources(path: Path) -> Iterator[dict[str, Any]]:
     """Yield the lines of sources; an incomplete last line is left out."""
     if not path.exists():
         return
-    with path.open(encoding="utf-8") as lines:
+    with path.open(encoding="utf-8", errors="replace") as lines:
         for number, line in enumerate(lines, start=1):
             if not line.endswith("\n"):
                 return
             try:
                 entry = json.loads(line)
                 entry["subject"], entry["recording"], entry["placement"], entry["stop"]
-            except (ValueError, KeyError, TypeError):
+            except (ValueError, KeyError, TypeError, RecursionError):
                 raise Sd2Error(
                     f"{path}: line {number} cannot be read: {line[:80]!r}", "one source, as JSON"
                 ) from None
             yield entry
 
 
-def _emptied(path: Path, header: Header) -> Any:
-    import zarr
+@contextmanager
+def _new_group(path: Path, header: Header) -> Iterator[Any]:
+    """Make a group in a folder, in place of what is there but the lock.
 
+    It is a data set once the block has ended: until then :func:`is_begun` says what it is.
+    """
     path.mkdir(exist_ok=True)
+    begun = {"zarr_format": 3, "node_type": "group", "attributes": {"format": _BEGUN}}
+    atomic_write_text(path / _DESCRIPTION, json.dumps(begun))
     for left in path.iterdir():
-        if left.name == LOCK_NAME:
+        if left.name in (LOCK_NAME, _DESCRIPTION):
             continue
         if left.is_dir():
             shutil.rmtree(left)
         else:
             left.unlink()
-    return zarr.open_group(str(path), mode="a", attributes=header.as_dict() | {"complete": False})
+    group = open_group(path, "r+")
+    yield group
+    group.attrs.put(header.as_dict() | {"complete": False})
+
+
+def is_begun(path: Path) -> bool:
+    """True for a folder that is empty, or of a store whose writer ended before it was whole."""
+    if not path.is_dir():
+        return False
+    names = {one.name for one in path.iterdir()} - {LOCK_NAME}
+    if _DESCRIPTION not in names:
+        return all(map(is_leftover, names))
+    try:
+        attributes = json.loads((path / _DESCRIPTION).read_text(encoding="utf-8"))["attributes"]
+        return bool(attributes["format"] == _BEGUN)
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return False
 
 
 def _line(entry: dict[str, Any]) -> str:
@@ -249,8 +284,8 @@ def _line(entry: dict[str, Any]) -> str:
 
 def _create(group: Any, name: str, kind: str, row: tuple[int, ...], rows: int) -> Any:
     fill = -1 if name == "split" else 0
-    return group.create_array(
-        name, shape=(rows, *row), dtype=kind, chunks=chunk_of(row), fill_value=fill
+    return create_array(
+        group, name, shape=(rows, *row), dtype=kind, chunks=chunk_of(row), fill_value=fill
     )
 
 

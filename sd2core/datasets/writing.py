@@ -26,7 +26,7 @@ from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.source import KINDS, LazySource, Source, SourceKey
 from sd2core.datasets.splitting import split_people
-from sd2core.datasets.store import LOCK_NAME, SegmentStore, open_arrays
+from sd2core.datasets.store import LOCK_NAME, SOURCES_NAME, SegmentStore, is_begun, open_arrays
 from sd2core.errors import Sd2Error
 from sd2core.files.lock import FileLock
 from sd2core.io.kinds import is_dataset
@@ -118,7 +118,13 @@ class _Writer:
         self._there: dict[bytes, str] = {}
         self._store: SegmentStore | None = None
         begun = SegmentStore(work) if is_dataset(work) else None
-        if begun is not None and (begun.sources or work == out or not out.exists()):
+        if begun is not None and begun.complete and not begun.sources:
+            raise Sd2Error(
+                f"{out} lacks its list of sources, {SOURCES_NAME}",
+                "a data set that is whole",
+                "Choose a new name, or copy that file again from where it came",
+            )
+        if begun is not None and begun.sources:
             self._store = begun
             for entry in begun.entries():
                 self._know(entry)
@@ -303,9 +309,7 @@ class _Writer:
 def _refuse_other(out: Path, form: FileFormat) -> None:
     """Refuse to overwrite anything but a data set."""
     if form == "zarr":
-        if out.exists() and not is_dataset(out) and (
-            not out.is_dir() or any(entry.name != LOCK_NAME for entry in out.iterdir())
-        ):  # fmt: skip
+        if out.exists() and not (is_dataset(out) or is_begun(out)):
             raise Sd2Error(f"{out} is there and holds no data set", "a new name")
     elif out.exists():
         open_dataset(out).close()

@@ -66,7 +66,7 @@ def is_dataset(path: Path) -> bool:
 
             with h5py.File(path, "r") as file:
                 return bool(file.attrs.get("format", "") == DATASET_FORMAT)
-    except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError, zipfile.BadZipFile):
         return False
     return False
 

@@ -13,16 +13,15 @@ from sd2core.files.paths import is_pattern
 from sd2core.io.fitted import fitted_doubts
 from sd2core.io.mesh_arrays import (
     RawMesh,
-    StoredVertices,
     read_npz,
     read_zarr,
-    real_type,
     write_npz,
     write_zarr,
 )
 from sd2core.io.mesh_checks import check_mesh, mark_empty_frames, uncertainty_of
 from sd2core.io.mesh_files import SURFACE_SUFFIXES, read_faces, read_mesh_files
 from sd2core.io.mesh_models import read_model_output
+from sd2core.io.stored_vertices import StoredVertices, real_type
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Progress, silent
 from sd2core.timebase import Timebase

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tempfile
-import threading
 import zipfile
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,6 +13,19 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_folder, atomic_write
+from sd2core.files.stores import (
+    COPY_AGAIN,
+    Damage,
+    Depth,
+    StoredArray,
+    array_in,
+    array_names,
+    create_array,
+    create_group,
+    open_group,
+    unreadable,
+)
+from sd2core.io.stored_vertices import StoredVertices
 from sd2core.mesh.sequence import MeshSequence, VertexArray, refuse_missing
 from sd2core.progress import Progress, silent
 
@@ -40,9 +52,8 @@ SMALL_NAMES = (
 )
 
 _CHUNK_BYTES = 2 * 2**20
-_LARGEST_CHUNK_BYTES = 64 * 2**20
-_KEPT_BYTES = 32 * 2**20
-"""Chunks that were read last: all of a short clip, which several threads read at once."""
+_WHOLE_CHECK_BYTES = 128 * 2**20
+"""Size of the vertices on disk up to which all are checked when a mesh is opened."""
 _FORMAT = "sd2-mesh"
 
 
@@ -60,95 +71,6 @@ class RawMesh:
     limbs: tuple[str, ...] = ()  # names, in the order in which arrays number them
     uncertainty: tuple[NDArray[Any], ...] | None = None  # as UNCERTAINTY_NAMES has them
     frame_numbers: NDArray[np.int64] | None = None  # (T,), of the video, when some are missing
-
-
-class StoredVertices:
-    """Vertices (T, V, 3) that stay on disk; scaled, moved and checked when they are read."""
-
-    def __init__(self, array: Any, source: str) -> None:
-        self._array = array
-        self._source = source
-        self._kept: dict[int, NDArray[Any]] = {}  # frames by chunk number, newest last
-        self._reading = threading.Lock()
-        self.scale = 1.0
-        self.shift_m = np.zeros(3, np.float32)
-        self.shape: tuple[int, ...] = tuple(array.shape)
-        self.dtype = real_type(array.dtype)
-
-    @property
-    def frames_per_chunk(self) -> int:
-        """Frames that come from the disk together."""
-        return int(self._array.chunks[0])
-
-    @property
-    def chunk_bytes(self) -> int:
-        """Memory of those frames."""
-        return self.frames_per_chunk * int(np.prod(self.shape[1:])) * self.dtype.itemsize
-
-    def __getitem__(self, key: Any) -> NDArray[Any]:
-        first = None
-        if isinstance(key, int | np.integer):
-            first = range(self.shape[0])[key]
-            part = self._stretch(first, first + 1)[0]
-        elif isinstance(key, slice) and key.step in (None, 1):
-            first, stop, _ = key.indices(self.shape[0])
-            part = self._stretch(first, stop)
-        else:
-            part = self._read(key)
-        # A sum is finite only when its terms are, and costs next to nothing
-        # beside the reading; a sum that overflowed is looked at again.
-        with np.errstate(all="ignore"):
-            suspect = not np.isfinite(part.sum())
-        if suspect and first is not None:
-            refuse_missing(part.reshape(-1, *self.shape[1:]), first, self._source)
-        if suspect and not np.isfinite(part).all():
-            raise Sd2Error(
-                f"{self._source}: vertices that are NaN or infinite in {_where(key)}",
-                "finite coordinates in metres in every frame",
-                "Fill or leave out those frames where the file is written",
-            )
-        if self.scale != 1.0:
-            part = part * part.dtype.type(self.scale)
-        if self.shift_m.any():
-            part = part + self.shift_m.astype(part.dtype)
-        return part
-
-    def _stretch(self, start: int, stop: int) -> NDArray[Any]:
-        """Frames ``start`` to ``stop``, chunk by chunk: Zarr is slower on many at once."""
-        if self.chunk_bytes > _LARGEST_CHUNK_BYTES or stop <= start:
-            return self._read(slice(start, stop))
-        part = np.empty((stop - start, *self.shape[1:]), self.dtype)
-        step = self.frames_per_chunk
-        for number in range(start // step, (stop - 1) // step + 1):
-            first, last = max(start, number * step), min(stop, (number + 1) * step)
-            chunk = self._chunk(number)
-            part[first - start : last - start] = chunk[first - number * step :][: last - first]
-        return part
-
-    def _chunk(self, number: int) -> NDArray[Any]:
-        """One chunk; the last ones are kept, because frames are played one by one."""
-        kept = self._kept.get(number)
-        if kept is not None:
-            return kept
-        with self._reading:
-            chunk = self._kept.get(number)
-            if chunk is None:
-                step = self.frames_per_chunk
-                chunk = self._read(slice(number * step, (number + 1) * step))
-                while self._kept and (len(self._kept) + 1) * self.chunk_bytes > _KEPT_BYTES:
-                    del self._kept[next(iter(self._kept))]
-                self._kept[number] = chunk
-        return chunk
-
-    def _read(self, key: Any) -> NDArray[Any]:
-        try:
-            return np.asarray(self._array[key], dtype=self.dtype)
-        except Exception as error:  # a damaged chunk fails in the codec's own ways
-            raise Sd2Error(
-                f"{self._source}: {_where(key)} cannot be read ({type(error).__name__}: {error})",
-                "complete chunks",
-                "Copy the recording again from where it came",
-            ) from error
 
 
 def read_npz(path: Path) -> RawMesh:
@@ -202,36 +124,71 @@ def named_arrays(arrays: dict[str, Any], names: list[str], source: str) -> RawMe
 
 
 def read_zarr(path: Path) -> RawMesh:
-    """Open a Zarr folder or ``.zarr.zip``; the vertices stay on disk."""
-    import zarr
-    from zarr.storage import ZipStore
+    """Open a Zarr folder or ``.zarr.zip``; the vertices stay on disk.
 
-    try:
-        store = ZipStore(path, mode="r") if path.is_file() else str(path)
-        group = zarr.open_group(store, mode="r")
-        names = sorted(group.array_keys())
-        arrays: dict[str, Any] = {name: group[name][...] for name in names if name in SMALL_NAMES}
-        arrays.update({name: group[name] for name in names if name in VERTEX_NAMES})
-        if "limbs" in group.attrs:
-            arrays["limbs"] = group.attrs["limbs"]
-    except (OSError, ValueError, KeyError, zipfile.BadZipFile, RuntimeError) as error:
-        raise Sd2Error(
-            f"{path} cannot be read as a Zarr group ({error})",
-            "a .zarr folder or .zarr.zip with the arrays vertices, faces and times_s",
-            "Copy it again with all its files, or write it again",
-        ) from error
+    Frames of damaged chunks are left out, as if nobody had been there.
+    """
+    group = open_group(path)
+    names = array_names(path)
+    small = [name for name in names if name in SMALL_NAMES]
+    arrays: dict[str, Any] = {name: array_in(group, path, name, "rows")[...] for name in small}
+    stored = _vertices(group, path, names)
+    if stored is not None:
+        arrays["vertices"] = stored
+    if "limbs" in group.attrs:
+        arrays["limbs"] = group.attrs["limbs"]
     raw = named_arrays(arrays, names, str(path))
     if raw.faces is not None and not len(raw.faces):
         raw.faces = None
-    stored = StoredVertices(raw.vertices, str(path))
-    if len(stored.shape) == 3 and stored.chunk_bytes > _LARGEST_CHUNK_BYTES:
+    assert stored is not None
+    damaged: tuple[Damage, ...] = ()
+    if len(stored.shape) == 3:
+        thorough: Depth = "checksums" if stored.checksums else "values"
+        whole = stored.file_bytes <= _WHOLE_CHECK_BYTES
+        damaged = stored.damage(thorough if whole else "lengths")
+    raw.vertices = StoredVertices(stored, damaged)
+    if damaged:
+        _leave_out(raw, damaged, path)
+    if len(stored.shape) == 3 and raw.vertices.large_chunks:
         raw.notes.append(
-            f"The vertices are stored in chunks of {stored.frames_per_chunk:,} frames "
-            f"({stored.chunk_bytes / 2**20:,.0f} MiB), which are read whole for every frame shown. "
-            "Saving the mesh again makes it fast."
+            f"The vertices are stored in chunks of {raw.vertices.frames_per_chunk:,} frames "
+            f"({raw.vertices.chunk_bytes / 2**20:,.0f} MiB), which are read whole for every frame "
+            "shown. Saving the mesh again makes it fast."
         )
-    raw.vertices = stored
     return raw
+
+
+def stored_arrays(path: Path) -> list[StoredArray]:
+    """Arrays of a mesh in Zarr, not yet read."""
+    group = open_group(path)
+    names = array_names(path)
+    vertices = _vertices(group, path, names)
+    small = [array_in(group, path, name, "rows") for name in names if name in SMALL_NAMES]
+    return small if vertices is None else [vertices, *small]
+
+
+def _vertices(group: Any, path: Path, names: list[str]) -> StoredArray | None:
+    """Vertices among the arrays of a group; None if there are none."""
+    name = next((name for name in VERTEX_NAMES if name in names), None)
+    return None if name is None else array_in(group, path, name, "frames", sparse=False)
+
+
+def _leave_out(raw: RawMesh, damaged: tuple[Damage, ...], path: Path) -> None:
+    """Mark the frames of damaged chunks as frames without a person."""
+    frames = raw.vertices.shape[0]
+    present = np.ones(frames, bool) if raw.present is None else np.array(raw.present, bool)
+    lost = np.zeros(frames, bool)
+    for one in damaged:
+        lost[one.start : one.stop] = True
+    if lost.all():
+        raise unreadable(path, damaged)
+    if len(present) == frames:
+        raw.present = present & ~lost
+    said = "; ".join(map(str, damaged))
+    raw.notes.append(
+        f"{path.name} is damaged: {said}. These frames are left out, as if nobody had been there. "
+        f"{COPY_AGAIN}."
+    )
 
 
 def write_npz(mesh: MeshSequence, path: Path, progress: Progress = silent) -> None:
@@ -271,11 +228,8 @@ def write_zarr(mesh: MeshSequence, path: Path, progress: Progress = silent) -> N
 
 
 def _write_group(mesh: MeshSequence, folder: Path, progress: Progress) -> None:
-    import zarr
-
     step = frames_per_chunk(mesh.vertices.shape, mesh.vertices.dtype)
-    group = zarr.open_group(str(folder), mode="w")
-    group.attrs.update({"format": _FORMAT, "version": 1, "unit": "m"})
+    group = create_group(folder, {"format": _FORMAT, "version": 1, "unit": "m"})
     vertices = create_vertices(group, mesh.vertices.shape, mesh.vertices.dtype)
     for start in range(0, mesh.frame_count, step):
         progress(start, mesh.frame_count)
@@ -301,7 +255,7 @@ def small_arrays(mesh: MeshSequence) -> dict[str, NDArray[Any]]:
 def write_small(mesh: MeshSequence, group: Any) -> None:
     """Write everything of a mesh but its vertices into a Zarr group."""
     for name, array in small_arrays(mesh).items():
-        group.create_array(name, data=array)
+        create_array(group, name, data=array)
     if mesh.uncertainty is not None:
         group.attrs["limbs"] = list(mesh.uncertainty.limbs)
 
@@ -316,12 +270,13 @@ def create_vertices(group: Any, shape: tuple[int, ...], dtype: Any) -> Any:
     """Create an array for vertices (T, V, 3) in a Zarr group, to be filled chunk by chunk."""
     from zarr.codecs import BloscCodec
 
-    return group.create_array(
+    return create_array(
+        group,
         "vertices",
         shape=shape,
         chunks=(frames_per_chunk(shape, dtype), *shape[1:]),
         dtype=np.dtype(dtype).newbyteorder("<"),
-        compressors=BloscCodec(cname="lz4", clevel=5, shuffle="shuffle"),
+        compressor=BloscCodec(cname="lz4", clevel=5, shuffle="shuffle"),
         # A chunk that goes missing is then found, not read as zeros.
         fill_value=float("nan"),
     )
@@ -349,14 +304,3 @@ def _zip_folder(folder: Path, stream: Any) -> None:
 
 def _first(arrays: dict[str, Any], names: tuple[str, ...]) -> Any | None:
     return next((arrays[name] for name in names if name in arrays), None)
-
-
-def real_type(dtype: Any) -> np.dtype[Any]:
-    """Single precision where it holds every number of this type, otherwise double."""
-    return np.dtype(np.float32 if np.can_cast(dtype, np.float32) else np.float64)
-
-
-def _where(key: Any) -> str:
-    if isinstance(key, slice):
-        return f"frames {key.start or 0} to {(key.stop or 0) - 1}"
-    return f"frame {key}"

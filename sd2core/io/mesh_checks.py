@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
-from sd2core.io.mesh_arrays import RawMesh, StoredVertices
+from sd2core.io.mesh_arrays import RawMesh
+from sd2core.io.stored_vertices import StoredVertices
 from sd2core.mesh.presence import checked
 from sd2core.mesh.sequence import place_in_words
 from sd2core.mesh.velocity_uncertainty import VelocityUncertainty

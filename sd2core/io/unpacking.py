@@ -12,6 +12,7 @@ from typing import IO, Any
 import numpy as np
 
 from sd2core.errors import Sd2Error
+from sd2core.files.stores import create_array, create_group
 from sd2core.io.mesh_arrays import (
     SMALL_NAMES,
     VERTEX_NAMES,
@@ -50,11 +51,9 @@ def unpack_npz(path: Path, out: Path) -> None:
     Nothing is checked, completed or placed: that is done when the store is read. Raises
     Sd2Error if it cannot be read.
     """
-    import zarr
-
     workspace = Path(tempfile.mkdtemp(prefix=f".{out.name}.", suffix=".tmp", dir=out.parent))
     try:
-        group = zarr.open_group(str(workspace / "new"), mode="w")
+        group = create_group(workspace / "new")
         with zipfile.ZipFile(path) as archive:
             with archive.open(_vertex_member(archive, path)) as stream:
                 _copy_vertices(stream, group, path)
@@ -64,7 +63,7 @@ def unpack_npz(path: Path, out: Path) -> None:
                 if name == "limbs":
                     group.attrs[name] = [str(one) for one in np.atleast_1d(arrays[name])]
                 else:
-                    group.create_array(name, data=np.asarray(arrays[name]))
+                    create_array(group, name, data=np.asarray(arrays[name]))
         if not out.exists():
             os.rename(workspace / "new", out)
     except Sd2Error:

@@ -9,16 +9,37 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Mapping, Sequence, Set
+from collections.abc import Iterable, Sequence, Set
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
+from sd2core.files.atomic import atomic_folder
+from sd2core.files.stores import (
+    StoredArray,
+    array_in,
+    create_array,
+    create_group,
+    growing,
+    open_group,
+)
 from sd2core.maps import LimbMaps
+from sd2core.pairs.rows import (
+    INDEX_NAME,
+    REMAKE,
+    TakeKey,
+    check_array,
+    check_header,
+    drop_torn_line,
+    key_of,
+    read_rows,
+    read_takes,
+    row_kinds,
+)
 from sd2core.sensor import VelocityAxis
 
 PairKind = Literal["simulated", "real"]
@@ -26,19 +47,9 @@ PairKind = Literal["simulated", "real"]
 
 FORMAT = "sd2-pairs"
 VERSION = 1
-INDEX_NAME = "takes.jsonl"
 
 _ARRAYS = ("synthetic", "radar", "times_s", "label")
 _CHUNK_FRAMES = 2250
-_REMAKE = "Make the pairs again with `sd2 simulate campaign` or `sd2 pairs`"
-
-
-class TakeKey(NamedTuple):
-    """Key of a take, unique in a set."""
-
-    subject: str
-    name: str
-    placement: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,13 +202,14 @@ class PairWriter:
             "provenance": json.loads(json.dumps(provenance)),
             "parts": list(parts),
         }
-        if (self._path / "zarr.json").exists():
-            self._group = _reopened(self._path, header)
-        else:
-            self._group = _begun(self._path, header)
-        index = _read_takes(self._path, provenance)
-        _drop_torn_line(self._path, len(index))
-        self._done = {_key(entry) for entry in index}
+        if not (self._path / "zarr.json").exists() or _stillborn(self._path):
+            _begin(self._path, header)
+        self._group = _reopened(self._path, header)
+        names = row_kinds(axis.bins, len(parts))
+        self._arrays = {name: growing(self._group, self._path, name) for name in names}
+        index = read_takes(self._path, provenance)
+        drop_torn_line(self._path, len(index))
+        self._done = {key_of(entry) for entry in index}
         self._frames = max((entry["stop"] for entry in index), default=0)
 
     @property
@@ -234,7 +246,7 @@ class PairWriter:
         if take.limbs is not None:
             written["limbs"] = take.limbs.values.transpose(2, 0, 1)
         for name, values in written.items():
-            array: Any = self._group[name]
+            array = self._arrays[name]
             # What a killed writer left beyond the last line is written over.
             if array.shape[0] < stop:
                 array.resize((stop, *array.shape[1:]))
@@ -260,7 +272,7 @@ def is_pair_store(path: Path) -> bool:
     try:
         header = json.loads((Path(path) / "zarr.json").read_text(encoding="utf-8"))
         return bool(header["attributes"]["format"] == FORMAT)
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return False
 
 
@@ -274,60 +286,59 @@ def read_pairs(path: Path) -> PairSet:
     """
     path = Path(path)
     header, index, lazily = open_takes(path)
-    frames = max(entry["stop"] for entry in index)
-    arrays = {name: array[:frames] for name, array in lazily.items()}
+    arrays = read_rows(path, lazily, index)
     limbs, parts = arrays.pop("limbs", None), tuple(header.get("parts", ()))
 
     def split(start: int, stop: int) -> LimbMaps | None:
         return None if limbs is None else LimbMaps(parts, limbs[start:stop].transpose(1, 2, 0))
 
-    takes = tuple(
-        Take(
-            subject=entry["subject"],
-            name=entry["name"],
-            placement=entry["placement"],
-            sensor_position_m=np.array(entry["sensor_position_m"], np.float64),
-            limbs=split(entry["start"], entry["stop"]),
-            **{name: array[entry["start"] : entry["stop"]] for name, array in arrays.items()},
-        )
-        for entry in index
-    )
     try:
-        return PairSet(
-            kind=header["kind"],
-            axis=VelocityAxis(int(header["bins"]), float(header["v_max_mps"])),
-            null_bins=tuple(header["null_bins"]),
-            frame_rate_hz=float(header["frame_rate_hz"]),
-            labels=tuple(header["labels"]),
-            takes=takes,
-            provenance=header["provenance"],
+        takes = tuple(
+            Take(
+                subject=entry["subject"],
+                name=entry["name"],
+                placement=entry["placement"],
+                sensor_position_m=np.array(entry["sensor_position_m"], np.float64),
+                limbs=split(entry["start"], entry["stop"]),
+                **{name: array[entry["start"] : entry["stop"]] for name, array in arrays.items()},
+            )
+            for entry in index
         )
-    except KeyError as error:
-        raise Sd2Error(
-            f"{path}: its header lacks {error}", f"{FORMAT} {VERSION}", _REMAKE
-        ) from None
+    except Sd2Error as error:
+        raise Sd2Error(f"{path}: {error.found}", error.expected, REMAKE) from error
+    labels = tuple(header["labels"])
+    for take in takes:
+        if not 0 <= take.label.min() <= take.label.max() < len(labels):
+            raise Sd2Error(
+                f"{path}: take {take.title} has labels from {take.label.min()} to"
+                f" {take.label.max()}",
+                f"0 to {len(labels) - 1}",
+                REMAKE,
+            )
+    return PairSet(
+        kind=header["kind"],
+        axis=VelocityAxis(int(header["bins"]), float(header["v_max_mps"])),
+        null_bins=tuple(header["null_bins"]),
+        frame_rate_hz=float(header["frame_rate_hz"]),
+        labels=labels,
+        takes=takes,
+        provenance=header["provenance"],
+    )
 
 
-def open_takes(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]], dict[str, Any]]:
+def open_takes(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]], dict[str, StoredArray]]:
     """Open a store: header, lines of takes, and arrays not yet read.
 
     Raises Sd2Error when it holds no pairs, of a newer version, empty or damaged.
     """
-    import zarr
-
     path = Path(path)
     header, index = read_description(path)
-    group = zarr.open_group(str(path), mode="r")
-    arrays: dict[str, Any] = {}
+    group = open_group(path)
+    arrays: dict[str, StoredArray] = {}
     frames = max(entry["stop"] for entry in index)
-    for name in (*_ARRAYS, *(["limbs"] if header.get("parts") else [])):
-        if name not in group or group[name].shape[0] < frames:
-            raise Sd2Error(
-                f"{path}: the array {name} is missing or shorter than {INDEX_NAME} says",
-                f"{frames} frames",
-                _REMAKE,
-            )
-        arrays[name] = group[name]
+    for name, (row, kind) in row_kinds(header["bins"], len(header.get("parts", ()))).items():
+        arrays[name] = array_in(group, path, name, "frames")
+        check_array(arrays[name], frames, row, kind)
     return header, index, arrays
 
 
@@ -344,13 +355,14 @@ def read_description(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     header = json.loads((path / "zarr.json").read_text(encoding="utf-8"))["attributes"]
     if header.get("version") != VERSION:
         raise Sd2Error(
-            f"{path} is of version {header.get('version')}", f"version {VERSION}", _REMAKE
+            f"{path} is of version {header.get('version')}", f"version {VERSION}", REMAKE
         )
     if header.get("kind") not in get_args(PairKind):
         raise Sd2Error(
-            f"{path}: its kind is {header.get('kind')!r}", f"one of {get_args(PairKind)}", _REMAKE
+            f"{path}: its kind is {header.get('kind')!r}", f"one of {get_args(PairKind)}", REMAKE
         )
-    takes = _read_takes(path, header.get("provenance"))
+    check_header(path, header)
+    takes = read_takes(path, header["provenance"])
     if not takes:
         raise Sd2Error(
             f"{path} holds no take yet",
@@ -360,32 +372,29 @@ def read_description(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     return header, takes
 
 
-def _begun(path: Path, header: dict[str, Any]) -> Any:
-    import zarr
+def _stillborn(path: Path) -> bool:
+    """True for pairs whose writer ended before it had made all arrays; no take is in them."""
+    if not is_pair_store(path) or (path / INDEX_NAME).exists():
+        return False
+    return not all((path / name / "zarr.json").exists() for name in _ARRAYS)
 
-    if path.exists() and (not path.is_dir() or any(path.iterdir())):
+
+def _begin(path: Path, header: dict[str, Any]) -> None:
+    """Make a store without takes, which takes its name when it is whole."""
+    if path.exists() and not is_pair_store(path) and (not path.is_dir() or any(path.iterdir())):
         raise Sd2Error(f"{path} is there and holds no pairs", "a new or empty folder")
-    group = zarr.open_group(str(path), mode="w", attributes=header)
     bins, parts = header["bins"], len(header["parts"])
-    for name, shape, kind in (
-        ("synthetic", (0, bins), "float32"),
-        ("radar", (0, bins), "float32"),
-        ("times_s", (0,), "float64"),
-        ("label", (0,), "int8"),
-        *([("limbs", (0, parts, bins), "float32")] if parts else []),
-    ):
-        group.create_array(
-            name, shape=shape, dtype=kind, chunks=(_CHUNK_FRAMES, *shape[1:]), fill_value=0
-        )
-    return group
+    with atomic_folder(path) as folder:
+        group = create_group(folder, header)
+        for name, (row, kind) in row_kinds(bins, parts).items():
+            chunks = (_CHUNK_FRAMES, *row)
+            create_array(group, name, shape=(0, *row), dtype=kind, chunks=chunks, fill_value=0)
 
 
 def _reopened(path: Path, header: dict[str, Any]) -> Any:
-    import zarr
-
     if not is_pair_store(path):
         raise Sd2Error(f"{path} is there and holds no pairs", "a new or empty folder")
-    group = zarr.open_group(str(path), mode="r+")
+    group = open_group(path, "r+")
     there = dict(group.attrs)
     for name, value in header.items():
         if there.get(name, []) != value:
@@ -395,45 +404,3 @@ def _reopened(path: Path, header: dict[str, Any]) -> Any:
                 "Go on with the same settings, or choose another folder",
             )
     return group
-
-
-def _read_takes(path: Path, provenance: Any) -> list[dict[str, Any]]:
-    """Read the lines of takes; an incomplete last line is left out."""
-    by_part = isinstance(provenance, Mapping) and provenance.get("made_by") == "sd2 pairs mars"
-    index = path / INDEX_NAME
-    if not index.exists():
-        return []
-    lines = index.read_text(encoding="utf-8").split("\n")
-    entries = []
-    for number, line in enumerate(lines[:-1], start=1):
-        try:
-            entry = json.loads(line)
-            _key(entry), entry["stop"] - entry["start"], entry["sensor_position_m"]
-        except (ValueError, KeyError, TypeError):
-            raise Sd2Error(
-                f"{index}: line {number} cannot be read: {line[:80]!r}",
-                "one take, as JSON",
-                "Delete the line to lose that take alone",
-            ) from None
-        if by_part and entry["name"].startswith("stretch-"):
-            # Written when the parts of one person were subjects of their own: "1-test".
-            entry["subject"], _, part = entry["subject"].rpartition("-")
-            entry["name"] = f"{part}-{entry['name']}"
-        entries.append(entry)
-    return entries
-
-
-def _drop_torn_line(path: Path, lines: int) -> None:
-    index = path / INDEX_NAME
-    if not index.exists():
-        return
-    content = index.read_bytes()
-    if not content.endswith(b"\n"):
-        whole = content[: content.rfind(b"\n") + 1]
-        assert whole.count(b"\n") == lines
-        with index.open("r+b") as file:
-            file.truncate(len(whole))
-
-
-def _key(entry: dict[str, Any]) -> TakeKey:
-    return TakeKey(entry["subject"], entry["name"], entry["placement"])

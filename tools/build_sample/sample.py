@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from sd2core.body.model import Body, Resolution
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_folder
+from sd2core.files.stores import create_array, create_group
 from sd2core.fmcw.options import Reflector, SignalOptions
 from sd2core.fmcw.signal import simulate_capture
 from sd2core.io.mesh_arrays import write_small
@@ -167,18 +168,17 @@ def write_compact_mesh(mesh: MeshSequence, path: Path) -> None:
     Vertices move smoothly, so their bytes repeat along time: about a third of the
     size of the ordinary layout. It is read like any other mesh.
     """
-    import zarr
     from zarr.codecs import BloscCodec, TransposeCodec
 
-    group = zarr.open_group(str(path), mode="w-")
-    group.attrs.update({"format": "sd2-mesh", "version": 1, "unit": "m"})
-    stored = group.create_array(
+    group = create_group(path, {"format": "sd2-mesh", "version": 1, "unit": "m"})
+    stored = create_array(
+        group,
         "vertices",
         shape=mesh.vertices.shape,
         chunks=(min(_CHUNK_FRAMES, mesh.frame_count), mesh.vertex_count, 3),
         dtype="<f4",
         filters=[TransposeCodec(order=(2, 1, 0))],
-        compressors=BloscCodec(cname="zstd", clevel=9, shuffle="shuffle"),
+        compressor=BloscCodec(cname="zstd", clevel=9, shuffle="shuffle"),
     )
     for start in range(0, mesh.frame_count, _CHUNK_FRAMES):
         stop = min(start + _CHUNK_FRAMES, mesh.frame_count)

@@ -25,15 +25,30 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         "info",
         "what is in a recording, video, mesh, radar capture, Doppler map, pairs, data set or model",
         handler=_info,
-        examples="  sd2 info walk.sd2\n  sd2 info walk.npz --json",
+        examples="  sd2 info walk.sd2\n  sd2 info walk.npz --json\n  sd2 info walk.zarr --verify",
     )
     parser.add_argument("path", type=Path, metavar="PATH")
+    parser.add_argument(
+        "--verify",
+        action="store_true",
+        help="read every chunk and compare it with its checksum; what is damaged is named",
+    )
     add_mesh_reading(parser)
     add_json(parser)
 
 
 def _info(options: argparse.Namespace) -> None:
-    show(describe(options.path, options), as_json=options.json)
+    if not options.verify:
+        show(describe(options.path, options), as_json=options.json)
+        return
+    from sd2core.cli.info.verifying import in_words, verify
+    from sd2core.io.kinds import kind_of
+
+    verified = verify(options.path, kind_of(options.path))
+    description = describe(options.path, options)
+    description.data["verified"] = verified
+    description.facts["verified"] = in_words(verified)
+    show(description, as_json=options.json)
 
 
 def describe(path: Path, options: argparse.Namespace) -> Description:

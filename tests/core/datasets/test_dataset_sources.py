@@ -173,7 +173,9 @@ def test_limb_maps_of_pairs_are_those_of_their_store(tmp_path: Path) -> None:
     write_dataset(out, gather([path], making), options)
     with open_dataset(out) as dataset:
         found = dataset["limbs"][:].reshape(2, 150, 9, 8)
-        written = sum(array.size * array.dtype.itemsize for array in dataset.arrays.values())
+        written = sum(
+            array.dtype.itemsize * int(np.prod(array.shape)) for array in dataset.arrays.values()
+        )
     for values, take in zip(found, read_pairs(path).takes, strict=True):
         assert take.limbs is not None
         assert np.array_equal(values, take.limbs.values.transpose(2, 0, 1))
@@ -244,7 +246,7 @@ def test_what_was_counted_is_what_is_written(tmp_path: Path) -> None:
         assert forecast.split.validation == dataset.header.splits["validation"] == ("anna",)
         assert sum(forecast.of_split().values()) == forecast.segments
     assert forecast.total_bytes >= sum(
-        array.size * array.dtype.itemsize for array in dataset.arrays.values()
+        array.dtype.itemsize * int(np.prod(array.shape)) for array in dataset.arrays.values()
     )
 
 

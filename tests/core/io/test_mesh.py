@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
-from sd2core.io import mesh_arrays
+from sd2core.io import mesh_arrays, stored_vertices
 from sd2core.io.mesh import load_mesh, save_mesh
 from sd2core.mesh.decimation import decimate
 from sd2core.mesh.sequence import MeshSequence
@@ -186,18 +186,18 @@ def test_chunks_are_read_once_while_there_is_room(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(mesh_arrays, "_CHUNK_BYTES", 42 * 12 * 10)  # ten frames a chunk
-    monkeypatch.setattr(mesh_arrays, "_KEPT_BYTES", 3 * 42 * 12 * 10)
+    monkeypatch.setattr(stored_vertices, "_KEPT_BYTES", 3 * 42 * 12 * 10)
     vertices, faces = body(60)
     save_mesh(MeshSequence(vertices, faces, Timebase(times(60))), tmp_path / "m.zarr")
     mesh = load_mesh(tmp_path / "m.zarr")
     read: list[int] = []
-    original = mesh_arrays.StoredVertices._read
+    original = stored_vertices.StoredVertices._read
 
     def counted(self: Any, key: slice) -> Any:
         read.append(key.start)
         return original(self, key)
 
-    monkeypatch.setattr(mesh_arrays.StoredVertices, "_read", counted)
+    monkeypatch.setattr(stored_vertices.StoredVertices, "_read", counted)
     mesh.read(0, 30)
     read.clear()
     for start in (20, 5, 10, 15, 0):
@@ -228,7 +228,7 @@ def test_stored_vertices_are_indexed_like_an_array(
     monkeypatch.setattr(mesh_arrays, "_CHUNK_BYTES", 42 * 12 * 7)
     vertices, faces = body(40)
     save_mesh(MeshSequence(vertices, faces, Timebase(times(40))), tmp_path / "m.zarr")
-    monkeypatch.setattr(mesh_arrays, "_LARGEST_CHUNK_BYTES", limit)
+    monkeypatch.setattr(stored_vertices, "_LARGEST_CHUNK_BYTES", limit)
     mesh = load_mesh(tmp_path / "m.zarr")
     assert ("chunks of 7 frames" in "".join(mesh.notes)) == (limit == 0)
     keys = [0, -1, 13, np.int64(14), slice(3, 30), slice(6, 7), slice(7, 14), slice(35, 99),

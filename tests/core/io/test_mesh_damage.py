@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from sd2core.io.mesh import load_mesh, save_mesh
 from sd2core.io.mesh_files import read_surface
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.timebase import Timebase
+from tests.damaged_files import change, cut, lose
 
 OBJ = """mtllib person.mtl
 o person
@@ -65,23 +67,54 @@ def chunks_of(path: Path) -> list[Path]:
     return sorted(entry for entry in (path / "vertices" / "c").rglob("*") if entry.is_file())
 
 
-def test_a_missing_chunk_is_missed(tmp_path):
+@pytest.mark.parametrize("damage", [lose, cut, change])
+@pytest.mark.parametrize(("number", "pose"), [(0, 1456), (1, 1455)])
+def test_frames_of_a_damaged_chunk_are_left_out(
+    tmp_path: Path, damage: Callable[[Path], None], number: int, pose: int
+) -> None:
     path = tmp_path / "mesh.zarr"
-    save_mesh(long_mesh(), path)
-    chunks = chunks_of(path)
-    assert len(chunks) > 1
-    chunks[-1].unlink()
-    with pytest.raises(Sd2Error, match=r"mesh\.zarr.*\(nan, nan, nan\)"):
-        load_mesh(path).read(2990, 3000)
+    mesh = long_mesh()
+    save_mesh(mesh, path)
+    damage(path / "vertices" / "c" / str(number) / "0" / "0")
+    first, last = (0, 1455) if number == 0 else (1456, 2911)
+    found = load_mesh(path)
+    assert any(f"frames {first} to {last} of vertices (vertices/c/{number}" in one
+               for one in found.notes)  # fmt: skip
+    absent = np.zeros(3000, bool)
+    absent[first : last + 1] = True
+    assert found.present is not None
+    assert np.array_equal(found.present, ~absent)
+    vertices = found.read(0, 3000)
+    assert np.array_equal(vertices[~absent], mesh.vertices[~absent])
+    assert (vertices[absent] == mesh.vertices[pose]).all()
+    assert np.array_equal(found.frame(first + 7), mesh.vertices[pose])
 
 
-def test_a_cut_chunk_is_named(tmp_path):
+def test_a_mesh_of_which_no_chunk_is_whole_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "mesh.zarr"
     save_mesh(long_mesh(), path)
-    chunk = chunks_of(path)[-1]
-    chunk.write_bytes(chunk.read_bytes()[:100])
-    with pytest.raises(Sd2Error, match=r"mesh\.zarr.*cannot be read"):
-        load_mesh(path).read(2990, 3000)
+    for chunk in chunks_of(path):
+        change(chunk)
+    with pytest.raises(Sd2Error, match=r"mesh\.zarr cannot be read: frames 0 to 1455 of vertices"):
+        load_mesh(path)
+
+
+def test_damage_that_comes_after_opening_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "mesh.zarr"
+    save_mesh(long_mesh(), path)
+    mesh = load_mesh(path)
+    change(chunks_of(path)[1])
+    with pytest.raises(Sd2Error, match=r"mesh\.zarr cannot be read: frames 1456 to 2911"):
+        mesh.read(1400, 1500)
+    assert len(mesh.read(2912, 3000)) == 88
+
+
+def test_damaged_faces_are_named(tmp_path: Path) -> None:
+    path = tmp_path / "mesh.zarr"
+    save_mesh(long_mesh(), path)
+    change(path / "faces" / "c" / "0" / "0")
+    with pytest.raises(Sd2Error, match=r"mesh\.zarr cannot be read: rows 0 to 49 of faces"):
+        load_mesh(path)
 
 
 def test_no_faces_at_all_make_a_point_cloud(tmp_path):

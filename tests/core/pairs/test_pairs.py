@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import shutil
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,6 +19,7 @@ from sd2core.maps import LimbMaps
 from sd2core.pairs.segments import cut, join, segment_starts
 from sd2core.pairs.store import INDEX_NAME, PairWriter, Take, TakeKey, is_pair_store, read_pairs
 from sd2core.sensor import VelocityAxis
+from tests.damaged_files import change, lose, states_of
 
 HEADER: dict[str, Any] = {
     "kind": "simulated",
@@ -229,3 +232,47 @@ def test_where_windows_overlap_the_one_farther_from_its_end_counts_more() -> Non
 def test_an_overlap_as_long_as_the_window_is_refused() -> None:
     with pytest.raises(Sd2Error, match="72 frames overlap by 72"):
         segment_starts(100, 72, 72)
+
+
+@pytest.mark.parametrize("damage", [change, lose])
+def test_takes_in_a_damaged_chunk_are_named_and_the_others_can_be_kept(
+    tmp_path: Path, damage: Callable[[Path], None]
+) -> None:
+    path = tmp_path / "pairs.zarr"
+    writer = PairWriter(path, **HEADER)
+    takes = [take("a", 2000), take("b", 200), take("c", 300), take("d", 2000), take("e", 1000)]
+    for (
+        each
+    ) in takes:  # chunks of 2250 frames: the second one holds the end of c, d, the start of e
+        writer.append(each)
+    damage(path / "radar" / "c" / "1" / "0")
+    with pytest.raises(Sd2Error, match=r"frames 2250 to 4499 of radar \(radar/c/1/0") as refused:
+        read_pairs(path)
+    assert "takes are lost: s1/c@0, s1/d@0. Exp" in str(refused.value)
+    index = path / INDEX_NAME
+    lines = index.read_text().splitlines(keepends=True)
+    index.write_text("".join(lines[:2] + lines[4:]))
+    kept = read_pairs(path).takes
+    assert all(same(*two) for two in zip(kept, takes[:2] + takes[4:], strict=True))
+
+
+def test_a_store_comes_into_being_whole(tmp_path: Path) -> None:
+    folder = tmp_path / "work"
+    folder.mkdir()
+    with states_of(folder, tmp_path) as left:
+        PairWriter(folder / "pairs.zarr", **HEADER)
+    assert len(left) >= 5
+    for state in left:
+        path = state / "pairs.zarr"
+        assert not path.exists()
+        PairWriter(path, **HEADER).append(take("a"))
+        assert same(read_pairs(path).takes[0], take("a"))
+
+
+def test_pairs_that_an_earlier_version_left_half_made_are_begun_anew(tmp_path: Path) -> None:
+    path = tmp_path / "pairs.zarr"
+    PairWriter(path, **HEADER)
+    shutil.rmtree(path / "radar")
+    shutil.rmtree(path / "label")
+    PairWriter(path, **HEADER).append(take("a"))
+    assert same(read_pairs(path).takes[0], take("a"))

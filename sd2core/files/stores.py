@@ -1,0 +1,320 @@
+"""Zarr stores on disk: made with a checksum per chunk, read and verified in one way.
+
+Every Zarr array of a file goes through here, because a damaged chunk must be named, and must not
+end the process.
+"""
+
+from __future__ import annotations
+
+import itertools
+import os
+import stat
+import zipfile
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.errors import Sd2Error
+from sd2core.progress import Progress, silent
+
+Depth = Literal["presence", "lengths", "checksums", "values"]
+"""How closely chunks are looked at; each includes those before it."""
+
+COPY_AGAIN = "Copy it again from where it came, or write it again"
+
+
+@dataclass(frozen=True)
+class Damage:
+    """Rows of an array that cannot be read."""
+
+    array: str
+    start: int
+    stop: int
+    unit: str  # Word for rows: frames, segments.
+    reason: str
+
+    def __str__(self) -> str:
+        return f"{self.unit} {self.start} to {self.stop - 1} of {self.array} ({self.reason})"
+
+
+class StoredArray:
+    """Numbers that stay on disk until they are sliced; Sd2Error names what is damaged.
+
+    Parameters
+    ----------
+    array : zarr.Array
+    path : Path
+        Store that it is in, a folder or a ``.zarr.zip``.
+    name : str
+    unit : str
+        Word for its rows in messages.
+    sparse : bool, optional
+        True if a chunk may be missing, because it holds nothing but the fill value; by default it
+        may where chunks have no checksums.
+
+    Raises
+    ------
+    Sd2Error
+        If it does not hold plain numbers, or is coded in a way that is not safe to decode.
+    """
+
+    def __init__(
+        self, array: Any, path: Path, name: str, unit: str, *, sparse: bool | None = None
+    ) -> None:
+        _refuse_unsafe(array, path, name)
+        from sd2core.files.chunk_codecs import codecs_of
+
+        self._array = array
+        self.path, self.name, self._unit = path, name, unit
+        self._codecs = codecs_of(array)
+        self._packed = path.is_file()
+        self._sparse = not self.checksums if sparse is None else sparse
+        self.shape: tuple[int, ...] = tuple(array.shape)
+        self.dtype: np.dtype[Any] = np.dtype(array.dtype)
+        # What is one file: a shard is one of several chunks.
+        self.chunks: tuple[int, ...] = tuple(array.shards or array.chunks)
+        if 0 in self.chunks:
+            raise Sd2Error(f"{path}: {name} has chunks of {self.chunks}", "one row at least")
+
+    @property
+    def checksums(self) -> bool:
+        """True if every chunk has a checksum."""
+        return self._codecs[-1:] == ("crc32c",)
+
+    @property
+    def file_bytes(self) -> int:
+        """Size of all chunks on disk."""
+        if self._packed:
+            return self.path.stat().st_size
+        folder = self.path / self._array.path
+        return sum(one.stat().st_size for one in folder.rglob("*") if one.is_file())
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __getitem__(self, key: Any) -> NDArray[Any]:
+        # Zarr fills in for a chunk that is missing. In a zip that is looked for when it is opened.
+        if not self._sparse and not self._packed:
+            self._refuse(self.damage("presence", _rows(key, self.shape)))
+        try:
+            return np.asarray(self._array[key])
+        except Exception as error:  # a damaged chunk fails in the codec's own ways
+            self._refuse(self.damage("values", _rows(key, self.shape)))
+            raise unreadable(self.path, f"{self.name} ({_said(error)})") from error
+
+    def _refuse(self, found: tuple[Damage, ...]) -> None:
+        if found:
+            raise unreadable(self.path, found)
+
+    def damage(
+        self, depth: Depth, rows: range | None = None, progress: Progress = silent
+    ) -> tuple[Damage, ...]:
+        """Return what is damaged of the chunks that hold some rows, all by default."""
+        rows = range(self.shape[0] if self.shape else 0) if rows is None else rows
+        if not rows or 0 in self.shape:
+            return ()
+        step = self.chunks[0]
+        sizes = zip(self.shape[1:], self.chunks[1:], strict=True)
+        across = [range(-(-size // chunk)) for size, chunk in sizes]
+        found: list[Damage] = []
+        with _chunk_files(self.path) as files:
+            for number in range(rows.start // step, -(-rows.stop // step)):
+                progress(number * step - rows.start, len(rows))
+                start, stop = number * step, min((number + 1) * step, self.shape[0])
+                for place in itertools.product(*across):
+                    reason = self._reason(files, (number, *place), depth)
+                    if reason is not None:
+                        found.append(Damage(self.name, start, stop, self._unit, reason))
+                        break
+        return tuple(found)
+
+    def _reason(self, files: _ChunkFiles, place: tuple[int, ...], depth: Depth) -> str | None:
+        """What is wrong with a chunk; None: nothing."""
+        key = f"{self._array.path}/{self._array.metadata.encode_chunk_key(place)}".lstrip("/")
+        size = files.size(key)
+        if size is None or depth == "presence":
+            return None if self._sparse or size is not None else f"{key} is missing"
+
+        from google_crc32c import value as crc32c
+
+        from sd2core.files.chunk_codecs import DamagedChunkError, check_blosc_frame
+
+        tail = 4 if self.checksums else 0
+        summed = tail > 0 and depth != "lengths"
+        try:
+            content = files.read(key) if summed else files.read(key, 16)
+            if self._codecs[-2 if tail else -1 :][:1] == ("blosc",):
+                check_blosc_frame(content[:16], size - tail)
+        except DamagedChunkError as error:
+            return f"{key}: {error}"
+        except Exception as error:  # a damaged zip fails in many ways, too
+            return f"{key}: {_said(error)}"
+        if summed and crc32c(content[:-4]).to_bytes(4, "little") != content[-4:]:
+            return f"{key} does not have its checksum"
+        return self._undecodable(place, key) if depth == "values" else None
+
+    def _undecodable(self, place: tuple[int, ...], key: str) -> str | None:
+        try:
+            self._array.blocks[place]
+        except Exception as error:  # as in __getitem__
+            return f"{key}: {_said(error)}"
+        return None
+
+
+class _ChunkFiles:
+    """Bytes of chunks by their keys, in a folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def __enter__(self) -> _ChunkFiles:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def size(self, key: str) -> int | None:
+        try:
+            found = os.stat(f"{self._folder}/{key}")
+        except OSError:
+            return None
+        return found.st_size if stat.S_ISREG(found.st_mode) else None
+
+    def read(self, key: str, most: int = -1) -> bytes:
+        with (self._folder / key).open("rb") as file:
+            return file.read(most)
+
+
+class _PackedChunkFiles(_ChunkFiles):
+    """The same in a zip, whose entries have checksums of their own."""
+
+    def __init__(self, path: Path) -> None:
+        self._archive = zipfile.ZipFile(path)
+
+    def __exit__(self, *_: object) -> None:
+        self._archive.close()
+
+    def size(self, key: str) -> int | None:
+        try:
+            return self._archive.getinfo(key).file_size
+        except KeyError:
+            return None
+
+    def read(self, key: str, most: int = -1) -> bytes:
+        with self._archive.open(key) as file:
+            return file.read(most)
+
+
+def _chunk_files(path: Path) -> _ChunkFiles:
+    return _PackedChunkFiles(path) if path.is_file() else _ChunkFiles(path)
+
+
+def open_group(path: Path, mode: Literal["r", "r+"] = "r") -> Any:
+    """Open a Zarr group, a folder or a ``.zarr.zip``; Sd2Error if it is none, or damaged."""
+    import zarr
+    from zarr.storage import ZipStore
+
+    import sd2core.files.chunk_codecs  # noqa: F401  puts a check before Blosc
+
+    try:
+        return zarr.open_group(ZipStore(path, mode="r") if path.is_file() else str(path), mode=mode)
+    except Exception as error:  # damaged descriptions fail in many ways
+        raise _no_group(path, error) from error
+
+
+def array_names(path: Path) -> list[str]:
+    """Names of the arrays in a store."""
+    if path.is_file():
+        with zipfile.ZipFile(path) as archive:
+            found = [Path(name) for name in archive.namelist()]
+    else:
+        found = [file.relative_to(path) for file in path.glob("*/*") if file.is_file()]
+    return sorted(
+        str(one.parent)
+        for one in found
+        if len(one.parts) == 2 and one.name in ("zarr.json", ".zarray")
+    )
+
+
+def array_in(
+    group: Any, path: Path, name: str, unit: str, *, sparse: bool | None = None
+) -> StoredArray:
+    """Array of an open group, to be read; Sd2Error if its description is damaged."""
+    try:
+        return StoredArray(group[name], path, name, unit, sparse=sparse)
+    except Sd2Error:
+        raise
+    except Exception as error:
+        raise _no_group(path / name, error) from error
+
+
+def growing(group: Any, path: Path, name: str) -> Any:
+    """Array of an open group, to be written to."""
+    array_in(group, path, name, "rows")
+    return group[name].with_config(_EVERY_CHUNK)
+
+
+def create_group(path: Path, attributes: Mapping[str, Any] | None = None) -> Any:
+    """Make an empty group in a folder, in place of what is there."""
+    import zarr
+
+    return zarr.open_group(str(path), mode="w", attributes=dict(attributes or {}))
+
+
+def create_array(group: Any, name: str, *, compressor: Any = None, **how: Any) -> Any:
+    """Make an array of a group whose chunks have checksums, by arguments as Zarr has them."""
+    from sd2core.files.chunk_codecs import checksummed
+
+    return group.create_array(name, compressors=checksummed(compressor), config=_EVERY_CHUNK, **how)
+
+
+_EVERY_CHUNK = {"write_empty_chunks": True}
+"""A chunk that is not there is then a chunk that was lost."""
+
+
+def _refuse_unsafe(array: Any, path: Path, name: str) -> None:
+    from sd2core.files.chunk_codecs import unsafe_codecs
+
+    if not hasattr(array, "metadata") or not hasattr(array, "shape"):
+        raise Sd2Error(f"{path}: {name} is a group", "an array", COPY_AGAIN)
+    unsafe = unsafe_codecs(array)
+    if unsafe or np.dtype(array.dtype).kind not in "biuf":
+        raise Sd2Error(
+            f"{path}: the array {name} is of {array.dtype}, coded by {', '.join(unsafe) or 'none'}",
+            "plain numbers, compressed by Blosc, zstd, gzip or not at all",
+            "Write it again with zarr's default codecs",
+        )
+
+
+def unreadable(path: Path, found: str | Iterable[Damage]) -> Sd2Error:
+    """Error that names what of a store cannot be read."""
+    what = found if isinstance(found, str) else "; ".join(map(str, found))
+    return Sd2Error(f"{path} cannot be read: {what}", "chunks as they were written", COPY_AGAIN)
+
+
+def _no_group(path: Path, error: Exception) -> Sd2Error:
+    return Sd2Error(
+        f"{path} cannot be read as a Zarr group ({_said(error)})",
+        "a complete Zarr store",
+        COPY_AGAIN,
+    )
+
+
+def _said(error: BaseException) -> str:
+    return f"{type(error).__name__}: {error}"[:200]
+
+
+def _rows(key: Any, shape: tuple[int, ...]) -> range | None:
+    """Rows that a key asks for, where it names them by a number or a slice."""
+    first = key[0] if isinstance(key, tuple) and key else key
+    if isinstance(first, int | np.integer) and -shape[0] <= first < shape[0]:
+        row = range(shape[0])[first]
+        return range(row, row + 1)
+    if isinstance(first, slice) and first.step in (None, 1):
+        start, stop, _ = first.indices(shape[0])
+        return range(start, max(start, stop))
+    return None
