@@ -124,8 +124,10 @@ class TestLearning:
     def test_seeds_differ_and_repeat(self, pairs: Path, tmp_path: Path) -> None:
         for name, seed in (("a", 1), ("b", 1), ("c", 2)):
             begin(settings(pairs, epochs=2, seed=seed), tmp_path / name)
+        begin(settings(pairs, epochs=2, seed=1, balanced=True), tmp_path / "balanced")
         assert same(tmp_path / "a", tmp_path / "b")
         assert not same(tmp_path / "a", tmp_path / "c")
+        assert not same(tmp_path / "a", tmp_path / "balanced")
 
     @pytest.mark.parametrize("model", ["gru", "s4"])
     def test_mixed_precision(self, pairs: Path, tmp_path: Path, model: str) -> None:
@@ -179,9 +181,11 @@ class TestLearning:
 
 
 class TestSteering:
-    @pytest.mark.parametrize("model", ["gru", "s4"])
-    def test_stopped_and_gone_on_with(self, pairs: Path, tmp_path: Path, model: str) -> None:
-        config = settings(pairs, model)
+    @pytest.mark.parametrize(("model", "balanced"), [("gru", True), ("s4", False)])
+    def test_stopped_and_gone_on_with(
+        self, pairs: Path, tmp_path: Path, model: str, balanced: bool
+    ) -> None:
+        config = settings(pairs, model, balanced=balanced)
         whole = begin(config, tmp_path / "whole")
         run = TrainingFolder(tmp_path / "run")
         stop = at(4, lambda: run.tell("stop"))
