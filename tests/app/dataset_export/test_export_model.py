@@ -211,7 +211,8 @@ def test_what_was_written_meanwhile_is_said(made, people, qtbot, tmp_path) -> No
     first.close()
     (people / "set.h5.go").touch()
     (folder,) = commands_in(tmp_path / "exports")
-    qtbot.waitUntil(lambda: folder.code is not None, timeout=20_000)
+    # Its code is there a moment before its process has ended.
+    qtbot.waitUntil(lambda: folder.code is not None and not folder.live, timeout=20_000)
     said: list[str] = []
     second.noted.connect(said.append)
     second.look_for_runs()
