@@ -131,10 +131,7 @@ def protocols_section(out: Path, minutes: float, seeds: int) -> str:
         runs=len(cpu_s),
         cpu_min=sum(cpu_s.values()) / 60.0,
     )
-    text += means_table(tables) + "\n" + _findings(tables)
-    for number, kind in enumerate(ADDED, start=2):
-        text += f"\n### Table {number}: {ADDED[kind]}\n\n" + confusion_table(tables, kind)
-    return text + _STEPS_TEXT + _lines(_step_rows(steps)) + "\n"
+    return text + _results(tables) + _STEPS_TEXT + _lines(_step_rows(steps)) + "\n"
 
 
 def full_size_section(out: Path, seeds: int) -> str:
@@ -150,11 +147,15 @@ def full_size_section(out: Path, seeds: int) -> str:
         runs=len(runs),
         cpu_min=sum(run.cpu_s for run in runs) / 60.0,
     )
-    text += means_table(tables) + "\n" + _findings(tables)
+    return text + _results(tables, " with as many frames") + "\n"
+
+
+def _results(tables: Tables, apart: str = "") -> str:
+    """Means, findings and both confusion tables; ``apart`` tells their headings from others."""
+    text = means_table(tables) + "\n" + _findings(tables)
     for number, kind in enumerate(ADDED, start=2):
-        text += f"\n### Table {number} with as many frames: {ADDED[kind]}\n\n"
-        text += confusion_table(tables, kind)
-    return text + "\n"
+        text += f"\n### Table {number}{apart}: {ADDED[kind]}\n\n" + confusion_table(tables, kind)
+    return text
 
 
 Tables = Mapping[tuple[str, str], Table]

@@ -47,6 +47,7 @@ Maps = list[NDArray[np.float32]]
 DEFAULT = MarsChoices()
 RIDGES = (10.0, 100.0)
 HALVINGS = 8
+_POINT_ARRAYS = ("point_rows", "point_mps", "point_intensity")
 Answers = tuple[NDArray[np.float64], NDArray[np.float64], float]
 
 
@@ -262,11 +263,9 @@ def halves_mps(
     second = rng.integers(0, 2, len(stretch.point_rows)) > 0
     means = []
     for half in (~second, second):
-        rows, weight = stretch.point_rows[half], stretch.point_intensity[half]
-        count = len(stretch.frames)
-        moment = np.bincount(rows, weight * stretch.point_mps[half], count)
-        total = np.bincount(rows, weight, count)
-        means.append(np.divide(moment, total, out=np.full(count, np.nan), where=total > 0))
+        points = {name: getattr(stretch, name)[half] for name in _POINT_ARRAYS}
+        with np.errstate(invalid="ignore"):  # NaN where a half has no point
+            means.append(replace(stretch, **points).mean_velocity_mps())
     both = np.isfinite(means[0]) & np.isfinite(means[1])
     return means[0][both], means[1][both]
 

@@ -259,7 +259,8 @@ class AccuracyModel(QObject):
         self._decided_for = self._asking
         if choice is not None:
             self._take(choice)
-        self.changed.emit()
+        else:
+            self.changed.emit()
         self.decided.emit()
 
     def _fail(self, error: Exception) -> None:

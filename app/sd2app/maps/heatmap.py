@@ -54,10 +54,12 @@ def velocity_labels(
     ]
 
 
-def paint_velocity_labels(painter: QPainter, plot: QRectF, v_max_mps: float) -> None:
-    """Write the velocities of an axis left of its plot."""
+def paint_velocity_labels(
+    painter: QPainter, plot: QRectF, labels: Sequence[tuple[float, float]]
+) -> None:
+    """Write :func:`velocity_labels` left of a plot."""
     line_px = painter.fontMetrics().height()
-    for velocity, beside_px in velocity_labels(v_max_mps, plot.height(), line_px):
+    for velocity, beside_px in labels:
         room = QRectF(0, plot.top() + beside_px - line_px / 2, plot.left() - 8, line_px)
         painter.drawText(room, AT_RIGHT, signed_text(velocity))
 
@@ -280,12 +282,12 @@ class HeatmapView(MapWidget):
         colours, v_max = self._display.palette, self._map.axis.v_max_mps
         painter.setPen(QPen(QColor(colours.border), 1))
         painter.drawRect(plot.adjusted(-0.5, -0.5, 0.5, 0.5))
-        line_px = painter.fontMetrics().height()
         painter.setPen(QPen(QColor(colours.muted), 1))
-        for velocity, _ in velocity_labels(v_max, plot.height(), line_px):
+        labels = velocity_labels(v_max, plot.height(), painter.fontMetrics().height())
+        for velocity, _ in labels:
             y = self.y_of(velocity)
             painter.drawLine(QPointF(plot.left() - 4, y), QPointF(plot.left(), y))
-        paint_velocity_labels(painter, plot, v_max)
+        paint_velocity_labels(painter, plot, labels)
 
     def _paint_cursors(self, painter: QPainter, plot: QRectF) -> None:
         with clipped(painter, plot):

@@ -131,7 +131,7 @@ class SpectrumView(Canvas):
             [(_y_of(plot, velocity, v_max), "") for velocity, _ in upwards],
             "" if self._is_tight(plot) else f"level ({unit} of the reference)",
         )
-        paint_velocity_labels(painter, plot, v_max)
+        paint_velocity_labels(painter, plot, upwards)
         if self._is_tight(plot):
             for x, text in across[:-1]:
                 box = QRectF(x + 3, plot.bottom() - line_px - 2, 60, line_px)
