@@ -289,7 +289,7 @@ class Journal:
                 self._others,
             )
         )
-        with atomic_write(path) as stream:
+        with atomic_write(path, mode=0o600) as stream:
             stream.write(record)
         self._parts.append(path)
         self._stream = os.open(path, os.O_WRONLY | os.O_APPEND | getattr(os, "O_BINARY", 0))

@@ -9,8 +9,9 @@ Every recording has a folder of its own below a folder of the caller's choice::
         000002-000004.declined parts of a session that the user discarded
         000001-000001.damaged  unreadable, and reported once
 
-Unreadable files are kept, and unsaved edits are deleted only when the user asks for it. A part
-that cannot be read costs that part: the one before it is offered, with a note.
+Only the user may read them. Unreadable files are kept, and unsaved edits are deleted only when
+the user asks for it. A part that cannot be read costs that part: the one before it is offered,
+with a note.
 """
 
 from __future__ import annotations
@@ -81,6 +82,7 @@ class Search:
 
 def search(folder: Path, suffixes: Iterable[str], without: Container[int] = ()) -> Search:
     """Read what sessions, except ``without``, left in a recording's folder, the newest first."""
+    _make_private(folder, *(path for path in listed(folder) if path.is_file()))
     offers, notes = [], []
     settled: list[Path] = []
     damaged: list[Path] = []
@@ -105,6 +107,13 @@ def search(folder: Path, suffixes: Iterable[str], without: Container[int] = ()) 
                 (damaged if note else settled).extend(parts)
             break
     return Search(Found(tuple(offers), tuple(notes)), tuple(settled), tuple(damaged))
+
+
+def _make_private(*paths: Path) -> None:
+    """Take the permissions of other users away from files and folders, where that is possible."""
+    for path in paths:
+        with suppress(OSError):
+            path.chmod(path.stat().st_mode & 0o700)
 
 
 def _replayed(path: Path) -> tuple[Replayed, str]:
@@ -202,6 +211,7 @@ class RecoveryPlace:
         Raises OSError when the folder cannot be made or written to.
         """
         self._folder.mkdir(parents=True, exist_ok=True)
+        _make_private(self._folder.parent, self._folder)
         lock = FileLock(self._folder / _LOCK_NAME)
         if self.held or not lock.take():
             return self.held
