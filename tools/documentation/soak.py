@@ -33,11 +33,13 @@ from sd2app.shell.window import MainWindow
 from sd2app.widgets.theme import apply_theme
 from sd2core.files.resources import resource_path
 from sd2core.files.tables import markdown_table
+from sd2core.processes import keep_little_free_memory
 
 LIMIT_S = 120.0
 TICK_MS = 5
 ROWS = 10
 REOPENINGS = 50
+_LOOK_S = 0.02
 _NONE, _CONTROL = Qt.KeyboardModifier.NoModifier, Qt.KeyboardModifier.ControlModifier
 
 
@@ -145,9 +147,14 @@ class Hand:
         self.rest()
 
     def rest(self) -> None:
-        """Wait until nothing is under way."""
-        synthesis = self._window.features.maps.synthesis
-        self._until(lambda: self._window.settled and synthesis.complete, "come to rest")
+        """Wait until nothing has been under way for half a second."""
+        synthesis, looks = self._window.features.maps.synthesis, [0]
+
+        def is_calm() -> bool:
+            looks[0] = looks[0] + 1 if self._window.settled and synthesis.complete else 0
+            return looks[0] * _LOOK_S > 0.5
+
+        self._until(is_calm, "come to rest")
 
     def round(self) -> None:
         """Play and label, drag the sensor, undo and save; the recording is then as it was."""
@@ -200,7 +207,7 @@ class Hand:
             if time.monotonic() > deadline_s:
                 said = self._window.messages.text or "the window says nothing"
                 raise RuntimeError(f"The window did not {step} within {LIMIT_S:.0f} s ({said})")
-            spin(0.02)
+            spin(_LOOK_S)
 
 
 def spin(seconds: float) -> None:
@@ -272,6 +279,7 @@ def main() -> int:
             print("\n".join(heading))
         print(line, flush=True)
 
+    keep_little_free_memory()
     application = QApplication(sys.argv[:1])
     apply_theme(application, False)
     with tempfile.TemporaryDirectory(prefix="sd2-soak-") as name:

@@ -17,6 +17,7 @@ from sd2app.shell.parts import Parts
 from sd2app.shell.window import MainWindow, is_dark
 from sd2app.widgets.picture import write_picture
 from sd2app.widgets.theme import apply_theme
+from sd2core.processes import keep_little_free_memory
 
 _SCREENSHOT_LIMIT_S = 120
 _SETTLE_S = 0.5
@@ -30,6 +31,7 @@ def run(paths: Sequence[Path] = (), *, screenshot: Path | None = None) -> int:
     """
     if screenshot is not None:
         os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+    keep_little_free_memory()
     application = QApplication.instance() or QApplication(sys.argv[:1])
     assert isinstance(application, QApplication)
     application.setApplicationName("SD² Studio")

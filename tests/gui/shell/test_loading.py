@@ -94,10 +94,12 @@ def test_an_open_recording_stays_in_view_while_another_is_read(window, qtbot, sm
 
 
 def test_the_window_fills_itself_once_its_skeleton_is_on_screen(
-    qtbot, small_recording, capsys
+    qtbot, small_recording, capsys, monkeypatch
 ) -> None:
-    picture = small_recording.parent / "window.png"
+    picture, memory_set = small_recording.parent / "window.png", []
+    monkeypatch.setattr(app, "keep_little_free_memory", lambda: memory_set.append(True))
     assert app.run([small_recording], screenshot=picture) == 0
+    assert memory_set
     assert capsys.readouterr().out == f"Wrote {picture}\n"
     # An empty window has a few colours.
     assert len(np.unique(np.asarray(Image.open(picture)).reshape(-1, 4), axis=0)) > 500
