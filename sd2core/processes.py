@@ -105,8 +105,8 @@ def lower_priority(nice: int | None = None) -> None:
 def keep_little_free_memory() -> None:
     """Keep the GNU C library from holding much freed memory; call it before threads are there.
 
-    By default threads get up to eight heaps per core, which large arrays are taken from as well; what
-    is free in them stays with the process (decision 63). Other C libraries are left as they are.
+    By default threads get up to eight heaps per core, which large arrays are taken from as well;
+    what is free in them stays with the process (decision 63). Other C libraries are left alone.
     """
     with suppress(AttributeError, OSError, TypeError):
         mallopt = ctypes.CDLL(None).mallopt
