@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+import os
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -18,6 +18,7 @@ from pydantic import (
 )
 
 from sd2core.errors import Sd2Error
+from sd2core.files.texts import read_json
 
 FILE_NAME = "recording.json"
 FORMAT: Literal["sd2-recording"] = "sd2-recording"
@@ -126,14 +127,9 @@ def read_document(file: Path) -> Document:
 
     Raises Sd2Error if it is not there, is damaged, or was written by a newer version.
     """
-    try:
-        content = json.loads(file.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise Sd2Error(
-            f"{file.parent} has no {file.name}", "a recording made by `sd2 import`"
-        ) from error
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise Sd2Error(f"{file} cannot be read ({error})", "JSON written by SD² Studio") from error
+    if not os.path.exists(file):
+        raise Sd2Error(f"{file.parent} has no {file.name}", "a recording made by `sd2 import`")
+    content = read_json(file)
     found_format = content.get("format") if isinstance(content, dict) else None
     if found_format != FORMAT:
         raise Sd2Error(f"{file} has the format {found_format!r}", f"the format {FORMAT!r}")
@@ -150,7 +146,7 @@ def read_document(file: Path) -> Document:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])
         raise Sd2Error(
-            f"{file}: {where} is {first['input']!r} ({first['msg']})",
+            f"{file}: {where} is {first['input']!r:.80} ({first['msg']})",
             "what docs/formats.md says of a recording",
             "Correct that entry with a text editor",
         ) from error

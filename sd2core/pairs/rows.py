@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
@@ -13,6 +12,7 @@ from pydantic import BaseModel, Field, ValidationError
 
 from sd2core.errors import Sd2Error
 from sd2core.files.stores import Damage, StoredArray
+from sd2core.files.texts import parse_json, read_content
 
 INDEX_NAME = "takes.jsonl"
 REMAKE = "Make the pairs again with `sd2 simulate campaign` or `sd2 pairs`"
@@ -63,9 +63,9 @@ def check_header(path: Path, header: Mapping[str, Any]) -> None:
 def _read_entry(line: str) -> dict[str, Any]:
     """Return the take that a line describes; ValueError if it is none."""
     try:
-        entry: dict[str, Any] = json.loads(line)
-    except RecursionError:
-        raise ValueError("nested too deeply") from None
+        entry: dict[str, Any] = parse_json(line, "it", "one take")
+    except Sd2Error as error:
+        raise ValueError(error.found) from None
     known = _Entry.model_validate(entry)
     if known.stop <= known.start:
         raise ValueError(f"its frames are {known.start} to {known.stop}")
@@ -159,7 +159,7 @@ def read_takes(path: Path, provenance: Any) -> list[dict[str, Any]]:
     index = path / INDEX_NAME
     if not index.exists():
         return []
-    lines = index.read_text(encoding="utf-8", errors="replace").split("\n")
+    lines = read_content(index, "one take per line").decode(errors="replace").split("\n")
     entries = []
     for number, line in enumerate(lines[:-1], start=1):
         try:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, field, fields, replace
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Any
 
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import located_path
+from sd2core.files.texts import read_toml
 from sd2core.files.toml import toml_lines
 from sd2core.pairs.segments import LENGTH, OVERLAP
 from sd2core.runs.pace import Kind
@@ -244,12 +244,7 @@ def read_config(path: Path) -> TrainConfig:
     Raises Sd2Error if it cannot be read, is no TOML, or holds what is not allowed.
     """
     path = Path(path)
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise Sd2Error(f"{path} does not exist", "a TOML file with settings") from None
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise Sd2Error(f"{path} cannot be read ({error})", "a TOML file with settings") from error
+    content = read_toml(path, "a TOML file with settings")
     return config_from(content, path.absolute().parent, str(path))
 
 

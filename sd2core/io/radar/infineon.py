@@ -20,6 +20,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_folder, atomic_write, atomic_write_text
+from sd2core.files.texts import read_content, read_json
 from sd2core.io.radar.capture import RadarCapture, check_cube
 from sd2core.radar_config import RadarConfig
 from sd2core.timebase import Timebase
@@ -32,6 +33,8 @@ _FIRST_PLAUSIBLE_UNIX_S = 1e8
 """Smaller start times are seconds since the start, not a date."""
 _LAST_PLAUSIBLE_UNIX_S = 1e11
 """Larger ones are not in seconds."""
+_LARGEST_TIME_S = 1e15
+"""What is larger, or infinite, is no time in any unit."""
 _FAR_TOO_SLOW = 100
 """Typical steps of this many frame repetition times are no pauses: the unit is another."""
 
@@ -205,16 +208,13 @@ def _json(content: dict[str, Any]) -> str:
 
 
 def _read_json(path: Path) -> Any:
-    try:
-        return json.loads(path.read_text("utf-8"))
-    except FileNotFoundError as error:
+    if not path.exists():
         raise Sd2Error(
             f"{path} is missing",
             f"{_DATA}, {_CONFIG} and {_TIMES} in one folder",
             "Copy the whole recording folder",
-        ) from error
-    except (OSError, ValueError) as error:
-        raise Sd2Error(f"{path} cannot be read as JSON ({error})", "a JSON text") from error
+        )
+    return read_json(path, "a JSON text")
 
 
 def _explain(path: Path, error: ValidationError) -> Sd2Error:
@@ -304,6 +304,8 @@ def _read_times(
         which = "fewer" if len(times) < frames else "more"
         note = f"{path.name} has {len(times)} times for {frames} frames, {which} than it should"
         return regular, start_unix_s, (f"{note}: {fallback}.",)
+    if frames == 1:
+        return regular, start_unix_s, ()
     steps = np.diff(times)
     if not np.isfinite(times).all() or (steps <= 0).any():
         bad = int(np.flatnonzero(~(steps > 0))[0])
@@ -351,9 +353,9 @@ def _notes_on_steps(name: str, steps_s: NDArray[np.float64], nominal_s: float) -
 
 
 def _parse_times(path: Path) -> NDArray[np.float64]:
-    """One number per line; a heading in the first line is allowed."""
-    lines = [line.strip() for line in path.read_text("utf-8", "replace").splitlines()]
-    lines = [line for line in lines if line]
+    """One number per line, NaN where it is no time; a heading in the first line is allowed."""
+    content = read_content(path, "one unix time in seconds per line")
+    lines = [line for line in map(str.strip, content.decode(errors="replace").splitlines()) if line]
     times = []
     for number, line in enumerate(lines, start=1):
         try:
@@ -366,4 +368,5 @@ def _parse_times(path: Path) -> NDArray[np.float64]:
                 "one unix time in seconds per line",
                 "Remove the file to place frames by the frame repetition time",
             ) from error
-    return np.array(times, dtype=np.float64)
+    found = np.array(times, dtype=np.float64)
+    return np.where(np.abs(found) < _LARGEST_TIME_S, found, np.nan)

@@ -24,6 +24,7 @@ from pathlib import Path
 
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
+from sd2core.files.texts import read_text
 from sd2core.labels.formats.losses import (
     ASPECTS,
     LabelFormat,
@@ -31,8 +32,8 @@ from sd2core.labels.formats.losses import (
     hold_texts,
     losses_by_format,
 )
+from sd2core.labels.formats.numbers import whole_number
 from sd2core.labels.formats.rows import UNNAMED, TableRows, assemble
-from sd2core.labels.formats.texts import read_text, whole_number
 from sd2core.labels.spans import Labels
 from sd2core.timebase import Timebase
 

@@ -16,7 +16,7 @@ from typing import TypeVar
 
 from sd2core.errors import Sd2Error
 from sd2core.labels.formats.losses import DEFAULT_TRACK
-from sd2core.labels.formats.texts import whole_number
+from sd2core.labels.formats.numbers import whole_number
 from sd2core.labels.label_set import GESTURES, LONGEST_NAME, LabelSet
 from sd2core.labels.spans import ORIGINS, OVERLAPS, Labels, LabelTrack, Origin, Overlap, Span
 from sd2core.timebase import Timebase
@@ -175,7 +175,7 @@ def _overlapping(spans: Sequence[Span]) -> set[str]:
     return found
 
 
-_ROW = re.compile(r"(.+) \[overlap (\d+)\]")
+_ROW = re.compile(r"(.+) \[overlap (\d{1,18})\]")
 
 Time = TypeVar("Time", int, float)
 
