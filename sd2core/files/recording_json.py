@@ -18,7 +18,7 @@ from pydantic import (
 )
 
 from sd2core.errors import Sd2Error
-from sd2core.files.texts import read_json
+from sd2core.files.texts import first_fault, read_json
 
 FILE_NAME = "recording.json"
 FORMAT: Literal["sd2-recording"] = "sd2-recording"
@@ -143,10 +143,8 @@ def read_document(file: Path) -> Document:
     try:
         return Document.model_validate(content)
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
         raise Sd2Error(
-            f"{file}: {where} is {first['input']!r:.80} ({first['msg']})",
+            f"{file}: {first_fault(error)}",
             "what docs/formats.md says of a recording",
             "Correct that entry with a text editor",
         ) from error

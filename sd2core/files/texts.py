@@ -6,11 +6,16 @@ import codecs
 import json
 import re
 import tomllib
+from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from sd2core.errors import Sd2Error
 from sd2core.files.limits import VARIABLE, check_regular, read_limit_bytes
+
+if TYPE_CHECKING:
+    from pydantic import ValidationError
 
 EXPECTED_JSON = "JSON written by SD² Studio"
 _PART = 8
@@ -19,6 +24,8 @@ _DEEPEST = 100
 """Lists and tables that may stand in each other; Python itself gives up before a thousand."""
 _LONG_NUMBER = re.compile(r"[0-9](?:[0-9_]{300,}|x[0-9a-fA-F_]{250,})")
 """A whole number that no float holds."""
+_LONGEST_FOUND = 60
+LONGEST_LINE_BYTES = 1 << 20
 _REMEDY = "Correct it with a text editor, or copy it again"
 
 _MARKS = (
@@ -81,6 +88,11 @@ def read_text(path: Path, expected: str) -> str:
     return text
 
 
+def lines_of(stream: BinaryIO) -> Iterator[bytes]:
+    """Lines of a file that may be long, with their ends; one of over 1 MiB comes in pieces."""
+    return iter(partial(stream.readline, LONGEST_LINE_BYTES), b"")
+
+
 def read_json(path: Path, expected: str = EXPECTED_JSON, remedy: str = "") -> Any:
     """Read a JSON file; raises Sd2Error as :func:`read_text` and :func:`parse_json`."""
     return parse_json(read_text(path, expected), path, expected, remedy)
@@ -106,6 +118,19 @@ def parse_toml(text: str, place: str | Path, expected: str, remedy: str = "") ->
     return content
 
 
+def first_fault(error: ValidationError) -> str:
+    """Describe the first fault: its place, the value found and the reason."""
+    first = error.errors(include_url=False)[0]
+    where = ".".join(str(part) for part in first["loc"]) or "the file"
+    if first["type"] == "missing":
+        return f"{where} is missing"
+    if first["type"] == "extra_forbidden":
+        return f"{where} is nothing that this version knows"
+    found = repr(first["input"])
+    found = found if len(found) <= _LONGEST_FOUND else f"{found[:_LONGEST_FOUND]}…"
+    return f"{where} is {found} ({first['msg']})"
+
+
 def _parsed(form: str, text: str, place: str | Path, expected: str, remedy: str) -> Any:
     try:
         if long := _LONG_NUMBER.search(text):
@@ -122,7 +147,7 @@ def _parsed(form: str, text: str, place: str | Path, expected: str, remedy: str)
 
 
 def _is_deep(content: Any) -> bool:
-    level = [[content]]
+    level: list[Any] = [[content]]
     for _ in range(_DEEPEST + 1):
         tables = (one.values() if isinstance(one, dict) else one for one in level)
         level = [one for table in tables for one in table if isinstance(one, dict | list)]

@@ -18,12 +18,11 @@ from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.paths import located_path, plain_path, stored_path
 from sd2core.files.recording_json import Span as InlineSpan
-from sd2core.files.texts import EXPECTED_JSON, parse_json, read_text
+from sd2core.files.texts import EXPECTED_JSON, first_fault, parse_json, read_text
 from sd2core.labels.entries import (
     Entry,
     LabelsEntry,
     LabelSetEntry,
-    first_fault,
     label_set_entry,
     labels_entry,
 )
@@ -180,7 +179,7 @@ def _made(path: Path, document: _Makes[_Made]) -> _Made:
     try:
         return document.made()
     except Sd2Error as error:
-        raise Sd2Error(f"{path}: {error.found}", error.expected, error.remedy) from error
+        raise error.within(path) from error
 
 
 def _text(content: dict[str, Any]) -> str:

@@ -33,8 +33,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text, remove_leftovers
 from sd2core.files.lock import FileLock, is_locked
 from sd2core.files.paths import user_data
-from sd2core.files.texts import read_content, read_json
-from sd2core.labels.entries import first_fault
+from sd2core.files.texts import first_fault, read_content, read_json
 from sd2core.labels.journal import SUFFIX, Journal, Replayed, replay, unpacked
 from sd2core.labels.spans import Labels
 

@@ -12,7 +12,7 @@ from pydantic import BaseModel, Field, ValidationError
 
 from sd2core.errors import Sd2Error
 from sd2core.files.stores import Damage, StoredArray
-from sd2core.files.texts import parse_json, read_content
+from sd2core.files.texts import first_fault, parse_json, read_content
 
 INDEX_NAME = "takes.jsonl"
 REMAKE = "Make the pairs again with `sd2 simulate campaign` or `sd2 pairs`"
@@ -74,10 +74,7 @@ def _read_entry(line: str) -> dict[str, Any]:
 
 def _reason_of(error: ValueError) -> str:
     """Place and reason of what pydantic refused, or what else was said."""
-    if isinstance(error, ValidationError):
-        first = error.errors(include_url=False)[0]
-        return f"{'.'.join(map(str, first['loc']))}: {first['msg']}"
-    return str(error)
+    return first_fault(error) if isinstance(error, ValidationError) else str(error)
 
 
 def check_array(array: StoredArray, frames: int, row: tuple[int, ...], kind: str) -> None:

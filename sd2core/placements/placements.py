@@ -236,7 +236,7 @@ def read_placements(file: Path) -> Placements:
     try:
         return placements_from_dict(content)
     except Sd2Error as error:
-        raise Sd2Error(f"{file}: {error.found}", error.expected, error.remedy) from error
+        raise error.within(file) from error
 
 
 def write_placements(file: Path, placements: Placements) -> None:

@@ -412,7 +412,7 @@ def open_recording(path: Path) -> Recording:
         placements = None if planned is None else placements_from_dict(planned)
     except Sd2Error as error:
         file = folder / FILE_NAME
-        raise Sd2Error(f"{file}: {error.found}", error.expected, error.remedy) from error
+        raise error.within(file) from error
     recording = Recording(
         folder,
         **{role: located_path(getattr(document, role), folder) for role in ROLES},  # type: ignore[arg-type]

@@ -10,9 +10,13 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, BinaryIO, Self
+
+from sd2core.errors import Sd2Error
+from sd2core.files.limits import check_regular
+from sd2core.files.texts import LONGEST_LINE_BYTES, lines_of, parse_json
 
 Event = dict[str, Any]
 
@@ -74,14 +78,20 @@ class ProgressTail:
     def new(self) -> list[Event]:
         """Whole lines since the last call; a line that is still being written comes later."""
         try:
+            check_regular(self._path)
             with self._path.open("rb") as stream:
                 stream.seek(self._offset)
-                content = stream.read()
-        except OSError:  # not there yet, or discarded
+                found = [event for line in self._whole_lines(stream) if (event := _parsed(line))]
+        except (OSError, Sd2Error):  # not there yet, discarded, or no file
             return []
-        whole = content[: content.rfind(b"\n") + 1]
-        self._offset += len(whole)
-        return [event for line in whole.splitlines() if (event := _parsed(line)) is not None]
+        return found
+
+    def _whole_lines(self, stream: BinaryIO) -> Iterator[bytes]:
+        for line in lines_of(stream):
+            if not line.endswith(b"\n") and len(line) < LONGEST_LINE_BYTES:
+                return
+            self._offset += len(line)
+            yield line
 
 
 def read_events(path: Path) -> list[Event]:
@@ -121,8 +131,8 @@ def _undone(event: Event, done: int) -> bool:
 
 def _parsed(line: bytes) -> Event | None:
     try:
-        event = json.loads(line)
-    except ValueError:  # torn by a kill
+        event = parse_json(line.decode(errors="replace"), "The line", "an event")
+    except Sd2Error:  # torn by a kill
         return None
     return event if isinstance(event, dict) and isinstance(event.get("event"), str) else None
 

@@ -98,7 +98,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
         if content.pop("format") != FORMAT or content.pop("version") != VERSION:
             raise ValueError(f"not {FORMAT} version {VERSION}")
         position = Position(**content.pop("position"))
-    except (SafetensorError, OSError, KeyError, TypeError, ValueError) as error:
+    except (SafetensorError, OSError, KeyError, TypeError, ValueError, RecursionError) as error:
         raise Sd2Error(
             f"{path} cannot be read ({error})", "a checkpoint that `sd2 train` wrote"
         ) from error

@@ -245,7 +245,10 @@ def read_config(path: Path) -> TrainConfig:
     """
     path = Path(path)
     content = read_toml(path, "a TOML file with settings")
-    return config_from(content, path.absolute().parent, str(path))
+    try:
+        return config_from(content, path.absolute().parent, str(path))
+    except Sd2Error as error:
+        raise error.within(path) from error
 
 
 def config_text(config: TrainConfig, folder: Path) -> str:

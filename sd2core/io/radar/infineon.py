@@ -267,7 +267,7 @@ def _read_config(path: Path, meta: _Meta) -> RadarConfig:
             name=meta.description,
         )
     except Sd2Error as error:
-        raise Sd2Error(f"{path}: {error.found}", error.expected, error.remedy) from error
+        raise error.within(path) from error
 
 
 def _open_samples(path: Path) -> NDArray[np.uint16]:

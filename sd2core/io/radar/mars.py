@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
+from sd2core.files.texts import read_text
 
 JOINTS = (
     "SpineBase",
@@ -195,25 +196,23 @@ def _joints(path: Path) -> NDArray[np.float64]:
 
 def _columns(path: Path, names: tuple[str, ...] | list[str]) -> NDArray[np.float64]:
     """Some columns of a file of numbers under a heading, (n, len(names))."""
-    try:
-        with path.open(encoding="utf-8-sig") as stream:
-            heading = [name.strip() for name in stream.readline().split(",")]
-            missing = [name for name in names if name not in heading]
-            if missing:
-                more = f" and {len(missing) - 3} more" if len(missing) > 3 else ""
-                raise Sd2Error(
-                    f"{path} has no column {', '.join(missing[:3])}{more}",
-                    "the columns of the MARS recordings",
-                )
-            lines = [line for line in stream if line.strip()]
-        if not lines:
-            raise Sd2Error(f"{path} holds no rows", "at least one")
-        places = [heading.index(name) for name in names]
-        table = np.loadtxt(lines, delimiter=",", usecols=places, ndmin=2)
-    except (OSError, ValueError) as error:
+    expected = "numbers separated by commas under a heading"
+    first, *lines = (line for line in read_text(path, expected).splitlines() if line.strip())
+    heading = [name.strip() for name in first.split(",")]
+    missing = [name for name in names if name not in heading]
+    if missing:
+        more = f" and {len(missing) - 3} more" if len(missing) > 3 else ""
         raise Sd2Error(
-            f"{path} cannot be read ({error})", "numbers separated by commas under a heading"
-        ) from error
+            f"{path} has no column {', '.join(missing[:3])}{more}",
+            "the columns of the MARS recordings",
+        )
+    if not lines:
+        raise Sd2Error(f"{path} holds no rows", "at least one")
+    places = [heading.index(name) for name in names]
+    try:
+        table = np.loadtxt(lines, delimiter=",", usecols=places, ndmin=2)
+    except ValueError as error:
+        raise Sd2Error(f"{path} cannot be read ({error})", expected) from error
     if not np.isfinite(table).all():
         row, column = np.argwhere(~np.isfinite(table))[0]
         raise Sd2Error(
