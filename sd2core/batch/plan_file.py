@@ -115,7 +115,7 @@ def _in_words(error: ValidationError, text: str, source: str) -> Sd2Error:
         return Sd2Error(f"{where}: {name} is not known", "a key that a plan may hold", _HINT)
     message = first["msg"].removeprefix("Value error, ")
     if kind == "value_error":
-        return Sd2Error(f"{where}: {name}: {message}" if name else f"{where}: {message}")
+        return Sd2Error(f"{where}: {name}: {message}" if name else f"{where}: {message}", "", _HINT)
     return Sd2Error(f"{where}: {name} is {first['input']!r:.80}", message, _HINT)
 
 

@@ -24,6 +24,12 @@ FILE_NAME = "recording.json"
 FORMAT: Literal["sd2-recording"] = "sd2-recording"
 VERSION = 1
 
+FARTHEST_S = 1e12
+"""Times reach no farther from 0, where milliseconds still differ."""
+Time = Annotated[FiniteFloat, Field(ge=-FARTHEST_S, le=FARTHEST_S)]
+Pixels = Annotated[PositiveInt, Field(le=100_000)]
+Focal = Annotated[FiniteFloat, Field(gt=0, le=1e6)]
+"""A focal length in pixels; the window shows nothing through a longer one."""
 PositiveFinite = Annotated[FiniteFloat, Field(gt=0)]
 StoredPath = Annotated[str, StringConstraints(pattern=r"\S")]
 """A path that names something: nothing at all would be the recording's own folder."""
@@ -42,8 +48,8 @@ class Span(BaseModel):
 
     model_config = ConfigDict(extra="allow", frozen=True)
 
-    start_s: FiniteFloat
-    end_s: FiniteFloat
+    start_s: Time
+    end_s: Time
     label: str
 
     @model_validator(mode="after")
@@ -72,8 +78,8 @@ class MeshReading(BaseModel):
     frames_per_s: PositiveFinite | None = None
     scale: PositiveFinite | None = None
     person: int | str | None = None
-    image_size: tuple[PositiveInt, PositiveInt] | None = None
-    focal_px: PositiveFinite | None = None
+    image_size: tuple[Pixels, Pixels] | None = None
+    focal_px: Focal | None = None
     distance_m: FiniteFloat | None = None
 
     def options(self) -> dict[str, Any]:
@@ -87,9 +93,9 @@ class CameraEntry(BaseModel):
 
     model_config = ConfigDict(extra="allow", frozen=True)
 
-    focal_px: PositiveFinite  # in pixels of a picture of width × height
-    width: PositiveInt | None = None  # None: that of the recording's video
-    height: PositiveInt | None = None
+    focal_px: Focal  # in pixels of a picture of width × height
+    width: Pixels | None = None  # None: that of the recording's video
+    height: Pixels | None = None
     source: str = ""  # of the focal length: user, metadata, default or simulated
 
     def focal_for(self, width: int, height: int) -> float:
@@ -114,7 +120,7 @@ class Document(BaseModel):
     mesh_reading: MeshReading = MeshReading()
     faces: StoredPath | None = None
     radar: StoredPath | None = None
-    radar_offset_s: FiniteFloat = 0.0
+    radar_offset_s: Time = 0.0
     denoiser: StoredPath | None = None
     bundled_denoiser: str | None = None
     sensor: SensorEntry = SensorEntry()

@@ -7,6 +7,7 @@ import json
 import re
 import tomllib
 from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
@@ -102,7 +103,7 @@ def parse_json(text: str, place: str | Path, expected: str, remedy: str = "") ->
     """Parse JSON that stands at a place, such as a file.
 
     Raises Sd2Error where it is none, or holds what no reader copes with: lists or tables in each
-    other more than a hundred deep, or a number of more than 300 digits.
+    other more than a hundred deep, a number of more than 300 digits, or half a character.
     """
     return _parsed("JSON", text, place, expected, remedy)
 
@@ -116,6 +117,16 @@ def parse_toml(text: str, place: str | Path, expected: str, remedy: str = "") ->
     """Parse TOML that stands at a place; raises Sd2Error as :func:`parse_json`."""
     content: dict[str, Any] = _parsed("TOML", text, place, expected, remedy)
     return content
+
+
+@contextmanager
+def errors_in(path: Path) -> Iterator[None]:
+    """Name the file in errors about what stands in it, and say what to do where they do not."""
+    try:
+        yield
+    except Sd2Error as error:
+        told = error.within(path)
+        raise Sd2Error(told.found, told.expected, told.remedy or _REMEDY) from error
 
 
 def first_fault(error: ValidationError) -> str:
@@ -139,9 +150,13 @@ def _parsed(form: str, text: str, place: str | Path, expected: str, remedy: str)
         content = json.loads(text) if form == "JSON" else tomllib.loads(text)
         if _is_deep(content):
             raise RecursionError
+        if "\\u" in text:  # Half of a character is no text that could be shown or written.
+            json.dumps(content, ensure_ascii=False, default=str).encode()
         return content
     except (ValueError, RecursionError) as error:
-        reason = "nested too deeply" if isinstance(error, RecursionError) else error
+        reason = "nested too deeply" if isinstance(error, RecursionError) else str(error)
+        if isinstance(error, UnicodeEncodeError):
+            reason = f"half a character, {error.object[error.start]!r}"
         found = f"{place} cannot be read as {form} ({reason})"
         raise Sd2Error(found, expected, remedy or _REMEDY) from error
 

@@ -18,7 +18,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.paths import located_path, plain_path, stored_path
 from sd2core.files.recording_json import Span as InlineSpan
-from sd2core.files.texts import EXPECTED_JSON, first_fault, parse_json, read_text
+from sd2core.files.texts import EXPECTED_JSON, errors_in, first_fault, parse_json, read_text
 from sd2core.labels.entries import (
     Entry,
     LabelsEntry,
@@ -176,10 +176,8 @@ def _read(path: Path, document: type[_Document], expected: str) -> _Document:
 
 
 def _made(path: Path, document: _Makes[_Made]) -> _Made:
-    try:
+    with errors_in(path):
         return document.made()
-    except Sd2Error as error:
-        raise error.within(path) from error
 
 
 def _text(content: dict[str, Any]) -> str:

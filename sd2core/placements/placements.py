@@ -19,7 +19,7 @@ import numpy as np
 
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
-from sd2core.files.texts import read_json, read_toml
+from sd2core.files.texts import errors_in, read_json, read_toml
 from sd2core.sensor import Vector, VirtualSensor, position_from_spherical
 
 FORMAT = "sd2-placements"
@@ -233,10 +233,8 @@ def read_placements(file: Path) -> Placements:
                 f"{file} has the format {name!r}, version {version!r}",
                 f"the format {FORMAT!r}, version {VERSION}",
             )
-    try:
+    with errors_in(file):
         return placements_from_dict(content)
-    except Sd2Error as error:
-        raise error.within(file) from error
 
 
 def write_placements(file: Path, placements: Placements) -> None:

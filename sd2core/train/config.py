@@ -9,7 +9,7 @@ from typing import Any
 
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import located_path
-from sd2core.files.texts import read_toml
+from sd2core.files.texts import errors_in, read_toml
 from sd2core.files.toml import toml_lines
 from sd2core.pairs.segments import LENGTH, OVERLAP
 from sd2core.runs.pace import Kind
@@ -29,7 +29,7 @@ def number(low: float, high: float, *, whole: bool = False) -> Rule:
 
     def rule(key: str, value: Any) -> Any:
         fits = isinstance(value, int | float) and not isinstance(value, bool)
-        if not fits or (whole and int(value) != value) or not low <= value <= high:
+        if not fits or not low <= value <= high or (whole and int(value) != value):
             raise refused(key, value, allowed)
         return int(value) if whole else float(value)
 
@@ -245,10 +245,8 @@ def read_config(path: Path) -> TrainConfig:
     """
     path = Path(path)
     content = read_toml(path, "a TOML file with settings")
-    try:
+    with errors_in(path):
         return config_from(content, path.absolute().parent, str(path))
-    except Sd2Error as error:
-        raise error.within(path) from error
 
 
 def config_text(config: TrainConfig, folder: Path) -> str:

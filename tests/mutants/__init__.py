@@ -8,6 +8,6 @@ folder that ``TARGETS`` takes in.
 
 from __future__ import annotations
 
-from tests.mutants import arrays
+from tests.mutants import arrays, texts
 
-TARGETS = {target.name: target for target in (*arrays.TARGETS,)}
+TARGETS = {target.name: target for target in (*arrays.TARGETS, *texts.TARGETS)}

@@ -11,6 +11,8 @@ import zipfile
 from pathlib import Path
 from typing import Any
 
+from tests.mutants.text_damage import WAYS, damage_record
+
 _HOSTILE: tuple[Any, ...] = (
     None, True, -1, 0, 1, 7, 65537, 10**9, 2**62, 1e300, 1e-300, 0.5, "", "x", "NaN", "Infinity",
     [], {}, [[]], [0], [-1], [3, 3], [10**9], {"name": "x"}, "blosc", "float64", "S4", "🦆",
@@ -33,13 +35,22 @@ def mutate(path: Path, seed: int) -> str:
     ways = [_cut, _flip, _overwrite, _repeat, _enlarge]
     if file.suffix == ".json" and rng.random() < 0.7:
         ways = [_replace_value]
+    if inside is None and ways != [_replace_value] and _is_text(content):
+        ways = [damage_record] if file.suffix == ".journal" else [*ways, *WAYS]
     change = rng.choice(ways)
     if inside is None:
         file.write_bytes(change(content, rng))
     else:
         file.write_bytes(_repacked(content, inside, rng, change))
     place = file.relative_to(path.parent)
-    return f"{change.__name__[1:]} {inside or ''} {place}".replace("  ", " ")
+    return f"{change.__name__.lstrip('_')} {inside or ''} {place}".replace("  ", " ")
+
+
+def _is_text(content: bytes) -> bool:
+    try:
+        return bool(content.decode())
+    except UnicodeDecodeError:
+        return False
 
 
 def _lose(file: Path) -> None:

@@ -20,7 +20,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_folder, atomic_write, atomic_write_text
-from sd2core.files.texts import read_content, read_json
+from sd2core.files.texts import errors_in, read_content, read_json
 from sd2core.io.radar.capture import RadarCapture, check_cube
 from sd2core.radar_config import RadarConfig
 from sd2core.timebase import Timebase
@@ -253,7 +253,7 @@ def _read_config(path: Path, meta: _Meta) -> RadarConfig:
             "a recording with one transmitter, mimo_mode 'off'",
             "Record again with one transmitter, or keep the chirps of one and its repetition time",
         )
-    try:
+    with errors_in(path):
         return RadarConfig(
             start_frequency_hz=shape.start_frequency_Hz,
             end_frequency_hz=shape.end_frequency_Hz,
@@ -266,8 +266,6 @@ def _read_config(path: Path, meta: _Meta) -> RadarConfig:
             adc_bits=meta.adc_resolution,
             name=meta.description,
         )
-    except Sd2Error as error:
-        raise error.within(path) from error
 
 
 def _open_samples(path: Path) -> NDArray[np.uint16]:
