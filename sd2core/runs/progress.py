@@ -88,10 +88,12 @@ class ProgressTail:
 
     def _whole_lines(self, stream: BinaryIO) -> Iterator[bytes]:
         for line in lines_of(stream):
-            if not line.endswith(b"\n") and len(line) < LONGEST_LINE_BYTES:
+            whole = line.endswith(b"\n")
+            if not whole and len(line) < LONGEST_LINE_BYTES:
                 return
             self._offset += len(line)
-            yield line
+            if whole:
+                yield line
 
 
 def read_events(path: Path) -> list[Event]:

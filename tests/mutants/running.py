@@ -64,8 +64,7 @@ class _Report:
 def _try_all(originals: Path, name: str, seeds: range, tell: Any) -> None:
     """Read mutants of one kind in a process of their own; tells seed by seed."""
     warnings.simplefilter("ignore")  # Zarr's, about what it does not recognise.
-    read = TARGETS[name].read
-    read(originals / name)  # What is imported and kept for later is no mutant's fault.
+    TARGETS[name].read(originals / name)  # What is imported for good is no fault of a mutant.
     _, hard = resource.getrlimit(resource.RLIMIT_AS)
     resource.setrlimit(resource.RLIMIT_AS, (_memory_bytes("VmSize") + _ADDRESS_BYTES, hard))
     place = originals / "mutants"
@@ -82,17 +81,22 @@ def _try_all(originals: Path, name: str, seeds: range, tell: Any) -> None:
         Path("/proc/self/clear_refs").write_text("5")  # The peak starts at what is used now.
         before_bytes = _memory_bytes("VmRSS")
         start_s = time.process_time()
-        try:
-            read(path)
-            outcome = "read"
-        except Sd2Error as error:
-            outcome = "refused" if name.partition(".")[0] in str(error) else f"no file: {error}"
-        except BaseException:
-            outcome = traceback.format_exc(limit=-4, chain=False)
+        outcome = outcome_of(name, path)
         spent_s = time.process_time() - start_s
         tell.send(_Report(seed, how, outcome, spent_s, _memory_bytes("VmHWM") - before_bytes))
         shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
     tell.send(None)
+
+
+def outcome_of(name: str, path: Path) -> str:
+    """Read a file: ``read``, ``refused``, or what went wrong."""
+    try:
+        TARGETS[name].read(path)
+        return "read"
+    except Sd2Error as error:
+        return "refused" if name.partition(".")[0] in str(error) else f"no file: {error}"
+    except BaseException:
+        return traceback.format_exc(limit=-4, chain=False)
 
 
 def _memory_bytes(of: str) -> int:

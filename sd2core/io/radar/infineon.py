@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any
 
 import numpy as np
@@ -277,7 +278,7 @@ def _open_samples(path: Path) -> NDArray[np.uint16]:
             f"{_DATA}, {_CONFIG} and {_TIMES} in one folder",
             "Copy the whole recording folder",
         ) from error
-    except (OSError, ValueError, EOFError) as error:
+    except (OSError, ValueError, EOFError, TokenError) as error:
         size = path.stat().st_size
         raise Sd2Error(
             f"{path} ({size} bytes) cannot be read as an array ({error})",

@@ -131,7 +131,7 @@ class FitErrors:
                 np.array(said["shape_covariance"], np.float64),
                 said["provenance"],
             )
-        except (KeyError, TypeError, ValueError, OverflowError) as error:
+        except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
             raise Sd2Error(
                 f"{path} cannot be read as errors of fits ({error})",
                 _EXPECTED,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -204,6 +205,16 @@ def test_a_long_value_is_not_repeated_whole(tmp_path: Path) -> None:
         with pytest.raises(Sd2Error) as caught:
             read_labels(path)
         assert len(str(caught.value)) < 400 + len(str(path))
+
+
+@pytest.mark.parametrize(
+    "beyond",
+    [{"id": 2**53}, {"id": 10**250}, {"end_s": 2e12}, {"start_s": -1e308}, {"end_s": math.nan}],
+)
+def test_what_no_window_can_show_is_refused(beyond: dict[str, Any]) -> None:
+    with pytest.raises(Sd2Error, match=r"1 to 9007199254740991|is not in time"):
+        Span(**SPAN | beyond)  # type: ignore[arg-type]
+    assert Span(**SPAN | {"id": 2**53 - 1, "end_s": 1e12}).duration_s > 9e11  # type: ignore[arg-type]
 
 
 def test_half_characters_are_refused_before_they_spoil_a_file() -> None:
