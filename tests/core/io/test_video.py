@@ -98,9 +98,7 @@ def test_first_frame_is_at_zero_when_the_file_starts_later(tmp_path: Path) -> No
         assert number_in(reader.read(0)) == 0
 
 
-@pytest.mark.parametrize(
-    "told", [b"00:00:01.33300000.1", b"00:00:............", b"99:99:9999999999999"]
-)
+@pytest.mark.parametrize("told", [b"00:00:01.3330000.1", b"00:00:............"])
 def test_a_duration_that_is_no_time_is_as_good_as_none(tmp_path: Path, told: bytes) -> None:
     path = write_video(tmp_path / "v.mkv", 40)
     whole = path.read_bytes()
