@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from sd2core.errors import Sd2Error
+from sd2core.files.limits import check_regular
 from sd2core.files.paths import is_pattern
 from sd2core.pairs.store import is_pair_store
 
@@ -29,6 +30,7 @@ def kind_of(path: Path) -> Kind:
         raise Sd2Error(f"{path} does not exist", "a file or folder", "Check the path")
     if path.is_dir():
         return _kind_of_folder(path)
+    check_regular(path)
     suffix = path.suffix.lower()
     if is_dataset(path):
         return "dataset"

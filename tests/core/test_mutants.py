@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.mutants import READERS, originals, tried
+from tests.mutants import TARGETS
+from tests.mutants.running import originals, tried
 
 
 @pytest.fixture(scope="module")
@@ -17,7 +18,7 @@ def files() -> Iterator[Path]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", READERS)
+@pytest.mark.parametrize("name", TARGETS)
 def test_mutants_are_read_or_refused(files: Path, name: str) -> None:
     tally = tried(name, range(40), files)
     assert not tally.failures
