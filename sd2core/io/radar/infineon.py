@@ -20,6 +20,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_folder, atomic_write, atomic_write_text
+from sd2core.files.limits import check_regular
 from sd2core.io.radar.capture import RadarCapture, check_cube
 from sd2core.radar_config import RadarConfig
 from sd2core.timebase import Timebase
@@ -271,7 +272,9 @@ def _read_config(path: Path, meta: _Meta) -> RadarConfig:
 
 
 def _open_samples(path: Path) -> NDArray[np.uint16]:
+    check_regular(path)
     try:
+        # Mapped, so that what its header says is compared with its size.
         return np.load(path, mmap_mode="r", allow_pickle=False)
     except FileNotFoundError as error:
         raise Sd2Error(
