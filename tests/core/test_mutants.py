@@ -17,4 +17,4 @@ def test_mutants_are_read_or_refused() -> None:
     assert [one for tally in tallies.values() for one in tally.failures] == []
     for name, tally in tallies.items():
         assert tally.outcomes["read"] + tally.outcomes["refused"] == EACH, name
-        assert tally.outcomes["refused"] > 0, name
+    assert sum(tally.outcomes["refused"] for tally in tallies.values()) > EACH * len(tallies) // 2
