@@ -282,7 +282,7 @@ def _open_samples(path: Path) -> NDArray[np.uint16]:
             f"{_DATA}, {_CONFIG} and {_TIMES} in one folder",
             "Copy the whole recording folder",
         ) from error
-    except (OSError, ValueError, EOFError) as error:
+    except Exception as error:  # a damaged header fails in many ways
         size = path.stat().st_size
         raise Sd2Error(
             f"{path} ({size} bytes) cannot be read as an array ({error})",
