@@ -11,6 +11,7 @@ from sd2core.errors import Sd2Error
 VARIABLE = "SD2_READ_LIMIT_GB"
 """Environment variable that raises the limit for commands and the window."""
 DEFAULT_LIMIT_BYTES = 256 * 10**6
+_FEW_CHUNKS = 10_000
 MULTIPLE = 50
 """Size that numbers may have, as a multiple of the file that holds them, above the limit."""
 
@@ -49,9 +50,21 @@ def check_size(place: str | Path, declared_bytes: int, stored_bytes: int = 0) ->
     if declared_bytes > limit:
         raise Sd2Error(
             f"{place} declares {_size(declared_bytes)}, in a file of {_size(stored_bytes)}",
-            f"at most {_size(limit)}: {MULTIPLE} times the file, or {_size(read_limit_bytes())}",
+            f"at most {_size(limit)}: {MULTIPLE} times the file, and for a small one"
+            f" {_size(read_limit_bytes())}",
             f"If the file is to be trusted, set the environment variable {VARIABLE} to"
             f" {declared_bytes / 1e9 + 0.1:.1f}",
+        )
+
+
+def check_chunk_count(place: str | Path, declared: int, stored: int) -> None:
+    """Raise Sd2Error if an array declares far more chunks than are there to be looked at."""
+    most = _FEW_CHUNKS + MULTIPLE * stored
+    if declared > most:
+        raise Sd2Error(
+            f"{place} declares {declared:,} chunks, of which {stored:,} are stored",
+            f"at most {most:,} for these",
+            "Copy it again from where it came, or write it again",
         )
 
 
@@ -72,14 +85,24 @@ def check_regular(path: Path) -> None:
         )
 
 
-def check_regular_within(folder: Path) -> None:
-    """Raise Sd2Error if there is such a thing anywhere in a folder."""
+def check_regular_within(folder: Path) -> int:
+    """Count the files in a folder, at any depth; Sd2Error if one is not regular."""
+    files = 0
     with os.scandir(folder) as entries:
         for entry in entries:
             if entry.is_dir(follow_symlinks=False):
-                check_regular_within(Path(entry))
-            elif not entry.is_file():  # No call to the system for most of them.
-                check_regular(Path(entry))
+                files += check_regular_within(Path(entry))
+            else:
+                files += 1
+                if not entry.is_file():  # Costs no call to the system, as a rule.
+                    check_regular(Path(entry))
+    return files
+
+
+def size_bytes(path: Path) -> int:
+    """Size of a file, or of all files in a folder."""
+    files = [path] if path.is_file() else path.rglob("*")
+    return sum(one.stat().st_size for one in files if one.is_file())
 
 
 _KINDS = {

@@ -22,7 +22,8 @@ def main() -> int:
     print(f"{'file':20}{columns}  slowest  largest")
     with originals(options.names) as folder:
         for name in options.names:
-            tally = tried(name, range(options.seed, options.seed + each), folder)
+            seeds = range(options.seed, options.seed + each)
+            tally = tried([(name, seed) for seed in seeds], folder)[name]
             counts = (tally.outcomes[one] for one in ("read", "refused", "failed", "crashed"))
             row = "".join(f"{count:8}" for count in (each, *counts))
             print(

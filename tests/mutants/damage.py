@@ -32,6 +32,9 @@ def mutate(path: Path, seed: int) -> str:
         return f"{way.__name__[1:]} {file.relative_to(path.parent)}"
     content = file.read_bytes()
     inside = _member(content, rng) if rng.random() < 0.5 else None
+    if file.suffix == ".safetensors" and rng.random() < 0.5:
+        file.write_bytes(_with_other_header(content, rng))
+        return f"replace_value in the header of {file.name}"
     ways = [_cut, _flip, _overwrite, _repeat, _enlarge]
     if file.suffix == ".json" and rng.random() < 0.7:
         ways = [_replace_value]
@@ -114,6 +117,20 @@ def _replace_value(content: bytes, rng: random.Random) -> bytes:
     else:
         node[key] = rng.choice(_HOSTILE)
     return json.dumps(document).encode()
+
+
+def _with_other_header(content: bytes, rng: random.Random) -> bytes:
+    """Safetensors with a value of its header, or of the card in it, replaced."""
+    end = 8 + int.from_bytes(content[:8], "little")
+    header = json.loads(content[8:end])
+    card = json.loads(header["__metadata__"]["sd2"])
+    if rng.random() < 0.5:
+        card = json.loads(_replace_value(json.dumps(card).encode(), rng))
+        header["__metadata__"]["sd2"] = json.dumps(card)
+        packed = json.dumps(header).encode()
+    else:
+        packed = _replace_value(content[8:end], rng)
+    return len(packed).to_bytes(8, "little") + packed + content[end:]
 
 
 def _member(content: bytes, rng: random.Random) -> str | None:

@@ -10,7 +10,7 @@ import time
 import traceback
 import warnings
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -30,6 +30,10 @@ _ADDRESS_BYTES = 4 * 10**9
 """Address space beyond that, so that a mutant does not take all memory of the machine."""
 
 
+Mutant = tuple[str, int]
+"""Name of a target, and the seed by which it is damaged."""
+
+
 @dataclass
 class Tally:
     """What became of the mutants of one kind of file."""
@@ -44,7 +48,6 @@ class Tally:
 class _Report:
     """A mutant before it is read (without an outcome), and after it."""
 
-    seed: int
     how: str
     outcome: str = ""
     spent_s: float = 0.0
@@ -61,29 +64,30 @@ class _Report:
         return None
 
 
-def _try_all(originals: Path, name: str, seeds: range, tell: Any) -> None:
-    """Read mutants of one kind in a process of their own; tells seed by seed."""
+def _try_all(originals: Path, mutants: Sequence[Mutant], tell: Any) -> None:
+    """Read mutants in a process of their own; tells one by one."""
     warnings.simplefilter("ignore")  # Zarr's, about what it does not recognise.
-    TARGETS[name].read(originals / name)  # What is imported for good is no fault of a mutant.
+    for name in dict(mutants):  # What is imported and kept for later is no mutant's fault.
+        TARGETS[name].read(originals / name)
     _, hard = resource.getrlimit(resource.RLIMIT_AS)
     resource.setrlimit(resource.RLIMIT_AS, (_memory_bytes("VmSize") + _ADDRESS_BYTES, hard))
     place = originals / "mutants"
     shutil.rmtree(place, ignore_errors=True)  # Left by a process that was ended.
     place.mkdir()
-    for seed in seeds:
+    for name, seed in mutants:
         path = place / name
         if (originals / name).is_dir():
             shutil.copytree(originals / name, path)
         else:
             shutil.copy(originals / name, path)
         how = mutate(path, seed)
-        tell.send(_Report(seed, how))
+        tell.send(_Report(how))
         Path("/proc/self/clear_refs").write_text("5")  # The peak starts at what is used now.
         before_bytes = _memory_bytes("VmRSS")
         start_s = time.process_time()
         outcome = outcome_of(name, path)
         spent_s = time.process_time() - start_s
-        tell.send(_Report(seed, how, outcome, spent_s, _memory_bytes("VmHWM") - before_bytes))
+        tell.send(_Report(how, outcome, spent_s, _memory_bytes("VmHWM") - before_bytes))
         shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
     tell.send(None)
 
@@ -105,34 +109,39 @@ def _memory_bytes(of: str) -> int:
     return next(1024 * int(line.split()[1]) for line in lines if line.startswith(of))
 
 
-def tried(name: str, seeds: range, originals: Path) -> Tally:
-    """Read that many mutants; a process that dies or hangs is one failure, the others go on."""
-    tally = Tally()
-    while seeds:
+def tried(mutants: Sequence[Mutant], originals: Path) -> dict[str, Tally]:
+    """Read mutants; a process that dies or hangs is one failure, the others go on."""
+    tallies = {name: Tally() for name in dict(mutants)}
+    while mutants:
         listen, tell = multiprocessing.Pipe(duplex=False)
         child = multiprocessing.get_context("spawn").Process(
-            target=_try_all, args=(originals, name, seeds, tell)
+            target=_try_all, args=(originals, mutants, tell)
         )
         child.start()
         tell.close()
-        last = _Report(seeds.start - 1, "the original")
+        done, last = 0, _Report("the original")
         for last in _reports(listen):
             if not last.outcome:
                 continue
+            name, seed = mutants[done]
+            done += 1
+            tally = tallies[name]
             tally.slowest_s = max(tally.slowest_s, last.spent_s)
             tally.largest_bytes = max(tally.largest_bytes, last.peak_bytes)
             tally.outcomes["failed" if last.failure else last.outcome] += 1
             if last.failure:
-                tally.failures.append(f"{name} {last.seed} ({last.how}): {last.failure}")
-        child.join(0 if last.outcome == "" else None)
+                tally.failures.append(f"{name} {seed} ({last.how}): {last.failure}")
+        child.join(5 if done < len(mutants) else None)
         if child.is_alive():
             child.kill()
             child.join()
-        if child.exitcode:
-            tally.outcomes["crashed"] += 1
-            tally.failures.append(f"{name} {last.seed} ({last.how}): exit code {child.exitcode}")
-        seeds = range(max(last.seed + 1, seeds.start + 1), seeds.stop)
-    return tally
+        if done < len(mutants):
+            name, seed = mutants[done]
+            done += 1
+            tallies[name].outcomes["crashed"] += 1
+            tallies[name].failures.append(f"{name} {seed} ({last.how}): exit code {child.exitcode}")
+        mutants = mutants[done:]
+    return tallies
 
 
 def _reports(listen: Any) -> Iterator[_Report]:

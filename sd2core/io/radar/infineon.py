@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from tokenize import TokenError
 from typing import Any
 
 import numpy as np
@@ -21,6 +20,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_folder, atomic_write, atomic_write_text
+from sd2core.files.limits import check_regular
 from sd2core.files.texts import errors_in, read_content, read_json
 from sd2core.io.radar.capture import RadarCapture, check_cube
 from sd2core.radar_config import RadarConfig
@@ -270,7 +270,9 @@ def _read_config(path: Path, meta: _Meta) -> RadarConfig:
 
 
 def _open_samples(path: Path) -> NDArray[np.uint16]:
+    check_regular(path)
     try:
+        # Mapped, so that what its header says is compared with its size.
         return np.load(path, mmap_mode="r", allow_pickle=False)
     except FileNotFoundError as error:
         raise Sd2Error(
@@ -278,7 +280,7 @@ def _open_samples(path: Path) -> NDArray[np.uint16]:
             f"{_DATA}, {_CONFIG} and {_TIMES} in one folder",
             "Copy the whole recording folder",
         ) from error
-    except (OSError, ValueError, EOFError, TokenError) as error:
+    except Exception as error:  # a damaged header fails in many ways
         size = path.stat().st_size
         raise Sd2Error(
             f"{path} ({size} bytes) cannot be read as an array ({error})",

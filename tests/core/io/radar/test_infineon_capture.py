@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -157,9 +158,29 @@ def _pickled(folder: Path) -> None:
     np.save(folder / "radar.npy", np.array([{"a": 1}], dtype=object), allow_pickle=True)
 
 
+def _endless_header(folder: Path) -> None:
+    path = folder / "radar.npy"
+    path.write_bytes(path.read_bytes().replace(b"}", b" ", 1))
+
+
+def _endless_shape(folder: Path) -> None:
+    path = folder / "radar.npy"
+    content = path.read_bytes()
+    assert b", 9)" in content
+    path.write_bytes(content.replace(b", 9)", b", %d)" % 10**30, 1))
+
+
+def _a_pipe(folder: Path) -> None:
+    (folder / "radar.npy").unlink()
+    os.mkfifo(folder / "radar.npy")
+
+
 DAMAGE: dict[str, tuple[Callable[[Path], object], str]] = {
     "cut samples": (_cut_samples, r"radar\.npy \(\d+ bytes\) cannot be read.*copy it again"),
     "cut header": (_cut_header, r"radar\.npy \(20 bytes\) cannot be read"),
+    "endless header": (_endless_header, r"radar\.npy \(\d+ bytes\) cannot be read"),
+    "endless shape": (_endless_shape, r"radar\.npy \(\d+ bytes\) cannot be read"),
+    "a pipe": (_a_pipe, r"radar\.npy is a named pipe"),
     "wrong dtype": (_floats, r"radar\.npy holds float32\. Expected: uint16"),
     "three axes": (_one_frame_only, r"shape \(3, 5, 9\)\. Expected: \(frames, 3 receivers, 5"),
     "no frames": (_no_frames, r"shape \(0, 3, 5, 9\).*at least one frame"),
