@@ -20,7 +20,7 @@ from sd2core.files.atomic import atomic_write_text
 from sd2core.files.digests import file_digest
 from sd2core.files.limits import check_regular
 from sd2core.files.paths import remove
-from sd2core.files.texts import lines_of, parse_json, read_json
+from sd2core.files.texts import parse_json, read_json, whole_lines
 from sd2core.maps import DopplerMap, MapKind, joined
 from sd2core.progress import Progress
 from sd2core.sensor import VirtualSensor
@@ -137,7 +137,7 @@ def rows_of(folder: BatchFolder) -> Iterator[list[Row]]:
     check_regular(folder.results)
     with folder.results.open("rb") as stream:
         place, expected = folder.results, "lines that `sd2 batch` wrote"
-        rows = (parse_json(line.decode(), place, expected) for line in lines_of(stream))
+        rows = (parse_json(line.decode(), place, expected) for line in whole_lines(stream))
         for _, group in groupby(rows, lambda row: (row["recording"], row["placement"])):
             yield list(group)
 

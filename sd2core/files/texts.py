@@ -19,14 +19,14 @@ if TYPE_CHECKING:
     from pydantic import ValidationError
 
 EXPECTED_JSON = "JSON written by SD² Studio"
-_PART = 8
-"""Part of the limit on memory that a text may have: parsed, it takes some twenty times as much."""
+_PART = 32
+"""Part of the limit on memory that a text may have: parsed, it takes up to 130 times as much."""
 _DEEPEST = 100
 """Lists and tables that may stand in each other; Python itself gives up before a thousand."""
 _LONG_NUMBER = re.compile(r"[0-9](?:[0-9_]{300,}|x[0-9a-fA-F_]{250,})")
 """A whole number that no float holds."""
 _LONGEST_FOUND = 60
-LONGEST_LINE_BYTES = 1 << 20
+_LONGEST_LINE_BYTES = 1 << 20
 _REMEDY = "Correct it with a text editor, or copy it again"
 
 _MARKS = (
@@ -91,7 +91,16 @@ def read_text(path: Path, expected: str) -> str:
 
 def lines_of(stream: BinaryIO) -> Iterator[bytes]:
     """Lines of a file that may be long, with their ends; one of over 1 MiB comes in pieces."""
-    return iter(partial(stream.readline, LONGEST_LINE_BYTES), b"")
+    return iter(partial(stream.readline, _LONGEST_LINE_BYTES), b"")
+
+
+def whole_lines(stream: BinaryIO) -> Iterator[bytes]:
+    """Lines of a file that is appended to, but for one that is being written, or was torn."""
+    for line in lines_of(stream):
+        if not line.endswith(b"\n") and len(line) < _LONGEST_LINE_BYTES:
+            stream.seek(-len(line), 1)
+            return
+        yield line
 
 
 def read_json(path: Path, expected: str = EXPECTED_JSON, remedy: str = "") -> Any:

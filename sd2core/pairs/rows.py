@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field, ValidationError
 
 from sd2core.errors import Sd2Error
+from sd2core.files.limits import check_regular
 from sd2core.files.stores import Damage, StoredArray
-from sd2core.files.texts import first_fault, parse_json, read_content
+from sd2core.files.texts import first_fault, parse_json, whole_lines
 
 INDEX_NAME = "takes.jsonl"
 REMAKE = "Make the pairs again with `sd2 simulate campaign` or `sd2 pairs`"
@@ -156,9 +157,11 @@ def read_takes(path: Path, provenance: Any) -> list[dict[str, Any]]:
     index = path / INDEX_NAME
     if not index.exists():
         return []
-    lines = read_content(index, "one take per line").decode(errors="replace").split("\n")
+    check_regular(index)
+    with index.open("rb") as stream:
+        lines = [line.decode(errors="replace") for line in whole_lines(stream)]
     entries = []
-    for number, line in enumerate(lines[:-1], start=1):
+    for number, line in enumerate(lines, start=1):
         try:
             entry = _read_entry(line)
         except ValueError as error:

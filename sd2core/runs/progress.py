@@ -10,13 +10,13 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any, BinaryIO, Self
+from typing import Any, Self
 
 from sd2core.errors import Sd2Error
 from sd2core.files.limits import check_regular
-from sd2core.files.texts import LONGEST_LINE_BYTES, lines_of, parse_json
+from sd2core.files.texts import parse_json, whole_lines
 
 Event = dict[str, Any]
 
@@ -81,19 +81,11 @@ class ProgressTail:
             check_regular(self._path)
             with self._path.open("rb") as stream:
                 stream.seek(self._offset)
-                found = [event for line in self._whole_lines(stream) if (event := _parsed(line))]
+                found = [event for line in whole_lines(stream) if (event := _parsed(line))]
+                self._offset = stream.tell()
         except (OSError, Sd2Error):  # not there yet, discarded, or no file
             return []
         return found
-
-    def _whole_lines(self, stream: BinaryIO) -> Iterator[bytes]:
-        for line in lines_of(stream):
-            whole = line.endswith(b"\n")
-            if not whole and len(line) < LONGEST_LINE_BYTES:
-                return
-            self._offset += len(line)
-            if whole:
-                yield line
 
 
 def read_events(path: Path) -> list[Event]:
@@ -132,6 +124,8 @@ def _undone(event: Event, done: int) -> bool:
 
 
 def _parsed(line: bytes) -> Event | None:
+    if not line.endswith(b"\n"):  # a piece of what is no line
+        return None
     try:
         event = parse_json(line.decode(errors="replace"), "The line", "an event")
     except Sd2Error:  # torn by a kill

@@ -129,6 +129,7 @@ def read(path: Path, timebase: Timebase | None = None, observation: str | None =
 
 def _table(path: Path, text: str) -> tuple[list[str], list[tuple[int, list[str]]]]:
     """Heading and rows, each with the number of its first line."""
+    csv.field_size_limit(max(csv.field_size_limit(), len(text)))
     first = next(line for line in text.splitlines() if line.strip())
     fitting = [mark for mark in ",;\t|" if _spoken_for(next(csv.reader([first], delimiter=mark)))]
     if not fitting:
@@ -144,7 +145,6 @@ def _table(path: Path, text: str) -> tuple[list[str], list[tuple[int, list[str]]
             "one kind of separator",
             "Save the table with commas",
         )
-    csv.field_size_limit(max(csv.field_size_limit(), len(text)))
     reader = csv.reader(
         io.StringIO(text, newline=""), delimiter=fitting[0], skipinitialspace=True, strict=True
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 from pathlib import Path
 
@@ -46,7 +47,7 @@ def test_missing_or_a_folder(tmp_path: Path, name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_too_large(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(VARIABLE, "0.008")
+    monkeypatch.setenv(VARIABLE, "0.032")
     assert "has 2 MB" in refusal(tmp_path / "x", b"x" * 2_000_000, name)
 
 
@@ -117,6 +118,12 @@ def test_hostile_xml(tmp_path: Path, declaration: str) -> None:
     sentence = refusal(tmp_path / "x.eaf", content)
     assert "declares a document type or entities" in sentence
     assert "save it again" in sentence
+
+
+def test_a_heading_may_be_longer_than_a_field_is_by_default(tmp_path: Path) -> None:
+    limit = csv.field_size_limit(131_072)
+    assert "a heading" in refusal(tmp_path / "x.tsv", f"label\t{'[' * 140_000}\n")
+    assert csv.field_size_limit(limit) > 140_000
 
 
 def test_deeply_nested_files_do_not_end_the_program(tmp_path: Path) -> None:
