@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from pydantic import ValidationError
 
 EXPECTED_JSON = "JSON written by SD² Studio"
-_PART = 32
+_PART = 64
 """Part of the limit on memory that a text may have: parsed, it takes up to 130 times as much."""
 _DEEPEST = 100
 """Lists and tables that may stand in each other; Python itself gives up before a thousand."""

@@ -22,7 +22,7 @@ def test_a_huge_file_is_refused_without_reading_it(
     monkeypatch.delenv(VARIABLE, raising=False)
     monkeypatch.setattr(Path, "read_bytes", lambda _: pytest.fail("read"))
     for read in (read_json, read_text, read_content):
-        words = rf"recording\.json has 2,000 MB.* a list of at most 8 MB.*{VARIABLE} to 64\.1"
+        words = rf"recording\.json has 2,000 MB.* a list of at most 4 MB.*{VARIABLE} to 128\.1"
         with pytest.raises(Sd2Error, match=words):
             read(path, "a list")
 
@@ -30,7 +30,7 @@ def test_a_huge_file_is_refused_without_reading_it(
 def test_the_limit_that_is_named_is_enough(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "x").write_text("x" * 5_000_000)
     monkeypatch.setenv(VARIABLE, "0.1")
-    with pytest.raises(Sd2Error, match=rf"{VARIABLE} to 0\.3") as caught:
+    with pytest.raises(Sd2Error, match=rf"{VARIABLE} to 0\.4") as caught:
         read_text(tmp_path / "x", "a text")
     monkeypatch.setenv(VARIABLE, caught.value.remedy.split()[-1])
     assert len(read_text(tmp_path / "x", "a text")) == 5_000_000
