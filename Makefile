@@ -22,7 +22,7 @@ help:
 	@echo "make format       let ruff format the code"
 	@echo "make test-slow    the slow tests"
 	@echo "make bench        the benchmarks"
-	@echo "make fuzz         10,000 damaged meshes, pairs and data sets, each read or refused (half an hour)"
+	@echo "make fuzz         10,000 damaged files of all kinds, each read or refused (half an hour)"
 	@echo "make wheel        dist/*.whl"
 	@echo "make screenshots  the pictures in docs/"
 	@echo "make accuracy     docs/accuracy-and-speed.md, measured (some five minutes)"

@@ -18,6 +18,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.lock import FileLock
 from sd2core.files.tables import as_cell
+from sd2core.files.texts import read_json
 from sd2core.io.mesh import save_mesh
 from sd2core.io.video import VideoReader, open_video
 from sd2core.io.video_writing import write_video
@@ -214,8 +215,8 @@ def _state(path: Path, described: dict[str, Any]) -> State:
 
 def _read(path: Path) -> dict[str, Any] | None:
     try:
-        found = json.loads(path.read_text("utf-8"))
-    except (OSError, ValueError):
+        found = read_json(path)
+    except Sd2Error:
         return None
     ours = isinstance(found, dict) and found.get("format") == FORMAT
     if not ours or not {"span", "frames", "files"} <= found.keys():

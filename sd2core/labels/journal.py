@@ -114,7 +114,8 @@ def unpacked(content: bytes) -> tuple[list[bytes], int]:
         start, end = at + _PREFIX_BYTES, at + _PREFIX_BYTES + length
         payload = content[start:end]
         if (
-            prefix != b"%08x %08x " % (length, zlib.crc32(payload))
+            length < 0
+            or prefix != b"%08x %08x " % (length, zlib.crc32(payload))
             or content[end : end + 1] != b"\n"
         ):
             return records, at

@@ -34,7 +34,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text, remove_leftovers
 from sd2core.files.lock import FileLock, is_locked
 from sd2core.files.paths import user_data
-from sd2core.labels.entries import first_fault
+from sd2core.files.texts import first_fault, read_content, read_json
 from sd2core.labels.journal import SUFFIX, Journal, Replayed, replay, unpacked
 from sd2core.labels.spans import Labels
 
@@ -117,7 +117,7 @@ def _make_private(*paths: Path) -> None:
 
 
 def _replayed(path: Path) -> tuple[Replayed, str]:
-    content = path.read_bytes()
+    content = read_content(path, "a journal of label edits")
     records, end = unpacked(content)
     if not records:
         raise _NoHeadError("it does not begin with a whole record")
@@ -232,9 +232,8 @@ class RecoveryPlace:
         if not is_locked(self._folder / _LOCK_NAME):
             return None
         try:
-            content = json.loads((self._folder / _HOLDER_NAME).read_text(encoding="utf-8"))
-            return Holder(**content)
-        except (OSError, ValueError, TypeError):  # not written yet, or by another version
+            return Holder(**read_json(self._folder / _HOLDER_NAME))
+        except (Sd2Error, TypeError):  # not written yet, or by another version
             return Holder()
 
     def offers(self, *, declined: bool = False) -> Found:

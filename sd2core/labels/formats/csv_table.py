@@ -26,6 +26,7 @@ from pathlib import Path
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.tables import as_cell, of_cell
+from sd2core.files.texts import read_text
 from sd2core.labels.formats.losses import (
     ASPECTS,
     LabelFormat,
@@ -33,8 +34,8 @@ from sd2core.labels.formats.losses import (
     hold_texts,
     losses_by_format,
 )
+from sd2core.labels.formats.numbers import whole_number
 from sd2core.labels.formats.rows import UNNAMED, TableRows, assemble
-from sd2core.labels.formats.texts import read_text, whole_number
 from sd2core.labels.spans import Labels
 from sd2core.timebase import Timebase
 
@@ -132,6 +133,7 @@ def read(path: Path, timebase: Timebase | None = None, observation: str | None =
 
 def _table(path: Path, text: str) -> tuple[list[str], list[tuple[int, list[str]]]]:
     """Heading and rows, each with the number of its first line."""
+    csv.field_size_limit(max(csv.field_size_limit(), len(text)))
     first = next(line for line in text.splitlines() if line.strip())
     fitting = [mark for mark in ",;\t|" if _spoken_for(next(csv.reader([first], delimiter=mark)))]
     if not fitting:
@@ -147,7 +149,6 @@ def _table(path: Path, text: str) -> tuple[list[str], list[tuple[int, list[str]]
             "one kind of separator",
             "Save the table with commas",
         )
-    csv.field_size_limit(max(csv.field_size_limit(), len(text)))
     reader = csv.reader(
         io.StringIO(text, newline=""), delimiter=fitting[0], skipinitialspace=True, strict=True
     )
