@@ -53,8 +53,11 @@ def time_in_turns(
     return [(Spread.of(spent[:, 0, k]), Spread.of(spent[:, 1, k])) for k in range(len(plans))]
 
 
-def peak_bytes(work: Callable[[], object]) -> int:
-    """Most bytes allocated at once during some work."""
+def peak_bytes(work: Callable[[], object], memory: bool) -> int | None:
+    """Most bytes allocated at once during some work; None without ``memory``."""
+    if not memory:
+        work()
+        return None
     tracemalloc.start()
     try:
         work()
@@ -73,6 +76,7 @@ def measure(
     options: SynthesisOptions | None = None,
     family: Family = "histogram",
     repeats: int = REPEATS,
+    memory: bool = True,
     progress: Progress = silent,
 ) -> Measurement:
     """Measure every sensible plan of a family on sampled frames of a clip.
@@ -87,6 +91,10 @@ def measure(
     repeats : int
         Number of timings of every plan; all plans take turns, so that a busy machine
         slows all of them alike.
+    memory : bool
+        Whether memory is measured too. Only for a process whose other threads rest: tracing of
+        allocations that ends while a compiled kernel of another thread allocates ends the
+        process (CPython before 3.12.9 and 3.13.2, python/cpython#128679).
     progress : Progress
         May raise Cancelled.
 
@@ -97,7 +105,7 @@ def measure(
     """
     options = check_options(mesh, options)
     if family == "fmcw":
-        return measure_waves(mesh, sensor, options, repeats, progress)
+        return measure_waves(mesh, sensor, options, repeats, memory, progress)
     surface = mesh.faces is not None
     trial = Trial(mesh, sensor, options, take_sample(mesh, options))
     plans = list(
@@ -112,11 +120,11 @@ def measure(
     runs = trial.sample.runs
     trial.reference(runs)
     trial.load_kernels()
-    errors, memory = [], []
+    errors, watched = [], []
     for number, plan in enumerate(plans):
         progress(2 * number, total)
         errors.append(trial.errors(plan, runs))
-        memory.append(_watched(trial, plan))
+        watched.append(_watched(trial, plan, memory))
     costs = time_in_turns(
         plans,
         repeats,
@@ -126,7 +134,7 @@ def measure(
     results = [
         PlanResult(plan, error, Cost(one, every, most, setup_s))
         for plan, error, (one, every), (most, setup_s) in zip(
-            plans, errors, costs, memory, strict=True
+            plans, errors, costs, watched, strict=True
         )
     ]
     reference = reference_plan(family, options.weight, surface=surface)
@@ -152,7 +160,7 @@ def _measurement(
     )
 
 
-def _watched(trial: Trial, plan: AccuracyPlan) -> tuple[int, float]:
+def _watched(trial: Trial, plan: AccuracyPlan, memory: bool) -> tuple[int | None, float]:
     """Most bytes allocated at once from scratch, and seconds before the first frame."""
     trial.forget()
     setup_s = 0.0
@@ -164,7 +172,7 @@ def _watched(trial: Trial, plan: AccuracyPlan) -> tuple[int, float]:
         setup_s = time.perf_counter() - start
         trial.milliseconds(plan)
 
-    most = peak_bytes(work)
+    most = peak_bytes(work, memory)
     return most, setup_s + trial.decimating_s(plan)
 
 
@@ -272,6 +280,7 @@ def measure_waves(
     sensor: VirtualSensor,
     options: SynthesisOptions,
     repeats: int,
+    memory: bool,
     progress: Progress,
 ) -> Measurement:
     """Measure the FMCW plans by the errors of their normalised power over velocity."""
@@ -298,11 +307,11 @@ def measure_waves(
     total = len(plans) * (repeats + 1) + 1
     progress(0, total)
     reference, converged = trial.reference(lambda: progress(0, total))
-    errors, memory = [], []
+    errors, watched = [], []
     for number, plan in enumerate(plans):
         progress(1 + number, total)
         errors.append(trial.errors(plan, reference))
-        memory.append(peak_bytes(partial(trial.columns, plan)))
+        watched.append(peak_bytes(partial(trial.columns, plan), memory))
     costs = time_in_turns(
         plans,
         repeats,
@@ -311,7 +320,7 @@ def measure_waves(
     )
     results = [
         PlanResult(plan, error, Cost(one, every, most, trial.setup_s(plan)))
-        for plan, error, (one, every), most in zip(plans, errors, costs, memory, strict=True)
+        for plan, error, (one, every), most in zip(plans, errors, costs, watched, strict=True)
     ]
     made = _measurement(reference_plan("fmcw"), results, trial.frames, mesh, sensor, options)
     return replace(made, convergence=_convergence(converged))

@@ -79,7 +79,8 @@ class Cost:
 
     one_thread_ms: Spread  # the thread's own processor time, which other programs do not disturb
     all_cores_ms: Spread
-    peak_bytes: int  # most memory allocated at once while the sampled frames were computed
+    peak_bytes: int | None
+    """Most memory allocated at once while the sampled frames were computed; None: not measured."""
     setup_s: float  # once per clip: decimating and preparing the sampled frames
 
 

@@ -233,7 +233,7 @@ def _print_measurement(measurement: Measurement) -> None:
         print(
             f"{one.median:>7.3f} ({one.p95:.3f})"
             f" {cores.median:>7.3f} ({cores.p95:.3f})"
-            f" {cost.peak_bytes / 1e6:>6.0f}"
+            f" {'–' if cost.peak_bytes is None else format(cost.peak_bytes / 1e6, '.0f'):>6}"
             f" {percent(errors.l1):>8} {percent(errors.l1_raw):>8}"
             f" {errors.peak_mps.median:>6.3f} ({errors.peak_mps.p95:.3f})"
             f" {errors.mean_mps.median:>6.3f} ({errors.mean_mps.p95:.3f})"

@@ -373,5 +373,5 @@ def compile_kernels() -> None:
             np.zeros((1, 1, 32)), np.zeros(1), np.zeros(1),
         )  # fmt: skip
         needed_kernel(
-            positions, knots, knots, scale, sensor, 32, DROP, np.ones(33, np.uint8), marks
+            positions, knots, knots, scale, sensor, 32, DROP, np.ones(33, np.uint8), marks.copy()
         )

@@ -120,6 +120,7 @@ def _measured(measurement: Measurement, picture: str) -> Iterator[str]:
     for result in measurement.results:
         cost, errors = result.cost, result.errors
         mark = "**" if result in front else ""
+        assert cost.peak_bytes is not None  # measured in this process, where nothing else works
         yield (
             f"| {mark}{result.plan}{mark} | {cost.one_thread_ms.median:.3g}"
             f" ({cost.one_thread_ms.p95:.3g}) | {cost.all_cores_ms.median:.3g}"

@@ -43,10 +43,10 @@ class AccuracyLibrary:
         return choose(mesh, sensor, **wish)
 
     def measure(self, mesh: MeshSequence, sensor: VirtualSensor, **wish: Any) -> Measurement:
-        """Measure all plans of a family."""
+        """Measure all plans of a family but for their memory: the window's other threads work."""
         from sd2core.accuracy.measuring import measure
 
-        return measure(mesh, sensor, **wish)
+        return measure(mesh, sensor, memory=False, **wish)
 
     def recall(
         self, mesh: MeshSequence, sensor: VirtualSensor, options: SynthesisOptions, family: Family

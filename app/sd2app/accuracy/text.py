@@ -85,6 +85,7 @@ def short(plan: AccuracyPlan) -> str:
 def point_text(result: PlanResult) -> str:
     """Plan, errors and cost of a point of the plot, one fact a line."""
     errors, cost = result.errors, result.cost
+    memory = "" if cost.peak_bytes is None else f"{cost.peak_bytes / 2**20:.0f} MiB at most, "
     return "\n".join(
         (
             str(result.plan),
@@ -94,6 +95,6 @@ def point_text(result: PlanResult) -> str:
             f"{percent(errors.wrong_bins.median)} of the energy in wrong bins",
             f"{milliseconds(cost.all_cores_ms.median)} per frame on all cores,"
             f" {milliseconds(cost.one_thread_ms.median)} on one thread",
-            f"{cost.peak_bytes / 2**20:.0f} MiB at most, {seconds(cost.setup_s)} once per clip",
+            f"{memory}{seconds(cost.setup_s)} once per clip",
         )
     )

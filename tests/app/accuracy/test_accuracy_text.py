@@ -1,8 +1,11 @@
 from __future__ import annotations
 
-import pytest
+from dataclasses import replace
 
-from sd2app.accuracy.text import InUse, deviation, short
+import pytest
+from fake_accuracy import FACING, result_of
+
+from sd2app.accuracy.text import InUse, deviation, point_text, short
 from sd2app.widgets.text import milliseconds, percent, seconds
 from sd2core.accuracy.plans import AccuracyPlan
 
@@ -50,3 +53,12 @@ def test_a_plan_is_said_shortly_and_with_its_figures():
     assert short(AccuracyPlan(visibility="depth", depth_resolution=128)) == "depth 128"
     text = str(InUse(plan, 0.008, 0.6))
     assert text == f"{plan} · ±0.8 % · 0.6 ms/frame"
+
+
+@pytest.mark.parametrize(
+    ("peak_bytes", "line"), [(3 << 20, "3 MiB at most, 250 ms once"), (None, "250 ms once")]
+)
+def test_memory_is_said_where_it_was_measured(peak_bytes, line):
+    result = result_of(FACING, 1.0, 0.01)
+    result = replace(result, cost=replace(result.cost, peak_bytes=peak_bytes))
+    assert point_text(result).splitlines()[-1].startswith(line)

@@ -201,3 +201,9 @@ def test_numba_users_beside_us_keep_their_folder() -> None:
     before = numba.config.CACHE_DIR
     compiled.compiled(lambda x: x)
     assert before == numba.config.CACHE_DIR
+
+
+@pytest.mark.slow
+def test_kernels_stay_within_their_arrays_when_they_are_compiled(tmp_path: Path) -> None:
+    code = "from sd2core.numerics.compiled import warm_up; warm_up()"
+    run(code, PACKAGE.parent, NUMBA_BOUNDSCHECK="1", NUMBA_CACHE_DIR=str(tmp_path))
