@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
@@ -126,6 +127,8 @@ class MainWindow(QMainWindow):
 
     def populate(self) -> None:
         """Load what takes time to import, and fill the skeleton."""
+        # Nearly all that is made now stays: looking for what does not would take a tenth of it.
+        gc.disable()
         # Imported here so that the skeleton is on screen before NumPy, PyAV,
         # numba and VTK are loaded.
         from sd2app.playback.views import TransportBar
@@ -177,6 +180,8 @@ class MainWindow(QMainWindow):
         # VTK last, imported in a thread: everything else is usable while it loads.
         self._importer = LatestRunner("import", self, lambda _: self._add_scene())
         self._importer.submit(lambda emit: import_module("sd2app.scene.view"))
+        gc.freeze()
+        gc.enable()
 
     def _fill_panels(self) -> None:
         from sd2app.shell.wiring import side_pages, track_stack
