@@ -212,7 +212,8 @@ class Recording:
         folder = _new_folder(Path(folder))
         files: dict[Role, Path] = {}
         for role, path in self._files().items():
-            if not exists(role, Path(path)):
+            # What went with the folder that it was in can be found again.
+            if not exists(role, Path(path)) and (copy or not self._is_gone):
                 if role == "denoiser":  # everything else can be shown without it
                     continue
                 raise Sd2Error(f"The {role} {path} does not exist", "a file or folder")
@@ -366,7 +367,7 @@ class Recording:
     def _check_unchanged(self) -> None:
         if self._base is None:
             return
-        if not (self.folder / FILE_NAME).is_file():
+        if self._is_gone:
             raise GoneError(
                 f"{self.folder} was renamed, moved or deleted, or its drive is not connected",
                 f"the folder that holds {FILE_NAME}",
@@ -378,6 +379,12 @@ class Recording:
         found = self.divergence(theirs)
         if found.changes:
             raise SavedElsewhereError(theirs, found)
+        self.accept(theirs)  # with fields that only a later version knows
+
+    @property
+    def _is_gone(self) -> bool:
+        """True if it was in its folder, and is not any more."""
+        return self._base is not None and not (self.folder / FILE_NAME).is_file()
 
     def _own_files(self) -> list[Path]:
         return [self.folder / FILE_NAME, self.folder / LABELS_NAME]

@@ -12,9 +12,9 @@ from labelled import even, imported
 from lock_holders import held
 
 from sd2core.errors import Sd2Error
+from sd2core.files.edit_lock import Holder
 from sd2core.labels import journal as journal_module
 from sd2core.labels.journal import Journal
-from sd2core.files.edit_lock import Holder
 from sd2core.labels.recovery import Found, RecoveryPlace, offers_in
 from sd2core.labels.spans import Labels, Span
 
