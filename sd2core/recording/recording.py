@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.errors import Sd2Error
-from sd2core.files.atomic import atomic_write_text
+from sd2core.files.atomic import atomic_write_text, full_disk_named
 from sd2core.files.paths import (
     free_path,
     is_absolute,
@@ -574,10 +574,11 @@ def _copied(
         target = free_path(folder, source.name, role, reserved=FILE_NAME)
         temporary = Path(tempfile.mkdtemp(prefix=".copy-", dir=folder))
         made.append(temporary)
-        if source.is_dir():
-            shutil.copytree(source, temporary / target.name)
-        else:
-            shutil.copy2(source, temporary / target.name)
+        with full_disk_named(target):
+            if source.is_dir():
+                shutil.copytree(source, temporary / target.name)
+            else:
+                shutil.copy2(source, temporary / target.name)
         (temporary / target.name).rename(target)
         made.append(target)
         temporary.rmdir()
