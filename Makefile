@@ -12,7 +12,7 @@ COMPILED := .venv/.compiled
 # Among them every module in KERNEL_MODULES of sd2core/numerics/compiled.py.
 KERNELS := $(wildcard sd2core/numerics/*.py sd2core/body/*.py sd2core/scattering/*.py sd2core/doppler/*.py sd2core/fmcw/*.py)
 
-.PHONY: help setup demo test test-slow lint format bench fuzz wheel screenshots accuracy fitting denoiser denoiser-comparison range-synthesis scale classifier real-gestures whole-loop paper clean
+.PHONY: help setup demo test test-slow lint format bench fuzz wheel screenshots accuracy fitting denoiser denoiser-comparison range-synthesis scale classifier real-gestures whole-loop paper soak clean
 
 help:
 	@echo "make demo         set up, and open the sample recording in the window"
@@ -22,7 +22,7 @@ help:
 	@echo "make format       let ruff format the code"
 	@echo "make test-slow    the slow tests"
 	@echo "make bench        the benchmarks"
-	@echo "make fuzz         10,000 damaged meshes, pairs and data sets, each read or refused (half an hour)"
+	@echo "make fuzz         10,000 damaged files of all kinds, each read or refused (half an hour)"
 	@echo "make wheel        dist/*.whl"
 	@echo "make screenshots  the pictures in docs/"
 	@echo "make accuracy     docs/accuracy-and-speed.md, measured (some five minutes)"
@@ -35,6 +35,7 @@ help:
 	@echo "make whole-loop   docs/whole-loop.md: from a recording to a classifier (20 minutes)"
 	@echo "make paper        docs/paper.md: the paper's figures and tables (half an hour after make classifier)"
 	@echo "make scale        docs/scale.md, measured (some ten minutes)"
+	@echo "make soak         an hour of use of the window: memory, threads, event loop (MINUTES=60)"
 	@echo "make clean        remove what the above made, .venv included"
 
 setup: system-packages $(COMPILED) landmark-models
@@ -120,6 +121,10 @@ paper: setup
 
 scale: setup
 	$(BIN)/python -m tools.documentation.scale
+
+MINUTES ?= 60
+soak: system-packages-for-tests setup
+	scripts/on_display.sh $(BIN)/python -m tools.documentation.soak --minutes $(MINUTES)
 
 clean:
 	rm -rf .venv build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .benchmarks \

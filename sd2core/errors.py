@@ -31,6 +31,12 @@ class Sd2Error(Exception):
         self.remedy = remedy
         super().__init__(found, expected, remedy)
 
+    def within(self, place: object) -> Sd2Error:
+        """Return the same error, said of a file; itself if it names that already."""
+        if str(place) in self.found:
+            return self
+        return Sd2Error(f"{place}: {self.found}", self.expected, self.remedy)
+
     def __str__(self) -> str:
         parts = [self.found]
         if self.expected:

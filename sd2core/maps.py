@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
+from sd2core.files.numpy_files import open_npz_file
 from sd2core.mesh.presence import Presence, checked
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
@@ -244,14 +245,9 @@ class DopplerMap:
             When the file is not a Doppler map or is damaged.
         """
         path = Path(path)
-        try:
-            with np.load(path, allow_pickle=False) as data:
-                arrays = {name: data[name] for name in data.files}
-        except Exception as error:  # a damaged archive fails in many ways
-            raise Sd2Error(
-                f"{path} cannot be read as a Doppler map ({error})",
-                "an .npz written by `sd2 synth`",
-            ) from error
+        expected = "an .npz written by `sd2 synth`"
+        with open_npz_file(path, "a Doppler map", expected) as data:
+            arrays = dict(data)
         missing = {"values", "velocity_mps", "times_s", "meta"} - arrays.keys()
         if missing:
             raise Sd2Error(
@@ -289,6 +285,8 @@ class DopplerMap:
                 if {"parts", "limbs"} <= arrays.keys()
                 else None,
             )
+        except Sd2Error as error:
+            raise error.within(path) from error
         except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
             raise Sd2Error(
                 f"{path}: its description is damaged ({error!r})", "the meta written by `sd2 synth`"

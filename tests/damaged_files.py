@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,12 @@ def change(file: Path) -> None:
 lose = Path.unlink
 
 
+def _copy_if_there(source: str, target: str) -> None:
+    """Copy a file that another thread of Zarr may take away before, its temporary ones."""
+    with suppress(FileNotFoundError):
+        shutil.copy2(source, target)
+
+
 @contextmanager
 def states_of(folder: Path, keep: Path) -> Iterator[list[Path]]:
     """Copies of a folder before each file takes its name, as a kill there would leave it."""
@@ -38,7 +44,7 @@ def states_of(folder: Path, keep: Path) -> Iterator[list[Path]]:
     def copy_and_replace(self: Path, target: Any) -> Path:
         with one_at_a_time:
             kept.append(keep / f"state-{len(kept)}")
-            shutil.copytree(folder, kept[-1])
+            shutil.copytree(folder, kept[-1], copy_function=_copy_if_there)
             return replace_file(self, target)
 
     with pytest.MonkeyPatch.context() as patched:

@@ -17,6 +17,7 @@ from sd2core.doppler.options import SynthesisOptions
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.paths import user_cache
+from sd2core.files.texts import read_text
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics.compiled import worker_count
 from sd2core.sensor import VirtualSensor
@@ -82,8 +83,8 @@ def cached_measurement(
     machine or version.
     """
     try:
-        measurement = _from_json(_place(mesh, family).read_text(encoding="utf-8"))
-    except (OSError, ValueError, KeyError, TypeError, Sd2Error):
+        measurement = _from_json(read_text(_place(mesh, family), "a measurement"))
+    except (ValueError, KeyError, TypeError, Sd2Error):
         # A cache: what cannot be read is measured again.
         return None
     same = (

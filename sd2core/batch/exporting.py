@@ -18,7 +18,9 @@ from sd2core.batch.synthesis import LONGEST_FRAMES
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.digests import file_digest
+from sd2core.files.limits import check_regular
 from sd2core.files.paths import remove
+from sd2core.files.texts import parse_json, read_json, whole_lines
 from sd2core.maps import DopplerMap, MapKind, joined
 from sd2core.progress import Progress
 from sd2core.sensor import VirtualSensor
@@ -92,8 +94,8 @@ def export_dataset(folder: BatchFolder, export: Export) -> None:
 def _noted(folder: BatchFolder) -> dict[str, Any]:
     """Content of the note about the data set; empty where there is none."""
     try:
-        content = json.loads((folder.path / _NOTE).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        content = read_json(folder.path / _NOTE)
+    except Sd2Error:
         return {}
     return content if isinstance(content, dict) else {}
 
@@ -132,8 +134,10 @@ class _Counted:
 
 def rows_of(folder: BatchFolder) -> Iterator[list[Row]]:
     """Yield the rows of one map after the other."""
-    with folder.results.open(encoding="utf-8") as stream:
-        rows = (json.loads(line) for line in stream)
+    check_regular(folder.results)
+    with folder.results.open("rb") as stream:
+        place, expected = folder.results, "lines that `sd2 batch` wrote"
+        rows = (parse_json(line.decode(), place, expected) for line in whole_lines(stream))
         for _, group in groupby(rows, lambda row: (row["recording"], row["placement"])):
             yield list(group)
 

@@ -9,7 +9,9 @@ from typing import Any
 
 from sd2core.batch.inputs import MeshInput, mesh_input, mesh_input_of
 from sd2core.batch.plan import Fit
+from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
+from sd2core.files.texts import read_json
 from sd2core.progress import silent
 
 
@@ -54,7 +56,7 @@ def facts_path(mesh: Path) -> Path:
 def fitted(mesh: Path) -> MeshInput | None:
     """Return a fitted mesh; None while it is missing or incomplete."""
     try:
-        content = json.loads(facts_path(mesh).read_text(encoding="utf-8"))
+        content = read_json(facts_path(mesh))
         return mesh_input(content) if mesh.exists() else None
-    except (OSError, ValueError, KeyError, TypeError):
+    except (Sd2Error, ValueError, KeyError, TypeError):
         return None

@@ -6,9 +6,11 @@ Needs neither Dask nor torch: the window and ``sd2 batch --status`` look at batc
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
+
+from pydantic.dataclasses import dataclass
 
 from sd2core.errors import Sd2Error
 from sd2core.runs.folder import RunFolder, State
@@ -91,7 +93,8 @@ class BatchFolder(RunFolder):
         Raises Sd2Error if there is no batch, or its description is damaged.
         """
         state, about = self.state_and_about()
-        return status_of(state, about, read_events(self.progress))
+        with self.refusing_damage():
+            return status_of(state, about, read_events(self.progress))
 
 
 def status_of(state: State, about: dict[str, Any], events: list[Event]) -> BatchStatus:

@@ -19,6 +19,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.digests import Digests, signature
 from sd2core.files.paths import files_at, is_there
+from sd2core.files.texts import read_json
 from sd2core.sensor import Vector, VirtualSensor
 
 if TYPE_CHECKING:
@@ -307,8 +308,8 @@ def _record_path(folder: BatchFolder, origin: Origin) -> Path:
 
 def _record(folder: BatchFolder, origin: Origin) -> dict[str, Any] | None:
     try:
-        content = json.loads(_record_path(folder, origin).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        content = read_json(_record_path(folder, origin))
+    except Sd2Error:
         return None
     usable = isinstance(content, dict) and content.get("code") == code_digest("inspect")
     return content if usable else None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ from sd2core.batch.plan import STEPS, BatchPlan
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.paths import is_absolute, located_path, stored_path
+from sd2core.files.texts import parse_toml, read_text
 from sd2core.files.toml import toml_lines
 from sd2core.io.radar import PAPER
 
@@ -30,12 +30,7 @@ def read_plan(path: Path) -> BatchPlan:
     what is not allowed.
     """
     path = Path(path)
-    try:
-        text = path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise Sd2Error(f"{path} does not exist", "a plan of a batch (.toml)") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise Sd2Error(f"{path} cannot be read ({error})", "a plan of a batch (.toml)") from error
+    text = read_text(path, "a plan of a batch (.toml)")
     return plan_from_text(text, path.absolute().parent, str(path))
 
 
@@ -46,9 +41,7 @@ def plan_from_text(text: str, folder: Path, source: str = "The plan") -> BatchPl
     """
     try:
         # Strict as JSON is: lists are lists and numbers are numbers. TOML's dates are neither.
-        content = json.dumps(tomllib.loads(text))
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise Sd2Error(f"{source} is no TOML: {error}", "TOML", _HINT) from error
+        content = json.dumps(parse_toml(text, source, "TOML", _HINT))
     except TypeError as error:
         raise Sd2Error(
             f"{source} holds a date or a time ({error})", "texts, numbers, lists and tables", _HINT
@@ -122,8 +115,8 @@ def _in_words(error: ValidationError, text: str, source: str) -> Sd2Error:
         return Sd2Error(f"{where}: {name} is not known", "a key that a plan may hold", _HINT)
     message = first["msg"].removeprefix("Value error, ")
     if kind == "value_error":
-        return Sd2Error(f"{where}: {name}: {message}" if name else f"{where}: {message}")
-    return Sd2Error(f"{where}: {name} is {first['input']!r}", message, _HINT)
+        return Sd2Error(f"{where}: {name}: {message}" if name else f"{where}: {message}", "", _HINT)
+    return Sd2Error(f"{where}: {name} is {first['input']!r:.80}", message, _HINT)
 
 
 def line_of(text: str, keys: tuple[str, ...]) -> int | None:

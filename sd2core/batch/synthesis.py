@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from sd2core.batch.inputs import MeshInput, open_mesh
 from sd2core.batch.plan import Synthesise
 from sd2core.errors import Sd2Error
+from sd2core.files.texts import read_json
 from sd2core.sensor import VelocityAxis, VirtualSensor
 
 if TYPE_CHECKING:
@@ -184,7 +185,7 @@ def chosen_plan(mesh: MeshInput, section: Synthesise, choosing: Choosing) -> dic
 def read_plan_of(path: Path) -> dict[str, Any] | None:
     """Read an accuracy plan that was chosen, if there is one."""
     try:
-        content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        content: dict[str, Any] = read_json(path)
+    except Sd2Error:
         return None
     return content

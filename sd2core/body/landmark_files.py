@@ -21,6 +21,7 @@ from sd2core.body.refining import Stretch
 from sd2core.body.track import PER_FRAME, Landmarks, LandmarkTrack, parts
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
+from sd2core.files.numpy_files import open_npz_file
 from sd2core.io.video import VideoReader
 from sd2core.timebase import Timebase
 
@@ -112,23 +113,21 @@ def write_arrays(
 
 def read_arrays(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
     """Read what :func:`write_arrays` wrote; no pickle is executed."""
-    if not path.is_file():
+    if not path.exists():
         raise Sd2Error(f"{path} does not exist", "a file of landmarks (.npz)")
-    try:
-        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as data:
-            arrays = {name: data[name] for name in data.files}
+    with open_npz_file(path, *_WHAT) as data:
+        arrays = dict(data)
         meta = json.loads(str(arrays.pop("meta")))
-        if not isinstance(meta, dict):
-            raise TypeError("no description")
-    except (OSError, KeyError, ValueError, TypeError, EOFError, zipfile.BadZipFile) as error:
-        raise _unreadable(path, error) from error
+    if not isinstance(meta, dict):
+        raise _unreadable(path, "no description")
     return arrays, meta
 
 
+_WHAT = "landmarks", "a file written by SD² Studio (.npz)"
+
+
 def _unreadable(path: Path, why: object) -> Sd2Error:
-    return Sd2Error(
-        f"{path} cannot be read as landmarks ({why})", "a file written by SD² Studio (.npz)"
-    )
+    return Sd2Error(f"{path} cannot be read as {_WHAT[0]} ({why})", _WHAT[1])
 
 
 class SearchStore:

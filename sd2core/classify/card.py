@@ -146,6 +146,8 @@ class ClassifierCard:
                 parameters=int(content["parameters"]),
                 path=path,
             )
+        except Sd2Error as error:
+            raise error.within(where) from error
         except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
             raise Sd2Error(
                 f"{where}: its description is damaged ({error!r})",

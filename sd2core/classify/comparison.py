@@ -34,6 +34,7 @@ from sd2core.denoise.live import TrainedDenoiser
 from sd2core.denoise.model import parameter_count
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
+from sd2core.files.texts import read_json
 from sd2core.progress import Progress, silent
 
 FORMAT = "sd2-classifier-run"
@@ -277,6 +278,6 @@ def _key(
 def _read(path: Path) -> Run | None:
     """Read a run; None where it is missing or damaged."""
     try:
-        return Run.from_json(json.loads(path.read_text("utf-8")))
-    except (OSError, ValueError, KeyError, TypeError, Sd2Error):
+        return Run.from_json(read_json(path))
+    except (ValueError, KeyError, TypeError, Sd2Error):
         return None

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 
 from sd2core.classify.card import ClassifierCard
 from sd2core.denoise.files import readable, user_models_folder
-from sd2core.denoise.weights import SUFFIX, Shapes, read_header, read_weights, write_weights
+from sd2core.denoise.weights import SUFFIX, Shapes, read_header, read_network, write_weights
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
     from sd2core.classify.live import TrainedClassifier
+    from sd2core.classify.models import Classifier
 
 _EXPECTED = "a classifier (.safetensors) written by `sd2 classify train`"
 
@@ -47,13 +48,10 @@ def load_classifier(path: Path) -> TrainedClassifier:
     from sd2core.classify.live import TrainedClassifier
     from sd2core.classify.models import build
 
-    try:
-        network = build(card.model, card.features.size, len(card.classes), **card.options)
-    except Sd2Error as error:
-        raise Sd2Error(
-            f"{path}: {error.found}", error.expected, "The file may be of another version"
-        ) from error
-    read_weights(path, network, card.model, shapes, _EXPECTED)
+    def built() -> Classifier:
+        return build(card.model, card.features.size, len(card.classes), **card.options)
+
+    network = read_network(path, built, card.model, shapes, _EXPECTED)
     return TrainedClassifier(network, card)
 
 

@@ -17,6 +17,8 @@ from sd2core.cutouts.source import FORMAT, CutSource, folder_name
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text, full_disk_named
 from sd2core.files.lock import FileLock
+from sd2core.files.tables import as_cell
+from sd2core.files.texts import read_json
 from sd2core.io.mesh import save_mesh
 from sd2core.io.video import VideoReader, open_video
 from sd2core.io.video_writing import write_video
@@ -110,7 +112,8 @@ def write_index(folder: Path) -> None:
     for one in entries:
         first, last, count = (one["frames"][name] for name in ("first", "last", "count"))
         flat = one | one["span"] | {"first_frame": first, "last_frame": last, "frames": count}
-        writer.writerow(["" if flat[name] is None else flat[name] for name in _COLUMNS])
+        cells = ("" if flat[name] is None else flat[name] for name in _COLUMNS)
+        writer.writerow([as_cell(cell) if isinstance(cell, str) else cell for cell in cells])
     atomic_write_text(folder / "index.csv", table.getvalue())
     kept = [{key: value for key, value in one.items() if key != "frame_times_s"} for one in entries]
     content = {"format": f"{FORMAT}-index", "version": 1, "spans": kept}
@@ -213,8 +216,8 @@ def _state(path: Path, described: dict[str, Any]) -> State:
 
 def _read(path: Path) -> dict[str, Any] | None:
     try:
-        found = json.loads(path.read_text("utf-8"))
-    except (OSError, ValueError):
+        found = read_json(path)
+    except Sd2Error:
         return None
     ours = isinstance(found, dict) and found.get("format") == FORMAT
     if not ours or not {"span", "frames", "files"} <= found.keys():

@@ -17,12 +17,16 @@ from sd2core.datasets.layout import (
     FileFormat,
     Header,
     bytes_per_segment,
+    check_arrays,
     check_format,
     chunk_of,
     row_shapes,
 )
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write, full_disk_named
+from sd2core.files.hdf5_files import member_of, open_hdf5_file, unreadable_hdf5
+from sd2core.files.limits import check_size
+from sd2core.files.numpy_files import open_npz_file
 from sd2core.files.stores import Damage, Depth, unreadable
 from sd2core.progress import Progress, silent
 
@@ -30,6 +34,7 @@ NPZ_LIMIT_BYTES = 1 << 30
 """An NPZ is written and read whole: larger ones do not fit beside what else is in memory."""
 
 META, SOURCES = "meta", "sources"
+_EXPECTED = "a data set that `sd2 export` made"
 
 
 def refuse_large_npz(out: Path, segments: int, header: Header) -> None:
@@ -101,46 +106,53 @@ class Hdf5Rows:
 
 def open_hdf5(path: Path) -> tuple[Header, dict[str, Any], Any]:
     """Open an HDF5 data set: header, arrays and the open file."""
-    import h5py
-
+    file = open_hdf5_file(path, _EXPECTED)
     try:
-        file = h5py.File(path, "r")
-    except OSError as error:
-        raise Sd2Error(
-            f"{path} cannot be read as HDF5 ({error})", "a data set that `sd2 export` made"
-        ) from error
-    try:
-        if META not in file:
+        meta = member_of(file, path, META)
+        if meta is None:
             raise Sd2Error(f"{path} holds no data set", "one that `sd2 export` made")
-        header = Header.from_dict(_json(file[META][()].decode("utf-8"), path), path)
-        names = _whole(header, file.keys(), path)
-        return header, {name: Hdf5Rows(file[name], path, name) for name in names}, file
-    except BaseException:
+        header = Header.from_dict(_json(meta[()].decode("utf-8"), path), path)
+        arrays = {
+            name: Hdf5Rows(member_of(file, path, name), path, name)
+            for name in _whole(header, file.keys(), path)
+        }
+        check_arrays(header, arrays, path)
+    except Exception as error:  # a damaged file fails in many ways
         file.close()
-        raise
+        if isinstance(error, Sd2Error):
+            raise
+        raise unreadable_hdf5(path, error, _EXPECTED) from error
+    return header, arrays, file
 
 
 def open_npz(path: Path) -> tuple[Header, dict[str, Any], list[dict[str, Any]]]:
     """Read an NPZ data set: header, arrays and sources."""
-    try:
-        with np.load(path, allow_pickle=False) as data:
-            found = {name: data[name] for name in data.files}
-    except Exception as error:  # a damaged archive fails in many ways
-        raise Sd2Error(
-            f"{path} cannot be read ({error})", "a data set that `sd2 export` made"
-        ) from error
+    with open_npz_file(path, "a data set", _EXPECTED) as data:
+        found = dict(data)
     if META not in found:
         raise Sd2Error(f"{path} holds no data set", "one that `sd2 export` made")
     header = Header.from_dict(_json(str(found[META]), path), path)
     lines = [_json(str(line), path) for line in found.get(SOURCES, ())]
-    return header, {name: found[name] for name in _whole(header, found.keys(), path)}, lines
+    arrays = {name: found[name] for name in _whole(header, found.keys(), path)}
+    check_arrays(header, arrays, path)
+    return header, arrays, lines
 
 
 def hdf5_sources(file: Any, path: Path) -> Iterator[dict[str, Any]]:
     """Yield the sources of an open HDF5 data set."""
-    lines = file[SOURCES]
-    for number in range(len(lines)):
-        yield _json(lines[number].decode("utf-8"), path)
+    try:
+        lines = member_of(file, path, SOURCES)
+        read_bytes = 0
+        for number in range(len(lines)):
+            line = lines[number]
+            # All lines may be one and the same in the file.
+            read_bytes += len(line)
+            check_size(f"{SOURCES} of {path}", read_bytes, path.stat().st_size)
+            yield _json(line.decode("utf-8"), path)
+    except Sd2Error:
+        raise
+    except Exception as error:  # a damaged file fails in many ways
+        raise unreadable_hdf5(path, error, _EXPECTED) from error
 
 
 def _write_npz(

@@ -37,6 +37,7 @@ from sd2core.files.stores import (
     create_array,
     growing,
     open_group,
+    read_attributes,
 )
 from sd2core.io.kinds import is_dataset
 
@@ -271,11 +272,7 @@ def is_begun(path: Path) -> bool:
     names = {one.name for one in path.iterdir()} - {LOCK_NAME}
     if _DESCRIPTION not in names:
         return all(map(is_leftover, names))
-    try:
-        attributes = json.loads((path / _DESCRIPTION).read_text(encoding="utf-8"))["attributes"]
-        return bool(attributes["format"] == _BEGUN)
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
-        return False
+    return bool(read_attributes(path).get("format") == _BEGUN)
 
 
 def _line(entry: dict[str, Any]) -> str:

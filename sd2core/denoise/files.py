@@ -8,13 +8,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from sd2core.denoise.card import ModelCard
-from sd2core.denoise.weights import SUFFIX, Shapes, read_header, read_weights, write_weights
+from sd2core.denoise.weights import SUFFIX, Shapes, read_header, read_network, write_weights
 from sd2core.errors import Sd2Error
+from sd2core.files.limits import check_regular
 from sd2core.files.paths import user_data
 from sd2core.files.resources import bundled_files
 
 if TYPE_CHECKING:
     from sd2core.denoise.live import TrainedDenoiser
+    from sd2core.denoise.model import Denoiser
 
 Card = TypeVar("Card")
 
@@ -83,14 +85,10 @@ def load_model(model: Path | str) -> TrainedDenoiser:
     from sd2core.denoise.live import TrainedDenoiser
     from sd2core.denoise.registry import build
 
-    try:
-        parts = max(1, len(card.parts))
-        network = build(card.model, card.axis.bins, parts, **card.options)
-    except Sd2Error as error:
-        raise Sd2Error(
-            f"{path}: {error.found}", error.expected, "The file may be of another version"
-        ) from error
-    read_weights(path, network, card.model, shapes, _EXPECTED)
+    def built() -> Denoiser:
+        return build(card.model, card.axis.bins, max(1, len(card.parts)), **card.options)
+
+    network = read_network(path, built, card.model, shapes, _EXPECTED)
     return TrainedDenoiser(network, card)
 
 
@@ -100,6 +98,7 @@ def find_model(model: Path | str) -> Path:
     Raises Sd2Error if there is no such model.
     """
     path = Path(model)
+    check_regular(path)
     if path.is_file():
         return path
     if path.is_dir():

@@ -86,7 +86,7 @@ FILTERS = ("none", "median", "wiener", "ridge")
 MODELS = tuple(name for name in _ENTRIES if name not in FILTERS)
 """Networks that are trained."""
 
-_LARGEST = 4096
+_LARGEST = 1024
 """No option is a larger number: a damaged file must not ask for all the memory."""
 
 

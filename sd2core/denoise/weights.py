@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
+from sd2core.files.limits import check_regular
 
 if TYPE_CHECKING:
     from torch import nn
@@ -21,6 +22,7 @@ Shapes = Mapping[str, list[int]]
 
 _KEY = "sd2"
 _LONGEST_HEADER = 4 << 20
+Network = TypeVar("Network", bound="nn.Module")
 
 
 def write_weights(path: Path, network: nn.Module, description: Mapping[str, Any]) -> None:
@@ -53,6 +55,7 @@ def read_header(path: Path, expected: str) -> tuple[dict[str, Any], Shapes]:
     ``expected`` names the kind of file in messages. Raises Sd2Error when the file is missing,
     damaged, cut short or of another program.
     """
+    check_regular(path)
     try:
         with path.open("rb") as stream:
             size = stream.seek(0, 2)
@@ -88,6 +91,12 @@ def read_header(path: Path, expected: str) -> tuple[dict[str, Any], Shapes]:
         raise Sd2Error(f"{path}: its header is damaged ({error!r})", expected) from error
     if size < 8 + length + end:
         raise _cut_short(path, size, 8 + length + end)
+    if size > 8 + length + end:
+        raise Sd2Error(
+            f"{path} has {size:,} bytes",
+            f"{8 + length + end:,} bytes, as its header says",
+            "Copy or train it again",
+        )
     return told, shapes
 
 
@@ -99,18 +108,34 @@ def format_of(path: Path) -> str:
     return str(read_header(path, "a model file (.safetensors)")[0].get("format", ""))
 
 
-def read_weights(path: Path, network: nn.Module, name: str, shapes: Shapes, expected: str) -> None:
-    """Load the weights of a file into a network that was built from its description.
+def read_network(
+    path: Path,
+    build: Callable[[], Network],
+    name: str,
+    shapes: Shapes,
+    expected: str,
+) -> Network:
+    """Build a network as a file describes it, and load its weights into it.
 
-    ``name`` is the model's name in the file; ``shapes`` come from :func:`read_header`. Raises
-    Sd2Error if they are of another network, or are not finite.
+    ``name`` is the model's in the file; ``shapes`` come from :func:`read_header`. Raises Sd2Error
+    if the network cannot be built, is not that of the weights, or they are not finite.
     """
     import torch
     from safetensors import SafetensorError
     from safetensors.torch import load
 
-    wanted = {key: list(tensor.shape) for key, tensor in network.state_dict().items()}
-    _compare_shapes(path, name, shapes, wanted, expected)
+    try:
+        with torch.device("meta"):  # Shapes, without memory for what they would hold.
+            planned = build()
+        wanted = {key: list(tensor.shape) for key, tensor in planned.state_dict().items()}
+        _compare_shapes(path, name, shapes, wanted, expected)
+        network = build()
+    except Sd2Error as error:
+        if str(path) in error.found:
+            raise
+        raise Sd2Error(
+            f"{path}: {error.found}", error.expected, "The file may be of another version"
+        ) from error
     try:
         weights = load(path.read_bytes())
     except (SafetensorError, ValueError, KeyError, RuntimeError) as error:
@@ -120,6 +145,7 @@ def read_weights(path: Path, network: nn.Module, name: str, shapes: Shapes, expe
             f"{path}: its weights hold NaN or infinity", "finite numbers", "Train the model again"
         )
     network.load_state_dict(weights)
+    return network
 
 
 def _cut_short(path: Path, size: int, expected: int) -> Sd2Error:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import re
+import secrets
 import shutil
 import tempfile
 from collections.abc import Iterator
@@ -20,24 +21,23 @@ _SHORT_WRITE = re.compile(r"\d+ requested and \d+ written")
 
 
 @contextmanager
-def atomic_write(path: Path) -> Iterator[IO[bytes]]:
+def atomic_write(path: Path, mode: int = 0o666) -> Iterator[IO[bytes]]:
     """Open a binary file that replaces ``path`` when the block succeeds.
 
     The bytes go to a temporary file in the same folder, which is flushed to disk and
     renamed; when the block raises, ``path`` is untouched. Where ``path`` is a link, the
-    file that it leads to is replaced. Raises OSError, whose ``filename`` is ``path``, if it
-    cannot be written.
+    file that it leads to is replaced. ``mode`` are the file's permissions, of which the process's
+    mask takes some away. Raises OSError, whose ``filename`` is ``path``, if it cannot be written.
     """
     path = Path(path)
     target = _target(path)
     with full_disk_named(path):
-        handle, temporary = _temporary(path, target)
+        handle, temporary = _temporary(path, target, mode)
         try:
             with os.fdopen(handle, "wb") as stream:
                 yield stream
                 stream.flush()
                 os.fsync(stream.fileno())
-            temporary.chmod(0o666 & ~_umask())
             temporary.replace(target)
         except BaseException:
             temporary.unlink(missing_ok=True)
@@ -138,16 +138,13 @@ def _target(path: Path) -> Path:
     return target
 
 
-def _temporary(path: Path, target: Path) -> tuple[int, Path]:
+def _temporary(path: Path, target: Path, mode: int = 0o666) -> tuple[int, Path]:
     # Not named after the file, whose name may be as long as a name can be.
+    temporary = target.with_name(f"{_PREFIX}{secrets.token_hex(8)}{_SUFFIX}")
+    new = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
     try:
-        handle, name = tempfile.mkstemp(prefix=_PREFIX, suffix=_SUFFIX, dir=target.parent)
+        # Made with its permissions: the mask cannot be read without setting it, for all threads.
+        handle = os.open(temporary, new, mode)
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(path)) from error
-    return handle, Path(name)
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+    return handle, temporary

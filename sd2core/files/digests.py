@@ -9,8 +9,10 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.paths import user_cache
+from sd2core.files.texts import read_json
 
 Signature = list[list[Any]]
 """Per file or folder: path, size, time of the last change in ns, inode."""
@@ -108,7 +110,7 @@ def _place(path: Path) -> Path:
 
 def _kept(place: Path) -> tuple[Signature, dict[str, str]]:
     try:
-        content = json.loads(place.read_text(encoding="utf-8"))
+        content = read_json(place)
         return list(content["files"]), dict(content["digests"])
-    except (OSError, ValueError, KeyError, TypeError):
+    except (Sd2Error, ValueError, KeyError, TypeError):
         return [], {}

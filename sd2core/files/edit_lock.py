@@ -18,8 +18,10 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.lock import FileLock, is_locked
+from sd2core.files.texts import read_json
 from sd2core.processes import ProcessId
 
 BEAT_EVERY_S = 60.0
@@ -122,8 +124,8 @@ class EditLock:
 
     def _noted(self) -> Holder | None:
         try:
-            return Holder(**json.loads(self._note.read_text(encoding="utf-8")))
-        except (OSError, ValueError, TypeError):  # not written yet, or by another version
+            return Holder(**read_json(self._note))
+        except (Sd2Error, TypeError):  # not written yet, or by another version
             return None
 
     def _noted_anew(self) -> Holder:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -47,8 +48,12 @@ def save_figure(
     told: dict[str, Any] = {"dpi": pixels_per_inch or "figure"}
     if provenance is not None:
         told["metadata"] = _metadata(kind, provenance)
-    with rc_context(None if provenance is None else _RULES), atomic_write(path) as stream:
-        figure.savefig(stream, format=kind[1:], **told)
+    # In memory first: on a full disk Matplotlib fails with an error of its own.
+    drawn = io.BytesIO()
+    with rc_context(None if provenance is None else _RULES):
+        figure.savefig(drawn, format=kind[1:], **told)
+    with atomic_write(path) as stream:
+        stream.write(drawn.getbuffer())
 
 
 def _metadata(kind: str, provenance: Mapping[str, Any]) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+import os
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -18,11 +18,18 @@ from pydantic import (
 )
 
 from sd2core.errors import Sd2Error
+from sd2core.files.texts import first_fault, read_json
 
 FILE_NAME = "recording.json"
 FORMAT: Literal["sd2-recording"] = "sd2-recording"
 VERSION = 1
 
+FARTHEST_S = 1e12
+"""Times reach no farther from 0, where milliseconds still differ."""
+Time = Annotated[FiniteFloat, Field(ge=-FARTHEST_S, le=FARTHEST_S)]
+Pixels = Annotated[PositiveInt, Field(le=100_000)]
+Focal = Annotated[FiniteFloat, Field(gt=0, le=1e6)]
+"""A focal length in pixels; the window shows nothing through a longer one."""
 PositiveFinite = Annotated[FiniteFloat, Field(gt=0)]
 StoredPath = Annotated[str, StringConstraints(pattern=r"\S")]
 """A path that names something: nothing at all would be the recording's own folder."""
@@ -41,8 +48,8 @@ class Span(BaseModel):
 
     model_config = ConfigDict(extra="allow", frozen=True)
 
-    start_s: FiniteFloat
-    end_s: FiniteFloat
+    start_s: Time
+    end_s: Time
     label: str
 
     @model_validator(mode="after")
@@ -71,8 +78,8 @@ class MeshReading(BaseModel):
     frames_per_s: PositiveFinite | None = None
     scale: PositiveFinite | None = None
     person: int | str | None = None
-    image_size: tuple[PositiveInt, PositiveInt] | None = None
-    focal_px: PositiveFinite | None = None
+    image_size: tuple[Pixels, Pixels] | None = None
+    focal_px: Focal | None = None
     distance_m: FiniteFloat | None = None
 
     def options(self) -> dict[str, Any]:
@@ -86,9 +93,9 @@ class CameraEntry(BaseModel):
 
     model_config = ConfigDict(extra="allow", frozen=True)
 
-    focal_px: PositiveFinite  # in pixels of a picture of width × height
-    width: PositiveInt | None = None  # None: that of the recording's video
-    height: PositiveInt | None = None
+    focal_px: Focal  # in pixels of a picture of width × height
+    width: Pixels | None = None  # None: that of the recording's video
+    height: Pixels | None = None
     source: str = ""  # of the focal length: user, metadata, default or simulated
 
     def focal_for(self, width: int, height: int) -> float:
@@ -113,7 +120,7 @@ class Document(BaseModel):
     mesh_reading: MeshReading = MeshReading()
     faces: StoredPath | None = None
     radar: StoredPath | None = None
-    radar_offset_s: FiniteFloat = 0.0
+    radar_offset_s: Time = 0.0
     denoiser: StoredPath | None = None
     bundled_denoiser: str | None = None
     sensor: SensorEntry = SensorEntry()
@@ -126,14 +133,9 @@ def read_document(file: Path) -> Document:
 
     Raises Sd2Error if it is not there, is damaged, or was written by a newer version.
     """
-    try:
-        content = json.loads(file.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise Sd2Error(
-            f"{file.parent} has no {file.name}", "a recording made by `sd2 import`"
-        ) from error
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise Sd2Error(f"{file} cannot be read ({error})", "JSON written by SD² Studio") from error
+    if not os.path.exists(file):
+        raise Sd2Error(f"{file.parent} has no {file.name}", "a recording made by `sd2 import`")
+    content = read_json(file)
     found_format = content.get("format") if isinstance(content, dict) else None
     if found_format != FORMAT:
         raise Sd2Error(f"{file} has the format {found_format!r}", f"the format {FORMAT!r}")
@@ -147,10 +149,8 @@ def read_document(file: Path) -> Document:
     try:
         return Document.model_validate(content)
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
         raise Sd2Error(
-            f"{file}: {where} is {first['input']!r} ({first['msg']})",
+            f"{file}: {first_fault(error)}",
             "what docs/formats.md says of a recording",
             "Correct that entry with a text editor",
         ) from error

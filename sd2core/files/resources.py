@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -58,25 +57,20 @@ def open_bundled_arrays(
     file is missing, damaged, of another version, or lacks an array that is asked for while it is
     open.
     """
-    import numpy as np
+    from sd2core.files.numpy_files import open_npz_file
 
-    try:
-        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as data:
-            meta = json.loads(str(data["meta"]))
-            if meta.get("format") != kind or meta.get("version", 0) > version:
-                raise Sd2Error(
-                    f"{path} is of format {meta.get('format')!r} version {meta.get('version')}",
-                    f"{kind!r} up to version {version}",
-                    "Open it with the version of SD² Studio that wrote it",
-                )
-            if meta.get("version", 0) < oldest:
-                raise Sd2Error(
-                    f"{path} is of format {kind!r} version {meta.get('version')}",
-                    f"version {oldest} or later",
-                    f"Make it anew with `{command}`",
-                )
-            yield meta, data
-    except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
-        raise Sd2Error(
-            f"{path} cannot be read as {what} ({error})", f"a file written by `{command}`"
-        ) from error
+    with open_npz_file(path, what, f"a file written by `{command}`") as data:
+        meta = json.loads(str(data["meta"]))
+        if meta.get("format") != kind or meta.get("version", 0) > version:
+            raise Sd2Error(
+                f"{path} is of format {meta.get('format')!r} version {meta.get('version')}",
+                f"{kind!r} up to version {version}",
+                "Open it with the version of SD² Studio that wrote it",
+            )
+        if meta.get("version", 0) < oldest:
+            raise Sd2Error(
+                f"{path} is of format {kind!r} version {meta.get('version')}",
+                f"version {oldest} or later",
+                f"Make it anew with `{command}`",
+            )
+        yield meta, data

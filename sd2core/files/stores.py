@@ -7,6 +7,8 @@ end the process.
 from __future__ import annotations
 
 import itertools
+import json
+import math
 import os
 import stat
 import zipfile
@@ -19,11 +21,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
+from sd2core.files.limits import (
+    check_chunk_count,
+    check_regular,
+    check_regular_within,
+    check_size,
+    read_limit_bytes,
+    size_bytes,
+)
+from sd2core.files.numpy_files import open_zip
 from sd2core.progress import Progress, silent
 
 Depth = Literal["presence", "lengths", "checksums", "values"]
 """How closely chunks are looked at; each includes those before it."""
 
+_DESCRIPTIONS = ("zarr.json", ".zgroup", ".zarray", ".zattrs", ".zmetadata")
+_PARSED = 8
+"""Memory of a description once it is parsed, as a multiple of its text, at least."""
 COPY_AGAIN = "Copy it again from where it came, or write it again"
 
 
@@ -88,10 +102,7 @@ class StoredArray:
     @property
     def file_bytes(self) -> int:
         """Size of all chunks on disk."""
-        if self._packed:
-            return self.path.stat().st_size
-        folder = self.path / self._array.path
-        return sum(one.stat().st_size for one in folder.rglob("*") if one.is_file())
+        return size_bytes(self.path if self._packed else self.path / self._array.path)
 
     def __len__(self) -> int:
         return self.shape[0]
@@ -218,18 +229,62 @@ def open_group(path: Path, mode: Literal["r", "r+"] = "r") -> Any:
     import zarr
     from zarr.storage import ZipStore
 
-    import sd2core.files.chunk_codecs  # noqa: F401  puts a check before Blosc
+    import sd2core.files.chunk_codecs  # noqa: F401  puts checks before the decoders
 
     try:
-        return zarr.open_group(ZipStore(path, mode="r") if path.is_file() else str(path), mode=mode)
+        packed = path.is_file()
+        if packed:
+            with open_zip(path) as archive:
+                files = len(archive.infolist())
+                for entry in archive.infolist():
+                    if entry.filename.rpartition("/")[2] in _DESCRIPTIONS:
+                        check_size(path / entry.filename, _PARSED * entry.file_size)
+        else:
+            files = check_regular_within(path)
+            for name in _DESCRIPTIONS:
+                for description in (*path.glob(name), *path.glob(f"*/{name}")):
+                    check_size(description, _PARSED * description.stat().st_size)
+        group = zarr.open_group(ZipStore(path, mode="r") if packed else str(path), mode=mode)
+        _check_declared(group, path, files)
+    except Sd2Error:
+        raise
     except Exception as error:  # damaged descriptions fail in many ways
         raise _no_group(path, error) from error
+    return group
+
+
+def _check_declared(group: Any, path: Path, files: int) -> None:
+    """Refuse arrays that together declare more than can come of what is stored."""
+    declared_bytes = chunks = 0
+    for name in array_names(path):
+        try:
+            array = group[name]
+            declared_bytes += math.prod(array.shape) * np.dtype(array.dtype).itemsize
+            sizes = zip(array.shape, array.shards or array.chunks, strict=True)
+            chunks += math.prod(-(-size // chunk) for size, chunk in sizes)
+        except Exception:  # whoever asks for this one is told
+            continue
+    check_chunk_count(path, chunks, files)
+    if declared_bytes > read_limit_bytes():
+        check_size(path, declared_bytes, size_bytes(path))
+
+
+def read_attributes(path: Path) -> dict[str, Any]:
+    """Attributes of a group in a folder, read without Zarr; none where it is not one."""
+    description = path / "zarr.json"
+    try:
+        check_regular(description)
+        check_size(description, _PARSED * description.stat().st_size)
+        attributes = json.loads(description.read_text(encoding="utf-8"))["attributes"]
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return {}
+    return attributes if isinstance(attributes, dict) else {}
 
 
 def array_names(path: Path) -> list[str]:
     """Names of the arrays in a store."""
     if path.is_file():
-        with zipfile.ZipFile(path) as archive:
+        with open_zip(path) as archive:
             found = [Path(name) for name in archive.namelist()]
     else:
         found = [file.relative_to(path) for file in path.glob("*/*") if file.is_file()]

@@ -1,7 +1,8 @@
-"""Tables as text, for a terminal and for Markdown; the first row is the heading."""
+"""Tables as text, for a terminal, Markdown and spreadsheets; the first row is the heading."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Sequence
 
 
@@ -26,3 +27,18 @@ def markdown_table(rows: Sequence[Sequence[str]]) -> list[str]:
     """The same in Markdown."""
     rule = ["---", *["---:"] * (len(rows[0]) - 1)]
     return [f"| {' | '.join(row)} |" for row in (rows[0], rule, *rows[1:])]
+
+
+# With wide signs, which some spreadsheets compute as well. Apostrophes count, so that a text with
+# one of its own comes back.
+_FORMULA = re.compile(r"'*\s*[=+\-@＝＋－＠]")
+
+
+def as_cell(text: str) -> str:
+    """Put an apostrophe before a text that a spreadsheet would compute."""
+    return f"'{text}" if _FORMULA.match(text) else text
+
+
+def of_cell(text: str) -> str:
+    """Undo :func:`as_cell`."""
+    return text[1:] if text.startswith("'") and _FORMULA.match(text) else text

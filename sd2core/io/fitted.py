@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import json
-import zipfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from pydantic import ValidationError
 
+from sd2core.files.numpy_files import open_zip
 from sd2core.files.recording_json import CameraEntry
+from sd2core.files.stores import read_attributes
 
 
 def fitted_camera(mesh: Path) -> CameraEntry | None:
@@ -38,13 +39,9 @@ def _said(mesh: Path) -> dict[str, Any]:
 
 def _read(mesh: Path) -> Any:
     if mesh.is_dir():
-        return _attributes((mesh / "zarr.json").read_bytes())
-    with zipfile.ZipFile(mesh) as archive:
+        return read_attributes(mesh).get("fit")
+    with open_zip(mesh) as archive:
         if "zarr.json" in archive.namelist():
-            return _attributes(archive.read("zarr.json"))
+            return json.loads(archive.read("zarr.json"))["attributes"]["fit"]
         with archive.open("fit.npy") as member:
             return json.loads(str(np.lib.format.read_array(member, allow_pickle=False)))
-
-
-def _attributes(text: bytes) -> Any:
-    return json.loads(text)["attributes"]["fit"]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import zipfile
 from pathlib import Path
 from typing import Literal
 
 from sd2core.errors import Sd2Error
+from sd2core.files.limits import check_regular
 from sd2core.files.paths import is_pattern
+from sd2core.files.stores import read_attributes
 from sd2core.pairs.store import is_pair_store
 
 Kind = Literal["recording", "video", "mesh", "radar", "map", "pairs", "model", "dataset"]
@@ -29,6 +30,7 @@ def kind_of(path: Path) -> Kind:
         raise Sd2Error(f"{path} does not exist", "a file or folder", "Check the path")
     if path.is_dir():
         return _kind_of_folder(path)
+    check_regular(path)
     suffix = path.suffix.lower()
     if is_dataset(path):
         return "dataset"
@@ -54,10 +56,10 @@ def kind_of(path: Path) -> Kind:
 def is_dataset(path: Path) -> bool:
     """True if a path looks like a data set of ``sd2 export``, finished or not; reads little."""
     suffix = path.suffix.lower()
+    if path.is_dir():
+        return bool(read_attributes(path).get("format") == DATASET_FORMAT)
+    check_regular(path)
     try:
-        if path.is_dir():
-            header = json.loads((path / "zarr.json").read_text(encoding="utf-8"))
-            return bool(header["attributes"]["format"] == DATASET_FORMAT)
         if suffix == ".npz":
             with zipfile.ZipFile(path) as archive:
                 return "segment_label.npy" in archive.namelist()

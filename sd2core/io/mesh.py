@@ -111,7 +111,7 @@ def load_mesh(
     try:
         timebase = Timebase(times_s)
     except Sd2Error as error:
-        raise Sd2Error(f"{source}: {error.found}", error.expected, error.remedy) from error
+        raise error.within(source) from error
     known = uncertainty_of(raw, source)
     if known is not None:
         known = known.times(_velocity_factor(raw.times_s, times_s, scale))

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_folder, atomic_write, full_disk_named
+from sd2core.files.numpy_files import open_npz_file
 from sd2core.files.stores import (
     COPY_AGAIN,
     Damage,
@@ -75,21 +76,12 @@ class RawMesh:
 
 def read_npz(path: Path) -> RawMesh:
     """Read ``vertices`` and, where present, ``faces``, ``times_s`` and ``fps``."""
-    try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-            wanted = VERTEX_NAMES + SMALL_NAMES
-            arrays = {name: archive[name] for name in archive.files if name in wanted}
-            names = list(archive.files)
-    except PermissionError as error:
-        raise Sd2Error(
-            f"{path} may not be read ({error.strerror})", "permission to read"
-        ) from error
-    except Exception as error:  # a damaged archive fails in many ways
-        raise Sd2Error(
-            f"{path} cannot be read as .npz ({error})",
-            "a complete .npz file that holds plain numbers",
-            "Write it again with numpy.savez(path, vertices=..., faces=..., times_s=...)",
-        ) from error
+    expected = "a complete .npz file that holds plain numbers"
+    remedy = "Write it again with numpy.savez(path, vertices=..., faces=..., times_s=...)"
+    with open_npz_file(path, ".npz", expected, remedy) as archive:
+        wanted = VERTEX_NAMES + SMALL_NAMES
+        arrays = {name: archive[name] for name in archive if name in wanted}
+        names = list(archive)
     return named_arrays(arrays, names, str(path))
 
 
@@ -111,11 +103,18 @@ def named_arrays(arrays: dict[str, Any], names: list[str], source: str) -> RawMe
             f"{', '.join(UNCERTAINTY_NAMES)}: all of them, or none",
         )
     limbs = _first(arrays, LIMB_NAMES)
+    try:
+        times_s = None if times is None else np.asarray(times, dtype=np.float64)
+        frames_per_s = None if rate is None else float(np.asarray(rate).reshape(-1)[0])
+    except (TypeError, ValueError, IndexError) as error:
+        raise Sd2Error(
+            f"{source}: its times or frames per second are no numbers ({error})", "real numbers"
+        ) from error
     return RawMesh(
         vertices=vertices,
         faces=_first(arrays, FACE_NAMES),
-        times_s=None if times is None else np.asarray(times, dtype=np.float64),
-        frames_per_s=None if rate is None else float(np.asarray(rate).reshape(-1)[0]),
+        times_s=times_s,
+        frames_per_s=frames_per_s,
         vertex_counts=_first(arrays, COUNT_NAMES),
         present=_first(arrays, PRESENCE_NAMES),
         limbs=() if limbs is None else tuple(map(str, np.atleast_1d(limbs))),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import re
 from pathlib import Path
 from typing import Any
@@ -11,11 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
+from sd2core.files.limits import check_regular, check_size
+from sd2core.files.numpy_files import open_npz_file
 from sd2core.files.paths import files_of_pattern
 from sd2core.io.mesh_arrays import FACE_NAMES, RawMesh
 from sd2core.progress import Progress, silent
 
 SURFACE_SUFFIXES = (".obj", ".ply", ".glb")
+_GLB_BYTES = 64
+"""Memory of an entry of an array, a matrix of 4 × 4 at most."""
 
 
 def natural_key(name: str) -> tuple[Any, ...]:
@@ -57,17 +62,23 @@ def read_surface(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64] | N
     """Vertices (V, 3) and faces (F, 3) of one file, in the order of the file."""
     import trimesh
 
+    kind = path.suffix[1:].lower()
+    check_regular(path)
     try:
-        if path.suffix.lower() == ".obj":
-            source: Any = _geometry_of_obj(path)
-        else:
-            source = str(path)
+        content = path.read_bytes()
+        if kind == "obj":
+            content = _geometry_of_obj(content)
+        elif kind == "glb":
+            check_size(path, _declared_bytes_of_glb(content), len(content))
+        # From memory, so that no other file is looked for that this one names.
         loaded = trimesh.load(
-            source, file_type=path.suffix[1:].lower(), process=False, maintain_order=True
+            io.BytesIO(content), file_type=kind, process=False, maintain_order=True
         )
         if isinstance(loaded, trimesh.Scene):
             loaded = loaded.to_geometry() if len(loaded.geometry) else trimesh.Trimesh()
         vertices = np.asarray(loaded.vertices, dtype=np.float64)
+    except Sd2Error:
+        raise
     except Exception as error:  # trimesh's readers raise whatever their parsing meets
         raise Sd2Error(
             f"{path} cannot be read as a mesh ({type(error).__name__}: {error})",
@@ -80,24 +91,39 @@ def read_surface(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64] | N
     return vertices, faces if len(faces) else None
 
 
-def _geometry_of_obj(path: Path) -> io.BytesIO:
+def _geometry_of_obj(content: bytes) -> bytes:
     """Vertices of an OBJ file and the vertex numbers of its faces, nothing else.
 
     Materials, groups and texture coordinates would split one surface into
     several and double, reorder or drop its vertices.
     """
     lines = []
-    for line in path.read_bytes().replace(b"\\\r\n", b" ").replace(b"\\\n", b" ").splitlines():
+    for line in content.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ").splitlines():
         words = line.split()
         if words[:1] == [b"v"]:
             lines.append(line)
         elif words[:1] == [b"f"]:
             lines.append(b" ".join(word.split(b"/")[0] for word in words))
-    return io.BytesIO(b"\n".join(lines) + b"\n")
+    return b"\n".join(lines) + b"\n"
+
+
+def _declared_bytes_of_glb(content: bytes) -> int:
+    """Memory that the numbers of a GLB file take, and its meshes where they are placed."""
+    length = int.from_bytes(content[12:16], "little")
+    scene = json.loads(content[20 : 20 + length])
+    counts = [abs(accessor["count"]) for accessor in scene.get("accessors", ())]
+    views = sum(abs(view["byteLength"]) for view in scene.get("bufferViews", ()))
+    meshes = [
+        sum(counts[part["attributes"]["POSITION"]] for part in mesh["primitives"])
+        for mesh in scene.get("meshes", ())
+    ]
+    placed = sum(meshes[node["mesh"]] for node in scene.get("nodes", ()) if "mesh" in node)
+    return int(views + _GLB_BYTES * (sum(counts) + placed))
 
 
 def read_faces(path: Path) -> NDArray[Any]:
     """Read triangles of a ``.npy``, ``.npz`` or mesh file; Sd2Error if it has none."""
+    check_regular(path)
     if not path.is_file():
         raise Sd2Error(
             f"The faces file {path} does not exist", "a .npy, .npz or .obj file", "Check the path"
@@ -110,14 +136,16 @@ def read_faces(path: Path) -> NDArray[Any]:
         return faces
     if suffix not in {".npy", ".npz"}:
         raise Sd2Error(f"{path} is no file of faces", "a .npy, .npz or .obj file")
-    try:
-        with path.open("rb") as file:
-            loaded = np.load(file, allow_pickle=False)
-            arrays = {"": loaded} if isinstance(loaded, np.ndarray) else dict(loaded)
-    except Exception as error:  # a damaged archive fails in many ways
-        raise Sd2Error(
-            f"{path} cannot be read ({error})", "a complete .npy or .npz file of plain numbers"
-        ) from error
+    expected = "a complete .npy or .npz file of plain numbers"
+    if suffix == ".npz":
+        with open_npz_file(path, "faces", expected) as archive:
+            arrays = dict(archive)
+    else:
+        try:
+            # Mapped, so that what its header says is compared with its size.
+            arrays = {"": np.array(np.load(path, mmap_mode="r", allow_pickle=False))}
+        except Exception as error:  # a damaged file fails in many ways
+            raise Sd2Error(f"{path} cannot be read ({error})", expected) from error
     names = [name for name in (*FACE_NAMES, "f") if name in arrays]
     if names or len(arrays) == 1:
         array: NDArray[Any] = arrays[names[0]] if names else next(iter(arrays.values()))

@@ -7,6 +7,7 @@ on the body's root, beside a weak-perspective camera per frame.
 
 from __future__ import annotations
 
+import operator
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
+from sd2core.files.limits import check_size
 from sd2core.io.mesh_arrays import (
     FACE_NAMES,
     RATE_NAMES,
@@ -110,7 +112,11 @@ def _vertices_of(entry: dict[Any, Any]) -> Any:
 def _choose(
     path: Path, people: dict[Any, Any], person: int | str | None, notes: list[str]
 ) -> dict[Any, Any]:
-    lengths = {key: len(_stacked(_vertices_of(value), path)) for key, value in people.items()}
+    held = {key: _vertices_of(value) for key, value in people.items()}
+    lengths = {
+        key: len(one if isinstance(one, list | tuple) else _stacked(one, path))
+        for key, one in held.items()
+    }
     listed = ", ".join(f"{key} ({count:,} frames)" for key, count in lengths.items())
     if person is None:
         key = max(lengths, key=lambda k: lengths[k])
@@ -142,6 +148,8 @@ def _stacked(vertices: Any, path: Path) -> NDArray[Any]:
                     "Save one person's fitted mesh per file",
                 )
         if shapes:
+            # All frames may be one and the same array in the file.
+            check_size(path, sum(v.nbytes for v in vertices), path.stat().st_size)
             return np.stack([v.reshape(shapes[0]) for v in vertices])
     raise Sd2Error(
         f"{path}: the vertices are a {type(vertices).__name__}",
@@ -162,7 +170,15 @@ def _number_frames(raw: RawMesh, entry: dict[Any, Any], path: Path) -> None:
     ids = entry.get("frame_ids")
     if ids is None or raw.times_s is not None:
         return
-    numbers = np.asarray(ids if isinstance(ids, np.ndarray) else list(ids), dtype=np.int64)
+    try:
+        if not isinstance(ids, np.ndarray):
+            ids = [operator.index(number) for number in ids]
+        numbers = np.asarray(ids, dtype=np.int64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise Sd2Error(
+            f"{path}: frame_ids are no numbers of frames ({error})",
+            "one video frame number per frame",
+        ) from error
     count = len(raw.vertices)  # type: ignore[arg-type]
     if numbers.shape != (count,):
         raise Sd2Error(

@@ -15,6 +15,7 @@ import io
 import lzma
 import pickle
 import re
+import sys
 import zlib
 from pathlib import Path
 from typing import Any, ClassVar
@@ -23,31 +24,39 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
+from sd2core.files.limits import VARIABLE, check_regular, read_limit_bytes
 
 _PIECE = 16 * 2**20
-LIMIT_BYTES = 4 * 2**30
-"""More than this is refused: a small compressed file may claim to hold anything."""
+_OBJECT_BYTES = 100
+"""Memory of what one instruction makes, about: an empty set comes of a single byte."""
 
 _NUMBERS = re.compile(r"[<>=|]?(?:[biufc]\d+|[?bBhHiIlLqQefdgFD]|[SUa]\d+)")
 _REMEDY = (
     "Save the vertices where the file was written: "
     "numpy.savez('mesh.npz', vertices=verts, faces=faces, times_s=times)"
 )
+_RAISE = f". If the file is to be trusted, raise the limit by the environment variable {VARIABLE}"
 
 
 class Refused(Exception):
     """Request of a file that is refused; the text follows the file's name."""
 
 
+class TooLarge(Refused):
+    """Request for more memory than is accepted."""
+
+
 class LimitedFile:
-    """A file of which no more than so many bytes can be read."""
+    """A file of which no more than so many bytes, in so many pieces, can be read."""
 
     def __init__(self, stream: Any, limit_bytes: int) -> None:
         self._stream = stream
         self.left = limit_bytes
+        self._pieces = limit_bytes // _OBJECT_BYTES
 
     def read(self, size: int) -> bytes:
         """Read up to ``size`` bytes."""
+        self._count()
         return bytes(self._upto(size))
 
     def read_exactly(self, size: int) -> bytearray:
@@ -65,13 +74,25 @@ class LimitedFile:
 
     def readline(self) -> bytes:
         """Read up to the next line break."""
+        self._count()
         line: bytes = self._stream.readline(min(_PIECE, self.left))
         self.left -= len(line)
         return line
 
+    def charge(self, size: int) -> None:
+        """Count memory that was taken for something else than what was read."""
+        if size > self.left:
+            raise TooLarge("makes more of its content than a file of its size may hold")
+        self.left -= size
+
+    def _count(self) -> None:
+        self._pieces -= 1
+        if self._pieces < 0:
+            raise TooLarge("holds more single objects than a file of its size may")
+
     def _upto(self, size: int) -> bytearray:
         if not 0 <= size <= self.left:
-            raise Refused(f"claims {size:,} bytes where {self.left:,} are still accepted")
+            raise TooLarge(f"claims {size:,} bytes where {self.left:,} are still accepted")
         content = bytearray()
         # In pieces, so that a false claim takes no memory.
         while len(content) < size:
@@ -126,14 +147,17 @@ def decompressed(file: Any) -> Any:
     return file
 
 
-def read_pickle(path: Path, limit_bytes: int = LIMIT_BYTES) -> Any:
+def read_pickle(path: Path, limit_bytes: int | None = None) -> Any:
     """Read arrays and containers from a pickle or joblib file, also a compressed one.
 
     Gives dictionaries, lists, tuples, sets, numbers, text and NumPy arrays of numbers; at most
-    ``limit_bytes`` are read after decompression. Raises Sd2Error if the file names anything else,
-    is damaged or too large.
+    ``limit_bytes``, by default what a file of its size may be read as, are read after decompression
+    and made of it. Raises Sd2Error if the file names anything else, is damaged or too large.
     """
+    check_regular(path)
     try:
+        if limit_bytes is None:
+            limit_bytes = read_limit_bytes(path.stat().st_size)
         with path.open("rb") as file:
             source = LimitedFile(decompressed(file), limit_bytes)
             return _DataUnpickler(source).load()
@@ -141,8 +165,10 @@ def read_pickle(path: Path, limit_bytes: int = LIMIT_BYTES) -> Any:
         raise Sd2Error(
             f"{path} {refusal}",
             "plain NumPy arrays, numbers, text, lists and dictionaries",
-            _REMEDY,
+            f"{_REMEDY}{_RAISE if isinstance(refusal, TooLarge) else ''}",
         ) from refusal
+    except Sd2Error:
+        raise
     except MemoryError as error:
         raise Sd2Error(
             f"{path} asks for more memory than there is", "the size that is really stored", _REMEDY
@@ -243,7 +269,7 @@ def _size(shape: Any, dtype: np.dtype[Any], left: int) -> int:
             raise Refused("holds an array with an impossible shape")
         size *= length
     if size > left:
-        raise Refused(
+        raise TooLarge(
             f"claims an array of shape {shape}, {size / 2**30:,.1f} GiB, more than the "
             f"{left / 2**30:,.1f} GiB that can be there"
         )
@@ -316,6 +342,7 @@ for _core in ("numpy.core", "numpy._core"):
     _ALLOWED[f"{_core}.numeric", "_frombuffer"] = _array_from_buffer
     _ALLOWED[f"{_core}.memmap", "memmap"] = _Name()
 _OF_A_LIST = (set, frozenset, collections.OrderedDict)
+_COPIES = (*_OF_A_LIST, bytes, bytearray)
 _CALLED = (
     *_OF_A_LIST,
     complex,
@@ -371,6 +398,8 @@ class _DataUnpickler(_Machine):
         if function in _OF_A_LIST and not all(isinstance(a, list | tuple) for a in arguments):
             raise Refused(f"builds {_named(function)} from something else than a list")
         super().load_reduce()
+        made = self.stack[-1]
+        self._source.charge(sys.getsizeof(made) if isinstance(made, _COPIES) else 0)
 
     def load_newobj(self) -> None:
         """Make a :class:`_JoblibArray`, the only object that joblib makes in this form."""
@@ -385,8 +414,13 @@ class _DataUnpickler(_Machine):
         if not isinstance(target, _Array | _Dtype | _JoblibArray):
             raise Refused(f"sets the state of {_named(target)}, which is forbidden")
         super().load_build()
+        self._source.charge(target.nbytes if isinstance(target, _Array) else 0)
         if isinstance(target, _JoblibArray):
             self.stack[-1] = target.read(self._source)
+
+    def load_frame(self) -> None:
+        """Read the instructions of a frame from the file, not all of them at once."""
+        self.read(8)
 
     def load_inst(self) -> None:
         """Refuse an instance of a class, by the class's name."""
@@ -402,6 +436,7 @@ class _DataUnpickler(_Machine):
     dispatch[pickle.NEWOBJ[0]] = load_newobj
     dispatch[pickle.BUILD[0]] = load_build
     dispatch[pickle.INST[0]] = load_inst
+    dispatch[pickle.FRAME[0]] = load_frame
     for _code in (pickle.OBJ, pickle.NEWOBJ_EX, pickle.NEXT_BUFFER, pickle.READONLY_BUFFER):
         dispatch[_code[0]] = load_forbidden
 

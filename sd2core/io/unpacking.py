@@ -12,6 +12,7 @@ from typing import IO, Any
 import numpy as np
 
 from sd2core.errors import Sd2Error
+from sd2core.files.numpy_files import open_npz_file, open_zip, read_array_header
 from sd2core.files.stores import create_array, create_group
 from sd2core.io.mesh_arrays import (
     SMALL_NAMES,
@@ -20,13 +21,14 @@ from sd2core.io.mesh_arrays import (
     frames_per_chunk,
 )
 
+_EXPECTED = "a complete .npz file that holds plain numbers"
 Header = tuple[tuple[int, ...], bool, np.dtype[Any]]
 
 
 def npz_bytes(path: Path) -> int:
     """Bytes of an ``.npz``'s arrays in memory; Sd2Error if it is no ``.npz``."""
     try:
-        with zipfile.ZipFile(path) as archive:
+        with open_zip(path) as archive:
             return sum(member.file_size for member in archive.infolist())
     except (OSError, zipfile.BadZipFile) as error:
         raise _unreadable(path, error) from error
@@ -36,7 +38,7 @@ def npz_vertices(path: Path) -> tuple[int, int]:
     """Frames and vertices of the mesh in an ``.npz``, read from a header; Sd2Error without any."""
     try:
         with (
-            zipfile.ZipFile(path) as archive,
+            open_zip(path) as archive,
             archive.open(_vertex_member(archive, path)) as stream,
         ):
             frames, vertices, _ = _header(stream, path)[0]
@@ -54,11 +56,11 @@ def unpack_npz(path: Path, out: Path) -> None:
     workspace = Path(tempfile.mkdtemp(prefix=f".{out.name}.", suffix=".tmp", dir=out.parent))
     try:
         group = create_group(workspace / "new")
-        with zipfile.ZipFile(path) as archive:
+        with open_zip(path) as archive:
             with archive.open(_vertex_member(archive, path)) as stream:
                 _copy_vertices(stream, group, path)
             members = {Path(name).stem for name in archive.namelist()}
-        with np.load(path, allow_pickle=False) as arrays:
+        with open_npz_file(path, ".npz", _EXPECTED) as arrays:
             for name in members.intersection(SMALL_NAMES):
                 if name == "limbs":
                     group.attrs[name] = [str(one) for one in np.atleast_1d(arrays[name])]
@@ -103,13 +105,7 @@ def _vertex_member(archive: zipfile.ZipFile, path: Path) -> str:
 
 
 def _header(stream: IO[bytes], path: Path) -> Header:
-    version = np.lib.format.read_magic(stream)
-    read: Any = (
-        np.lib.format.read_array_header_1_0
-        if version == (1, 0)
-        else np.lib.format.read_array_header_2_0
-    )
-    shape, by_column, dtype = read(stream)
+    shape, by_column, dtype = read_array_header(stream)
     if len(shape) != 3 or shape[2] != 3 or dtype.kind != "f":
         raise Sd2Error(
             f"{path}: the vertices have shape {shape} and type {dtype}",
@@ -119,6 +115,4 @@ def _header(stream: IO[bytes], path: Path) -> Header:
 
 
 def _unreadable(path: Path, error: Exception) -> Sd2Error:
-    return Sd2Error(
-        f"{path} cannot be read as .npz ({error})", "a complete .npz file that holds plain numbers"
-    )
+    return Sd2Error(f"{path} cannot be read as .npz ({error})", _EXPECTED)

@@ -22,6 +22,7 @@ from av.error import FFmpegError
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
+from sd2core.files.limits import check_regular
 from sd2core.progress import Progress, silent
 
 _WHOLE_MEGAPIXELS = 100.0
@@ -39,6 +40,8 @@ _TICKS_PER_FRAME = 4
 
 _FIRST_FRAME_S = 0.1
 """A video that starts this soon has lost its first frame; a later start was meant so."""
+
+_CLOCK = re.compile(r"(\d{1,9}):(\d{1,9}):(\d{1,9}(?:\.\d*)?)")
 
 _LONG_STEP = 10
 """Steps of an uneven video that are this many times the typical one are noted."""
@@ -71,6 +74,7 @@ def open_stream(path: Path) -> tuple[Any, Any]:
     """
     if not path.exists():
         raise Sd2Error(f"{path} does not exist", "a video file", "Check the path")
+    check_regular(path)
     if path.is_dir():
         raise Sd2Error(f"{path} is a folder", "a video file", "Name the file in it")
     try:
@@ -295,7 +299,7 @@ def _stated_seconds(container: Any, stream: Any) -> float:
     start_s = float((stream.start_time or 0) * stream.time_base)
     if start_s < _FIRST_FRAME_S:
         start_s = 0.0
-    tag = re.fullmatch(r"(\d+):(\d+):([\d.]+)", stream.metadata.get("DURATION", ""))
+    tag = _CLOCK.fullmatch(stream.metadata.get("DURATION", ""))
     if tag:
         hours, minutes, seconds = (float(part) for part in tag.groups())
         return 3600 * hours + 60 * minutes + seconds - start_s

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, fields
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, NonNegativeInt, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, NonNegativeInt
 
 from sd2core.labels.label_set import Label, LabelSet
 from sd2core.labels.spans import Labels, LabelTrack, Origin, Overlap, ShownFrames, Span
@@ -88,7 +88,6 @@ class LabelsEntry(Entry):
         return Labels(tracks, tuple(entry.made() for entry in self.spans), self.label_set.made())
 
 
-_LONGEST_FOUND = 60
 _SPAN_FIELDS = tuple(field.name for field in fields(Span))
 _SPAN_OPTIONAL = {"note": "", "author": "", "confidence": None, "origin": "person"}
 
@@ -124,16 +123,3 @@ def labels_entry(labels: Labels, timebase: Timebase | None = None) -> dict[str, 
         "tracks": track_entries(labels.tracks),
         "spans": [span_entry(span, span.frames(timebase)) for span in labels.spans],
     }
-
-
-def first_fault(error: ValidationError) -> str:
-    """Describe the first fault: its place, the value found and the reason."""
-    first = error.errors(include_url=False)[0]
-    where = ".".join(str(part) for part in first["loc"]) or "the file"
-    if first["type"] == "missing":
-        return f"{where} is missing"
-    if first["type"] == "extra_forbidden":
-        return f"{where} is nothing that this version knows"
-    found = repr(first["input"])
-    found = found if len(found) <= _LONGEST_FOUND else f"{found[:_LONGEST_FOUND]}…"
-    return f"{where} is {found} ({first['msg']})"

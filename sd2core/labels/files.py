@@ -18,11 +18,11 @@ from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.paths import located_path, plain_path, stored_path
 from sd2core.files.recording_json import Span as InlineSpan
+from sd2core.files.texts import EXPECTED_JSON, errors_in, first_fault, parse_json, read_text
 from sd2core.labels.entries import (
     Entry,
     LabelsEntry,
     LabelSetEntry,
-    first_fault,
     label_set_entry,
     labels_entry,
 )
@@ -153,13 +153,8 @@ def _one_line(label: str) -> str:
 
 
 def _read(path: Path, document: type[_Document], expected: str) -> _Document:
-    try:
-        text = path.read_text(encoding="utf-8")
-        content = json.loads(text)
-    except FileNotFoundError as error:
-        raise Sd2Error(f"{path} does not exist", f"a file of the format {expected!r}") from error
-    except (OSError, ValueError, RecursionError) as error:  # no UTF-8, no JSON, nested too deep
-        raise Sd2Error(f"{path} cannot be read ({error})", "JSON written by SD² Studio") from error
+    text = read_text(path, f"a file of the format {expected!r}")
+    content = parse_json(text, path, EXPECTED_JSON)
     found = content.get("format") if isinstance(content, dict) else None
     if found != expected:
         raise Sd2Error(f"{path} has the format {found!r}", f"the format {expected!r}")
@@ -181,10 +176,8 @@ def _read(path: Path, document: type[_Document], expected: str) -> _Document:
 
 
 def _made(path: Path, document: _Makes[_Made]) -> _Made:
-    try:
+    with errors_in(path):
         return document.made()
-    except Sd2Error as error:
-        raise Sd2Error(f"{path}: {error.found}", error.expected, error.remedy) from error
 
 
 def _text(content: dict[str, Any]) -> str:

@@ -114,7 +114,8 @@ def unpacked(content: bytes) -> tuple[list[bytes], int]:
         start, end = at + _PREFIX_BYTES, at + _PREFIX_BYTES + length
         payload = content[start:end]
         if (
-            prefix != b"%08x %08x " % (length, zlib.crc32(payload))
+            length < 0
+            or prefix != b"%08x %08x " % (length, zlib.crc32(payload))
             or content[end : end + 1] != b"\n"
         ):
             return records, at
@@ -289,7 +290,7 @@ class Journal:
                 self._others,
             )
         )
-        with atomic_write(path) as stream:
+        with atomic_write(path, mode=0o600) as stream:
             stream.write(record)
         self._parts.append(path)
         self._stream = os.open(path, os.O_WRONLY | os.O_APPEND | getattr(os, "O_BINARY", 0))

@@ -9,8 +9,9 @@ Every recording has a folder of its own below a folder of the caller's choice::
         000002-000004.declined parts of a session that the user discarded
         000001-000001.damaged  unreadable, and reported once
 
-Unreadable files are kept, and unsaved edits are deleted only when the user asks for it. A part
-that cannot be read costs that part: the one before it is offered, with a note.
+Only the user may read them. Unreadable files are kept, and unsaved edits are deleted only when
+the user asks for it. A part that cannot be read costs that part: the one before it is offered,
+with a note.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ from sd2core.files.atomic import remove_leftovers
 from sd2core.files.edit_lock import EditLock, Holder
 from sd2core.files.lock import is_locked
 from sd2core.files.paths import user_data
-from sd2core.labels.entries import first_fault
+from sd2core.files.texts import first_fault, read_content
 from sd2core.labels.journal import SUFFIX, Journal, Replayed, replay, unpacked
 from sd2core.labels.spans import Labels
 
@@ -78,6 +79,7 @@ class Search:
 
 def search(folder: Path, suffixes: Iterable[str], without: Container[int] = ()) -> Search:
     """Read what sessions, except ``without``, left in a recording's folder, the newest first."""
+    _make_private(folder, *(path for path in listed(folder) if path.is_file()))
     offers, notes = [], []
     settled: list[Path] = []
     damaged: list[Path] = []
@@ -104,8 +106,15 @@ def search(folder: Path, suffixes: Iterable[str], without: Container[int] = ()) 
     return Search(Found(tuple(offers), tuple(notes)), tuple(settled), tuple(damaged))
 
 
+def _make_private(*paths: Path) -> None:
+    """Take the permissions of other users away from files and folders, where that is possible."""
+    for path in paths:
+        with suppress(OSError):
+            path.chmod(path.stat().st_mode & 0o700)
+
+
 def _replayed(path: Path) -> tuple[Replayed, str]:
-    content = path.read_bytes()
+    content = read_content(path, "a journal of label edits")
     records, end = unpacked(content)
     if not records:
         raise _NoHeadError("it does not begin with a whole record")
@@ -191,6 +200,7 @@ class RecoveryPlace:
                 if not self._beside.take():
                     return False
         self._folder.mkdir(parents=True, exist_ok=True)
+        _make_private(self._folder.parent, self._folder)
         if self._lock.take():
             return True
         if self._beside is not None:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field, replace
 from operator import attrgetter
 from typing import Literal
 
 from sd2core.errors import Sd2Error
+from sd2core.files.recording_json import FARTHEST_S
 from sd2core.labels.label_set import GESTURES, LabelSet, check_name, check_text
 from sd2core.timebase import Timebase
 
@@ -18,6 +18,8 @@ Overlap = Literal["exclusive", "free"]
 ORIGINS: tuple[Origin, ...] = ("person", "suggestion", "import")
 OVERLAPS: tuple[Overlap, ...] = ("exclusive", "free")
 
+LARGEST_ID = 2**53 - 1
+"""Largest number that a float, and so any program that reads JSON, tells from the next one."""
 _IN_ORDER = attrgetter("start_s", "end_s", "id")
 
 
@@ -41,7 +43,7 @@ class Span:
     Parameters
     ----------
     id : int
-        At least 1; unique within the labels of a recording, and kept by edits.
+        1 to :data:`LARGEST_ID`; unique within the labels of a recording, and kept by edits.
     track : str
         Name of a :class:`LabelTrack`.
     start_s, end_s : float
@@ -63,14 +65,19 @@ class Span:
     origin: Origin = "person"
 
     def __post_init__(self) -> None:
-        if isinstance(self.id, bool) or not isinstance(self.id, int) or self.id < 1:
-            raise Sd2Error(f"The id of a span is {self.id!r}", "a whole number from 1 on")
+        whole = isinstance(self.id, int) and not isinstance(self.id, bool)
+        if not whole or not 1 <= self.id <= LARGEST_ID:
+            raise Sd2Error(
+                f"The id of a span is {self.id!r:.40}", f"a whole number from 1 to {LARGEST_ID}"
+            )
         check_name(self.label, "label")
         check_name(self.track, "track")
         check_text(self.note, "note of a span")
         check_text(self.author, "author of a span")
-        if not (math.isfinite(self.start_s) and math.isfinite(self.end_s)):
-            raise Sd2Error(f"{self.words()} is not finite", "finite times in seconds")
+        if not (abs(self.start_s) <= FARTHEST_S and abs(self.end_s) <= FARTHEST_S):
+            raise Sd2Error(
+                f"{self.words()} is not in time", f"finite times in seconds, up to {FARTHEST_S:g}"
+            )
         if not self.start_s < self.end_s:
             raise Sd2Error(f"{self.words()} ends before it has begun", "a start before the end")
         known = self.confidence

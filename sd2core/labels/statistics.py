@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sd2core.files.tables import as_cell
 from sd2core.labels.spans import Labels, Span
 
 HEADINGS = (
@@ -86,7 +87,7 @@ def statistics_text(rows: Iterable[Sequence[str]], separator: str = ",") -> str:
     writer = csv.writer(written, delimiter=separator, lineterminator="\n")
     writer.writerow(HEADINGS)
     for label, *cells in rows:
-        writer.writerow([label, *("" if cell == NO_NUMBER else cell for cell in cells)])
+        writer.writerow([as_cell(label), *("" if cell == NO_NUMBER else cell for cell in cells)])
     return written.getvalue()
 
 

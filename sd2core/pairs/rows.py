@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
@@ -12,7 +11,9 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field, ValidationError
 
 from sd2core.errors import Sd2Error
+from sd2core.files.limits import check_regular
 from sd2core.files.stores import Damage, StoredArray
+from sd2core.files.texts import first_fault, parse_json, whole_lines
 
 INDEX_NAME = "takes.jsonl"
 REMAKE = "Make the pairs again with `sd2 simulate campaign` or `sd2 pairs`"
@@ -63,9 +64,9 @@ def check_header(path: Path, header: Mapping[str, Any]) -> None:
 def _read_entry(line: str) -> dict[str, Any]:
     """Return the take that a line describes; ValueError if it is none."""
     try:
-        entry: dict[str, Any] = json.loads(line)
-    except RecursionError:
-        raise ValueError("nested too deeply") from None
+        entry: dict[str, Any] = parse_json(line, "it", "one take")
+    except Sd2Error as error:
+        raise ValueError(error.found) from None
     known = _Entry.model_validate(entry)
     if known.stop <= known.start:
         raise ValueError(f"its frames are {known.start} to {known.stop}")
@@ -74,10 +75,7 @@ def _read_entry(line: str) -> dict[str, Any]:
 
 def _reason_of(error: ValueError) -> str:
     """Place and reason of what pydantic refused, or what else was said."""
-    if isinstance(error, ValidationError):
-        first = error.errors(include_url=False)[0]
-        return f"{'.'.join(map(str, first['loc']))}: {first['msg']}"
-    return str(error)
+    return first_fault(error) if isinstance(error, ValidationError) else str(error)
 
 
 def check_array(array: StoredArray, frames: int, row: tuple[int, ...], kind: str) -> None:
@@ -159,9 +157,11 @@ def read_takes(path: Path, provenance: Any) -> list[dict[str, Any]]:
     index = path / INDEX_NAME
     if not index.exists():
         return []
-    lines = index.read_text(encoding="utf-8", errors="replace").split("\n")
+    check_regular(index)
+    with index.open("rb") as stream:
+        lines = [line.decode(errors="replace") for line in whole_lines(stream)]
     entries = []
-    for number, line in enumerate(lines[:-1], start=1):
+    for number, line in enumerate(lines, start=1):
         try:
             entry = _read_entry(line)
         except ValueError as error:

@@ -26,6 +26,7 @@ from sd2core.files.stores import (
     create_group,
     growing,
     open_group,
+    read_attributes,
 )
 from sd2core.maps import LimbMaps
 from sd2core.pairs.rows import (
@@ -273,11 +274,7 @@ class PairWriter:
 
 def is_pair_store(path: Path) -> bool:
     """Tell if a folder looks like pairs, from one small file."""
-    try:
-        header = json.loads((Path(path) / "zarr.json").read_text(encoding="utf-8"))
-        return bool(header["attributes"]["format"] == FORMAT)
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
-        return False
+    return bool(read_attributes(Path(path)).get("format") == FORMAT)
 
 
 def read_pairs(path: Path) -> PairSet:
@@ -356,7 +353,7 @@ def read_description(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
             f"{path} holds no pairs of synthetic and radar Doppler",
             "a folder made by `sd2 simulate campaign` or `sd2 pairs`",
         )
-    header = json.loads((path / "zarr.json").read_text(encoding="utf-8"))["attributes"]
+    header = read_attributes(path)
     if header.get("version") != VERSION:
         raise Sd2Error(
             f"{path} is of version {header.get('version')}", f"version {VERSION}", REMAKE

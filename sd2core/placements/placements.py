@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import json
 import math
-import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import MISSING, dataclass, fields
 from pathlib import Path
 from typing import Any, ClassVar
@@ -20,6 +19,7 @@ import numpy as np
 
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
+from sd2core.files.texts import errors_in, read_json, read_toml
 from sd2core.sensor import Vector, VirtualSensor, position_from_spherical
 
 FORMAT = "sd2-placements"
@@ -224,15 +224,8 @@ def read_placements(file: Path) -> Placements:
     Raises Sd2Error, which names the file, if it cannot be read or holds something else.
     """
     file = Path(file)
-    try:
-        text = file.read_text(encoding="utf-8")
-        content = tomllib.loads(text) if file.suffix.lower() == ".toml" else json.loads(text)
-    except (OSError, ValueError, RecursionError) as error:
-        raise Sd2Error(
-            f"{file} cannot be read ({error})",
-            "placements as JSON or TOML",
-            "`sd2 placements` writes such a file",
-        ) from error
+    read: Callable[..., Any] = read_toml if file.suffix.lower() == ".toml" else read_json
+    content = read(file, "placements as JSON or TOML", "`sd2 placements` writes such a file")
     if isinstance(content, dict):
         name, version = content.pop("format", FORMAT), content.pop("version", VERSION)
         if name != FORMAT or type(version) is not int or version != VERSION:
@@ -240,10 +233,8 @@ def read_placements(file: Path) -> Placements:
                 f"{file} has the format {name!r}, version {version!r}",
                 f"the format {FORMAT!r}, version {VERSION}",
             )
-    try:
+    with errors_in(file):
         return placements_from_dict(content)
-    except Sd2Error as error:
-        raise Sd2Error(f"{file}: {error.found}", error.expected, error.remedy) from error
 
 
 def write_placements(file: Path, placements: Placements) -> None:

@@ -35,6 +35,7 @@ from sd2core.files.recording_json import (
     Span,
     read_document,
 )
+from sd2core.files.texts import errors_in
 from sd2core.labels.files import FILE_NAME as LABELS_NAME
 from sd2core.labels.files import labels_of, read_labels, write_labels
 from sd2core.placements.placements import Placements, placements_from_dict
@@ -510,12 +511,9 @@ def open_recording(path: Path) -> Recording:
     digests = digests_of([folder / FILE_NAME])
     document = read_document(folder / FILE_NAME)
     planned = document.placements
-    try:
+    with errors_in(folder / FILE_NAME):
         sensor = VirtualSensor(**{name: getattr(document.sensor, name) for name in _SENSOR})
         placements = None if planned is None else placements_from_dict(planned)
-    except Sd2Error as error:
-        file = folder / FILE_NAME
-        raise Sd2Error(f"{file}: {error.found}", error.expected, error.remedy) from error
     recording = Recording(
         folder,
         **{role: located_path(getattr(document, role), folder) for role in ROLES},  # type: ignore[arg-type]

@@ -16,6 +16,7 @@ from typing import Any
 
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
+from sd2core.files.texts import read_json
 from sd2core.processes import INTERRUPTED, ONE_THREAD, ProcessId
 from sd2core.runs.control import read_control, write_control
 from sd2core.runs.folder import LIVE, RunFolder, State
@@ -148,10 +149,10 @@ class CommandFolder(RunFolder):
             return super().about()
         except Sd2Error:
             end = self._of_yesterday[1]
-            with suppress(OSError, ValueError, KeyError, TypeError):
-                about = json.loads(self.description.read_text(encoding="utf-8"))
+            with suppress(Sd2Error, ValueError, KeyError, TypeError):
+                about = read_json(self.description)
                 if about["format"] == self.format and "state" not in about:
-                    code = int(json.loads(end.read_text("utf-8"))["code"]) if end.exists() else None
+                    code = int(read_json(end)["code"]) if end.exists() else None
                     state = _STATES.get(code, "failed")
                     return {**about, "version": self.version, "state": state, "code": code}
             raise
@@ -178,8 +179,8 @@ class CommandFolder(RunFolder):
 
     def _read_launch(self, part: str) -> ProcessId | None:
         try:
-            return ProcessId(**json.loads(self._launched.read_text("utf-8"))[part])
-        except (OSError, ValueError, KeyError, TypeError):
+            return ProcessId(**read_json(self._launched)[part])
+        except (Sd2Error, KeyError, TypeError):
             return None
 
     @property

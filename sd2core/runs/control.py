@@ -14,7 +14,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal, get_args
 
+from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
+from sd2core.files.texts import read_text
 
 Word = Literal["run", "pause", "stop", "cancel"]
 WORDS: tuple[Word, ...] = get_args(Word)
@@ -30,8 +32,8 @@ def write_control(path: Path, word: Word) -> None:
 def read_control(path: Path) -> Word:
     """Word that a run is to obey; ``run`` where there is none, or an unknown one."""
     try:
-        text = path.read_text(encoding="utf-8").strip()
-    except (OSError, UnicodeDecodeError):
+        text = read_text(path, "a word").strip()
+    except Sd2Error:
         return "run"
     for word in WORDS:
         if text == word:

@@ -8,13 +8,19 @@ Needs neither Qt, Dask nor torch.
 from __future__ import annotations
 
 import json
+import os
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, ClassVar, Literal
+
+from pydantic import ValidationError
 
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.lock import FileLock, is_locked
+from sd2core.files.texts import first_fault, read_json
 from sd2core.processes import ProcessId
 from sd2core.runs.control import Word, write_control
 from sd2core.version import __version__
@@ -77,7 +83,7 @@ class RunFolder:
         try:
             about = self.about()
             return ProcessId(int(about["pid"]), float(about["process_started_unix_s"]))
-        except (Sd2Error, KeyError, TypeError, ValueError):
+        except (Sd2Error, KeyError, TypeError, ValueError, OverflowError):
             return None
 
     def lock(self) -> FileLock:
@@ -133,17 +139,12 @@ class RunFolder:
         Raises Sd2Error when there is no run, or its description is damaged.
         """
         path = self.description
-        try:
-            about = json.loads(path.read_text(encoding="utf-8"))
-        except FileNotFoundError:
+        if not os.path.exists(path):
             raise Sd2Error(
                 f"{self.path} is no {self.noun}",
                 f"a folder with {self.file_name}, made by `{self.maker}`",
-            ) from None
-        except (OSError, ValueError) as error:
-            raise Sd2Error(
-                f"{path} cannot be read ({error})", f"what `{self.maker}` wrote"
-            ) from error
+            )
+        about = read_json(path, f"what `{self.maker}` wrote")
         known = isinstance(about, dict) and about.get("format") == self.format
         known = known and about.get("version") == self.version
         if not known or about.get("state") not in (*LIVE, *ENDED):
@@ -151,6 +152,19 @@ class RunFolder:
                 f"{path} does not describe a {self.noun}", f"{self.format} version {self.version}"
             )
         return dict(about)
+
+    @contextmanager
+    def refusing_damage(self) -> Iterator[None]:
+        """Raise Sd2Error for what fails because values are of other types than were written."""
+        try:
+            yield
+        except (TypeError, ValueError, KeyError, AttributeError, OverflowError) as error:
+            reason = first_fault(error) if isinstance(error, ValidationError) else error
+            raise Sd2Error(
+                f"{self.description} or {self.progress.name} is damaged ({reason})",
+                f"what `{self.maker}` wrote",
+                "Copy the folder again",
+            ) from error
 
     def tell(self, word: Word) -> None:
         """Tell the process what to do.

@@ -10,8 +10,10 @@ import json
 import platform
 from pathlib import Path
 
+from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.paths import user_cache
+from sd2core.files.texts import read_json
 
 Kind = tuple[str | int | None, ...]
 """What is done, with all that the time of an item depends on: ``("fit", "medium")``."""
@@ -84,9 +86,9 @@ def _name(kind: Kind) -> str:
 def _known() -> dict[str, tuple[float, float]]:
     """Seconds per item, and those of the whole work, by kind."""
     try:
-        content = json.loads(_path().read_text(encoding="utf-8"))
+        content = read_json(_path())
         return {name: (float(each_s), float(all_s)) for name, (each_s, all_s) in content.items()}
-    except (OSError, ValueError, TypeError, AttributeError):  # none yet, or damaged
+    except (Sd2Error, ValueError, TypeError, AttributeError):  # none yet, or damaged
         return {}
 
 

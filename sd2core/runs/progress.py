@@ -14,6 +14,10 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, Self
 
+from sd2core.errors import Sd2Error
+from sd2core.files.limits import check_regular
+from sd2core.files.texts import parse_json, whole_lines
+
 Event = dict[str, Any]
 
 
@@ -74,14 +78,14 @@ class ProgressTail:
     def new(self) -> list[Event]:
         """Whole lines since the last call; a line that is still being written comes later."""
         try:
+            check_regular(self._path)
             with self._path.open("rb") as stream:
                 stream.seek(self._offset)
-                content = stream.read()
-        except OSError:  # not there yet, or discarded
+                found = [event for line in whole_lines(stream) if (event := _parsed(line))]
+                self._offset = stream.tell()
+        except (OSError, Sd2Error):  # not there yet, discarded, or no file
             return []
-        whole = content[: content.rfind(b"\n") + 1]
-        self._offset += len(whole)
-        return [event for line in whole.splitlines() if (event := _parsed(line)) is not None]
+        return found
 
 
 def read_events(path: Path) -> list[Event]:
@@ -120,9 +124,11 @@ def _undone(event: Event, done: int) -> bool:
 
 
 def _parsed(line: bytes) -> Event | None:
+    if not line.endswith(b"\n"):  # a piece of what is no line
+        return None
     try:
-        event = json.loads(line)
-    except ValueError:  # torn by a kill
+        event = parse_json(line.decode(errors="replace"), "The line", "an event")
+    except Sd2Error:  # torn by a kill
         return None
     return event if isinstance(event, dict) and isinstance(event.get("event"), str) else None
 

@@ -13,6 +13,7 @@ from safetensors.torch import save
 
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write, atomic_write_text
+from sd2core.files.limits import check_regular
 
 FORMAT = "sd2-checkpoint"
 VERSION = 1
@@ -83,6 +84,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
             "a run that came as far as its first checkpoint",
             "Start it again in another folder",
         )
+    check_regular(path)
     weights: dict[str, torch.Tensor] = {}
     moments: dict[int, dict[str, torch.Tensor]] = {}
     try:
@@ -98,7 +100,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
         if content.pop("format") != FORMAT or content.pop("version") != VERSION:
             raise ValueError(f"not {FORMAT} version {VERSION}")
         position = Position(**content.pop("position"))
-    except (SafetensorError, OSError, KeyError, TypeError, ValueError) as error:
+    except (SafetensorError, OSError, KeyError, TypeError, ValueError, RecursionError) as error:
         raise Sd2Error(
             f"{path} cannot be read ({error})", "a checkpoint that `sd2 train` wrote"
         ) from error

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, field, fields, replace
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Any
 
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import located_path
+from sd2core.files.texts import errors_in, read_toml
 from sd2core.files.toml import toml_lines
 from sd2core.pairs.segments import LENGTH, OVERLAP
 from sd2core.runs.pace import Kind
@@ -29,7 +29,7 @@ def number(low: float, high: float, *, whole: bool = False) -> Rule:
 
     def rule(key: str, value: Any) -> Any:
         fits = isinstance(value, int | float) and not isinstance(value, bool)
-        if not fits or (whole and int(value) != value) or not low <= value <= high:
+        if not fits or not low <= value <= high or (whole and int(value) != value):
             raise refused(key, value, allowed)
         return int(value) if whole else float(value)
 
@@ -244,13 +244,9 @@ def read_config(path: Path) -> TrainConfig:
     Raises Sd2Error if it cannot be read, is no TOML, or holds what is not allowed.
     """
     path = Path(path)
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise Sd2Error(f"{path} does not exist", "a TOML file with settings") from None
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise Sd2Error(f"{path} cannot be read ({error})", "a TOML file with settings") from error
-    return config_from(content, path.absolute().parent, str(path))
+    content = read_toml(path, "a TOML file with settings")
+    with errors_in(path):
+        return config_from(content, path.absolute().parent, str(path))
 
 
 def config_text(config: TrainConfig, folder: Path) -> str:

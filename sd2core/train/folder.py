@@ -6,9 +6,10 @@ Needs no torch: the window and ``sd2 runs`` look at runs without loading it.
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from pydantic.dataclasses import dataclass
 
 from sd2core.errors import Sd2Error
 from sd2core.runs.folder import LIVE, RunFolder, State
@@ -80,7 +81,8 @@ class TrainingFolder(RunFolder):
         Raises Sd2Error if there is no run, or its description is damaged.
         """
         state, about = self.state_and_about()
-        return _status(self, state, about, standing(read_events(self.progress)))
+        with self.refusing_damage():
+            return _status(self, state, about, standing(read_events(self.progress)))
 
     def discard(self) -> None:
         """Delete what the run made, and the folder when nothing else is in it."""

@@ -1,8 +1,9 @@
-"""Workers do not outlive the process that started them."""
+"""Workers do not outlive the process that started them, nor free memory its use."""
 
 from __future__ import annotations
 
 import os
+import platform
 import signal
 import subprocess
 import sys
@@ -133,3 +134,44 @@ def test_a_process_that_is_gone_holds_no_lock(tmp_path) -> None:
                 pass
             assert not is_locked(tmp_path / "lock")
             started.returncode = -signal.SIGKILL  # it has been asked for above
+
+
+USE = """
+import ctypes, sys, threading
+import numpy as np
+import psutil
+from sd2core.processes import keep_little_free_memory
+
+if sys.argv[1] == "little":
+    keep_little_free_memory()
+
+def resident_mb():
+    return psutil.Process().memory_info().rss / 1e6
+
+def work(kept, together):
+    for _ in range(5):
+        large = np.ones(20_000_000, np.uint8)
+        kept.append(bytes(200_000))  # between two large ones, as what a window keeps is
+    del large
+    together.wait()
+
+kept, together = [], threading.Barrier(9)
+np.ones(30_000_000, np.uint8)
+before_mb = resident_mb()
+threads = [threading.Thread(target=work, args=(kept, together)) for _ in range(8)]
+for thread in threads:
+    thread.start()
+together.wait()
+print(resident_mb() - before_mb - sum(map(len, kept)) / 1e6)
+"""
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="of the GNU C library")
+def test_memory_that_threads_have_freed_goes_back_to_the_system() -> None:
+    def left_mb(wish: str) -> float:
+        run = subprocess.run(
+            [sys.executable, "-c", USE, wish], capture_output=True, text=True, check=True
+        )
+        return float(run.stdout)
+
+    assert left_mb("little") < 30 < 60 < left_mb("much")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +13,8 @@ from sd2app.background.latest import LatestRunner
 from sd2app.widgets.record_table import Heading, RecordTableModel
 from sd2core.batch.folder import BatchFolder
 from sd2core.errors import Sd2Error
+from sd2core.files.limits import check_regular
+from sd2core.files.texts import parse_json, whole_lines
 from sd2core.placements.placements import Place
 from sd2core.sensor import Vector, VirtualSensor, spherical_from_position
 
@@ -85,9 +86,10 @@ class BatchResults(RecordTableModel[Result]):
 
 def _rows(file: Path) -> list[Result]:
     rows: dict[tuple[str, int], Result] = {}
-    with file.open(encoding="utf-8") as stream:
-        for line in stream:
-            row = _row(line)
+    check_regular(file)
+    with file.open("rb") as stream:
+        for line in whole_lines(stream):
+            row = _row(line.decode(errors="replace"))
             if row is not None:
                 rows.setdefault((row.recording, row.placement), row)
             if len(rows) >= _MOST_ROWS:
@@ -97,7 +99,7 @@ def _rows(file: Path) -> list[Result]:
 
 def _row(line: str) -> Result | None:
     try:
-        content = json.loads(line)
+        content = parse_json(line, "The line", "a map")
         maps = {
             kind: content[kind]
             for kind in ("synthetic", "denoised", "simulated")
@@ -113,7 +115,7 @@ def _row(line: str) -> Result | None:
             _vector(content["target_m"]),
             maps,
         )
-    except (ValueError, KeyError, TypeError, Sd2Error):
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, Sd2Error):
         return None
 
 

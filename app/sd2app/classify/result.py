@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 
 from sd2core.classify.metrics import shares
 from sd2core.errors import Sd2Error
+from sd2core.files.texts import read_json
 
 _EXPECTED = "table.json of `sd2 classify table`, or what `sd2 classify eval --json` writes"
 _TABLE = "table.json"
@@ -113,12 +113,10 @@ def read_result(path: Path) -> ClassResult:
             raise Sd2Error(f"{path} holds no {_TABLE}", _EXPECTED)
         path = inside
     try:
-        content = json.loads(path.read_text("utf-8"))
+        content = read_json(path, _EXPECTED)
         if "conditions" in content:
             return _of_table(path, content)
         return _of_score(path, content)
-    except OSError as error:
-        raise Sd2Error(f"{path} cannot be read ({error.strerror})", _EXPECTED) from error
     except (ValueError, KeyError, TypeError, IndexError, AttributeError) as error:
         raise Sd2Error(f"{path} is no such result ({error!r})", _EXPECTED) from error
 

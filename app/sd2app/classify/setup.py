@@ -22,6 +22,7 @@ from sd2core.datasets.labelled import (
     unfolded,
 )
 from sd2core.errors import Sd2Error
+from sd2core.files.texts import parse_json
 from sd2core.runs.pace import known_pace_s
 from sd2core.train.data import Split, split_subjects
 
@@ -208,8 +209,9 @@ class ClassSetup(RunSetup[DataSource]):
 def _people(text: str) -> dict[str, str]:
     """Stored names of people by the paths of their sources."""
     try:
-        return {str(path): str(name) for path, name in json.loads(text).items()}
-    except (ValueError, AttributeError):
+        people = parse_json(text, "The setting", "names of people")
+        return {str(path): str(name) for path, name in people.items()}
+    except (Sd2Error, AttributeError):
         return {}
 
 

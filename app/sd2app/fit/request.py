@@ -10,6 +10,7 @@ from typing import Any
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.paths import free_path, plain_path, remove
+from sd2core.files.texts import read_json
 from sd2core.recording.recording import FILE_NAME, SUFFIX, open_recording
 
 REQUEST_NAME = "fit-request.json"
@@ -118,9 +119,9 @@ class FitRequest:
 def read_request(folder: Path) -> FitRequest | None:
     """The request that a folder keeps; None where there is none that can be read."""
     try:
-        content = json.loads((folder / REQUEST_NAME).read_text(encoding="utf-8"))
+        content = read_json(folder / REQUEST_NAME)
         return _request(plain_path(folder), content)
-    except (OSError, ValueError, KeyError, TypeError):
+    except (Sd2Error, ValueError, KeyError, TypeError):
         return None
 
 

@@ -9,6 +9,8 @@ from typing import NamedTuple
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.settings import Settings
+from sd2core.errors import Sd2Error
+from sd2core.files.texts import parse_json
 
 HEADER_PX = 24
 """Height of the title row of a map, which is all of a folded one."""
@@ -102,7 +104,7 @@ def _read(text: str) -> Mapping[str, Row]:
     try:
         return {
             str(name): Row(None if px is None else int(px), bool(folded))
-            for name, (px, folded) in json.loads(text or "{}").items()
+            for name, (px, folded) in parse_json(text or "{}", "The setting", "rows").items()
         }
-    except (ValueError, TypeError, AttributeError):
+    except (Sd2Error, ValueError, TypeError, AttributeError, OverflowError):
         return {}

@@ -15,7 +15,9 @@ from PySide6.QtWidgets import QApplication
 from sd2app.settings import Settings
 from sd2app.shell.parts import Parts
 from sd2app.shell.window import MainWindow, is_dark
+from sd2app.widgets.picture import write_picture
 from sd2app.widgets.theme import apply_theme
+from sd2core.processes import keep_little_free_memory
 
 _SCREENSHOT_LIMIT_S = 120
 _SETTLE_S = 0.5
@@ -29,6 +31,7 @@ def run(paths: Sequence[Path] = (), *, screenshot: Path | None = None) -> int:
     """
     if screenshot is not None:
         os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+    keep_little_free_memory()
     application = QApplication.instance() or QApplication(sys.argv[:1])
     assert isinstance(application, QApplication)
     application.setApplicationName("SD² Studio")
@@ -77,15 +80,15 @@ def wait_until_settled(application: QApplication, window: MainWindow, limit_s: f
 def _take_screenshot(
     application: QApplication, window: MainWindow, path: Path, limit_s: float
 ) -> int:
-    """Write the window as PNG and close it; returns an exit code."""
+    """Write the window as PNG and close it; returns an exit code, or raises OSError."""
     settled = wait_until_settled(application, window, limit_s)
-    saved = window.grab().save(str(path), "PNG")
     failure = window.messages.text if window.ready else ""
-    window.close()
-    application.processEvents()
-    if not saved:
-        print(f"{path} cannot be written.", file=sys.stderr)
-        return 1
+    try:
+        write_picture(window, path)
+    finally:
+        window.close()
+        application.processEvents()
+    print(f"Wrote {path}")
     if not settled:
         print(f"The window got no further for {limit_s:.0f} s; {path} shows it.", file=sys.stderr)
         return 1

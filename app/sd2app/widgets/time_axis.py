@@ -15,6 +15,7 @@ from sd2app.palette import Palette
 GUTTER_PX = 56
 """Space left of every track for the velocity axis, so that all tracks line up."""
 MARGIN_PX = 8
+_FARTHEST_PX = 1e6
 
 
 @dataclass(frozen=True)
@@ -31,9 +32,9 @@ class TimeScale:
         return max(self.width_px - GUTTER_PX - MARGIN_PX, 1.0)
 
     def x_of(self, time_s: float) -> float:
-        """Pixel of a time."""
+        """Pixel of a time, at most a million from 0: Qt paints what is farther wrongly."""
         share = (time_s - self.start_s) / (self.end_s - self.start_s)
-        return GUTTER_PX + share * self.plot_width_px
+        return min(max(GUTTER_PX + share * self.plot_width_px, -_FARTHEST_PX), _FARTHEST_PX)
 
     def time_of(self, x_px: float) -> float:
         """Time of a pixel, extrapolated outside."""

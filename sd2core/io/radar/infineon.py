@@ -20,6 +20,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_folder, atomic_write, atomic_write_text
+from sd2core.files.limits import check_regular
+from sd2core.files.texts import errors_in, lines_of, read_json
 from sd2core.io.radar.capture import RadarCapture, check_cube
 from sd2core.radar_config import RadarConfig
 from sd2core.timebase import Timebase
@@ -32,6 +34,8 @@ _FIRST_PLAUSIBLE_UNIX_S = 1e8
 """Smaller start times are seconds since the start, not a date."""
 _LAST_PLAUSIBLE_UNIX_S = 1e11
 """Larger ones are not in seconds."""
+_LARGEST_TIME_S = 1e15
+"""What is larger, or infinite, is no time in any unit."""
 _FAR_TOO_SLOW = 100
 """Typical steps of this many frame repetition times are no pauses: the unit is another."""
 
@@ -205,16 +209,13 @@ def _json(content: dict[str, Any]) -> str:
 
 
 def _read_json(path: Path) -> Any:
-    try:
-        return json.loads(path.read_text("utf-8"))
-    except FileNotFoundError as error:
+    if not path.exists():
         raise Sd2Error(
             f"{path} is missing",
             f"{_DATA}, {_CONFIG} and {_TIMES} in one folder",
             "Copy the whole recording folder",
-        ) from error
-    except (OSError, ValueError) as error:
-        raise Sd2Error(f"{path} cannot be read as JSON ({error})", "a JSON text") from error
+        )
+    return read_json(path, "a JSON text")
 
 
 def _explain(path: Path, error: ValidationError) -> Sd2Error:
@@ -253,7 +254,7 @@ def _read_config(path: Path, meta: _Meta) -> RadarConfig:
             "a recording with one transmitter, mimo_mode 'off'",
             "Record again with one transmitter, or keep the chirps of one and its repetition time",
         )
-    try:
+    with errors_in(path):
         return RadarConfig(
             start_frequency_hz=shape.start_frequency_Hz,
             end_frequency_hz=shape.end_frequency_Hz,
@@ -266,12 +267,12 @@ def _read_config(path: Path, meta: _Meta) -> RadarConfig:
             adc_bits=meta.adc_resolution,
             name=meta.description,
         )
-    except Sd2Error as error:
-        raise Sd2Error(f"{path}: {error.found}", error.expected, error.remedy) from error
 
 
 def _open_samples(path: Path) -> NDArray[np.uint16]:
+    check_regular(path)
     try:
+        # Mapped, so that what its header says is compared with its size.
         return np.load(path, mmap_mode="r", allow_pickle=False)
     except FileNotFoundError as error:
         raise Sd2Error(
@@ -279,7 +280,7 @@ def _open_samples(path: Path) -> NDArray[np.uint16]:
             f"{_DATA}, {_CONFIG} and {_TIMES} in one folder",
             "Copy the whole recording folder",
         ) from error
-    except (OSError, ValueError, EOFError) as error:
+    except Exception as error:  # a damaged header fails in many ways
         size = path.stat().st_size
         raise Sd2Error(
             f"{path} ({size} bytes) cannot be read as an array ({error})",
@@ -304,6 +305,8 @@ def _read_times(
         which = "fewer" if len(times) < frames else "more"
         note = f"{path.name} has {len(times)} times for {frames} frames, {which} than it should"
         return regular, start_unix_s, (f"{note}: {fallback}.",)
+    if frames == 1:
+        return regular, start_unix_s, ()
     steps = np.diff(times)
     if not np.isfinite(times).all() or (steps <= 0).any():
         bad = int(np.flatnonzero(~(steps > 0))[0])
@@ -351,10 +354,12 @@ def _notes_on_steps(name: str, steps_s: NDArray[np.float64], nominal_s: float) -
 
 
 def _parse_times(path: Path) -> NDArray[np.float64]:
-    """One number per line; a heading in the first line is allowed."""
-    lines = [line.strip() for line in path.read_text("utf-8", "replace").splitlines()]
-    lines = [line for line in lines if line]
+    """One number per line, NaN where it is no time; a heading in the first line is allowed."""
+    check_regular(path)
     times = []
+    with path.open("rb") as stream:
+        texts = (line.decode(errors="replace").strip() for line in lines_of(stream))
+        lines = [text for text in texts if text]
     for number, line in enumerate(lines, start=1):
         try:
             times.append(float(line.split(",")[0]))
@@ -366,4 +371,5 @@ def _parse_times(path: Path) -> NDArray[np.float64]:
                 "one unix time in seconds per line",
                 "Remove the file to place frames by the frame repetition time",
             ) from error
-    return np.array(times, dtype=np.float64)
+    found = np.array(times, dtype=np.float64)
+    return np.where(np.abs(found) < _LARGEST_TIME_S, found, np.nan)

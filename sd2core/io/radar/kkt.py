@@ -22,6 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
+from sd2core.files.hdf5_files import member_of, open_hdf5_file, unreadable_hdf5
+from sd2core.files.limits import check_regular
 from sd2core.labels.label_set import LONGEST_NAME, Label, LabelSet
 from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.maps import DopplerMap
@@ -73,26 +75,20 @@ def load_kkt(path: Path | str) -> RecordedMap:
     HDF5, is damaged or cut off, holds something else, or values that no such recording has.
     """
     path = Path(path)
-    import h5py
-
+    check_regular(path)
     if not path.is_file():
         raise Sd2Error(f"There is no file {path}", "a gesture recording (.h5)", "Check the path")
-    try:
-        if not h5py.is_hdf5(path):
-            raise Sd2Error(f"{path} is not an HDF5 file", "a gesture recording (.h5)")
-        with h5py.File(path, "r") as file:
+    expected = "a complete gesture recording (.h5)"
+    with open_hdf5_file(path, expected) as file:
+        try:
             values = _values(file, path)  # (ranges, Dopplers, T)
             marks = _marks(file, path, values.shape[2])  # (T,)
             counts = _counts(file, path, values.shape[2])  # (T,) or None
-            attributes = _attributes(file)
-    except Sd2Error:
-        raise
-    except Exception as error:  # a damaged file fails in many ways
-        raise Sd2Error(
-            f"{path} cannot be read as HDF5 ({error})",
-            "a complete gesture recording (.h5)",
-            "Copy or download it again",
-        ) from error
+            attributes = _attributes(file, path)
+        except Sd2Error:
+            raise
+        except Exception as error:  # a damaged file fails in many ways
+            raise unreadable_hdf5(path, error, expected) from error
     timebase, notes = _clock(counts, values.shape[2])
     gesture = attributes.get(_NAME, "")
     if not (gesture.strip() and gesture.isprintable() and len(gesture) <= LONGEST_NAME):
@@ -129,13 +125,15 @@ def load_kkt(path: Path | str) -> RecordedMap:
     )
 
 
-def _over_ranges(values: NDArray[np.float64]) -> NDArray[np.float32]:
+def _over_ranges(values: NDArray[np.floating]) -> NDArray[np.float32]:
     """Power over velocity, ascending, positive when approaching: (31, T).
 
     In the recordings that the layout was read off, echoes above the middle bin move to
     higher range indices. Those are taken to be farther away, so such an echo recedes.
     """
-    power = np.square(values).sum(axis=0)
+    power = np.zeros(values.shape[1:])
+    for at_range in values:  # One after the other: an hour of all of them takes a gigabyte.
+        power += np.square(at_range.astype(np.float64))
     return power[:0:-1].astype(np.float32)
 
 
@@ -172,7 +170,7 @@ def _clock(counts: NDArray[np.int64] | None, frames: int) -> tuple[Timebase, tup
     return Timebase(numbers * FRAME_S), notes if lost else ()
 
 
-def _values(file: h5py.File, path: Path) -> NDArray[np.float64]:
+def _values(file: h5py.File, path: Path) -> NDArray[np.floating]:
     dataset = _dataset(file, path, "DS1")
     shape = dataset.shape
     fits = len(shape) == 4 and shape[:3] == (2, _RANGES, _DOPPLERS) and shape[3] > 0
@@ -186,7 +184,7 @@ def _values(file: h5py.File, path: Path) -> NDArray[np.float64]:
         raise Sd2Error(
             f"DS1 of {path} has {shape[3]:,} frames", f"up to {_MOST_FRAMES:,}, about an hour"
         )
-    values = np.asarray(dataset[0], dtype=np.float64)
+    values: NDArray[np.floating] = dataset[0]
     good = np.isfinite(values) & (values >= 0)
     if not good.all():
         at_range, at_doppler, frame = np.argwhere(~good)[0]
@@ -214,35 +212,28 @@ def _marks(file: h5py.File, path: Path, frames: int) -> NDArray[np.bool_]:
 
 def _counts(file: h5py.File, path: Path, frames: int) -> NDArray[np.int64] | None:
     """Frame counter of the sensor, (T,); None if there is none that fits."""
-    if "FRAME_COUNT" not in file:
-        return None
-    dataset = _dataset(file, path, "FRAME_COUNT")
-    if dataset.dtype.kind not in "iu" or dataset.shape != (frames, 2):
+    dataset = member_of(file, path, "FRAME_COUNT")
+    if dataset is None or dataset.dtype.kind not in "iu" or dataset.shape != (frames, 2):
         return None
     return np.asarray(dataset[:, 0], dtype=np.int64)
 
 
 def _dataset(file: h5py.File, path: Path, name: str) -> h5py.Dataset:
-    """A dataset whose numbers are in this very file."""
+    """An array that must be there."""
     import h5py
 
-    link = file.get(name, getlink=True)
-    if link is None:
+    found = member_of(file, path, name)
+    if found is None:
         holds = ", ".join(sorted(map(str, file.keys()))[:6]) or "nothing"
         raise Sd2Error(f"{path} has no {name}; it holds {holds}", _EXPECTED)
-    if not isinstance(link, h5py.HardLink):
-        raise Sd2Error(f"{name} of {path} is a link to elsewhere", f"{name} in the file itself")
-    found = file[name]
     if not isinstance(found, h5py.Dataset) or found.shape is None:
         raise Sd2Error(f"{name} of {path} is no array", _EXPECTED)
-    if found.external or found.is_virtual:
-        raise Sd2Error(f"{name} of {path} lies in another file", f"{name} in the file itself")
     return found
 
 
-def _attributes(file: h5py.File) -> dict[str, str]:
+def _attributes(file: h5py.File, path: Path) -> dict[str, str]:
     """Notes of the recorder as text, but for ``Description``, which is the same in all files."""
-    group = file.get(_GROUP)
+    group = member_of(file, path, _GROUP)
     if group is None:
         return {}
     names = (_NAME, "Datatime", "Device", "FW_version", "Hand_type", "Mode")

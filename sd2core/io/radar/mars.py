@@ -15,13 +15,15 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
+from sd2core.files.limits import check_regular
+from sd2core.files.texts import lines_of
 
 JOINTS = (
     "SpineBase",
@@ -195,9 +197,12 @@ def _joints(path: Path) -> NDArray[np.float64]:
 
 def _columns(path: Path, names: tuple[str, ...] | list[str]) -> NDArray[np.float64]:
     """Some columns of a file of numbers under a heading, (n, len(names))."""
+    expected = "numbers separated by commas under a heading"
+    check_regular(path)
     try:
-        with path.open(encoding="utf-8-sig") as stream:
-            heading = [name.strip() for name in stream.readline().split(",")]
+        with path.open("rb") as stream:
+            lines = (line.decode("utf-8-sig") for line in lines_of(stream) if line.strip())
+            heading = [name.strip() for name in next(lines, "").split(",")]
             missing = [name for name in names if name not in heading]
             if missing:
                 more = f" and {len(missing) - 3} more" if len(missing) > 3 else ""
@@ -205,15 +210,13 @@ def _columns(path: Path, names: tuple[str, ...] | list[str]) -> NDArray[np.float
                     f"{path} has no column {', '.join(missing[:3])}{more}",
                     "the columns of the MARS recordings",
                 )
-            lines = [line for line in stream if line.strip()]
-        if not lines:
-            raise Sd2Error(f"{path} holds no rows", "at least one")
-        places = [heading.index(name) for name in names]
-        table = np.loadtxt(lines, delimiter=",", usecols=places, ndmin=2)
+            first = next(lines, None)
+            if first is None:
+                raise Sd2Error(f"{path} holds no rows", "at least one")
+            places = [heading.index(name) for name in names]
+            table = np.loadtxt(chain([first], lines), delimiter=",", usecols=places, ndmin=2)
     except (OSError, ValueError) as error:
-        raise Sd2Error(
-            f"{path} cannot be read ({error})", "numbers separated by commas under a heading"
-        ) from error
+        raise Sd2Error(f"{path} cannot be read ({error})", expected) from error
     if not np.isfinite(table).all():
         row, column = np.argwhere(~np.isfinite(table))[0]
         raise Sd2Error(

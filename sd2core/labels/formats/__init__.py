@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sd2core.errors import Sd2Error
+from sd2core.files.texts import errors_in, read_text
 from sd2core.labels import files
 from sd2core.labels.formats import (
     audacity,
@@ -26,7 +27,6 @@ from sd2core.labels.formats import (
     textgrid,
 )
 from sd2core.labels.formats.losses import ASPECTS, Aspect, LabelFormat, Loss, sentences
-from sd2core.labels.formats.texts import read_text
 from sd2core.labels.spans import Labels
 from sd2core.timebase import Timebase
 
@@ -126,7 +126,8 @@ def read_labels(
     """
     path = Path(path)
     chosen = format_for(path, writing=False) if format is None else _named(format)
-    return _PROGRAMS[chosen.name].read(path, timebase, observation)
+    with errors_in(path):
+        return _PROGRAMS[chosen.name].read(path, timebase, observation)
 
 
 def write_labels(

@@ -11,9 +11,10 @@ from pathlib import Path
 
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
+from sd2core.files.texts import read_text
 from sd2core.labels.formats.losses import LabelFormat, Loss, losses_by_format
+from sd2core.labels.formats.numbers import positional
 from sd2core.labels.formats.rows import UNNAMED, Row, assemble
-from sd2core.labels.formats.texts import positional, read_text
 from sd2core.labels.spans import Labels
 from sd2core.timebase import Timebase
 

@@ -18,9 +18,9 @@ from typing import Any
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.paths import plain_path, stored_path
+from sd2core.files.texts import read_json
 from sd2core.labels.formats.losses import ASPECTS, LabelFormat, Loss, counted, losses_by_format
 from sd2core.labels.formats.rows import Lane, Row, assemble, clean_name, edges_s, lanes_of, track_of
-from sd2core.labels.formats.texts import read_text
 from sd2core.labels.label_set import GESTURES, Label, LabelSet
 from sd2core.labels.spans import Labels, Overlap, Span
 from sd2core.timebase import Timebase
@@ -127,13 +127,7 @@ def read(path: Path, timebase: Timebase | None = None, observation: str | None =
 
 
 def _project(path: Path) -> dict[str, Any]:
-    text = read_text(path, _EXPECTED)
-    try:
-        project = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise Sd2Error(
-            f"{path} is not whole JSON: {error}", _EXPECTED, "Copy it again, or save it in BORIS"
-        ) from None
+    project = read_json(path, _EXPECTED, "Copy it again, or save it in BORIS")
     if not isinstance(project, dict) or not isinstance(project.get("observations"), dict):
         raise Sd2Error(f"{path} is JSON without observations", _EXPECTED)
     return project

@@ -7,7 +7,8 @@ RFC 4180, in UTF-8 without a byte order mark, with these columns::
 ``first_frame`` is the frame shown at ``start_s``, counted from 0, ``last_frame`` the last one of
 the span, and ``frames`` their number; a span outside the video has none. Seconds are exact, and
 are what counts when a file has both. ``end_frame``, in tables of before, is the first one after
-the span.
+the span. A text that a spreadsheet would compute, such as ``=1+1``, has an apostrophe in front,
+which is taken off again when it is read.
 
 Tables of other programs are read by the names of their columns, whatever separates them.
 """
@@ -24,6 +25,8 @@ from pathlib import Path
 
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
+from sd2core.files.tables import as_cell, of_cell
+from sd2core.files.texts import read_text
 from sd2core.labels.formats.losses import (
     ASPECTS,
     LabelFormat,
@@ -31,8 +34,8 @@ from sd2core.labels.formats.losses import (
     hold_texts,
     losses_by_format,
 )
+from sd2core.labels.formats.numbers import whole_number
 from sd2core.labels.formats.rows import UNNAMED, TableRows, assemble
-from sd2core.labels.formats.texts import read_text, whole_number
 from sd2core.labels.spans import Labels
 from sd2core.timebase import Timebase
 
@@ -42,7 +45,8 @@ FORMAT = LabelFormat(
     suffixes=(".csv", ".tsv"),
     made_for="spreadsheets, pandas, R",
     keeps=frozenset(ASPECTS) - {"empty tracks", "label set", "colours and keys"},
-    remark="Seconds, and the first frame, the last one and their number.",
+    remark="Seconds, and the first frame, the last one and their number. A text that a spreadsheet"
+    " would compute, such as =1+1, has an apostrophe in front; reading takes it off again.",
 )
 
 COLUMNS = (
@@ -94,9 +98,10 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
         known = span.confidence
         writer.writerow(
             (
-                *(span.id, span.track, track.overlap, span.label),
+                *(span.id, as_cell(span.track), track.overlap, as_cell(span.label)),
                 *(float(span.start_s), float(span.end_s), *frames),
-                *(span.note, span.author, "" if known is None else float(known), span.origin),
+                *(as_cell(span.note), as_cell(span.author)),
+                *("" if known is None else float(known), span.origin),
             )
         )
     atomic_write_text(path, text.getvalue())
@@ -118,7 +123,7 @@ def read(path: Path, timebase: Timebase | None = None, observation: str | None =
     numbers = _Numbers(path, lines, where)
     table = TableRows()
     for line, cells in lines:
-        cell = {name: cells[index] for name, index in where.items()}
+        cell = {name: of_cell(cells[index]) for name, index in where.items()}
         edges_s = _edges_s(path, line, numbers, cell, timebase)
         known = cell.get("confidence")
         confidence = numbers.of(line, "confidence", known) if known else None
@@ -128,6 +133,7 @@ def read(path: Path, timebase: Timebase | None = None, observation: str | None =
 
 def _table(path: Path, text: str) -> tuple[list[str], list[tuple[int, list[str]]]]:
     """Heading and rows, each with the number of its first line."""
+    csv.field_size_limit(max(csv.field_size_limit(), len(text)))
     first = next(line for line in text.splitlines() if line.strip())
     fitting = [mark for mark in ",;\t|" if _spoken_for(next(csv.reader([first], delimiter=mark)))]
     if not fitting:
@@ -143,7 +149,6 @@ def _table(path: Path, text: str) -> tuple[list[str], list[tuple[int, list[str]]
             "one kind of separator",
             "Save the table with commas",
         )
-    csv.field_size_limit(max(csv.field_size_limit(), len(text)))
     reader = csv.reader(
         io.StringIO(text, newline=""), delimiter=fitting[0], skipinitialspace=True, strict=True
     )

@@ -12,8 +12,9 @@ from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import fromstring
 
 from sd2core.errors import Sd2Error
+from sd2core.files.texts import read_content
+from sd2core.labels.formats.numbers import whole_number
 from sd2core.labels.formats.rows import Row, assemble, clean_name, track_of
-from sd2core.labels.formats.texts import read_content, whole_number
 from sd2core.labels.label_set import GESTURES, Label, LabelSet
 from sd2core.labels.spans import Labels
 from sd2core.timebase import Timebase

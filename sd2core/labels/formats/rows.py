@@ -16,9 +16,18 @@ from typing import TypeVar
 
 from sd2core.errors import Sd2Error
 from sd2core.labels.formats.losses import DEFAULT_TRACK
-from sd2core.labels.formats.texts import whole_number
+from sd2core.labels.formats.numbers import whole_number
 from sd2core.labels.label_set import GESTURES, LONGEST_NAME, LabelSet
-from sd2core.labels.spans import ORIGINS, OVERLAPS, Labels, LabelTrack, Origin, Overlap, Span
+from sd2core.labels.spans import (
+    LARGEST_ID,
+    ORIGINS,
+    OVERLAPS,
+    Labels,
+    LabelTrack,
+    Origin,
+    Overlap,
+    Span,
+)
 from sd2core.timebase import Timebase
 
 UNNAMED = "unnamed"
@@ -122,7 +131,7 @@ def _ids(rows: Sequence[Row]) -> list[int]:
     used: set[int] = set()
     kept: list[int | None] = []
     for row in rows:
-        fits = row.id is not None and row.id > 0 and row.id not in used
+        fits = row.id is not None and 0 < row.id <= LARGEST_ID and row.id not in used
         kept.append(row.id if fits else None)
         if fits and row.id is not None:
             used.add(row.id)
@@ -175,7 +184,7 @@ def _overlapping(spans: Sequence[Span]) -> set[str]:
     return found
 
 
-_ROW = re.compile(r"(.+) \[overlap (\d+)\]")
+_ROW = re.compile(r"(.+) \[overlap (\d{1,18})\]")
 
 Time = TypeVar("Time", int, float)
 

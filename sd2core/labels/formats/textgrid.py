@@ -14,9 +14,10 @@ from pathlib import Path
 
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
+from sd2core.files.texts import read_text
 from sd2core.labels.formats.losses import LabelFormat, Loss, losses_by_format
+from sd2core.labels.formats.numbers import positional, whole_number
 from sd2core.labels.formats.rows import Lane, Row, assemble, edges_s, lanes_of, track_of
-from sd2core.labels.formats.texts import positional, read_text, whole_number
 from sd2core.labels.spans import Labels, Overlap
 from sd2core.timebase import Timebase
 

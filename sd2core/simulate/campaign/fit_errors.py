@@ -30,12 +30,14 @@ from sd2core.body.shape import BodyShape
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.resources import resource_path
+from sd2core.files.texts import read_json
 from sd2core.simulate.campaign.posture import Group, all_groups, change_posture, posture
 
 FORMAT = "sd2-fit-errors"
 VERSION = 1
 RESOURCE = "fit_errors.json"
 
+_EXPECTED = f"a file of format {FORMAT}, see docs/formats.md"
 _WAVES = 96
 
 
@@ -106,7 +108,7 @@ class FitErrors:
         """
         path = resource_path(RESOURCE) if path is None else Path(path)
         try:
-            said = json.loads(path.read_text("utf-8"))
+            said = read_json(path, _EXPECTED)
             if said["format"] != FORMAT or said["version"] > VERSION:
                 raise Sd2Error(
                     f"{path} is of format {said['format']!r} version {said['version']}",
@@ -129,10 +131,10 @@ class FitErrors:
                 np.array(said["shape_covariance"], np.float64),
                 said["provenance"],
             )
-        except (OSError, KeyError, TypeError, ValueError) as error:
+        except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
             raise Sd2Error(
                 f"{path} cannot be read as errors of fits ({error})",
-                "a file of format sd2-fit-errors, see docs/formats.md",
+                _EXPECTED,
             ) from error
 
     def as_dict(self) -> dict[str, Any]:

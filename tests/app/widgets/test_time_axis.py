@@ -14,6 +14,12 @@ def test_pixels_and_times_lead_back_to_each_other(start, duration, width, share)
     assert scale.time_of(scale.x_of(time_s)) == pytest.approx(time_s, abs=1e-6 * duration)
 
 
+def test_what_is_far_away_has_a_pixel_that_can_be_painted():
+    scale = TimeScale(0.0, 0.1, 4000)
+    assert scale.x_of(1e12) == 1e6
+    assert scale.x_of(-1e308) == -1e6
+
+
 @given(st.floats(-1e3, 1e3), st.floats(1e-2, 1e4), st.integers(1, 20))
 def test_ticks_are_round_inside_and_not_too_many(low, span, most):
     high = low + span

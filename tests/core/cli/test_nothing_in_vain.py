@@ -57,8 +57,8 @@ class TestOutput:
         command: str,
         monkeypatch: pytest.MonkeyPatch,
     ) -> None:
-        def refuse(**_: object) -> None:
-            raise PermissionError(13, "Permission denied", str(tmp_path / ".sd2-x.tmp"))
+        def refuse(name: str, *_: object) -> None:
+            raise PermissionError(13, "Permission denied", name)
 
         monkeypatch.setattr("sd2core.io.mesh.load_mesh", must_not_work)
         monkeypatch.setattr("sd2core.io.radar.load_capture", must_not_work)
@@ -66,7 +66,7 @@ class TestOutput:
         outcome = sd2(command, plate, "--out", tmp_path / "folder.npz")
         assert outcome.code == 1
         assert "folder.npz is a folder" in outcome.err
-        monkeypatch.setattr("sd2core.files.atomic.tempfile.mkstemp", refuse)
+        monkeypatch.setattr("sd2core.files.atomic.os.open", refuse)
         outcome = sd2(command, plate, "--out", tmp_path / "map.npz")
         assert outcome.code == 1
         assert "map.npz cannot be written (Permission denied)" in outcome.err

@@ -76,7 +76,7 @@ def test_what_is_written_is_read_and_what_a_recording_plans_is_listed(
         (("--ranges", "1", "--seed", "3"), "--seed is given without --cloud"),
         (("--cloud", "3", "--ranges", "1,2"), "is not an interval"),
         (("--ranges", "1", "--placements", "x.json"), "--placements is given with --ranges"),
-        (("--placements", "nowhere.json"), "nowhere.json cannot be read"),
+        (("--placements", "nowhere.json"), "nowhere.json does not exist"),
         (("--ranges", "1", "--out", "x.txt"), "ends in .json"),
     ],
 )

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from full_disk import full_disk
 
 from sd2core.body.model import Body
 from sd2core.body.rotations import about
@@ -169,6 +170,14 @@ def test_the_figure_shows_every_mesh(mesh: MeshSequence, tmp_path: Path, suffix:
     save_figure(draw_comparison(found), tmp_path / f"figure{suffix}")
     start = (tmp_path / f"figure{suffix}").read_bytes()[:200]
     assert {".png": b"PNG", ".svg": b"<?xml"}[suffix] in start
+
+
+@pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
+def test_a_figure_is_whole_or_not_there(mesh: MeshSequence, tmp_path: Path, suffix: str) -> None:
+    figure = draw_comparison(compare_meshes([mesh, mesh], ["a", "b"]))
+    with full_disk(), pytest.raises(OSError, match="figure"):
+        save_figure(figure, tmp_path / f"figure{suffix}")
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_figure_of_another_kind_is_refused(mesh: MeshSequence, tmp_path: Path) -> None:

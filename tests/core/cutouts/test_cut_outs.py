@@ -93,6 +93,16 @@ def test_the_index_lists_all_that_was_ever_cut_into_the_folder(source, tmp_path)
     assert "/" not in rows[1]["folder"]
 
 
+def test_a_spreadsheet_computes_no_text_of_the_index(source, tmp_path) -> None:
+    cut(source.only(["maps"]), tmp_path, replace(WAVE, label="=1+1", note="-x", author="@a"))
+    with (tmp_path / "index.csv").open(encoding="utf-8", newline="") as file:
+        (row,) = csv.DictReader(file)
+    assert [row[name] for name in ("label", "note", "author")] == ["'=1+1", "'-x", "'@a"]
+    assert (
+        json.loads((tmp_path / "index.json").read_text("utf-8"))["spans"][0]["span"]["note"] == "-x"
+    )
+
+
 def test_what_is_there_and_the_same_is_left_alone(source, tmp_path) -> None:
     first = cut(source, tmp_path, WAVE, PUSH)
     before = [path.stat().st_mtime_ns for path in first]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import json
 import os
 import shutil
 from collections.abc import Callable
@@ -143,3 +144,34 @@ def test_hdf5_has_checksums_and_names_what_is_damaged(tmp_path: Path) -> None:
         assert np.array_equal(dataset["synthetic"][:32], truth[:32])
         with pytest.raises(Sd2Error, match=r"set\.h5 cannot be read: segments 32 to 49 of synth"):
             dataset["synthetic"][40]
+
+
+def test_what_a_data_set_in_hdf5_has_elsewhere_is_refused(tmp_path: Path) -> None:
+    out = tmp_path / "set.h5"
+    write_dataset(out, several(), OPTIONS)
+    for name in ("meta", "sources", "synthetic", "start_s"):
+        linked = tmp_path / f"{name}.h5"
+        shutil.copy(out, linked)
+        with h5py.File(linked, "a") as file:
+            del file[name]
+            file[name] = h5py.ExternalLink(str(out), name)
+        with (
+            pytest.raises(Sd2Error, match=rf"{name} of .*{name}\.h5 is a link to elsewhere"),
+            open_dataset(linked) as found,
+        ):
+            list(found.sources())
+
+
+def test_sources_that_together_are_larger_than_the_limit_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "set.h5"
+    write_dataset(out, several(), OPTIONS)
+    with open_dataset(out) as found:
+        first = len(json.dumps(next(found.sources())))
+        monkeypatch.setenv("SD2_READ_LIMIT_GB", str((first + 10) / 1e9))
+        monkeypatch.setattr("sd2core.files.limits.MULTIPLE", 0)
+        lines = found.sources()
+        next(lines)
+        with pytest.raises(Sd2Error, match=r"sources of .*set\.h5 declares"):
+            next(lines)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import struct
 import subprocess
 import sys
@@ -253,3 +254,22 @@ def test_a_card_is_checked() -> None:
         with pytest.raises(Sd2Error):
             replace(card, **wrong)
     assert ModelCard.from_json(json.loads(json.dumps(card.to_json()))) == card
+
+
+def test_a_network_larger_than_its_weights_is_not_built(model: Path) -> None:
+    """As described it would take 25 GB."""
+    change_card(model, lambda card: card["options"].update(channels=1024, depth=1024))
+    with pytest.raises(Sd2Error, match=r"small\.safetensors: the weights are not those"):
+        load_model(model)
+
+
+def test_bytes_after_the_weights_are_refused(model: Path) -> None:
+    model.write_bytes(model.read_bytes() + b"x")
+    with pytest.raises(Sd2Error, match=r"small\.safetensors has .* as its header says"):
+        describe_model(model)
+
+
+def test_a_pipe_is_not_opened(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.safetensors")
+    with pytest.raises(Sd2Error, match=r"pipe\.safetensors is a named pipe"):
+        describe_model(tmp_path / "pipe.safetensors")

@@ -3,6 +3,10 @@ from __future__ import annotations
 import os
 import stat
 import sys
+import threading
+import time
+from collections.abc import Iterator
+from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 
 import pytest
 
@@ -26,16 +30,60 @@ def test_the_new_file_replaces_the_old_one(tmp_path):
     assert path.read_text(encoding="utf-8") == "new: ±2 m/s"
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="POSIX permissions")
+posix = pytest.mark.skipif(sys.platform == "win32", reason="POSIX permissions")
+
+
+@pytest.fixture
+def mask() -> Iterator[None]:
+    """Others of the group may read what is written, and nobody else."""
+    before = os.umask(0o027)
+    yield
+    os.umask(before)
+
+
+@posix
+@pytest.mark.usefixtures("mask")
 def test_the_file_is_as_readable_as_any_other(tmp_path):
-    path, plain = tmp_path / "file.json", tmp_path / "plain"
-    before = os.umask(0o022)
-    try:
-        atomic_write_text(path, "text")
-        plain.write_text("text")
-    finally:
-        os.umask(before)
-    assert stat.S_IMODE(path.stat().st_mode) == stat.S_IMODE(plain.stat().st_mode)
+    atomic_write_text(tmp_path / "file.json", "text")
+    with atomic_write(tmp_path / "private.json", mode=0o600):
+        pass
+    modes = {path.name: stat.S_IMODE(path.stat().st_mode) for path in tmp_path.iterdir()}
+    assert modes == {"file.json": 0o640, "private.json": 0o600}
+
+
+@posix
+@pytest.mark.usefixtures("mask")
+def test_files_of_other_threads_keep_their_permissions_meanwhile(tmp_path, monkeypatch):
+    of_the_system, done = os.umask, threading.Event()
+
+    def slow(mask: int) -> int:
+        before = of_the_system(mask)
+        time.sleep(0.01)  # lets the other threads run, as the system may at any time
+        return before
+
+    monkeypatch.setattr(os, "umask", slow)
+
+    def write() -> None:
+        for number in range(50):
+            atomic_write_text(tmp_path / "file.json", f"{number}")
+        done.set()
+
+    modes: set[int] = set()
+
+    def create(name: str) -> None:
+        path = tmp_path / name
+        while not done.is_set():
+            path.touch()
+            modes.add(stat.S_IMODE(path.stat().st_mode))
+            path.unlink()
+
+    with ThreadPoolExecutor(4) as threads:
+        works = [threads.submit(write), *(threads.submit(create, name) for name in "abc")]
+        wait(works, return_when=FIRST_EXCEPTION)
+        done.set()
+    for work in works:
+        work.result()
+    assert modes == {0o640}
 
 
 def test_an_error_reads_as_sentences():
@@ -83,10 +131,10 @@ def test_looking_whether_a_file_can_be_written_leaves_no_trace(tmp_path):
 
 
 def test_a_folder_that_may_not_be_written_is_named(tmp_path, monkeypatch):
-    def refuse(**_):
-        raise PermissionError(13, "Permission denied", str(tmp_path / ".sd2-abc.tmp"))
+    def refuse(name, *_):
+        raise PermissionError(13, "Permission denied", name)
 
-    monkeypatch.setattr("sd2core.files.atomic.tempfile.mkstemp", refuse)
+    monkeypatch.setattr("sd2core.files.atomic.os.open", refuse)
     with pytest.raises(PermissionError) as caught:
         check_writable(tmp_path / "file.json")
     assert caught.value.filename == str(tmp_path / "file.json")

@@ -12,14 +12,18 @@ from typing import Any
 import numpy as np
 import pytest
 import zarr
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
-from numcodecs import Blosc, Shuffle
-from zarr.codecs import BloscCodec
+from numcodecs import Blosc, GZip, Shuffle, Zlib, Zstd
+from zarr.codecs import BloscCodec, GzipCodec, ZstdCodec
 
 from sd2core.errors import Sd2Error
-from sd2core.files.chunk_codecs import DamagedChunkError, check_blosc_frame
+from sd2core.files.chunk_codecs import DamagedChunkError, check_blosc_frame, check_zstd_frame
+from sd2core.files.limits import VARIABLE
 from sd2core.files.stores import StoredArray, array_in, create_array, create_group, open_group
+from sd2core.io.kinds import is_dataset
+from sd2core.io.mesh import load_mesh
+from sd2core.pairs.store import is_pair_store
 from tests.damaged_files import change
 
 ROWS, CHUNK = 40, 10
@@ -190,10 +194,8 @@ def test_shards_are_verified_as_files(tmp_path: Path) -> None:
 
 
 def test_a_zip_that_changed_is_named(tmp_path: Path) -> None:
-    path, packed = store(tmp_path / "new.zarr"), tmp_path / "new.zarr.zip"
-    with zipfile.ZipFile(packed, "w") as archive:
-        for file in path.rglob("*"):
-            archive.write(file, file.relative_to(path))
+    path = store(tmp_path / "new.zarr")
+    packed = zipped(path)
     assert np.array_equal(opened(packed)[...], values())
     content = bytearray(packed.read_bytes())
     content[content.index(chunk(path, 1).read_bytes()) + 100] ^= 4
@@ -234,3 +236,111 @@ def test_nobody_opens_zarr_another_way() -> None:
         if any(word in file.read_text(encoding="utf-8") for word in opening)
     }
     assert ways == {"sd2core/files/stores.py"}
+
+
+@pytest.mark.parametrize("packed", [False, True])
+def test_a_shape_that_a_store_cannot_hold_is_refused_until_the_limit_is_raised(
+    tmp_path: Path, packed: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = old_store(tmp_path / "a.zarr")
+    change_text(path / "a" / "zarr.json", "40,\n    500", "40,\n    500000")
+    change_text(path / "a" / "zarr.json", "10,\n        500", "10,\n        500000")
+    if packed:
+        path = zipped(path)
+    monkeypatch.setenv(VARIABLE, "0.001")
+    with pytest.raises(Sd2Error, match=rf"{path.name} declares 80\.0 MB.*{VARIABLE} to 0\.2"):
+        open_group(path)
+    monkeypatch.setenv(VARIABLE, "0.2")
+    assert opened(path).shape == (40, 500_000)
+
+
+@pytest.mark.parametrize("packed", [False, True])
+def test_a_description_without_end_is_refused(
+    tmp_path: Path, packed: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = store(tmp_path / "a.zarr")
+    (path / "a" / "zarr.json").write_text("[" * 200_000)
+    if packed:
+        path = zipped(path, zipfile.ZIP_DEFLATED)
+    monkeypatch.setenv(VARIABLE, "0.001")
+    with pytest.raises(Sd2Error, match=rf"{path.name}/a/zarr\.json declares 1\.6 MB"):
+        open_group(path)
+
+
+def test_chunks_without_end_are_refused(tmp_path: Path) -> None:
+    path = old_store(tmp_path / "a.zarr")
+    change_text(path / "a" / "zarr.json", "40,\n    500", "40000000,\n    1")
+    change_text(path / "a" / "zarr.json", "10,\n        500", "1,\n        1")
+    with pytest.raises(Sd2Error, match=r"a\.zarr declares 40,000,000 chunks"):
+        open_group(path)
+
+
+def test_a_pipe_in_a_store_is_not_opened(tmp_path: Path) -> None:
+    for place in ("zarr.json", "a/zarr.json", "a/c/1/0"):
+        path = store(tmp_path / f"{place.count('/')}.zarr")
+        (path / place).unlink()
+        os.mkfifo(path / place)
+        for reading in (open_group, is_pair_store, is_dataset, load_mesh):
+            if place == "zarr.json" or reading in (open_group, load_mesh):
+                with pytest.raises(Sd2Error, match=rf"{place} is a named pipe"):
+                    reading(path)
+
+
+BOMBS: dict[str, tuple[Any, Any, Any]] = {
+    # By codec: as Zarr's version 3 and version 2 have it.
+    "blosc": (BloscCodec(cname="zstd"), Blosc("zstd"), Blosc("zstd")),
+    "zstd": (ZstdCodec(), Zstd(), Zstd()),
+    "gzip": (GzipCodec(), GZip(), GZip()),
+    "zlib": (None, Zlib(), Zlib()),
+}
+
+
+@pytest.mark.parametrize("version", [2, 3])
+@pytest.mark.parametrize("codec", BOMBS)
+def test_a_chunk_that_inflates_is_refused(
+    tmp_path: Path, codec: str, version: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if BOMBS[codec][3 - version] is None:
+        return
+    monkeypatch.setenv(VARIABLE, "0.001")
+    path = old_store(tmp_path / "a.zarr", BOMBS[codec][3 - version], version)
+    np.testing.assert_array_equal(opened(path)[...], values())
+    place = chunk(path, 1) if version == 3 else path / "a" / "1.0"
+    place.write_bytes(bytes(BOMBS[codec][2].encode(bytes(6 * 10**6))))
+    with pytest.raises(Sd2Error, match=r"frames 10 to 19 of a .*(decodes to|header says)"):
+        opened(path)[...]
+
+
+@given(st.binary(max_size=300_000) | st.integers(0, 300_000).map(bytes), st.booleans())
+@settings(max_examples=20, deadline=None)
+def test_zstd_decodes_to_what_its_frame_says(content: bytes, told: bool) -> None:
+    frame = bytes(Zstd().encode(content))
+    if not told:
+        frame = size_taken_out(frame)
+        assert bytes(Zstd().decode(frame)) == content
+    check_zstd_frame(frame, len(content))
+    if len(content) > 2**18:
+        with pytest.raises(DamagedChunkError, match="decodes to"):
+            check_zstd_frame(frame, len(content) - 2**18)
+
+
+def size_taken_out(frame: bytes) -> bytes:
+    """Frame of zstd with a window of 8 MB in place of the size of its content."""
+    flags = frame[4]
+    width = (1, 2, 4, 8)[flags >> 6]
+    start = 5 if flags & 32 else 6
+    return frame[:4] + bytes([flags & 0b00000100, 13 << 3]) + frame[start + width :]
+
+
+def zipped(path: Path, how: int = zipfile.ZIP_STORED) -> Path:
+    packed = path.with_name(f"{path.name}.zip")
+    with zipfile.ZipFile(packed, "w", how) as archive:
+        for file in path.rglob("*"):
+            archive.write(file, file.relative_to(path))
+    return packed
+
+
+def change_text(path: Path, before: str, after: str) -> None:
+    text = path.read_text()
+    assert before in text
+    path.write_text(text.replace(before, after, 1))

@@ -1,7 +1,12 @@
 from __future__ import annotations
 
+import json
+import os
 import random
+import struct
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +16,7 @@ from hypothesis import strategies as st
 
 from sd2core.errors import Sd2Error
 from sd2core.io.mesh import load_mesh
-from sd2core.io.mesh_files import natural_key
+from sd2core.io.mesh_files import natural_key, read_surface
 from sd2core.progress import Cancelled
 
 SHAPE = trimesh.creation.icosphere(subdivisions=1, radius=0.85)
@@ -146,3 +151,43 @@ def test_reading_files_can_be_cancelled(tmp_path: Path) -> None:
     with pytest.raises(Cancelled):
         load_mesh(tmp_path, progress=stop)
     assert seen == [(0, 4), (1, 4), (2, 4)]
+
+
+def glb(path: Path, change: Callable[[dict[str, Any]], None]) -> Path:
+    """A surface as GLB whose description was changed."""
+    trimesh.creation.icosphere(subdivisions=3).export(path)
+    content = path.read_bytes()
+    end = 20 + int.from_bytes(content[12:16], "little")
+    scene = json.loads(content[20:end])
+    change(scene)
+    text = json.dumps(scene).encode()
+    text += b" " * (-len(text) % 4)
+    head = content[:8] + struct.pack("<II", len(content) - end + 20 + len(text), len(text))
+    path.write_bytes(head + content[16:20] + text + content[end:])
+    return path
+
+
+def many_placed(scene: dict[str, Any]) -> None:
+    one = next(node for node in scene["nodes"] if "mesh" in node)
+    scene["nodes"] += [one] * 500
+
+
+def many_numbers(scene: dict[str, Any]) -> None:
+    scene["accessors"].append({"componentType": 5126, "type": "VEC3", "count": 10**6})
+
+
+@pytest.mark.parametrize("change", [many_placed, many_numbers])
+def test_a_scene_larger_than_its_file_can_hold_is_refused(
+    tmp_path: Path, change: Callable[[dict[str, Any]], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SD2_READ_LIMIT_GB", "0.001")
+    assert len(read_surface(glb(tmp_path / "whole.glb", lambda scene: None))[0]) == 642
+    with pytest.raises(Sd2Error, match=r"large\.glb declares .* MB"):
+        read_surface(glb(tmp_path / "large.glb", change))
+
+
+@pytest.mark.parametrize("suffix", [".obj", ".ply", ".glb"])
+def test_a_pipe_is_not_opened(tmp_path: Path, suffix: str) -> None:
+    os.mkfifo(tmp_path / f"pipe{suffix}")
+    with pytest.raises(Sd2Error, match=r"pipe\.\w+ is a named pipe"):
+        read_surface(tmp_path / f"pipe{suffix}")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.io.mesh import load_mesh
-from sd2core.io.mesh_models import weak_perspective_shift
+from sd2core.io.mesh_models import read_model_output, weak_perspective_shift
 
 WIDTH, HEIGHT, FOCAL_PX = 1280, 720, 900.0
 
@@ -245,3 +245,23 @@ def test_a_hostile_mesh_does_not_run(tmp_path: Path) -> None:
     with pytest.raises(Sd2Error, match=r"w\.pkl asks for '\w+\.system', which is forbidden"):
         load_mesh(tmp_path / "w.pkl")
     assert not (tmp_path / "executed").exists()
+
+
+def test_one_frame_does_not_stand_for_any_number(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "same.pkl"
+    path.write_bytes(pickle.dumps({"verts": [np.ones((1000, 3))] * 500}))
+    monkeypatch.setenv("SD2_READ_LIMIT_GB", "0.001")
+    with pytest.raises(Sd2Error, match=r"same\.pkl declares 12\.0 MB"):
+        read_model_output(path)
+    monkeypatch.setenv("SD2_READ_LIMIT_GB", "0.1")
+    assert read_model_output(path).vertices.shape == (500, 1000, 3)
+
+
+@pytest.mark.parametrize("ids", [["x"] * 4, [[1]] * 4, 7, [2**70] * 4, [None] * 4])
+def test_frame_ids_that_are_no_numbers_are_named(tmp_path: Path, ids: Any) -> None:
+    path = tmp_path / "w.pkl"
+    path.write_bytes(pickle.dumps({"verts": np.ones((4, 5, 3)), "frame_ids": ids}))
+    with pytest.raises(Sd2Error, match=r"w\.pkl: frame_ids are no numbers of frames"):
+        read_model_output(path)

@@ -22,6 +22,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sd2core.errors import Sd2Error
+from sd2core.files.limits import VARIABLE
 from sd2core.io.pickles import decompressed, read_pickle
 
 PROTOCOLS = range(pickle.HIGHEST_PROTOCOL + 1)
@@ -342,3 +343,63 @@ def test_damage_gives_a_sentence_or_data(
 def test_compressions_are_recognised(compress: Callable[[bytes], bytes], content: bytes) -> None:
     content = b"\x80\x04" + content
     assert decompressed(io.BytesIO(compress(content))).read(10_000) == content
+
+
+LIMIT = 2**20
+
+
+def frame(instructions: bytes) -> bytes:
+    return b"\x95" + struct.pack("<Q", len(instructions)) + instructions
+
+
+def kept(content: bytes) -> bytes:
+    """Instructions that put bytes into the memo's first place."""
+    return b"B" + struct.pack("<I", len(content)) + content + b"q\x00"
+
+
+COPIED = b"c__builtin__\nbytearray\nh\x00\x85R0"
+"""Instructions that make a copy of the memo's first object, and drop it."""
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"\x80\x04" + b"\x8f" * 20_000 + b".", "more single objects"),
+        (b"\x80\x04" + frame(b"]" * 20_000) + b".", "more single objects"),
+        (b"\x80\x03" + kept(bytes(10**5)) + COPIED * 20 + b".", "makes more of its content"),
+    ],
+)  # fmt: skip
+def test_a_small_file_does_not_become_many_objects(
+    tmp_path: Path, content: bytes, words: str
+) -> None:
+    path = tmp_path / "bomb.pkl"
+    path.write_bytes(content)
+    with pytest.raises(Sd2Error, match=rf"bomb\.pkl .*{words}.*{VARIABLE}"):
+        read_pickle(path, limit_bytes=LIMIT)
+
+
+def test_one_array_is_not_filled_again_and_again(tmp_path: Path) -> None:
+    path = tmp_path / "again.pkl"
+    content = pickle.dumps(np.arange(10_000.0), 2)
+    path.write_bytes(content[:-1] + b"0" + (content[2:-1] + b"0") * 20 + b"N.")
+    with pytest.raises(Sd2Error, match=r"again\.pkl "):
+        read_pickle(path, limit_bytes=LIMIT)
+    assert read_pickle(path, limit_bytes=2**23) is None
+
+
+def test_the_limit_goes_by_the_size_of_the_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "zeros.pkl"
+    joblib.dump({"a": np.zeros(2**18)}, path, compress=9)
+    monkeypatch.setenv(VARIABLE, "0.001")
+    with pytest.raises(Sd2Error, match=rf"zeros\.pkl claims .*{VARIABLE}"):
+        read_pickle(path)
+    monkeypatch.setenv(VARIABLE, "0.01")
+    assert read_pickle(path)["a"].shape == (2**18,)
+
+
+def test_a_pipe_is_not_opened(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.pkl")
+    with pytest.raises(Sd2Error, match=r"pipe\.pkl is a named pipe"):
+        read_pickle(tmp_path / "pipe.pkl")

@@ -98,6 +98,16 @@ def test_first_frame_is_at_zero_when_the_file_starts_later(tmp_path: Path) -> No
         assert number_in(reader.read(0)) == 0
 
 
+@pytest.mark.parametrize("told", [b"00:00:01.3330000.1", b"00:00:............"])
+def test_a_duration_that_is_no_time_is_as_good_as_none(tmp_path: Path, told: bytes) -> None:
+    path = write_video(tmp_path / "v.mkv", 40)
+    whole = path.read_bytes()
+    assert b"00:00:01.333000000" in whole
+    path.write_bytes(whole.replace(b"00:00:01.333000000", told))
+    with open_video(path) as reader:
+        assert len(reader) == 40
+
+
 def test_a_file_without_times_says_so(tmp_path: Path) -> None:
     path = write_video(tmp_path / "v.h264", 10)
     with open_video(path) as reader:

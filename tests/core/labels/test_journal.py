@@ -19,6 +19,12 @@ FRAMES = even()
 START = imported(FRAMES, 7)
 
 
+def test_a_length_that_leads_back_ends_the_reading() -> None:
+    record = packed(head("/walk.sd2", START, 0, "", 0.0))
+    # As long as its prefix and the newline before it: its end would be its own start.
+    assert unpacked(record + b"-0000013 00000000 ") == ([record[18:-1]], len(record))
+
+
 def session(labels: Labels, seed: int, edits: int) -> tuple[list[bytes], list[Labels]]:
     """Records of a session, and the labels after each."""
     rng = random.Random(seed)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -177,11 +178,12 @@ def test_what_cannot_be_is_refused(tmp_path: Path, change: dict[str, Any], says:
 @pytest.mark.parametrize(
     ("content", "says"),
     [
-        (b"", "cannot be read .*line 1 column 1"),
+        (b"", "is empty"),
         (b'{"format": "sd2-labels",', "cannot be read .*line 1 column"),
-        (b"\xff\xfe", "cannot be read .*utf-8"),
-        (b"[" * 100_000, "cannot be read"),
-        (b'{"format": ' + b"9" * 5000 + b"}", "cannot be read .*integer"),
+        (b"\xff\xfe", "is empty"),
+        (b"\xff", "is not UTF-8"),
+        (b"[" * 100_000, "cannot be read .*nested too deeply"),
+        (b'{"format": ' + b"9" * 5000 + b"}", "cannot be read .*line 1: a number of 5,000 digits"),
         (b"[]", "has the format None"),
         (b'{"format": "sd2-recording", "version": 1}', "has the format 'sd2-recording'"),
     ],
@@ -205,6 +207,16 @@ def test_a_long_value_is_not_repeated_whole(tmp_path: Path) -> None:
         assert len(str(caught.value)) < 400 + len(str(path))
 
 
+@pytest.mark.parametrize(
+    "beyond",
+    [{"id": 2**53}, {"id": 10**250}, {"end_s": 2e12}, {"start_s": -1e308}, {"end_s": math.nan}],
+)
+def test_what_no_window_can_show_is_refused(beyond: dict[str, Any]) -> None:
+    with pytest.raises(Sd2Error, match=r"1 to 9007199254740991|is not in time"):
+        Span(**SPAN | beyond)  # type: ignore[arg-type]
+    assert Span(**SPAN | {"id": 2**53 - 1, "end_s": 1e12}).duration_s > 9e11  # type: ignore[arg-type]
+
+
 def test_half_characters_are_refused_before_they_spoil_a_file() -> None:
     with pytest.raises(Sd2Error, match=r"note of a span is .*whole characters"):
         Span(1, "Gestures", 0.0, 1.0, "wave", note="\ud83d")
@@ -226,7 +238,7 @@ def test_times_that_are_no_numbers_are_refused(tmp_path: Path) -> None:
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(Sd2Error, match=r"labels\.json does not exist"):
         read_labels(tmp_path / FILE_NAME)
-    with pytest.raises(Sd2Error, match="cannot be read"):
+    with pytest.raises(Sd2Error, match="is a folder"):
         read_labels(tmp_path)
 
 

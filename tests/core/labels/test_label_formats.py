@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from dataclasses import replace
 from pathlib import Path
 
@@ -145,6 +146,17 @@ def test_an_old_file_outlives_an_interrupted_save(
         write_labels(path, Labels(), TIMEBASE, name)
     assert path.read_text(encoding="utf-8") == "old"
     assert list(tmp_path.iterdir()) == [path]
+
+
+@given(labels=any_labels(min_spans=1))
+@few
+def test_a_spreadsheet_computes_none_of_the_texts(folder: Path, labels: Labels) -> None:
+    path = folder / "labels.csv"
+    write_labels(path, labels, TIMEBASE)
+    with path.open(encoding="utf-8", newline="") as file:
+        for row in csv.DictReader(file):
+            for name in ("track", "label", "note", "author"):
+                assert not row[name].lstrip().startswith(tuple("=+-@＝＋－＠")), row[name]
 
 
 RICH = Labels(

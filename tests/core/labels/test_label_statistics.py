@@ -77,6 +77,13 @@ def test_against_numpy_and_against_counting_instants(drawn) -> None:
         assert one.share == pytest.approx(held.mean())
 
 
+@pytest.mark.parametrize("separator", [",", "\t"])
+def test_a_spreadsheet_computes_no_label(separator: str) -> None:
+    rows = statistics_rows(label_statistics(labels_of((1, 2, "@SUM(A1)"), (3, 4, "=1"))))
+    lines = list(csv.reader(io.StringIO(statistics_text(rows, separator)), delimiter=separator))
+    assert [line[0] for line in lines[-2:]] == ["'=1", "'@SUM(A1)"]
+
+
 def test_as_text_it_can_be_read_back() -> None:
     labels = labels_of((1, 2, 'say "hi", wave'), (3, 5.5, 'say "hi", wave'), (6, 7, "–"))
     rows = statistics_rows(label_statistics(labels))

@@ -172,6 +172,43 @@ class TestOffers:
         assert taken(root, recording).offers().offers[0].recording == recording
 
 
+@pytest.mark.skipif(os.name == "nt", reason="POSIX permissions")
+class TestPrivacy:
+    @pytest.fixture(autouse=True)
+    def mask(self) -> Iterator[None]:
+        before = os.umask(0o022)
+        yield
+        os.umask(before)
+
+    def test_nobody_else_reads_what_a_session_writes(
+        self, taken: Take, root: Path, recording: Path
+    ) -> None:
+        place = taken(root, recording)
+        place.begin(START).write("Edit", edited(1))
+        assert self.modes(*root.glob("*/*.journal"), *root.glob("*/holder.json")) == {0o600}
+        assert self.modes(root, *root.iterdir()) == {0o700}
+
+    @pytest.mark.parametrize("look", ["open", "list"])
+    def test_what_an_earlier_version_left_is_closed_to_others(
+        self, taken: Take, root: Path, recording: Path, look: str
+    ) -> None:
+        crashed(root, recording, 3)
+        (folder,) = root.iterdir()
+        for path in (root, folder, *folder.iterdir()):
+            path.chmod(0o755 if path.is_dir() else 0o644)
+        if look == "open":
+            assert taken(root, recording).offers().offers
+            assert self.modes(root) == {0o700}
+        else:
+            assert offers_in(root).offers
+        assert self.modes(folder) == {0o700}
+        assert self.modes(*folder.iterdir()) == {0o600}
+
+    @staticmethod
+    def modes(*paths: Path) -> set[int]:
+        return {path.stat().st_mode & 0o777 for path in paths}
+
+
 class TestDamage:
     @pytest.mark.parametrize(
         ("content", "says"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 from pathlib import Path
 
@@ -10,7 +11,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from sd2core.errors import Sd2Error
-from sd2core.labels.formats import FORMATS, read_labels, texts, write_labels
+from sd2core.files.limits import VARIABLE
+from sd2core.labels.formats import FORMATS, read_labels, write_labels
 from sd2core.labels.spans import Labels, Span
 from sd2core.timebase import Timebase
 
@@ -37,7 +39,7 @@ def test_empty(tmp_path: Path, name: str, content: bytes) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_missing_or_a_folder(tmp_path: Path, name: str) -> None:
-    with pytest.raises(Sd2Error, match="is not there"):
+    with pytest.raises(Sd2Error, match="does not exist"):
         read_labels(tmp_path / "x", format=name)
     with pytest.raises(Sd2Error, match="is a folder"):
         read_labels(tmp_path, format=name)
@@ -45,8 +47,8 @@ def test_missing_or_a_folder(tmp_path: Path, name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_too_large(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(texts, "LARGEST_BYTES", 2**20)
-    assert "has 2 MiB" in refusal(tmp_path / "x", b"x" * 2**21, name)
+    monkeypatch.setenv(VARIABLE, "0.032")
+    assert "has 2 MB" in refusal(tmp_path / "x", b"x" * 2_000_000, name)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -118,8 +120,14 @@ def test_hostile_xml(tmp_path: Path, declaration: str) -> None:
     assert "save it again" in sentence
 
 
+def test_a_heading_may_be_longer_than_a_field_is_by_default(tmp_path: Path) -> None:
+    limit = csv.field_size_limit(131_072)
+    assert "a heading" in refusal(tmp_path / "x.tsv", f"label\t{'[' * 140_000}\n")
+    assert csv.field_size_limit(limit) > 140_000
+
+
 def test_deeply_nested_files_do_not_end_the_program(tmp_path: Path) -> None:
-    assert "not whole JSON" in refusal(tmp_path / "x.boris", "[" * 200_000)
+    assert "nested too deeply" in refusal(tmp_path / "x.boris", "[" * 200_000)
 
 
 @pytest.mark.parametrize(

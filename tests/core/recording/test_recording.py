@@ -209,6 +209,11 @@ def test_a_failed_save_leaves_the_old_recording(
         ({"video": ""}, "recording.json: video is ''"),
         ({"mesh": " "}, "recording.json: mesh is ' '"),
         ({"sensor": {"field_of_view_deg": 500}}, "recording.json.*field of view is 500"),
+        ({"radar_offset_s": 1e13}, "radar_offset_s is 10000"),
+        ({"spans": [{"start_s": -1e308, "end_s": 1, "label": "x"}]}, "spans.0.start_s is -1e"),
+        ({"camera": {"focal_px": 1e110}}, "camera.focal_px is 1e"),
+        ({"camera": {"focal_px": 500, "width": 10**20}}, "camera.width is 1000"),
+        ({"mesh_reading": {"image_size": [10**20, 1]}}, "mesh_reading.image_size.0 is 1000"),
         ({"mesh_reading": {"scale": -1}}, "recording.json: mesh_reading.scale is -1"),
         ({"mesh_reading": {"frames_per_s": 0}}, "recording.json: mesh_reading.frames_per_s is 0"),
         ({"mesh_reading": {"image_size": [0, 480]}}, "recording.json: mesh_reading.image_size.0"),
@@ -221,7 +226,7 @@ def test_what_is_wrong_is_said(files: Path, change: dict, says: str) -> None:
         open_recording(made.folder)
 
 
-@pytest.mark.parametrize("text", ["", "{", "[]", "3", "\udcff"])
+@pytest.mark.parametrize("text", ["", "{", "[]", "3", "\udcff", '"\\ud800"'])
 def test_damaged_files_are_explained(files: Path, text: str) -> None:
     made = make(files)
     (made.folder / FILE_NAME).write_bytes(text.encode("utf-8", "surrogateescape"))

@@ -59,5 +59,5 @@ def test_a_damaged_file_is_refused(bundled: FitErrors, tmp_path: Path) -> None:
     path.write_text(json.dumps(said | {"version": 99}))
     with pytest.raises(Sd2Error, match="version 99"):
         FitErrors.load(path)
-    with pytest.raises(Sd2Error, match="cannot be read"):
+    with pytest.raises(Sd2Error, match="does not exist"):
         FitErrors.load(tmp_path / "nothing.json")

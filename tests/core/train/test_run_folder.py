@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -50,6 +51,18 @@ class TestProgress:
                 writer.say("start", resumed=True, steps_done=0)
             events = [event["event"] for event in read_events(path)]
             assert events == ["start", *(["step"] if cut == len(line) else []), "start"]
+
+    def test_what_is_no_line_is_left_out(self, tmp_path: Path) -> None:
+        path = tmp_path / "progress.jsonl"
+        good = b'{"event": "start"}\n'
+        for bad in (b"[" * 100_000, b'{"event": ' + b"9" * 5000, b"\xff", b" " * 3_000_000):
+            path.write_bytes(good + bad + b"\n" + good)
+            tail = ProgressTail(path)
+            assert [event["event"] for event in tail.new()] == ["start", "start"]
+            assert tail.new() == []
+        path.unlink()
+        os.mkfifo(path)
+        assert read_events(path) == []
 
     def test_what_is_done_again_counts_once(self) -> None:
         step = [{"event": "step", "step": n, "first": True} for n in range(1, 6)]

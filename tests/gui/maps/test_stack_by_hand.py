@@ -7,6 +7,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from answering import menu_at, pick
+from full_disk import full_disk
 from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QCursor, QGuiApplication, QImage, QWheelEvent
 from PySide6.QtWidgets import QApplication
@@ -208,6 +209,13 @@ def test_pictures_are_written(stack, tmp_path):
     with pytest.raises(Sd2Error, match=r"map\.bmp"):
         write_picture(stack.synthetic, tmp_path / "map.bmp")
     assert not (tmp_path / "map.bmp").exists()
+
+
+@pytest.mark.parametrize("name", ["map.png", "map.svg"])
+def test_a_picture_is_whole_or_not_there(stack, tmp_path, name):
+    with full_disk(), pytest.raises(OSError, match=name):
+        write_picture(stack.synthetic, tmp_path / name)
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_badge_says_that_the_sensor_is_elsewhere(window, stack, qtbot):

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from full_disk import full_disk
 from PIL import Image
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QLabel
+from PySide6.QtWidgets import QApplication, QLabel
 from window_models import models_of
 
 from sd2app.session import document
@@ -92,8 +93,24 @@ def test_an_open_recording_stays_in_view_while_another_is_read(window, qtbot, sm
         assert not cover.isVisible()
 
 
-def test_the_window_fills_itself_once_its_skeleton_is_on_screen(qtbot, small_recording) -> None:
-    picture = small_recording.parent / "window.png"
+def test_the_window_fills_itself_once_its_skeleton_is_on_screen(
+    qtbot, small_recording, capsys, monkeypatch
+) -> None:
+    picture, memory_set = small_recording.parent / "window.png", []
+    monkeypatch.setattr(app, "keep_little_free_memory", lambda: memory_set.append(True))
     assert app.run([small_recording], screenshot=picture) == 0
+    assert memory_set
+    assert capsys.readouterr().out == f"Wrote {picture}\n"
     # An empty window has a few colours.
     assert len(np.unique(np.asarray(Image.open(picture)).reshape(-1, 4), axis=0)) > 500
+
+
+def test_a_screenshot_is_whole_or_not_there(qtbot, empty_window, tmp_path, capsys) -> None:
+    picture = tmp_path / "window.png"
+    picture.write_bytes(b"as before")
+    with full_disk(), pytest.raises(OSError, match="too large") as caught:
+        app._take_screenshot(QApplication.instance(), empty_window, picture, limit_s=60)
+    assert caught.value.filename == str(picture)
+    assert [path.read_bytes() for path in tmp_path.iterdir()] == [b"as before"]
+    assert not empty_window.isVisible()
+    assert capsys.readouterr().out == ""

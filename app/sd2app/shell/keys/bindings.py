@@ -12,6 +12,7 @@ from sd2app.labels.model import LabelsModel
 from sd2app.settings import Settings
 from sd2app.widgets.key_text import canonical, native
 from sd2core.errors import Sd2Error
+from sd2core.files.texts import parse_json
 
 _CHOSEN = "keys"
 _RESERVED = {
@@ -160,8 +161,8 @@ class KeyBindings(QObject):
 def _stored(text: str, known: Mapping[str, object]) -> dict[str, tuple[str, ...]]:
     """What was stored, as far as it can be understood; of two with one key the first has it."""
     try:
-        content = json.loads(text)
-    except ValueError:
+        content = parse_json(text, "The setting", "keys of actions")
+    except Sd2Error:
         return {}
     chosen: dict[str, tuple[str, ...]] = {}
     taken: set[str] = set(_RESERVED)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -136,6 +137,11 @@ def _cut_header(folder: Path) -> None:
     (folder / "radar.npy").write_bytes((folder / "radar.npy").read_bytes()[:20])
 
 
+def _open_header(folder: Path) -> None:
+    path = folder / "radar.npy"
+    path.write_bytes(path.read_bytes().replace(b"}", b"{", 1))
+
+
 def _floats(folder: Path) -> None:
     np.save(folder / "radar.npy", np.load(folder / "radar.npy").astype(np.float32))
 
@@ -152,13 +158,34 @@ def _pickled(folder: Path) -> None:
     np.save(folder / "radar.npy", np.array([{"a": 1}], dtype=object), allow_pickle=True)
 
 
+def _endless_header(folder: Path) -> None:
+    path = folder / "radar.npy"
+    path.write_bytes(path.read_bytes().replace(b"}", b" ", 1))
+
+
+def _endless_shape(folder: Path) -> None:
+    path = folder / "radar.npy"
+    content = path.read_bytes()
+    assert b", 9)" in content
+    path.write_bytes(content.replace(b", 9)", b", %d)" % 10**30, 1))
+
+
+def _a_pipe(folder: Path) -> None:
+    (folder / "radar.npy").unlink()
+    os.mkfifo(folder / "radar.npy")
+
+
 DAMAGE: dict[str, tuple[Callable[[Path], object], str]] = {
     "cut samples": (_cut_samples, r"radar\.npy \(\d+ bytes\) cannot be read.*copy it again"),
     "cut header": (_cut_header, r"radar\.npy \(20 bytes\) cannot be read"),
+    "endless header": (_endless_header, r"radar\.npy \(\d+ bytes\) cannot be read"),
+    "endless shape": (_endless_shape, r"radar\.npy \(\d+ bytes\) cannot be read"),
+    "a pipe": (_a_pipe, r"radar\.npy is a named pipe"),
     "wrong dtype": (_floats, r"radar\.npy holds float32\. Expected: uint16"),
     "three axes": (_one_frame_only, r"shape \(3, 5, 9\)\. Expected: \(frames, 3 receivers, 5"),
     "no frames": (_no_frames, r"shape \(0, 3, 5, 9\).*at least one frame"),
     "pickled objects": (_pickled, r"radar\.npy \(\d+ bytes\) cannot be read"),
+    "open header": (_open_header, r"radar\.npy \(\d+ bytes\) cannot be read as an array"),
     "no samples": (lambda f: (f / "radar.npy").unlink(), r"radar\.npy is missing"),
     "no configuration": (lambda f: (f / "config.json").unlink(), r"config\.json is missing"),
     "not JSON": (
@@ -247,6 +274,8 @@ TIMES: dict[str, tuple[np.ndarray, bool, str]] = {
     "more": (np.arange(9) * NOMINAL_S, False, "has 9 times for 7 frames, more"),
     "standing": (np.minimum(STEADY_S, STEADY_S[4]), False, "does not increase from frame 4 to 5"),
     "not a number": (STEADY_S + np.array([0, 0, 0, np.nan, 0, 0, 0]), False, "frame 2 to 3"),
+    "endless": (np.append(STEADY_S[:-1], np.inf), False, "frame 5 to 6"),
+    "beyond time": (np.append(STEADY_S[:-1], 1e308), False, "frame 5 to 6"),
     "burst": (BURST_S, False, "buffered before they got their time"),
     "gap": (GAP_S, True, "has 1 gap of up to 0.100 s"),
     "jitter": (JITTER_S, True, "jitter by up to 7 ms around 33 ms"),
@@ -264,6 +293,14 @@ def test_odd_times_are_noted(folder: Path, case: str) -> None:
     expected_s = times_s if used else STEADY_S
     np.testing.assert_allclose(capture.timebase.times_s, expected_s, atol=1e-6)
     assert capture.start_unix_s == START_UNIX_S
+
+
+def test_one_frame_needs_no_time(tmp_path: Path, cube: np.ndarray) -> None:
+    folder = write_capture(tmp_path / "one", cube[:1], CONFIG, [0.0], simulated=True)
+    write_times(folder, np.array([np.nan]))
+    capture = load_capture(folder)
+    assert capture.timebase.times_s.tolist() == [0.0]
+    assert capture.start_unix_s is None
 
 
 @pytest.mark.parametrize("first_ms", [0.0, 1e3 * START_UNIX_S])

@@ -192,7 +192,7 @@ def test_a_claim_of_very_many_frames_is_refused_before_they_are_read(tmp_path: P
     path = write_kkt(tmp_path / "huge.h5", DS1=None)
     with h5py.File(path, "a") as file:
         file.create_dataset("DS1", (2, 32, 32, 10**9), np.float16, chunks=(1, 8, 8, 256))
-    with pytest.raises(Sd2Error, match="has 1,000,000,000 frames"):
+    with pytest.raises(Sd2Error, match=r"DS1 of .*huge\.h5 declares 4\.1 TB"):
         load_kkt(path)
 
 
@@ -208,7 +208,7 @@ def test_a_file_that_is_cut_off_is_refused_wherever_it_ends(tmp_path: Path) -> N
 def test_what_is_no_hdf5_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "text.h5"
     path.write_text("hello")
-    with pytest.raises(Sd2Error, match="is not an HDF5 file"):
+    with pytest.raises(Sd2Error, match="cannot be read as HDF5"):
         load_kkt(path)
     for missing in (tmp_path / "none.h5", tmp_path):
         with pytest.raises(Sd2Error, match="There is no file"):

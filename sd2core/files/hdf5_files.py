@@ -1,0 +1,95 @@
+"""Arrays in HDF5 files: within the file itself, of sizes judged before they are read."""
+
+from __future__ import annotations
+
+import math
+import zlib
+from pathlib import Path
+from typing import Any
+
+from sd2core.errors import Sd2Error
+from sd2core.files.limits import check_chunk_count, check_regular, check_size, read_limit_bytes
+
+_DEFLATE = 1
+_FILTERS = {_DEFLATE, 2, 3, 32000}
+"""Known to h5py everywhere: deflate, shuffle, fletcher32, lzf."""
+_DEFLATE_MOST = 1032
+"""Bytes that deflate can make of one."""
+
+
+def open_hdf5_file(path: Path, expected: str) -> Any:
+    """Open an HDF5 file to read; Sd2Error if it is none."""
+    import h5py
+
+    check_regular(path)
+    try:
+        return h5py.File(path, "r")
+    except Exception as error:  # a damaged file fails in many ways
+        raise unreadable_hdf5(path, error, expected) from error
+
+
+def unreadable_hdf5(path: Path, error: Exception, expected: str) -> Sd2Error:
+    """Error that an HDF5 file is damaged, for what fails while it is open."""
+    return Sd2Error(
+        f"{path} cannot be read as HDF5 ({error})", expected, "Copy or download it again"
+    )
+
+
+def member_of(file: Any, path: Path, name: str) -> Any:
+    """Array or group of an open file by its name, None if there is none.
+
+    Raises Sd2Error if it lies elsewhere, in another file or under another name, or is larger than
+    the size of the file allows.
+    """
+    import h5py
+
+    link = file.get(name, getlink=True)
+    if link is None:
+        return None
+    if not isinstance(link, h5py.HardLink):
+        raise Sd2Error(f"{name} of {path} is a link to elsewhere", f"{name} in the file itself")
+    found = file[name]
+    if isinstance(found, h5py.Dataset):
+        if found.external or found.is_virtual:
+            raise Sd2Error(f"{name} of {path} lies in another file", f"{name} in the file itself")
+        _check_array(found, path, name)
+    return found
+
+
+def _check_array(array: Any, path: Path, name: str) -> None:
+    stored = path.stat().st_size
+    place = f"{name} of {path}"
+    plan = array.id.get_create_plist()
+    filters = [plan.get_filter(number)[0] for number in range(plan.get_nfilters())]
+    if not _FILTERS.issuperset(filters) or len(set(filters)) < len(filters):
+        raise Sd2Error(
+            f"{place} is compressed by the HDF5 filters {filters}",
+            "deflate (gzip) or lzf, once",
+            "Write it again with h5py's compression='gzip'",
+        )
+    shape = array.shape or ()
+    check_size(place, math.prod(shape) * array.dtype.itemsize, stored)
+    if array.chunks is None:
+        return
+    limit = read_limit_bytes(stored)
+    count, suspects = 0, []
+
+    def look(chunk: Any) -> None:
+        nonlocal count
+        count += 1
+        if chunk.size * _DEFLATE_MOST > limit:
+            suspects.append(chunk.chunk_offset)
+
+    array.id.chunk_iter(look)
+    places = math.prod(-(-n // step) for n, step in zip(shape, array.chunks, strict=True))
+    check_chunk_count(place, places, count)
+    for offset in suspects if _DEFLATE in filters else ():
+        _, content = array.id.read_direct_chunk(offset)
+        decoder = zlib.decompressobj()
+        decoder.decompress(content, limit)
+        if decoder.unconsumed_tail:
+            raise Sd2Error(
+                f"{place} holds a chunk that is larger than {limit:,} bytes, in {len(content):,}",
+                f"chunks of {array.chunks}",
+                "Copy or download it again",
+            )

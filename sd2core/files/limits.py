@@ -1,0 +1,120 @@
+"""Limits on what is opened and read: regular files, and sizes judged before they are believed."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+
+from sd2core.errors import Sd2Error
+
+VARIABLE = "SD2_READ_LIMIT_GB"
+"""Environment variable that raises the limit for commands and the window."""
+DEFAULT_LIMIT_BYTES = 256 * 10**6
+_FEW_CHUNKS = 10_000
+MULTIPLE = 50
+"""Size that numbers may have, as a multiple of the file that holds them, above the limit."""
+
+
+def read_limit_bytes(stored_bytes: int = 0) -> int:
+    """Bytes of memory that what is read from a file may take.
+
+    Parameters
+    ----------
+    stored_bytes : int, optional
+        Size of the file. Numbers that are really there, or compressed to a fiftieth, are read
+        whatever the limit.
+
+    Raises
+    ------
+    Sd2Error
+        If the environment variable ``SD2_READ_LIMIT_GB`` is no positive number.
+    """
+    text = os.environ.get(VARIABLE, "")
+    try:
+        limit = float(text) * 1e9 if text else DEFAULT_LIMIT_BYTES
+        if not limit > 0:
+            raise ValueError
+        return max(int(min(limit, 2**62)), MULTIPLE * stored_bytes)
+    except ValueError as error:
+        raise Sd2Error(
+            f"The environment variable {VARIABLE} is {text!r}",
+            "gigabytes that may be read from one file, such as 4",
+            "Change it, or take it away",
+        ) from error
+
+
+def check_size(place: str | Path, declared_bytes: int, stored_bytes: int = 0) -> None:
+    """Raise Sd2Error if what ``place``, a file and what is in it, declares is over the limit."""
+    limit = read_limit_bytes(stored_bytes)
+    if declared_bytes > limit:
+        raise Sd2Error(
+            f"{place} declares {_size(declared_bytes)}, in a file of {_size(stored_bytes)}",
+            f"at most {_size(limit)}: {MULTIPLE} times the file, and for a small one"
+            f" {_size(read_limit_bytes())}",
+            f"If the file is to be trusted, set the environment variable {VARIABLE} to"
+            f" {declared_bytes / 1e9 + 0.1:.1f}",
+        )
+
+
+def check_chunk_count(place: str | Path, declared: int, stored: int) -> None:
+    """Raise Sd2Error if an array declares far more chunks than are there to be looked at."""
+    most = _FEW_CHUNKS + MULTIPLE * stored
+    if declared > most:
+        raise Sd2Error(
+            f"{place} declares {declared:,} chunks, of which {stored:,} are stored",
+            f"at most {most:,} for these",
+            "Copy it again from where it came, or write it again",
+        )
+
+
+def check_regular(path: Path) -> None:
+    """Raise Sd2Error if a path is a pipe, a device or a socket, which may never end.
+
+    A path at which there is nothing is not refused here, but by whoever opens it.
+    """
+    try:
+        mode = path.stat().st_mode
+    except (OSError, ValueError):
+        return
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+        raise Sd2Error(
+            f"{path} is {_KINDS.get(stat.S_IFMT(mode), 'a special file')}",
+            "a regular file or a folder",
+            "Copy what it gives into a file, and name that",
+        )
+
+
+def check_regular_within(folder: Path) -> int:
+    """Count the files in a folder, at any depth; Sd2Error if one is not regular."""
+    files = 0
+    with os.scandir(folder) as entries:
+        for entry in entries:
+            if entry.is_dir(follow_symlinks=False):
+                files += check_regular_within(Path(entry))
+            else:
+                files += 1
+                if not entry.is_file():  # Costs no call to the system, as a rule.
+                    check_regular(Path(entry))
+    return files
+
+
+def size_bytes(path: Path) -> int:
+    """Size of a file, or of all files in a folder."""
+    files = [path] if path.is_file() else path.rglob("*")
+    return sum(one.stat().st_size for one in files if one.is_file())
+
+
+_KINDS = {
+    stat.S_IFIFO: "a named pipe",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+    stat.S_IFSOCK: "a socket",
+}
+
+
+def _size(size_bytes: int) -> str:
+    for unit, name in ((1e12, "TB"), (1e9, "GB"), (1e6, "MB"), (1e3, "kB")):
+        if size_bytes >= unit:
+            return f"{size_bytes / unit:.1f} {name}"
+    return f"{size_bytes} bytes"

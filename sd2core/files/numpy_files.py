@@ -1,0 +1,86 @@
+"""Arrays in NumPy's ``.npz`` files, whose sizes are judged before they are read."""
+
+from __future__ import annotations
+
+import math
+import zipfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.errors import Sd2Error
+from sd2core.files.limits import check_regular, check_size
+
+
+class NpzArrays(Mapping[str, NDArray[Any]]):
+    """Arrays of an open ``.npz`` by name, each read when asked for; no pickle is executed."""
+
+    def __init__(self, archive: zipfile.ZipFile) -> None:
+        self._entries = {
+            entry.filename.removesuffix(".npy"): entry
+            for entry in archive.infolist()
+            if entry.filename.endswith(".npy")
+        }
+        self._archive = archive
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._entries)
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        entry = self._entries[name]
+        with self._archive.open(entry) as stream:
+            shape, _, dtype = read_array_header(stream)
+            there = entry.file_size - stream.tell()
+        if math.prod(shape) * dtype.itemsize > there:
+            raise ValueError(f"{name} declares {dtype} of shape {shape}, in {there:,} bytes")
+        with self._archive.open(entry) as stream:
+            return np.asarray(np.lib.format.read_array(stream, allow_pickle=False))
+
+
+@contextmanager
+def open_npz_file(path: Path, what: str, expected: str, remedy: str = "") -> Iterator[NpzArrays]:
+    """Open an ``.npz``, whose arrays are read where asked for.
+
+    Raises Sd2Error, that it cannot be read as ``what``, if it is damaged or declares more than its
+    size allows, also for what goes wrong while it is open.
+    """
+    try:
+        with open_zip(path) as archive:
+            yield NpzArrays(archive)
+    except Sd2Error:
+        raise
+    except PermissionError as error:
+        raise Sd2Error(
+            f"{path} may not be read ({error.strerror})", "permission to read"
+        ) from error
+    except Exception as error:  # a damaged archive fails in many ways
+        raise Sd2Error(f"{path} cannot be read as {what} ({error})", expected, remedy) from error
+
+
+@contextmanager
+def open_zip(path: Path) -> Iterator[zipfile.ZipFile]:
+    """Open a zip to read; Sd2Error if its files are larger than its size allows."""
+    check_regular(path)
+    with path.open("rb") as stream, zipfile.ZipFile(stream) as archive:
+        # No more is ever decompressed than a file's entry says.
+        declared = sum(entry.file_size for entry in archive.infolist())
+        check_size(path, declared, path.stat().st_size)
+        yield archive
+
+
+def read_array_header(stream: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+    """Shape, True if by columns, and type of the array in an ``.npy``; ValueError if none."""
+    read: Any = (
+        np.lib.format.read_array_header_1_0
+        if np.lib.format.read_magic(stream) == (1, 0)
+        else np.lib.format.read_array_header_2_0
+    )
+    shape, by_column, dtype = read(stream)
+    return shape, by_column, dtype

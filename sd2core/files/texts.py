@@ -1,0 +1,180 @@
+"""Text files, JSON and TOML: judged by kind and size before they are read, refused in words."""
+
+from __future__ import annotations
+
+import codecs
+import json
+import re
+import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+from sd2core.errors import Sd2Error
+from sd2core.files.limits import VARIABLE, check_regular, read_limit_bytes
+
+if TYPE_CHECKING:
+    from pydantic import ValidationError
+
+EXPECTED_JSON = "JSON written by SD² Studio"
+_PART = 64
+"""Part of the limit on memory that a text may have: parsed, it takes up to 130 times as much."""
+_DEEPEST = 100
+"""Lists and tables that may stand in each other; Python itself gives up before a thousand."""
+_LONG_NUMBER = re.compile(r"[0-9](?:[0-9_]{300,}|x[0-9a-fA-F_]{250,})")
+"""A whole number that no float holds."""
+_LONGEST_FOUND = 60
+_LONGEST_LINE_BYTES = 1 << 20
+_REMEDY = "Correct it with a text editor, or copy it again"
+
+_MARKS = (
+    (codecs.BOM_UTF8, "utf-8"),
+    (codecs.BOM_UTF16_LE, "utf-16-le"),
+    (codecs.BOM_UTF16_BE, "utf-16-be"),
+)
+
+
+def read_content(path: Path, expected: str) -> bytes:
+    """Read a whole file; ``expected`` describes it for the message: ``"an ELAN file"``.
+
+    Raises Sd2Error when it is missing, no regular file, or larger than a text can be.
+    """
+    try:
+        check_regular(path)
+        if path.is_dir():
+            raise Sd2Error(f"{path} is a folder", expected, "Name the file itself")
+        size, most = path.stat().st_size, read_limit_bytes() // _PART
+        if size > most:
+            raise Sd2Error(
+                f"{path} has {size / 1e6:,.0f} MB",
+                f"{expected} of at most {most / 1e6:,.0f} MB",
+                "Check that this is the file you mean; if so, set the environment variable"
+                f" {VARIABLE} to {_PART * size / 1e9 + 0.1:.1f}",
+            )
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise Sd2Error(f"{path} does not exist", expected, "Check the path") from None
+    except (OSError, ValueError) as error:  # ValueError: no path at all, with a zero byte in it
+        reason = getattr(error, "strerror", None) or error
+        raise Sd2Error(f"{path} cannot be read: {reason}", expected) from error
+
+
+def read_text(path: Path, expected: str) -> str:
+    """Read a text in UTF-8, or in UTF-16 with a byte order mark; line ends stay as they are.
+
+    Raises Sd2Error as :func:`read_content`, and when the file is no such text or empty.
+    """
+    content = read_content(path, expected)
+    encoding = "utf-8"
+    for mark, name in _MARKS:
+        if content.startswith(mark):
+            content, encoding = content[len(mark) :], name
+    remedy = "Save it as UTF-8"
+    try:
+        text = content.decode(encoding)
+    except UnicodeDecodeError as error:
+        raise Sd2Error(
+            f"{path} is not {encoding.upper()}: byte {error.start} is {content[error.start]:#04x}",
+            f"{expected} in UTF-8 or UTF-16",
+            remedy,
+        ) from None
+    if "\0" in text:
+        raise Sd2Error(
+            f"{path} holds zero bytes", f"{expected}, which is text in UTF-8 or UTF-16", remedy
+        )
+    if not text.strip():
+        raise Sd2Error(f"{path} is empty", expected, "Copy it again, or write it again")
+    return text
+
+
+def lines_of(stream: BinaryIO) -> Iterator[bytes]:
+    """Lines of a file that may be long, with their ends; one of over 1 MiB comes in pieces."""
+    return iter(partial(stream.readline, _LONGEST_LINE_BYTES), b"")
+
+
+def whole_lines(stream: BinaryIO) -> Iterator[bytes]:
+    """Lines of a file that is appended to, but for one that is being written, or was torn."""
+    for line in lines_of(stream):
+        if not line.endswith(b"\n") and len(line) < _LONGEST_LINE_BYTES:
+            stream.seek(-len(line), 1)
+            return
+        yield line
+
+
+def read_json(path: Path, expected: str = EXPECTED_JSON, remedy: str = "") -> Any:
+    """Read a JSON file; raises Sd2Error as :func:`read_text` and :func:`parse_json`."""
+    return parse_json(read_text(path, expected), path, expected, remedy)
+
+
+def parse_json(text: str, place: str | Path, expected: str, remedy: str = "") -> Any:
+    """Parse JSON that stands at a place, such as a file.
+
+    Raises Sd2Error where it is none, or holds what no reader copes with: lists or tables in each
+    other more than a hundred deep, a number of more than 300 digits, or half a character.
+    """
+    return _parsed("JSON", text, place, expected, remedy)
+
+
+def read_toml(path: Path, expected: str, remedy: str = "") -> dict[str, Any]:
+    """Read a TOML file; raises Sd2Error as :func:`read_text` and :func:`parse_toml`."""
+    return parse_toml(read_text(path, expected), path, expected, remedy)
+
+
+def parse_toml(text: str, place: str | Path, expected: str, remedy: str = "") -> dict[str, Any]:
+    """Parse TOML that stands at a place; raises Sd2Error as :func:`parse_json`."""
+    content: dict[str, Any] = _parsed("TOML", text, place, expected, remedy)
+    return content
+
+
+@contextmanager
+def errors_in(path: Path) -> Iterator[None]:
+    """Name the file in errors about what stands in it, and say what to do where they do not."""
+    try:
+        yield
+    except Sd2Error as error:
+        told = error.within(path)
+        raise Sd2Error(told.found, told.expected, told.remedy or _REMEDY) from error
+
+
+def first_fault(error: ValidationError) -> str:
+    """Describe the first fault: its place, the value found and the reason."""
+    first = error.errors(include_url=False)[0]
+    where = ".".join(str(part) for part in first["loc"]) or "the file"
+    if first["type"] == "missing":
+        return f"{where} is missing"
+    if first["type"] == "extra_forbidden":
+        return f"{where} is nothing that this version knows"
+    found = repr(first["input"])
+    found = found if len(found) <= _LONGEST_FOUND else f"{found[:_LONGEST_FOUND]}…"
+    return f"{where} is {found} ({first['msg']})"
+
+
+def _parsed(form: str, text: str, place: str | Path, expected: str, remedy: str) -> Any:
+    try:
+        if long := _LONG_NUMBER.search(text):
+            line = text.count("\n", 0, long.start()) + 1
+            raise ValueError(f"line {line}: a number of {len(long[0]):,} digits")
+        content = json.loads(text) if form == "JSON" else tomllib.loads(text)
+        if _is_deep(content):
+            raise RecursionError
+        if "\\u" in text:  # Half of a character is no text that could be shown or written.
+            json.dumps(content, ensure_ascii=False, default=str).encode()
+        return content
+    except (ValueError, RecursionError) as error:
+        reason = "nested too deeply" if isinstance(error, RecursionError) else str(error)
+        if isinstance(error, UnicodeEncodeError):
+            reason = f"half a character, {error.object[error.start]!r}"
+        found = f"{place} cannot be read as {form} ({reason})"
+        raise Sd2Error(found, expected, remedy or _REMEDY) from error
+
+
+def _is_deep(content: Any) -> bool:
+    level: list[Any] = [[content]]
+    for _ in range(_DEEPEST + 1):
+        tables = (one.values() if isinstance(one, dict) else one for one in level)
+        level = [one for table in tables for one in table if isinstance(one, dict | list)]
+        if not level:
+            return False
+    return True

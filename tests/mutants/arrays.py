@@ -1,0 +1,116 @@
+"""Files of arrays: meshes, pairs, data sets, maps, models, radar maps."""
+
+from __future__ import annotations
+
+import pickle
+from pathlib import Path
+
+import joblib
+import numpy as np
+import trimesh
+import zarr
+from numcodecs import Blosc, GZip, Zstd
+
+from sd2core.classify.files import load_classifier, save_classifier
+from sd2core.datasets.options import DatasetOptions
+from sd2core.datasets.reading import open_dataset
+from sd2core.datasets.sources import pair_sources
+from sd2core.datasets.writing import write_dataset
+from sd2core.denoise.files import load_model, save_model
+from sd2core.io.mesh import load_mesh, save_mesh
+from sd2core.io.radar import load_recorded_map
+from sd2core.maps import DopplerMap
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.pairs.store import read_pairs
+from sd2core.sensor import VelocityAxis
+from sd2core.timebase import Timebase
+from tests.core.classify.classifiers import classifier
+from tests.core.denoise.denoisers import trained
+from tests.core.io.radar.kkt_files import write_kkt
+from tests.mutants.target import Target
+from tests.small_pairs import write_pairs
+
+
+def _mesh(frames: int = 400) -> MeshSequence:
+    rng = np.random.default_rng(1)
+    vertices = rng.normal(size=(frames, 500, 3)).astype(np.float32) * 0.3 + np.float32([0, 0, 3])
+    faces = np.stack([np.arange(398), np.arange(398) + 1, np.arange(398) + 2], axis=1)
+    present = np.arange(frames) > 4
+    return MeshSequence(vertices, faces, Timebase.regular(frames, 30.0), present=present)
+
+
+def _write_mesh(path: Path) -> None:
+    save_mesh(_mesh(), path)
+
+
+def _write_old_mesh(path: Path) -> None:
+    mesh = _mesh(40)
+    group = zarr.open_group(str(path), mode="w", zarr_format=2)
+    group.create_array("vertices", data=mesh.vertices[:], chunks=(8, 500, 3), compressors=GZip())
+    group.create_array("times_s", data=mesh.timebase.times_s, chunks=(8,), compressors=Zstd())
+    group.create_array("faces", data=mesh.faces, chunks=(99, 3), compressors=Blosc())
+
+
+def _person() -> dict[object, object]:
+    mesh = _mesh(12)
+    person = {"verts": list(mesh.vertices[:]), "frame_ids": list(range(12))}
+    return {1: person, 2: {**person, "frame_ids": np.arange(12)}, "fps": 30.0}
+
+
+def _write_surface(path: Path) -> None:
+    mesh = _mesh(1)
+    trimesh.Trimesh(mesh.vertices[0], mesh.faces, process=False).export(path)
+
+
+def _write_map(path: Path) -> None:
+    values = np.random.default_rng(3).random((16, 60)).astype(np.float32)
+    time = Timebase.regular(60, 30.0)
+    DopplerMap(values, VelocityAxis(16, 2.0), time, "synthetic", "share", meta={}).save(path)
+
+
+def _read_mesh(path: Path) -> None:
+    mesh = load_mesh(path)
+    mesh.read(0, mesh.frame_count)
+
+
+def _write_pairs(path: Path) -> None:
+    write_pairs(path, ("s1", "s2"))
+
+
+def _write_dataset(path: Path) -> None:
+    pairs = path.with_name(f"pairs of {path.name}.zarr")
+    _write_pairs(pairs)
+    sources = pair_sources([pairs], ("synthetic", "simulated"))
+    write_dataset(path, sources, DatasetOptions(length=30, overlap=10))
+
+
+def _read_dataset(path: Path) -> None:
+    with open_dataset(path) as dataset:
+        list(dataset.sources())
+        for name in dataset.arrays:
+            dataset[name][:]
+
+
+TARGETS = [
+    Target("mesh.zarr", _write_mesh, _read_mesh),
+    Target("mesh.zarr.zip", _write_mesh, _read_mesh),
+    Target("pairs.zarr", _write_pairs, read_pairs),
+    Target("set.zarr", _write_dataset, _read_dataset),
+    Target("set.h5", _write_dataset, _read_dataset),
+    Target("set.npz", _write_dataset, _read_dataset),
+    Target("old.zarr", _write_old_mesh, _read_mesh),
+    Target("mesh.npz", _write_mesh, _read_mesh),
+    Target("body.pkl", lambda path: path.write_bytes(pickle.dumps(_person())), _read_mesh),
+    Target("old.pkl", lambda path: path.write_bytes(pickle.dumps(_person(), 2)), _read_mesh),
+    Target("body.joblib", lambda path: joblib.dump(_person(), path, compress=1), _read_mesh),
+    Target("plain.joblib", lambda path: joblib.dump(_person(), path), _read_mesh),
+    Target("body.obj", _write_surface, _read_mesh),
+    Target("body.ply", _write_surface, _read_mesh),
+    Target("body.glb", _write_surface, _read_mesh),
+    Target("map.npz", _write_map, DopplerMap.load),
+    Target("model.safetensors", lambda path: save_model(path, trained("s4")), load_model),
+    Target(
+        "gestures.safetensors", lambda path: save_classifier(path, classifier()), load_classifier
+    ),
+    Target("radar.h5", write_kkt, load_recorded_map),
+]

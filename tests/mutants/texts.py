@@ -1,0 +1,215 @@
+"""Texts, recordings, captures and videos, read as the commands do that a user runs on them."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from contextlib import redirect_stdout
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from sd2core.batch.folder import BatchFolder
+from sd2core.batch.plan_file import read_plan
+from sd2core.cli.parser import build_parser
+from sd2core.errors import Sd2Error
+from sd2core.files.recording_json import CameraEntry
+from sd2core.io.radar import write_capture
+from sd2core.io.radar.mars import mars_parts, read_mars
+from sd2core.io.video import open_video
+from sd2core.labels import files
+from sd2core.labels.formats import read_labels, write_labels
+from sd2core.labels.journal import SUFFIX, change, head, packed
+from sd2core.labels.label_set import GESTURES
+from sd2core.labels.recovery import search
+from sd2core.labels.spans import Labels
+from sd2core.placements.placements import PlacementCloud, read_placements, write_placements
+from sd2core.radar_config import PAPER_RADAR
+from sd2core.recording.recording import Recording
+from sd2core.runs.progress import ProgressWriter
+from sd2core.simulate.campaign.fit_errors import FitErrors
+from sd2core.timebase import Timebase
+from sd2core.train.config import read_config
+from sd2core.train.folder import TrainingFolder
+from tests.core.mocap.mars_files import approaching, write_part
+from tests.labelled import imported
+from tests.mutants.target import Target
+from tests.numbered_videos import write_video
+
+_CLOCK = Timebase.regular(120, 30.0)
+_LABELS = imported(_CLOCK, 1)
+_CLOUD = PlacementCloud(5, (1.0, 2.0), (0.0, 10.0), (0.0, 0.0), 1)
+_PLAN = """\
+format = "sd2-batch-plan"
+version = 1
+out = "out"
+
+[recordings]
+files = ["walk.sd2", "runs/*.sd2"]
+subjects = "folder"
+subject_of = {walk = "Ada"}
+
+[placements]
+kind = "grid"
+ranges_m = [1.0, 2.5]
+azimuths_deg = [-30, 0, 30]
+
+[synthesise]
+preset = "paper"
+tolerance = 0.1
+null_bins = [15, 16]
+
+[export]
+format = "zarr"
+segment_frames = 72
+test_subjects = ["Ada"]
+"""
+_SETTINGS = """\
+[data]
+pairs = ["campaign.zarr"]
+validation_subjects = ["Ada"]
+
+[model]
+name = "s4"
+
+[training]
+epochs = 20
+learning_rate = 1e-3
+"""
+_PLACEMENTS = """\
+kind = "cloud"
+count = 20
+seed = 7
+range_m = [1.0, 4.0]
+azimuth_deg = [-60.0, 60.0]
+elevation_deg = [0.0, 10.0]
+"""
+
+
+def _sd2(*command: object) -> None:
+    """Run a command and print what it prints as a terminal in UTF-8 would."""
+    parser, _ = build_parser()
+    options = parser.parse_args(list(map(str, command)))
+    with redirect_stdout(io.TextIOWrapper(io.BytesIO(), encoding="utf-8")):
+        options.handler(options)
+
+
+def _labels(name: str, format: str) -> Target:
+    def write(path: Path) -> None:
+        write_labels(path, _LABELS, _CLOCK, format)
+
+    def read(path: Path) -> None:
+        read_labels(path, _CLOCK, format)
+        _sd2("labels", "show", path, "--format", format)
+
+    return Target(name, write, read)
+
+
+def _text(name: str, text: str, read: Callable[[Path], object]) -> Target:
+    return Target(name, lambda path: path.write_text(text), read)
+
+
+def _write_recording(path: Path) -> None:
+    video = write_video(path.with_suffix(".mp4"), 5)
+    camera = CameraEntry(focal_px=500.0)
+    made = Recording.create(path, video=video, title="Walk", camera=camera, copy=True)
+    replace(made, labels=_LABELS, placements=_CLOUD).save(_CLOCK)
+
+
+def _journal() -> bytes:
+    before, after = Labels(), replace(_LABELS, label_set=GESTURES)
+    first = head("/walk.sd2", before, 0, "", 1.0)
+    return packed(first) + packed(change("Add", 2.0, before, after) | {"others": {"title": "x"}})
+
+
+def _read_journal(path: Path) -> None:
+    for note in search(path.parent, [SUFFIX]).found.notes:
+        raise Sd2Error(note)
+
+
+def _write_run(path: Path) -> None:
+    run = TrainingFolder(path)
+    run.create("s4")
+    with ProgressWriter(run.progress) as lines:
+        lines.say("start", epochs=2, minutes=None, resumed=False, steps_done=0)
+        lines.say("step", step=3, loss=0.5, elapsed_s=1.5, left_s=8.0)
+        lines.say("epoch", epoch=1, step=9, validation_rmse=0.3, validation_mae_mps=0.1, best=True)
+        lines.say("end", error={"found": "x", "expected": "y", "remedy": ""})
+    run.set_state("finished")
+
+
+def _write_batch(path: Path) -> None:
+    batch = BatchFolder(path)
+    batch.prepare()
+    counts = {"synthesise": 4}
+    with ProgressWriter(batch.progress) as lines:
+        lines.say("start")
+        lines.say("progress", total=counts, done=counts, there={}, failed=0, elapsed_s=2.0)
+    batch.set_state("stopped", started_unix_s=5.0)
+
+
+def _write_capture(path: Path) -> None:
+    config = replace(PAPER_RADAR, receivers=1, chirps_per_frame=4, samples_per_chirp=8)
+    counts = np.random.default_rng(1).integers(0, 4096, (9, 1, 4, 8), dtype=np.uint16)
+    times_s = np.arange(9) * config.frame_repetition_s
+    write_capture(path, counts, config, times_s, simulated=True, start_unix_s=1.6e9)
+
+
+def _write_mars(path: Path) -> None:
+    points = [(frame, 0.5, 10.0) for frame in range(12)]
+    write_part(path, "test", approaching(12, 0.5), np.arange(12), points)
+
+
+def _read_mars(path: Path) -> None:
+    for part in mars_parts(path):
+        read_mars(path, part)
+
+
+def _read_video(path: Path) -> None:
+    _sd2("info", path)
+    with open_video(path) as video:
+        for frame in (0, len(video) // 2, len(video) - 1):
+            video.read(frame)
+
+
+def _info(path: Path) -> None:
+    _sd2("info", path, "--json")
+    _sd2("info", path)
+
+
+TARGETS = [
+    Target("recording.sd2", _write_recording, _info),
+    Target("labels.json", lambda path: files.write_labels(path, _LABELS), files.read_labels),
+    Target(
+        "label-set.json", lambda path: files.write_label_set(path, GESTURES), files.read_label_set
+    ),
+    _labels("labels.csv", "csv"),
+    _labels("audacity.txt", "audacity"),
+    _labels("labels.eaf", "elan"),
+    _labels("labels.TextGrid", "textgrid"),
+    _labels("labels.boris", "boris"),
+    _labels("mne.txt", "mne"),
+    _text(
+        "table.tsv",
+        "track\tlabel\tfirst_frame\tlast_frame\nleft\twave\t3\t9\nleft\ttap\t20\t40\n",
+        lambda path: read_labels(path, _CLOCK),
+    ),
+    Target("000001-000001.journal", lambda path: path.write_bytes(_journal()), _read_journal),
+    _text("plan.toml", _PLAN, read_plan),
+    _text("training.toml", _SETTINGS, read_config),
+    _text("placements.toml", _PLACEMENTS, read_placements),
+    Target(
+        "placements.json",
+        lambda path: write_placements(path, _CLOUD),
+        read_placements,
+    ),
+    Target("errors.json", lambda path: FitErrors.load().save(path), FitErrors.load),
+    Target("run", _write_run, lambda path: TrainingFolder(path).status()),
+    Target("batch", _write_batch, lambda path: BatchFolder(path).status()),
+    Target("infineon", _write_capture, _info),
+    Target("mars", _write_mars, _read_mars),
+    Target("video.mp4", write_video, _read_video),
+    Target("video.mkv", write_video, _read_video),
+    Target("video.avi", lambda path: write_video(path, codec="mpeg4"), _read_video),
+]

@@ -1,0 +1,293 @@
+"""Use the real window for minutes, and print what it takes of the machine: `make soak MINUTES=60`.
+
+Mouse and keys play, label, drag the sensor, undo, save and open another recording, over and over,
+on two copies of the sample. Every tenth of the time a row is measured, always with the window at
+rest. The exit code is 1 where Python raised anything.
+"""
+
+from __future__ import annotations
+
+import argparse
+import gc
+import json
+import os
+import shutil
+import sys
+import tempfile
+import threading
+import time
+import traceback
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psutil
+from PySide6.QtCore import QEventLoop, QObject, QPoint, Qt, QTimer
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication
+
+from sd2app.settings import Settings
+from sd2app.shell.window import MainWindow
+from sd2app.widgets.theme import apply_theme
+from sd2core.files.resources import resource_path
+from sd2core.files.tables import markdown_table
+from sd2core.processes import keep_little_free_memory
+
+LIMIT_S = 120.0
+TICK_MS = 5
+ROWS = 10
+REOPENINGS = 50
+_LOOK_S = 0.02
+_NONE, _CONTROL = Qt.KeyboardModifier.NoModifier, Qt.KeyboardModifier.ControlModifier
+
+
+@dataclass(frozen=True)
+class Row:
+    """State of the process at a moment of rest, and what happened since the row before."""
+
+    minute: float
+    rounds: int
+    resident_mb: float
+    threads: int
+    most_threads: int  # Since the row before, also while something was computed.
+    descriptors: int
+    objects: int
+    top_level_widgets: int
+    median_gap_ms: float
+    gap_95_ms: float
+    gap_99_ms: float
+    largest_gap_ms: float
+
+
+HEADINGS = (
+    *("minute", "rounds", "RSS, MB", "threads", "most", "descriptors", "objects", "windows"),
+    *("gap, ms", "95 %", "99 %", "largest"),
+)
+
+
+class Pulse(QObject):
+    """Times between turns of the event loop, by a timer of 5 ms, and the most threads."""
+
+    def __init__(self, process: psutil.Process) -> None:
+        super().__init__()
+        self._process = process
+        self._timer = QTimer(self, interval=TICK_MS, timerType=Qt.TimerType.PreciseTimer)
+        self._timer.timeout.connect(self._tick)
+        self._threads = QTimer(self, interval=200)
+        self._threads.timeout.connect(self._count)
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget what was measured."""
+        self.gaps_ms: list[float] = []
+        self.most_threads = self._process.num_threads()
+        self._last_s = time.perf_counter()
+        self._timer.start()
+        self._threads.start()
+
+    def _tick(self) -> None:
+        now_s = time.perf_counter()
+        self.gaps_ms.append(1000 * (now_s - self._last_s))
+        self._last_s = now_s
+
+    def _count(self) -> None:
+        self.most_threads = max(self.most_threads, self._process.num_threads())
+
+
+class Meter:
+    """Measures rows, and the minutes since it was made."""
+
+    def __init__(self) -> None:
+        self._process = psutil.Process()
+        self._pulse = Pulse(self._process)
+        self._began_s = time.monotonic()
+
+    @property
+    def minute(self) -> float:
+        """Minutes since the start."""
+        return (time.monotonic() - self._began_s) / 60
+
+    def resident_mb(self) -> float:
+        """Memory of the process."""
+        return float(self._process.memory_info().rss) / 1e6
+
+    def row(self, rounds: int) -> Row:
+        """Measure a row."""
+        gaps_ms = self._pulse.gaps_ms or [0.0]
+        row = Row(
+            round(self.minute, 2),
+            rounds,
+            round(self.resident_mb(), 1),
+            self._process.num_threads(),
+            self._pulse.most_threads,
+            self._process.num_fds(),
+            len(gc.get_objects()),
+            len(QApplication.topLevelWidgets()),
+            *(round(float(one), 1) for one in np.percentile(gaps_ms, (50, 95, 99, 100))),
+        )
+        self._pulse.restart()
+        return row
+
+
+class Hand:
+    """Mouse and keys on a window; a step that comes to nothing raises RuntimeError."""
+
+    def __init__(self, window: MainWindow) -> None:
+        self._window, self._session = window, window.session
+        self._until(lambda: window.features.scene.view is not None, "show the scene")
+        self._scene = window.features.scene.view
+        self._scene.set_view("overview")
+
+    def open(self, recording: Path) -> None:
+        """Open a recording in place of what is open, and wait for all that is computed."""
+        self._window.open_paths([recording])
+        self._until(lambda: self._session.document.paths == (recording,), f"open {recording.name}")
+        self.rest()
+
+    def rest(self) -> None:
+        """Wait until nothing has been under way for half a second."""
+        synthesis, looks = self._window.features.maps.synthesis, [0]
+
+        def is_calm() -> bool:
+            looks[0] = looks[0] + 1 if self._window.settled and synthesis.complete else 0
+            return looks[0] * _LOOK_S > 0.5
+
+        self._until(is_calm, "come to rest")
+
+    def round(self) -> None:
+        """Play and label, drag the sensor, undo and save; the recording is then as it was."""
+        session = self._session
+        spans, place = self._spans(), session.sensor.sensor
+        self._press("Home")
+        self._press("Space")
+        self._until(lambda: session.playback.playing, "play")
+        for _ in ("begin", "end"):
+            spin(1.0)
+            self._press("1")
+        self._until(lambda: self._spans() == spans + 1, "label")
+        self._drag_sensor()
+        self._until(lambda: session.sensor.sensor != place, "drag the sensor")
+        self._press("Space")
+        self._until(lambda: not session.playback.playing, "stop")
+        self.rest()
+        self._save()
+        self._press("Z", _CONTROL)
+        self._press("Z", _CONTROL)
+        done = (spans, place)
+        self._until(lambda: (self._spans(), session.sensor.sensor) == done, "undo")
+        self.rest()
+        self._save()
+
+    def _press(self, name: str, modifier: Qt.KeyboardModifier = _NONE) -> None:
+        QTest.keyClick(self._window, getattr(Qt.Key, f"Key_{name}"), modifier)
+
+    def _drag_sensor(self) -> None:
+        x, y, _ = self._scene.scene.pose.project(self._session.sensor.sensor.position_m)[0]
+        start = QPoint(round(x), round(y))
+        held = self._scene.childAt(start)
+        QTest.mousePress(held, Qt.MouseButton.LeftButton, pos=held.mapFrom(self._scene, start))
+        for step in range(60):
+            there = start + QPoint(round(30 * np.sin(step / 10)), step // 3)
+            QTest.mouseMove(held, held.mapFrom(self._scene, there))
+            spin(0.03)
+        QTest.mouseRelease(held, Qt.MouseButton.LeftButton, pos=held.mapFrom(self._scene, there))
+
+    def _save(self) -> None:
+        self._press("S", _CONTROL)
+        self._until(lambda: not self._session.document.modified, "save")
+
+    def _spans(self) -> int:
+        return len(self._window.features.labels.model.labels.spans)
+
+    def _until(self, condition: Callable[[], bool], step: str) -> None:
+        deadline_s = time.monotonic() + LIMIT_S
+        while not condition():
+            if time.monotonic() > deadline_s:
+                said = self._window.messages.text or "the window says nothing"
+                raise RuntimeError(f"The window did not {step} within {LIMIT_S:.0f} s ({said})")
+            spin(_LOOK_S)
+
+
+def spin(seconds: float) -> None:
+    """Run the event loop, which alone decides when it sleeps."""
+    loop = QEventLoop()
+    QTimer.singleShot(round(1000 * seconds), loop.quit)
+    loop.exec()
+
+
+class Raised:
+    """What Python raised in slots and threads, where nobody else would know."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        sys.excepthook = lambda *raised: self._note(*raised)
+        threading.excepthook = lambda args: self._note(*args[:3])
+        sys.unraisablehook = lambda args: self._note(*args[:3])
+
+    def _note(self, *raised: Any) -> None:
+        self.count += 1
+        traceback.print_exception(*raised)
+
+
+def soak(minutes: float, folder: Path, say: Callable[[Row], None]) -> float:
+    """Use a window for so long, then open 50 times more; returns the MB that these added.
+
+    ``say`` is given every row; two copies of the sample go to ``folder``.
+    """
+    recordings = [folder / "left.sd2", folder / "right.sd2"]
+    for copy in recordings:
+        shutil.copytree(resource_path("swipes.sd2"), copy)
+    window = MainWindow(Settings.forgetful())
+    window.resize(1280, 800)
+    window.show()
+    window.populate()
+    window.activateWindow()
+    hand, meter, rounds, rows = Hand(window), Meter(), 0, 1
+    hand.open(recordings[0])
+    say(meter.row(rounds))
+    while meter.minute < minutes:
+        hand.round()
+        rounds += 1
+        hand.open(recordings[rounds % 2])
+        if meter.minute >= minutes * rows / ROWS:
+            say(meter.row(rounds))
+            rows += 1
+    before_mb = meter.resident_mb()
+    for number in range(1, REOPENINGS + 1):
+        hand.open(recordings[(rounds + number) % 2])
+    added_mb = meter.resident_mb() - before_mb
+    window.close()
+    return added_mb
+
+
+def main() -> int:
+    """Use the window and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--minutes", type=float, default=60.0)
+    parser.add_argument("--json", action="store_true", help="one row a line, as JSON")
+    options = parser.parse_args()
+    raised = Raised()
+
+    def say(row: Row) -> None:
+        cells = [f"{value:g}" for value in asdict(row).values()]
+        *heading, line = markdown_table([HEADINGS, cells])
+        if options.json:
+            line = json.dumps(asdict(row))
+        elif row.rounds == 0:
+            print("\n".join(heading))
+        print(line, flush=True)
+
+    keep_little_free_memory()
+    application = QApplication(sys.argv[:1])
+    apply_theme(application, False)
+    with tempfile.TemporaryDirectory(prefix="sd2-soak-") as name:
+        os.environ["XDG_DATA_HOME"] = name
+        added_mb = soak(options.minutes, Path(name), say)
+    print(f"\n{REOPENINGS} more openings of a recording added {added_mb:.0f} MB.")
+    return 1 if raised.count else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
