@@ -67,19 +67,19 @@ def _align(options: argparse.Namespace) -> int:
 
 
 def _aligned(recording: Recording, options: argparse.Namespace) -> dict[str, Any]:
-    """Entry of one recording; what cannot be aligned is told in it, and the others go on."""
+    """Entry of one recording; what cannot be aligned or saved is told in it, and others go on."""
     before_s = recording.radar_offset_s
     entry: dict[str, Any] = {
         "recording": str(recording.folder), "before_s": before_s, "saved": False
     }  # fmt: skip
     try:
         found = _found(recording, options.within)
+        if options.save and not found.problem:
+            recording.radar_offset_s = found.offset_s
+            recording.save()
+            entry["saved"] = True
     except Sd2Error as error:
         return entry | {"problem": str(error)}
-    if options.save and not found.problem:
-        recording.radar_offset_s = found.offset_s
-        recording.save()
-        entry["saved"] = True
     return entry | {
         "problem": found.problem,
         "offset_s": found.offset_s,

@@ -15,7 +15,7 @@ import numpy as np
 
 from sd2core.cutouts.source import FORMAT, CutSource, folder_name
 from sd2core.errors import Sd2Error
-from sd2core.files.atomic import atomic_write_text
+from sd2core.files.atomic import atomic_write_text, full_disk_named
 from sd2core.files.lock import FileLock
 from sd2core.files.tables import as_cell
 from sd2core.files.texts import read_json
@@ -139,8 +139,9 @@ def _write_all(
             made = folder / f"{_UNFINISHED}{one.span.id}"
             made.mkdir()
             try:
-                _write_one(source, one.span, video, made, within)
-                _put(made, one.path)
+                with full_disk_named(one.path):
+                    _write_one(source, one.span, video, made, within)
+                    _put(made, one.path)
             except BaseException:
                 shutil.rmtree(made, ignore_errors=True)
                 raise

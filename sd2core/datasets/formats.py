@@ -23,7 +23,7 @@ from sd2core.datasets.layout import (
     row_shapes,
 )
 from sd2core.errors import Sd2Error
-from sd2core.files.atomic import atomic_write
+from sd2core.files.atomic import atomic_write, full_disk_named
 from sd2core.files.hdf5_files import member_of, open_hdf5_file, unreadable_hdf5
 from sd2core.files.limits import check_size
 from sd2core.files.numpy_files import open_npz_file
@@ -207,9 +207,10 @@ def _file_in_place_of(path: Path) -> Iterator[Path]:
 
     made = path.with_name(f".sd2-{os.getpid()}-{path.name}")
     try:
-        yield made
-        with made.open("r+b") as stream:
-            os.fsync(stream.fileno())
+        with full_disk_named(path):
+            yield made
+            with made.open("r+b") as stream:
+                os.fsync(stream.fileno())
         made.replace(path)
     finally:
         made.unlink(missing_ok=True)

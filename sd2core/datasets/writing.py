@@ -28,6 +28,7 @@ from sd2core.datasets.source import KINDS, LazySource, Source, SourceKey
 from sd2core.datasets.splitting import split_people
 from sd2core.datasets.store import LOCK_NAME, SOURCES_NAME, SegmentStore, is_begun, open_arrays
 from sd2core.errors import Sd2Error
+from sd2core.files.atomic import full_disk_named
 from sd2core.files.lock import FileLock
 from sd2core.io.kinds import is_dataset
 from sd2core.progress import Progress, part_of, silent
@@ -98,8 +99,9 @@ def write_dataset(
         raise Sd2Error(f"A process is writing to {out}", "one at a time", "Wait until it ends")
     writer: _Writer | None = None
     try:
-        writer = _Writer(out, work, form, options)
-        written = writer.write(sources, progress)
+        with full_disk_named(out):
+            writer = _Writer(out, work, form, options)
+            written = writer.write(sources, progress)
     finally:
         lock.release()
         # A store without a segment would only be in the way of other settings.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import secrets
 import shutil
 import tempfile
@@ -16,6 +17,7 @@ _PREFIX, _SUFFIX = ".sd2-", ".tmp"
 
 DISK_FULL = frozenset({errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)})
 """Errors of the system that another write would meet as well."""
+_SHORT_WRITE = re.compile(r"\d+ requested and \d+ written")
 
 
 @contextmanager
@@ -29,19 +31,34 @@ def atomic_write(path: Path, mode: int = 0o666) -> Iterator[IO[bytes]]:
     """
     path = Path(path)
     target = _target(path)
-    handle, temporary = _temporary(path, target, mode)
+    with full_disk_named(path):
+        handle, temporary = _temporary(path, target, mode)
+        try:
+            with os.fdopen(handle, "wb") as stream:
+                yield stream
+                stream.flush()
+                os.fsync(stream.fileno())
+            temporary.replace(target)
+        except BaseException:
+            temporary.unlink(missing_ok=True)
+            raise
+
+
+@contextmanager
+def full_disk_named(path: Path) -> Iterator[None]:
+    """Have errors of a full disk name what was to be written, and what to do.
+
+    A write to an open file fails without a name, and libraries fail after it in their own words:
+    any error that a full disk led to becomes an OSError whose ``filename`` is ``path``.
+    """
     try:
-        with os.fdopen(handle, "wb") as stream:
-            yield stream
-            stream.flush()
-            os.fsync(stream.fileno())
-        temporary.replace(target)
-    except BaseException as error:
-        temporary.unlink(missing_ok=True)
-        # A write to an open file fails without saying which file it is.
-        if isinstance(error, OSError) and error.errno in DISK_FULL and not error.filename:
-            raise OSError(error.errno, error.strerror, str(path)) from error
-        raise
+        yield
+    except Exception as error:
+        full = _full_disk(error)
+        if full is None:
+            raise
+        words = f"{os.strerror(full)}: free some, or write to another place"
+        raise OSError(full, words, str(path)) from error
 
 
 def check_writable(path: Path) -> None:
@@ -64,14 +81,15 @@ def atomic_folder(path: Path) -> Iterator[Path]:
 
     One that is there goes then; when the block raises, it stays as it was.
     """
-    workspace = Path(tempfile.mkdtemp(prefix=f".{path.name}.", suffix=".tmp", dir=path.parent))
-    new = workspace / path.name
-    try:
-        new.mkdir()
-        yield new
-        replace_folder(new, path, workspace / f"{path.name}.old")
-    finally:
-        shutil.rmtree(workspace, ignore_errors=True)
+    with full_disk_named(path):
+        workspace = Path(tempfile.mkdtemp(prefix=f".{path.name}.", suffix=".tmp", dir=path.parent))
+        new = workspace / path.name
+        try:
+            new.mkdir()
+            yield new
+            replace_folder(new, path, workspace / f"{path.name}.old")
+        finally:
+            shutil.rmtree(workspace, ignore_errors=True)
 
 
 def replace_folder(new: Path, path: Path, aside: Path) -> None:
@@ -96,6 +114,21 @@ def remove_leftovers(folder: Path) -> None:
     """Delete temporary files of killed writes in a folder; no process may be writing there."""
     for path in Path(folder).glob(f"{_PREFIX}*{_SUFFIX}"):
         path.unlink(missing_ok=True)
+
+
+def _full_disk(error: BaseException | None) -> int | None:
+    """Number of the error of a full disk, in an error or in those that led to it."""
+    while error is not None:
+        if isinstance(error, OSError) and error.errno in DISK_FULL:
+            return error.errno
+        # A copied folder and a NumPy array keep words only.
+        if isinstance(error, OSError) and error.errno is None:
+            if _SHORT_WRITE.fullmatch(words := str(error)):
+                return errno.ENOSPC
+            if (found := next((one for one in DISK_FULL if os.strerror(one) in words), 0)) != 0:
+                return found
+        error = error.__cause__ or error.__context__
+    return None
 
 
 def _target(path: Path) -> Path:

@@ -6,8 +6,11 @@ inherit a number: so it tells a running process from one that died.
 
 from __future__ import annotations
 
+import errno
+import os
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import IO
 
@@ -35,7 +38,9 @@ else:
     def _grab(stream: IO[bytes]) -> bool:
         try:
             fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
+        except OSError as error:
+            if error.errno not in (errno.EWOULDBLOCK, errno.EACCES):
+                raise  # this file system keeps no locks
             return False
         return True
 
@@ -43,8 +48,8 @@ else:
         # A shared lock: all who look get one at the same time, unless a process holds the lock.
         try:
             fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except OSError:
-            return True
+        except OSError as error:
+            return error.errno in (errno.EWOULDBLOCK, errno.EACCES)
         return False
 
 
@@ -56,17 +61,31 @@ class FileLock:
         self._stream: IO[bytes] | None = None
 
     def take(self) -> bool:
-        """Try to lock; False if another process, or this one, holds the lock."""
-        stream = self._path.open("ab")
-        if not _grab(stream):
-            stream.close()
-            return False
-        self._stream = stream
-        return True
+        """Try to lock; False if another process, or this one, holds the lock.
 
-    def release(self) -> None:
-        """Unlock."""
+        Raises OSError where the file cannot be opened, or the file system keeps no locks.
+        """
+        while True:
+            stream = _opened(self._path)
+            try:
+                grabbed = _grab(stream)
+            except OSError as error:
+                stream.close()
+                raise OSError(error.errno, error.strerror, str(self._path)) from error
+            if grabbed and _is_at(stream, self._path):
+                self._stream = stream
+                return True
+            stream.close()
+            if not grabbed:
+                return False
+            # The one who held it deleted it meanwhile: nobody else would see this lock.
+
+    def release(self, *, delete: bool = False) -> None:
+        """Unlock, and delete the file where asked to and possible."""
         if self._stream is not None:
+            if delete and _is_at(self._stream, self._path):
+                with suppress(OSError):
+                    self._path.unlink()
             self._stream.close()
             self._stream = None
 
@@ -76,7 +95,23 @@ def is_locked(path: Path) -> bool:
     if not path.exists():
         return False
     try:
-        with path.open("ab") as stream:
+        with _opened(path) as stream:
             return _is_held(stream)
-    except OSError:  # another user's file, or one that was deleted just now
+    except OSError:  # a file that nobody but another user may open, or that was deleted just now
+        return False
+
+
+def _opened(path: Path) -> IO[bytes]:
+    try:
+        return path.open("ab")
+    except PermissionError:
+        if not path.exists():
+            raise
+        return path.open("rb")  # another user's file can be locked as well
+
+
+def _is_at(stream: IO[bytes], path: Path) -> bool:
+    try:
+        return os.path.samestat(os.fstat(stream.fileno()), path.stat())
+    except OSError:
         return False

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
-from sd2core.files.atomic import atomic_folder, atomic_write
+from sd2core.files.atomic import atomic_folder, atomic_write, full_disk_named
 from sd2core.files.numpy_files import open_npz_file
 from sd2core.files.stores import (
     COPY_AGAIN,
@@ -214,7 +214,10 @@ def write_zarr(mesh: MeshSequence, path: Path, progress: Progress = silent) -> N
     A chunk holds about 2 MB: all vertices of a stretch of frames.
     """
     if path.suffix.lower() == ".zip":
-        with tempfile.TemporaryDirectory(".tmp", f".{path.name}.", path.parent) as place:
+        with (
+            full_disk_named(path),
+            tempfile.TemporaryDirectory(".tmp", f".{path.name}.", path.parent) as place,
+        ):
             _write_group(mesh, Path(place), progress)
             with atomic_write(path) as stream:
                 _zip_folder(Path(place), stream)

@@ -16,25 +16,22 @@ with a note.
 
 from __future__ import annotations
 
-import getpass
 import hashlib
-import json
 import os
-import socket
-import time
 from collections.abc import Container, Iterable
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
 
 from pydantic import ValidationError
 
 from sd2core.errors import Sd2Error
-from sd2core.files.atomic import atomic_write_text, remove_leftovers
-from sd2core.files.lock import FileLock, is_locked
+from sd2core.files.atomic import remove_leftovers
+from sd2core.files.edit_lock import EditLock, Holder
+from sd2core.files.lock import is_locked
 from sd2core.files.paths import user_data
-from sd2core.files.texts import first_fault, read_content, read_json
+from sd2core.files.texts import first_fault, read_content
 from sd2core.labels.journal import SUFFIX, Journal, Replayed, replay, unpacked
 from sd2core.labels.spans import Labels
 
@@ -165,34 +162,21 @@ def recovery_folder() -> Path:
     return user_data("recovery")
 
 
-@dataclass(frozen=True)
-class Holder:
-    """Process that edits the labels of a recording; empty or 0 where unknown."""
-
-    user: str = ""
-    host: str = ""
-    pid: int = 0
-    since_unix_s: float = 0.0
-
-    def __str__(self) -> str:
-        who = self.user or "Another user"
-        return f"{who} on {self.host} (process {self.pid})" if self.host else who
-
-
 class RecoveryPlace:
     """Folder of the journals of one recording, and its lock.
 
-    ``root`` is the recovery folder of the program, made when it is needed. Locks hold between
-    processes that name the same folder: a folder of the user's keeps out that user's own windows
-    only. ``recording`` is the labelled recording or video; a link is the same as its target.
+    ``root`` is the recovery folder of the program, made when it is needed. Its locks hold between
+    processes that name the same folder, as a user's own windows do; ``beside`` is one that others
+    see as well. ``recording`` is the labelled recording or video; a link is the same as its target.
     """
 
-    def __init__(self, root: Path, recording: Path) -> None:
+    def __init__(self, root: Path, recording: Path, beside: EditLock | None = None) -> None:
         self._recording = Path(recording).resolve()
         number = hashlib.sha256(os.path.normcase(self._recording).encode()).hexdigest()[:12]
         name = "".join(one if one.isalnum() else "-" for one in self._recording.stem[:40])
         self._folder = Path(root) / f"{name}-{number}"
-        self._lock: FileLock | None = None
+        self._lock = EditLock(self._folder / _LOCK_NAME, self._folder / _HOLDER_NAME)
+        self._beside = beside
         self._begun: set[int] = set()
 
     @property
@@ -202,39 +186,44 @@ class RecoveryPlace:
 
     @property
     def held(self) -> bool:
-        """True while this place holds the lock."""
-        return self._lock is not None
+        """True while this place holds the lock of its folder."""
+        return self._lock.held
 
     def take(self) -> bool:
-        """Take the lock; False where another process holds it, and the labels are read-only here.
+        """Take the locks; False where another process holds one, and labels are read-only here.
 
-        Raises OSError when the folder cannot be made or written to.
+        A lock beside the recording that cannot be written is left out. Raises OSError when the
+        folder cannot be made or written to; the lock beside the recording is held then.
         """
+        if self._beside is not None:
+            with suppress(OSError):
+                if not self._beside.take():
+                    return False
         self._folder.mkdir(parents=True, exist_ok=True)
         _make_private(self._folder.parent, self._folder)
-        lock = FileLock(self._folder / _LOCK_NAME)
-        if self.held or not lock.take():
-            return self.held
-        self._lock = lock
-        holder = Holder(_user(), socket.gethostname(), os.getpid(), time.time())
-        with suppress(OSError):  # editing works without it
-            atomic_write_text(self._folder / _HOLDER_NAME, json.dumps(asdict(holder)) + "\n")
-        return True
+        if self._lock.take():
+            return True
+        if self._beside is not None:
+            self._beside.release()
+        return False
+
+    def beat(self) -> None:
+        """Tell others that the locks are still held."""
+        for lock in self._locks:
+            lock.beat()
 
     def release(self) -> None:
-        """Release the lock. Close the journal first."""
-        if self._lock is not None:
-            self._lock.release()
-            self._lock = None
+        """Release the locks. Close the journal first."""
+        for lock in self._locks:
+            lock.release()
 
     def holder(self) -> Holder | None:
-        """Return the process that holds the lock, this or another one; None where it is free."""
-        if not is_locked(self._folder / _LOCK_NAME):
-            return None
-        try:
-            return Holder(**read_json(self._folder / _HOLDER_NAME))
-        except (Sd2Error, TypeError):  # not written yet, or by another version
-            return Holder()
+        """Return the process that holds a lock, this or another one; None where all are free."""
+        return next(filter(None, (lock.holder() for lock in self._locks)), None)
+
+    @property
+    def _locks(self) -> tuple[EditLock, ...]:
+        return (self._lock,) if self._beside is None else (self._beside, self._lock)
 
     def offers(self, *, declined: bool = False) -> Found:
         """Find labels of earlier sessions; ``declined`` ones only when asked for."""
@@ -307,10 +296,3 @@ def offers_in(root: Path, *, declined: bool = False) -> Found:
     offers = [offer for one in found for offer in one.offers]
     notes = [note for one in found for note in one.notes]
     return Found(tuple(sorted(offers, key=lambda one: -one.time_unix_s)), tuple(notes))
-
-
-def _user() -> str:
-    try:
-        return getpass.getuser()
-    except (OSError, KeyError, ImportError):  # a number without a name, e.g. in a container
-        return ""

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
-from sd2core.files.atomic import atomic_folder
+from sd2core.files.atomic import atomic_folder, full_disk_named
 from sd2core.files.stores import (
     StoredArray,
     array_in,
@@ -242,6 +242,10 @@ class PairWriter:
                 f"Take {take.title} is split into the parts {list(parts)}",
                 f"{header.get('parts', [])}, as {self._path} has",
             )
+        with full_disk_named(self._path):
+            self._write(take)
+
+    def _write(self, take: Take) -> None:
         start, stop = self._frames, self._frames + len(take.times_s)
         written = {name: getattr(take, name) for name in _ARRAYS}
         if take.limbs is not None:

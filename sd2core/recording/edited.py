@@ -12,15 +12,12 @@ from pydantic import ValidationError
 from sd2core.errors import Sd2Error
 from sd2core.files.recording_json import SensorEntry
 from sd2core.placements.placements import placements_from_dict
+from sd2core.recording.divergence import WORDS
 from sd2core.recording.recording import Recording
 from sd2core.sensor import VirtualSensor
 
-WORDS = {
-    "sensor": "sensor",
-    "placements": "plan of placements",
-    "radar_offset_s": "offset of the radar",
-}
-"""Names of the fields, and what a user calls them."""
+EDITED = ("sensor", "placements", "radar_offset_s")
+"""Names of the fields."""
 
 
 def edited_fields(recording: Recording) -> dict[str, Any]:
@@ -47,10 +44,10 @@ def decoded_fields(entry: Mapping[str, Any]) -> dict[str, Any]:
     except (KeyError, TypeError, ValueError, ValidationError) as error:
         raise Sd2Error(
             f"Sensor, placements and offset that were not saved cannot be read ({error})",
-            f"the fields {', '.join(WORDS)}",
+            f"the fields {', '.join(EDITED)}",
         ) from error
 
 
 def differing(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[str]:
     """Name the fields in which two entries differ, in words."""
-    return [words for name, words in WORDS.items() if one.get(name) != other.get(name)]
+    return [WORDS[name] for name in EDITED if one.get(name) != other.get(name)]

@@ -11,12 +11,13 @@ import json
 import math
 import shutil
 import tempfile
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.errors import Sd2Error
-from sd2core.files.atomic import atomic_write_text
+from sd2core.files.atomic import atomic_write_text, full_disk_named
 from sd2core.files.paths import (
     free_path,
     is_absolute,
@@ -39,6 +40,7 @@ from sd2core.labels.files import FILE_NAME as LABELS_NAME
 from sd2core.labels.files import labels_of, read_labels, write_labels
 from sd2core.placements.placements import Placements, placements_from_dict
 from sd2core.progress import Progress, silent
+from sd2core.recording.divergence import WORDS, Divergence, State, digests_of
 from sd2core.recording.relinking import ROLES, Relinked, Role, exists, find_again, is_many
 from sd2core.sensor import VirtualSensor
 
@@ -58,6 +60,24 @@ _SENSOR = ("position_m", "azimuth_deg", "elevation_deg", "field_of_view_deg")
 
 _AIDS: set[Role] = {"faces", "denoiser"}
 """Files that are nothing to look at by themselves."""
+
+
+class GoneError(Sd2Error):
+    """Error for a recording that is no longer in its folder."""
+
+
+class SavedElsewhereError(Sd2Error):
+    """Error for a recording that something else has changed since it was read."""
+
+    def __init__(self, theirs: Recording, divergence: Divergence) -> None:
+        self.theirs = theirs  # as it is on disk
+        self.divergence = divergence
+        super().__init__(
+            f"{theirs.folder} was saved by another window or program since it was read:"
+            f" {', '.join(divergence.changes)}",
+            "the recording as it was read",
+            "Read it again, and repeat what is to be changed",
+        )
 
 
 @dataclass(eq=False)
@@ -125,7 +145,10 @@ class Recording:
     title: str = ""
     simulated: bool = False
     camera: CameraEntry | None = None
+    # As the files were last read or written; None before.
     _read: Document = field(default_factory=Document, repr=False)
+    _base: State | None = field(default=None, repr=False)
+    _digests: Mapping[str, str] = field(default_factory=dict, repr=False)
 
     @classmethod
     def create(
@@ -190,7 +213,8 @@ class Recording:
         folder = _new_folder(Path(folder))
         files: dict[Role, Path] = {}
         for role, path in self._files().items():
-            if not exists(role, Path(path)):
+            # What went with the folder that it was in can be found again.
+            if not exists(role, Path(path)) and (copy or not self._is_gone):
                 if role == "denoiser":  # everything else can be shown without it
                     continue
                 raise Sd2Error(f"The {role} {path} does not exist", "a file or folder")
@@ -211,7 +235,8 @@ class Recording:
                 **files,  # type: ignore[arg-type]
                 title=self.title or folder.stem,
                 labels_elsewhere=False,
-                _read=self._read.model_copy(deep=True),
+                _base=None,
+                _digests={},
             )
             made.save(timebase)
         except BaseException:
@@ -267,9 +292,20 @@ class Recording:
 
         Labels are written before, to ``labels.json``, with their frames where a timebase
         is given; but see :attr:`labels_elsewhere`.
+
+        Raises
+        ------
+        GoneError
+            When the recording is no longer in its folder.
+        SavedElsewhereError
+            When something else has changed it since it was read; see :meth:`accept`.
+        OSError
+            When a file cannot be written; it is then as it was.
         """
-        document = self._read
-        if self.labels is not None and not self.labels_elsewhere:
+        self._check_unchanged()
+        document = self._document()
+        if self._writes_labels:
+            assert self.labels is not None
             write_labels(
                 self.folder / LABELS_NAME,
                 self.labels,
@@ -278,6 +314,14 @@ class Recording:
                 video=self.video,
             )
             self.spans = ()
+            self._note_written(LABELS_NAME)
+        text = json.dumps(document.model_dump(mode="json"), indent=2, ensure_ascii=False)
+        atomic_write_text(self.folder / FILE_NAME, text + "\n")
+        self._note_written(FILE_NAME)
+        self._read, self._base = document, self.state()
+
+    def _document(self) -> Document:
+        document = self._read.model_copy(deep=True)
         document.version = VERSION
         document.title = self.title
         document.simulated = self.simulated
@@ -286,20 +330,77 @@ class Recording:
         document.radar_offset_s = _finite(self.radar_offset_s, "radar offset in seconds")
         document.bundled_denoiser = self.bundled_denoiser
         document.placements = None if self.placements is None else self.placements.as_dict()
-        document.spans = tuple(self.spans)
+        document.spans = () if self._writes_labels else tuple(self.spans)
         for name in _SENSOR:
             setattr(document.sensor, name, getattr(self.sensor, name))
         for role in ROLES:
             path = getattr(self, role)
             setattr(document, role, None if path is None else stored_path(path, self.folder))
-        text = json.dumps(document.model_dump(mode="json"), indent=2, ensure_ascii=False)
-        atomic_write_text(self.folder / FILE_NAME, text + "\n")
+        return document
+
+    @property
+    def _writes_labels(self) -> bool:
+        return self.labels is not None and not self.labels_elsewhere
+
+    # --- what others save -----------------------------------------------------------------
+
+    def state(self) -> State:
+        """Settings and labels as they are now, to be compared with those of another time."""
+        settings = {name: getattr(self, name) for name in WORDS}
+        for role in ROLES:  # as they are read again
+            if settings[role] is not None:
+                stored = stored_path(settings[role], self.folder)
+                settings[role] = located_path(stored, self.folder)
+        return State(settings, self.labelled)
+
+    def accept(self, theirs: Recording) -> None:
+        """Take what is on disk as known, so that :meth:`save` writes over it."""
+        self._read, self._base, self._digests = theirs._read, theirs._base, theirs._digests
+
+    def divergence(self, theirs: Recording) -> Divergence:
+        """Compare with the same recording as it is on disk by now."""
+        mine = self.state()
+        there = theirs.state()
+        if self.labels_elsewhere:  # this one writes no labels
+            there = replace(there, labels=mine.labels)
+        return Divergence(self._base or mine, mine, there)
+
+    def _check_unchanged(self) -> None:
+        if self._base is None:
+            return
+        if self._is_gone:
+            raise GoneError(
+                f"{self.folder} was renamed, moved or deleted, or its drive is not connected",
+                f"the folder that holds {FILE_NAME}",
+                "Bring it back, or save the recording in another folder",
+            )
+        if digests_of(self._own_files()) == self._digests:
+            return
+        theirs = open_recording(self.folder)
+        found = self.divergence(theirs)
+        if found.changes:
+            raise SavedElsewhereError(theirs, found)
+        self.accept(theirs)  # with fields that only a later version knows
+
+    @property
+    def _is_gone(self) -> bool:
+        """True if it was in its folder, and is not any more."""
+        return self._base is not None and not (self.folder / FILE_NAME).is_file()
+
+    def _own_files(self) -> list[Path]:
+        return [self.folder / FILE_NAME, self.folder / LABELS_NAME]
+
+    def _note_written(self, name: str) -> None:
+        self._digests = {**self._digests, **digests_of([self.folder / name])}
 
     def read_labels_again(self) -> None:
         """Read ``labels.json`` again, if there is one; Sd2Error if it is damaged."""
         labels = self.folder / LABELS_NAME
         if labels.exists():
+            self._note_written(LABELS_NAME)
             self.labels = read_labels(labels).labels
+            if self._base is not None:
+                self._base = replace(self._base, labels=self.labels)
 
     def focal_px(self, width: int, height: int) -> float | None:
         """Focal length in pixels of pictures of this size, None if unknown.
@@ -406,6 +507,8 @@ def open_recording(path: Path) -> Recording:
     """
     path = Path(path)
     folder = plain_path(path.parent if path.name == FILE_NAME else path)
+    # Taken first: what is written while it is read counts as another's.
+    digests = digests_of([folder / FILE_NAME])
     document = read_document(folder / FILE_NAME)
     planned = document.placements
     with errors_in(folder / FILE_NAME):
@@ -424,8 +527,10 @@ def open_recording(path: Path) -> Recording:
         simulated=document.simulated,
         camera=document.camera,
         _read=document,
+        _digests=digests,
     )
     recording.read_labels_again()
+    recording._base = recording.state()
     return recording
 
 
@@ -467,10 +572,11 @@ def _copied(
         target = free_path(folder, source.name, role, reserved=FILE_NAME)
         temporary = Path(tempfile.mkdtemp(prefix=".copy-", dir=folder))
         made.append(temporary)
-        if source.is_dir():
-            shutil.copytree(source, temporary / target.name)
-        else:
-            shutil.copy2(source, temporary / target.name)
+        with full_disk_named(target):
+            if source.is_dir():
+                shutil.copytree(source, temporary / target.name)
+            else:
+                shutil.copy2(source, temporary / target.name)
         (temporary / target.name).rename(target)
         made.append(target)
         temporary.rmdir()

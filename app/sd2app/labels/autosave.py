@@ -7,13 +7,14 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QObject, QTimer, Signal
 
 from sd2app.labels.model import LabelsModel
 from sd2app.session.content import UNTITLED
 from sd2app.session.document import DocumentModel
 from sd2app.widgets.text import clock_text
 from sd2core.errors import Sd2Error
+from sd2core.files.edit_lock import BEAT_EVERY_S, edit_lock
 from sd2core.labels.journal import Journal
 from sd2core.labels.recovery import Found, Offer, RecoveryPlace, offers_in
 from sd2core.labels.spans import Labels
@@ -51,6 +52,9 @@ class LabelAutosave(QObject):
         self._step = 0  # of the history
         self.notes: tuple[str, ...] = ()  # on unreadable sessions, or edits that are not kept
         self.waiting = Found()  # at the start, until a recording is open
+        beat = QTimer(self)
+        beat.timeout.connect(self._beat)
+        beat.start(round(BEAT_EVERY_S * 1000))
         document.saved.connect(self._follow_saving)
         document.undo_stack.indexChanged.connect(self._keep_others)
 
@@ -100,8 +104,14 @@ class LabelAutosave(QObject):
         self._place = None
         self._refusal, self._offers, self.notes, self._keeping = "", (), (), True
 
+    def _beat(self) -> None:
+        if self._place is not None:
+            self._place.beat()
+
     def _begin_at(self, path: Path, *, reread: bool) -> None:
-        self._place = RecoveryPlace(self._root, path)
+        content = self._document.content
+        beside = edit_lock(path) if content is not None and content.saved else None
+        self._place = RecoveryPlace(self._root, path, beside)
         self._take(reread=reread)
 
     def _take(self, *, reread: bool) -> None:

@@ -17,6 +17,7 @@ from sd2core.labels import edits, field_edits
 from sd2core.labels.comparison import changed_stretch
 from sd2core.labels.edits import Change, Edit, Side, duplicate_together, nudge_together
 from sd2core.labels.spans import Labels, Span
+from sd2core.recording.divergence import State
 from sd2core.recording.edited import decoded_fields
 
 
@@ -55,7 +56,7 @@ class LabelEdits(QObject):
     An impossible edit changes nothing, and ``failed`` says why. ``applying`` is emitted before an
     edit, so that a drag in progress ends first; ``done_at`` after an edit, an undo or a redo, with
     the earliest start and latest end of changed spans; ``restoring`` with the other fields of the
-    recording that are restored with the labels, in the same step.
+    recording that are restored, or taken over, with the labels in the same step.
     """
 
     failed = Signal(str)
@@ -158,18 +159,35 @@ class LabelEdits(QObject):
         recording, offer = self._document.recording, self._session.offer
         if recording is None or offer is None or self.refused():
             return
-        self.applying.emit()
-        before = self.labels.labels
         others: dict[str, Any] = {}
         if offer.others is not None and self._session.changed_others(offer):
             try:
                 others = decoded_fields(offer.others)
             except Sd2Error as error:
                 self.failed.emit(str(error))
-        self.undo_stack.beginMacro("Restore edits" if others else "Restore labels")
+        self.applying.emit()
+        before = self.labels.labels
         recording.labels = self._session.take_offer()  # on disk already, as a session of its own
         self.labels.set_labels(recording.labels)
-        self.make(Edit("Restore labels", recording.labels), before)
+        name = "Restore edits" if others else "Restore labels"
+        self._make_with(name, before, recording.labels, others)
+
+    def take_state(self, name: str, state: State) -> None:
+        """Take over labels and settings that were saved elsewhere, as one step."""
+        recording = self._document.recording
+        if recording is None:
+            return
+        self.applying.emit()
+        before, now = self.labels.labels, recording.state()
+        after = before if state.labels == now.labels else state.labels
+        others = {one: value for one, value in state.settings.items() if value != now.settings[one]}
+        if others or after is not before:
+            self._make_with(name, before, after, others)
+
+    def _make_with(self, name: str, before: Labels, after: Labels, others: dict[str, Any]) -> None:
+        """Make one step of an edit of labels and of other fields."""
+        self.undo_stack.beginMacro(name)
+        self.make(Edit(name, after), before)
         if others:
             self.restoring.emit(others)
         self.undo_stack.endMacro()

@@ -226,10 +226,10 @@ class DocumentModel(QObject):
     # --- saving ---------------------------------------------------------------------------
 
     def save(self) -> None:
-        """Write the recording where it came from; Sd2Error or OSError if that fails."""
+        """Write the recording where it came from; raises what :meth:`Recording.save` does."""
         if self.content is not None and self.content.saved:
             self.content.recording.save(self.content.timebase)
-            self._tell_saved()
+            self.tell_saved()
 
     def save_as(self, folder: Path) -> None:
         """Make a recording folder that refers to the files where they are."""
@@ -240,7 +240,7 @@ class DocumentModel(QObject):
             folder, timebase=self.content.timebase
         )
         self.content = replace(self.content, recording=made)
-        self._tell_saved()
+        self.tell_saved()
 
     def relink(self, folder: Path) -> Relinked | None:
         """Look for missing files under one folder, and read again what was found."""
@@ -249,7 +249,7 @@ class DocumentModel(QObject):
         relinked = self.recording.relink(folder)
         if relinked.found:
             if self.content is not None and self.content.saved:
-                self._tell_saved()
+                self.tell_saved()
             self._start(self.recording, [])
         return relinked
 
@@ -258,7 +258,8 @@ class DocumentModel(QObject):
         if self.content is not None and self.content.saved:
             self.content.recording.read_labels_again()
 
-    def _tell_saved(self) -> None:
+    def tell_saved(self) -> None:
+        """Take what is there as saved."""
         self.undo_stack.setClean()
         self.saved.emit()
         self.changed.emit()

@@ -107,10 +107,11 @@ class Edits:
             self._push_change("Plan placements", {"placements": before[1]})
 
     def restore(self, fields: Mapping[str, Any]) -> None:
-        """Take over sensor, placements and offset of an earlier session."""
-        self.place_sensor(fields["sensor"], "Restore sensor")
-        rest = {name: value for name, value in fields.items() if name != "sensor"}
-        self._change("Restore placements and offset", rest)
+        """Take over fields of an earlier session, or that were saved elsewhere."""
+        rest = dict(fields)
+        if "sensor" in rest:
+            self.place_sensor(rest.pop("sensor"), "Restore sensor")
+        self._change("Restore settings", rest)
 
     # --- alignment of the real capture ----------------------------------------------------
 

@@ -11,13 +11,16 @@ from PySide6.QtWidgets import QMenu, QMessageBox
 from sd2app.feature import Action, Drop, Feature, Shell
 from sd2app.fit.model import FitModel
 from sd2app.fit.request import read_request
+from sd2app.labels.edits import LabelEdits
 from sd2app.session.content import recording_of
 from sd2app.session.session import Session
 from sd2app.shell.open_dialog import ask_to_open
-from sd2app.widgets.dialogs import ask_folder, ask_new
+from sd2app.shell.saving import ask_what_is_kept
+from sd2app.widgets.dialogs import Answer, ask_folder, ask_new, confirmed
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import plain_path
 from sd2core.files.resources import resource_path
+from sd2core.recording.recording import GoneError, SavedElsewhereError
 
 _PARTS = ("video", "mesh", "radar")
 
@@ -25,8 +28,8 @@ _PARTS = ("video", "mesh", "radar")
 class FilesFeature(Feature):
     """The recording as files; a folder in which a ``fit`` was stopped is taken up."""
 
-    def __init__(self, session: Session, shell: Shell, fit: FitModel) -> None:
-        self._session, self._shell, self._fit = session, shell, fit
+    def __init__(self, session: Session, shell: Shell, fit: FitModel, labels: LabelEdits) -> None:
+        self._session, self._shell, self._fit, self._labels = session, shell, fit, labels
         self._document = session.document
         self._document.opened.connect(self._remember)
         self._document.saved.connect(self._remember)
@@ -156,13 +159,52 @@ class FilesFeature(Feature):
             )
 
     def save(self) -> bool:
-        """Save in place, or ask where."""
+        """Save in place, or ask where; ask what is kept where it was saved elsewhere as well."""
         content = self._document.content
         if content is None:
             return True
         if not content.saved:
             return self.save_as()
-        return self._shell.attempt(lambda: (self._document.save(), True)) is not None
+        return self._shell.attempt(self._save_here) is True
+
+    def _save_here(self) -> bool:
+        try:
+            self._document.save()
+        except GoneError as error:
+            return self._ask_where_else(error)
+        except SavedElsewhereError as error:
+            return self._ask_what_is_kept(error)
+        return True
+
+    def _ask_where_else(self, error: GoneError) -> bool:
+        """Offer another folder in place of one that is not there any more."""
+        words = f"{error} Nothing is lost: edits are kept for recovery until they are saved."
+        if not confirmed(self._shell.dialog_parent, "Save as?", words, Answer.Save):
+            return False
+        saved = self.save_as()
+        if saved and (recording := self._document.recording) is not None and recording.missing():
+            parts = " and ".join(recording.missing())
+            self._shell.warn(f"The {parts} went with the folder: File → Find missing files…")
+        return saved
+
+    def _ask_what_is_kept(self, error: SavedElsewhereError) -> bool:
+        """Let the user choose between what is here, what is on disk, and both."""
+        recording = self._document.recording
+        assert recording is not None
+        answer = ask_what_is_kept(self._shell.dialog_parent, self._document.title, error.divergence)
+        if answer is None:
+            return False
+        recording.accept(error.theirs)
+        if answer == "theirs":
+            self._labels.take_state("Take what was saved elsewhere", error.divergence.theirs)
+            self._document.tell_saved()
+            return True
+        if answer == "merge":
+            merged = error.divergence.merged()
+            self._labels.take_state("Merge what was saved elsewhere", merged.state)
+            if merged.notes:
+                self._shell.note(" ".join(merged.notes))
+        return self.save()
 
     def save_as(self) -> bool:
         """Ask for a new recording folder and save there."""

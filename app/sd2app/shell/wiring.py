@@ -115,7 +115,7 @@ class Features:
         )
         self.playback = PlaybackFeature(session)
         self.program = ProgramFeature(session, shell, labels)
-        self.files = FilesFeature(session, shell, self.fit.model)
+        self.files = FilesFeature(session, shell, self.fit.model, labels.edits)
         self.scene = SceneFeature(
             session, shell, maps.synthesis, self.sensor.placements, labels.offer_frame
         )

@@ -119,9 +119,9 @@ def _show(options: argparse.Namespace) -> None:
 
 
 def _convert(options: argparse.Namespace) -> None:
-    check_label_output(options.out, replace=options.replace)
+    there = check_label_output(options.out, replace=options.replace)
     labels, clock = read_named(options)
-    lost = write(options.out, labels, clock, options.to)
+    lost = write(options.out, labels, clock, options.to, over=there)
     if options.json:
         print_json({"path": str(options.out), "spans": len(labels.spans), "not_kept": lost})
         return

@@ -62,14 +62,16 @@ def _set(options: argparse.Namespace) -> None:
 
     if (options.use is None) != (options.out is None):
         raise Sd2Error("One of --use and --out is given", "both of them, or none")
-    for path in (options.export, options.out):
-        if path is not None:
-            check_label_output(path, replace=options.replace)
+    there = {
+        path: check_label_output(path, replace=options.replace)
+        for path in (options.export, options.out)
+        if path is not None
+    }
     labels, clock = read_named(options)
     written, lost = [], []
     if options.use is not None:
         labels = set_label_set(labels, _other(options.use)).labels
-        lost = write(options.out, labels, clock)
+        lost = write(options.out, labels, clock, over=there[options.out])
         written.append(options.out)
     if options.export is not None:
         files.write_label_set(options.export, labels.label_set)

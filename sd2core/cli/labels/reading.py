@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from sd2core.cli.options import positive_float
 from sd2core.errors import Sd2Error
+from sd2core.files.digests import cached_digest
 
 if TYPE_CHECKING:
     from sd2core.labels.spans import Labels
@@ -160,12 +161,27 @@ def recording_clock(recording: Recording) -> Timebase:
 
 
 def write(
-    path: Path, labels: Labels, timebase: Timebase | None, file_format: str | None = None
+    path: Path,
+    labels: Labels,
+    timebase: Timebase | None,
+    file_format: str | None = None,
+    *,
+    over: str | None = None,
 ) -> list[str]:
-    """Write labels by the file's suffix; return the losses as sentences."""
+    """Write labels by the file's suffix; return the losses as sentences.
+
+    ``over`` is the digest of the file that they replace, where they were made of it: one that was
+    saved meanwhile is not replaced.
+    """
     from sd2core.labels import files
     from sd2core.labels.formats import write_labels
 
+    if over is not None and over != cached_digest(path):
+        raise Sd2Error(
+            f"{path} was saved by a window or another program while this command ran",
+            "the file as it was read",
+            "Run the command again",
+        )
     if file_format is None and path.suffix.lower() == ".json":
         files.write_labels(path, labels, timebase=timebase)
         return []
@@ -179,13 +195,17 @@ def print_lost(lost: list[str]) -> None:
         print(f"  not kept: {sentence}")
 
 
-def check_label_output(path: Path, *, replace: bool) -> None:
-    """Refuse a file that cannot be written, or that is there and not to be replaced."""
+def check_label_output(path: Path, *, replace: bool) -> str:
+    """Refuse a file that cannot be written, or that is there and not to be replaced.
+
+    Return the digest of what is there, for :func:`write`; empty without a file.
+    """
     from sd2core.cli.reading import check_output
 
     if path.exists() and not replace:
         raise Sd2Error(f"{path} exists", "a new file", "Choose another name, or say --replace")
     check_output(path, path.suffix.lower())
+    return cached_digest(path)
 
 
 def _video_clock(path: Path) -> Timebase:

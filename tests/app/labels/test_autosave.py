@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from labelled import even, imported, random_edit
+from PySide6.QtCore import QTimer
 
 from sd2app.labels.autosave import LabelAutosave
 from sd2app.labels.dragging import LabelDragging
@@ -406,6 +407,21 @@ class TestTwoWindows:
         # The sensor, say, can be saved; the labels of the first stay.
         second.document.save()
         assert len(read_labels(recording / "labels.json").labels.spans) == 1
+
+    def test_one_with_another_home_looks_on_as_well(self, desk, recording, tmp_path) -> None:
+        first, second = desk(), desk()
+        second.session._root = tmp_path / "home of another"
+        first.open(recording)
+        second.open(recording)
+        assert second.session.read_only
+        assert f"(process {os.getpid()})" in second.session.refusal
+        (note,) = recording.glob(".edited-by.json")
+        os.utime(note, (1.0, 1.0))
+        first.session.findChild(QTimer).timeout.emit()
+        assert note.stat().st_mtime > 1.0
+        first.session.close()
+        second.session.try_again()
+        assert not second.session.refusal
 
     def test_it_edits_once_the_first_has_let_go(self, desk, root, recording) -> None:
         first, second = desk().open(recording), desk().open(recording)

@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import swinging_recordings
 from cli_outcome import Sd2
 
+from sd2core.cli import align
 from sd2core.files.resources import resource_path
 from sd2core.recording.recording import open_recording
 
@@ -57,3 +59,23 @@ def test_what_comes_with_the_program_is_not_changed(sd2: Sd2) -> None:
     outcome = sd2("align", resource_path("swipes.sd2"), "--save")
     assert outcome.code == 1
     assert "a recording of your own" in outcome.err
+
+
+def test_what_another_saved_while_it_was_aligned_is_kept(
+    sd2: Sd2, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = swinging_recordings.recording(tmp_path / "a.sd2").folder
+
+    def found(*_: object) -> SimpleNamespace:
+        theirs = open_recording(folder)
+        theirs.title = "theirs"
+        theirs.save()
+        return SimpleNamespace(problem="", offset_s=0.5)
+
+    monkeypatch.setattr(align, "_found", found)
+    outcome = sd2("align", folder, "--save", "--json")
+    assert outcome.code == 1
+    (entry,) = json.loads(outcome.out)["recordings"]
+    assert "since it was read: another title" in entry["problem"]
+    assert not entry["saved"]
+    assert open_recording(folder).title == "theirs"

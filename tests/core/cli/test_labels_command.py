@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 from pathlib import Path
 
@@ -342,3 +343,26 @@ def test_spans_are_cut_out(sd2: Sd2, moving_recording: Path, tmp_path: Path) -> 
     assert not (made / "synthetic.npz").exists()
     refused = sd2("labels", "cut", moving_recording, "--out", out, "--label", "push")
     assert "up-to-down, wave" in refused.err
+
+
+@pytest.mark.parametrize(
+    ("command", "module"),
+    [("convert", "sd2core.cli.labels"), ("set", "sd2core.cli.labels.label_set")],
+)
+def test_labels_that_were_saved_while_the_command_ran_are_not_replaced(
+    sd2: Sd2, anna: Path, monkeypatch: pytest.MonkeyPatch, command: str, module: str
+) -> None:
+    place = importlib.import_module(module)
+    read = place.read_named
+
+    def slow(options: object) -> object:
+        found = read(options)
+        written(anna, (0.0, 1.0, "saved meanwhile"))
+        return found
+
+    monkeypatch.setattr(place, "read_named", slow)
+    told = [anna] if command == "convert" else ["--use", "usual", "--out", anna]
+    outcome = sd2("labels", command, anna, *told, "--replace")
+    assert outcome.code == 1
+    assert f"{anna} was saved by a window or another program" in outcome.err
+    assert [one.label for one in files.read_labels(anna).labels.spans] == ["saved meanwhile"]

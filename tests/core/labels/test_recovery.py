@@ -12,9 +12,10 @@ from labelled import even, imported
 from lock_holders import held
 
 from sd2core.errors import Sd2Error
+from sd2core.files.edit_lock import Holder
 from sd2core.labels import journal as journal_module
 from sd2core.labels.journal import Journal
-from sd2core.labels.recovery import Found, Holder, RecoveryPlace, offers_in
+from sd2core.labels.recovery import Found, RecoveryPlace, offers_in
 from sd2core.labels.spans import Labels, Span
 
 START = imported(even(), 7)
@@ -320,9 +321,9 @@ class TestOneWindow:
 
     def test_it_ends_with_the_process(self, taken: Take, root: Path, recording: Path) -> None:
         place = taken(root, recording)
-        place.release()
         (lock,) = root.rglob("lock")
         (said,) = root.rglob("holder.json")
+        place.release()
         said.write_text("half a")
         process = held(lock)
         try:

@@ -1,0 +1,103 @@
+"""What somebody else saved in a recording since it was read here, and how both go together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from sd2core.files.digests import file_digest
+from sd2core.labels.comparison import compare
+from sd2core.labels.merging import chosen, merge
+from sd2core.labels.spans import Labels
+
+WORDS = {
+    "sensor": "sensor",
+    "placements": "plan of placements",
+    "radar_offset_s": "offset of the radar",
+    "denoiser": "denoiser",
+    "bundled_denoiser": "denoiser",
+    "title": "title",
+    "simulated": "word on what is simulated",
+    "camera": "camera",
+    "video": "video",
+    "mesh": "mesh",
+    "faces": "faces of the mesh",
+    "mesh_reading": "way to read the mesh",
+    "radar": "radar file",
+}
+"""Settings in ``recording.json``, and what a user calls them."""
+
+
+@dataclass(frozen=True)
+class State:
+    """Settings and labels of a recording at one time."""
+
+    settings: Mapping[str, Any]
+    labels: Labels
+
+
+@dataclass(frozen=True)
+class Merge:
+    """Settings and labels of both sides, and sentences on what both had changed."""
+
+    state: State
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Divergence:
+    """States of a recording: as it was read, as it is here, and as it is on disk by now."""
+
+    base: State
+    mine: State
+    theirs: State
+
+    @property
+    def changes(self) -> list[str]:
+        """What was saved elsewhere and is not the same here, in words; empty without any."""
+        return [
+            *filter(None, [self._changed_labels()]),
+            *(f"another {words}" for words in _named(self._changed())),
+        ]
+
+    def merged(self) -> Merge:
+        """Settings and labels with the changes of both sides; see :func:`.merging.merge`.
+
+        Of a setting that both changed, mine holds.
+        """
+        base, mine, theirs = (one.settings for one in (self.base, self.mine, self.theirs))
+        settings = {name: chosen(base[name], mine[name], theirs[name]) for name in mine}
+        labels = merge(self.base.labels, self.mine.labels, self.theirs.labels)
+        notes = []
+        if labels.both:
+            notes.append(f"Of {_spans(labels.both)} that both had changed, both are there.")
+        if labels.aside:
+            notes.append(f"On tracks “(both)” lie {_spans(labels.aside)} that had no room.")
+        if clash := _named(name for name in self._changed() if mine[name] != base[name]):
+            notes.append(f"Both had changed the {' and the '.join(clash)}: yours is kept.")
+        return Merge(State(settings, labels.labels), tuple(notes))
+
+    def _changed(self) -> list[str]:
+        """Settings that were changed elsewhere, to something else than here."""
+        base, mine, theirs = (one.settings for one in (self.base, self.mine, self.theirs))
+        return [name for name in mine if theirs[name] not in (base[name], mine[name])]
+
+    def _changed_labels(self) -> str:
+        if self.theirs.labels == self.mine.labels:
+            return ""
+        return str(compare(self.base.labels, self.theirs.labels))
+
+
+def digests_of(paths: Iterable[Path]) -> dict[str, str]:
+    """Hashes of files' contents by their names, without those that are not there."""
+    return {path.name: file_digest(path) for path in paths if path.is_file()}
+
+
+def _named(names: Iterable[str]) -> list[str]:
+    return list(dict.fromkeys(WORDS[name] for name in names))
+
+
+def _spans(count: int) -> str:
+    return f"{count:,} span{'s' * (count != 1)}"
