@@ -83,5 +83,5 @@ def test_a_radar_file_with_a_map_shows_it_and_brings_its_labels(tmp_path):
 def test_a_damaged_radar_file_is_the_problem_that_is_named(tmp_path):
     path = tmp_path / "swing.h5"
     path.write_bytes(b"nothing of the kind")
-    with pytest.raises(Sd2Error, match="swing.h5 cannot be read as HDF5"):
+    with pytest.raises(Sd2Error, match=r"swing\.h5 cannot be read as HDF5"):
         load_content(recording_of([path]), "mean", lambda *_: None)
