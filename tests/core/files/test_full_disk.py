@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from full_disk import full_disk
 
 from sd2core.datasets.source import Source
 from sd2core.datasets.writing import write_dataset
@@ -28,23 +28,9 @@ from sd2core.timebase import Timebase
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="limits the size of files")
 
-ROOM_BYTES = 6000
 AXIS = VelocityAxis(64, 2.0)
 RNG = np.random.default_rng(0)
 LABELS = Labels(spans=tuple(Span(k + 1, "Gestures", k, k + 0.5, "swipe") for k in range(800)))
-
-
-@contextmanager
-def full_disk() -> Iterator[None]:
-    """No file may become longer than a few pages: a write beyond fails as on a full disk."""
-    import resource
-
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (ROOM_BYTES, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 def a_map() -> DopplerMap:
@@ -117,7 +103,7 @@ WRITERS: dict[str, Callable[[Path], object]] = {
 def test_names_the_file_and_what_to_do(name: str, tmp_path: Path) -> None:
     path = tmp_path / name
     with (
-        full_disk(),
+        full_disk(6000),
         pytest.raises(OSError, match="free some, or write to another place") as caught,
     ):
         WRITERS[name](path)
@@ -132,7 +118,7 @@ def test_names_the_file_and_what_to_do(name: str, tmp_path: Path) -> None:
 def test_leaves_the_old_file_whole_and_nothing_beside_it(name: str, tmp_path: Path) -> None:
     path = tmp_path / name
     path.write_bytes(b"old")
-    with full_disk(), pytest.raises(OSError, match="free some"):
+    with full_disk(6000), pytest.raises(OSError, match="free some"):
         WRITERS[name](path)
     assert path.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [path]
@@ -145,7 +131,7 @@ def test_a_recording_stays_as_it_was_saved(tmp_path: Path) -> None:
     made.save()
     before = {path.name: path.read_bytes() for path in made.folder.iterdir()}
     made.labels = LABELS
-    with full_disk(), pytest.raises(OSError, match="free some") as caught:
+    with full_disk(6000), pytest.raises(OSError, match="free some") as caught:
         made.save()
     assert caught.value.filename == str(made.folder / "labels.json")
     assert {path.name: path.read_bytes() for path in made.folder.iterdir()} == before
@@ -158,7 +144,7 @@ def test_a_copy_into_a_recording_names_the_copy(kind: str, tmp_path: Path) -> No
     large = mesh if kind == "file" else mesh / "0.npz"
     large.parent.mkdir(exist_ok=True)
     large.write_bytes(resource_path("swipes.sd2").joinpath("video.mp4").read_bytes())
-    with full_disk(), pytest.raises(OSError, match="free some") as caught:
+    with full_disk(6000), pytest.raises(OSError, match="free some") as caught:
         Recording.create(tmp_path / "walk.sd2", mesh=mesh, copy=True)
     assert caught.value.filename == str(tmp_path / "walk.sd2" / mesh.name)
     assert not (tmp_path / "walk.sd2").exists()
