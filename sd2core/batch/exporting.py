@@ -18,7 +18,7 @@ from sd2core.batch.synthesis import LONGEST_FRAMES
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.digests import file_digest
-from sd2core.files.limits import check_regular
+from sd2core.files.limits import open_regular
 from sd2core.files.paths import remove
 from sd2core.files.texts import parse_json, read_json, whole_lines
 from sd2core.maps import DopplerMap, MapKind, joined
@@ -134,8 +134,7 @@ class _Counted:
 
 def rows_of(folder: BatchFolder) -> Iterator[list[Row]]:
     """Yield the rows of one map after the other."""
-    check_regular(folder.results)
-    with folder.results.open("rb") as stream:
+    with open_regular(folder.results) as stream:
         place, expected = folder.results, "lines that `sd2 batch` wrote"
         rows = (parse_json(line.decode(), place, expected) for line in whole_lines(stream))
         for _, group in groupby(rows, lambda row: (row["recording"], row["placement"])):

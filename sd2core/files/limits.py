@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import stat
 from pathlib import Path
+from typing import BinaryIO
 
 from sd2core.errors import Sd2Error
 
@@ -83,6 +84,12 @@ def check_regular(path: Path) -> None:
             "a regular file or a folder",
             "Copy what it gives into a file, and name that",
         )
+
+
+def open_regular(path: Path) -> BinaryIO:
+    """Open a file to read its bytes; Sd2Error as :func:`check_regular`."""
+    check_regular(path)
+    return path.open("rb")
 
 
 def check_regular_within(folder: Path) -> int:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
-from sd2core.files.limits import check_regular, check_size
+from sd2core.files.limits import check_size, open_regular
 
 
 class NpzArrays(Mapping[str, NDArray[Any]]):
@@ -67,8 +67,7 @@ def open_npz_file(path: Path, what: str, expected: str, remedy: str = "") -> Ite
 @contextmanager
 def open_zip(path: Path) -> Iterator[zipfile.ZipFile]:
     """Open a zip to read; Sd2Error if its files are larger than its size allows."""
-    check_regular(path)
-    with path.open("rb") as stream, zipfile.ZipFile(stream) as archive:
+    with open_regular(path) as stream, zipfile.ZipFile(stream) as archive:
         # No more is ever decompressed than a file's entry says.
         declared = sum(entry.file_size for entry in archive.infolist())
         check_size(path, declared, path.stat().st_size)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field, ValidationError
 
 from sd2core.errors import Sd2Error
-from sd2core.files.limits import check_regular
+from sd2core.files.limits import open_regular
 from sd2core.files.stores import Damage, StoredArray
 from sd2core.files.texts import first_fault, parse_json, whole_lines
 
@@ -157,8 +157,7 @@ def read_takes(path: Path, provenance: Any) -> list[dict[str, Any]]:
     index = path / INDEX_NAME
     if not index.exists():
         return []
-    check_regular(index)
-    with index.open("rb") as stream:
+    with open_regular(index) as stream:
         lines = [line.decode(errors="replace") for line in whole_lines(stream)]
     entries = []
     for number, line in enumerate(lines, start=1):

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from sd2core.errors import Sd2Error
-from sd2core.files.limits import check_regular
+from sd2core.files.limits import open_regular
 from sd2core.files.texts import parse_json, whole_lines
 
 Event = dict[str, Any]
@@ -78,8 +78,7 @@ class ProgressTail:
     def new(self) -> list[Event]:
         """Whole lines since the last call; a line that is still being written comes later."""
         try:
-            check_regular(self._path)
-            with self._path.open("rb") as stream:
+            with open_regular(self._path) as stream:
                 stream.seek(self._offset)
                 found = [event for line in whole_lines(stream) if (event := _parsed(line))]
                 self._offset = stream.tell()

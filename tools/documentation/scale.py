@@ -27,6 +27,7 @@ from sd2core.batch.plan_file import plan_from_text
 from sd2core.batch.synthesis import LONGEST_FRAMES, Choosing, synthesise
 from sd2core.batch.task_graph import TaskGraph
 from sd2core.cli.batch import bytes_words
+from sd2core.files.limits import size_bytes
 from sd2core.files.resources import resource_path
 from sd2core.numerics.compiled import warm_up
 from sd2core.recording.recording import open_recording
@@ -417,8 +418,7 @@ def _fits(folder: Path, frames: tuple[int, ...]) -> list[Fitted]:
             _say(f"no fit: {error.stderr}")
             return []
         mesh = folder / f"{count}.zarr"
-        size = sum(one.stat().st_size for one in mesh.rglob("*") if one.is_file())
-        fits.append(Fitted(count, seconds, peak_mb, size))
+        fits.append(Fitted(count, seconds, peak_mb, size_bytes(mesh)))
     return fits
 
 

@@ -13,7 +13,7 @@ from sd2app.background.latest import LatestRunner
 from sd2app.widgets.record_table import Heading, RecordTableModel
 from sd2core.batch.folder import BatchFolder
 from sd2core.errors import Sd2Error
-from sd2core.files.limits import check_regular
+from sd2core.files.limits import open_regular
 from sd2core.files.texts import parse_json, whole_lines
 from sd2core.placements.placements import Place
 from sd2core.sensor import Vector, VirtualSensor, spherical_from_position
@@ -86,8 +86,7 @@ class BatchResults(RecordTableModel[Result]):
 
 def _rows(file: Path) -> list[Result]:
     rows: dict[tuple[str, int], Result] = {}
-    check_regular(file)
-    with file.open("rb") as stream:
+    with open_regular(file) as stream:
         for line in whole_lines(stream):
             row = _row(line.decode(errors="replace"))
             if row is not None:

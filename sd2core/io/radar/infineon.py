@@ -20,7 +20,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_folder, atomic_write, atomic_write_text
-from sd2core.files.limits import check_regular
+from sd2core.files.limits import check_regular, open_regular
 from sd2core.files.texts import errors_in, lines_of, read_json
 from sd2core.io.radar.capture import RadarCapture, check_cube
 from sd2core.radar_config import RadarConfig
@@ -355,9 +355,8 @@ def _notes_on_steps(name: str, steps_s: NDArray[np.float64], nominal_s: float) -
 
 def _parse_times(path: Path) -> NDArray[np.float64]:
     """One number per line, NaN where it is no time; a heading in the first line is allowed."""
-    check_regular(path)
     times = []
-    with path.open("rb") as stream:
+    with open_regular(path) as stream:
         texts = (line.decode(errors="replace").strip() for line in lines_of(stream))
         lines = [text for text in texts if text]
     for number, line in enumerate(lines, start=1):
