@@ -150,12 +150,12 @@ def survey_scene(
         at_rate[plan] = trial.columns(plan, runs, progress=within)
         survey.change[plan] = relative_l1(at_rate[plan].smooth, reference.smooth)
         step()
-    # Counting alone, over many frames at once: it is too quick for a few. In turns, so that a
-    # busy machine slows all alike; the first time prepares what only this plan needs.
+    # In turns, so that a busy machine slows all alike; the first time prepares what only this
+    # plan needs.
     counted = (*rates, *(plan for plan in single if plan.range_law == "frame"))
     for _, plan in product(range(_COUNTING_REPEATS), counted):
         cheap = replace(plan, visibility="facing" if surface else "none")
-        spent_ms = trial.milliseconds(cheap, threads=1, progress=within)
+        spent_ms = trial.milliseconds(cheap, threads=1, runs=runs, progress=within)
         survey.count_ms[plan] = min(survey.count_ms.get(plan, spent_ms), spent_ms)
     for fewer, more in pairwise(rates):
         # More moments take longer, whatever a clock says of microseconds.

@@ -47,7 +47,9 @@ def scene_facts(trial: Trial, progress: Progress = silent) -> SceneFacts:
     options = trial.options
     axis = options.axis
     synthesizer = trial.synthesizer(
-        AccuracyPlan(visibility="none", weight=options.weight), progress=progress
+        AccuracyPlan(visibility="none", weight=options.weight),
+        runs=trial.sample.chosen_on,
+        progress=progress,
     )
     live = np.zeros(synthesizer.mesh.vertex_count, np.bool_)
     beyond: list[float] = []

@@ -46,6 +46,9 @@ def synthesizer_for(
     return Synthesizer(counted, plan.options(options), blocks_of=like)
 
 
+_BLOCK_FRAMES = 5
+"""Half a run, so that of a run's margins nothing is prepared."""
+
 _REFERENCE_FRAMES = 5
 """At once: some 50 ms of a large mesh, so that a cancelled choice soon ends."""
 
@@ -142,7 +145,7 @@ class Trial:
         A plan that reuses masks is tried with masks made to the left and to the
         right of the sensor; both count.
         """
-        synthesizer = self.synthesizer(plan, progress=progress)
+        synthesizer = self.synthesizer(plan, runs=runs, progress=progress)
         if not plan.mask_reuse_m:
             return self._counted(synthesizer, runs, self._aside(), progress=progress)
         parts = []
@@ -166,22 +169,32 @@ class Trial:
         return compute_errors(found.raw, reference.raw, found.smooth, reference.smooth, axis)
 
     def milliseconds(
-        self, plan: AccuracyPlan, threads: int | None = None, *, progress: Progress = silent
+        self,
+        plan: AccuracyPlan,
+        threads: int | None = None,
+        *,
+        runs: Sequence[Run] | None = None,
+        progress: Progress = silent,
     ) -> float:
-        """Time of a plan per frame, over all sampled frames, after the sensor has moved.
+        """Time of a plan per frame, after the sensor has moved: of some runs, or all that is read.
 
         With one thread the processor time of that thread, otherwise wall-clock time.
         """
-        synthesizer = self.synthesizer(plan, threads, progress=progress)
-        frames = synthesizer.mesh.frame_count
+        synthesizer = self.synthesizer(plan, threads, runs=runs, progress=progress)
+        spans = [(0, synthesizer.mesh.frame_count)] if runs is None else _spans(runs)
         if plan.mask_reuse_m:
-            synthesizer.stretch(self.sensor, 0, frames, progress=progress, shares=False)
+            for span in spans:
+                synthesizer.stretch(self.sensor, *span, progress=progress, shares=False)
         visibility: Visibility | None = "frozen" if plan.mask_reuse_m else None
         place = self._aside()
         start = time.perf_counter()
-        stretch = synthesizer.stretch(place, 0, frames, visibility, progress, shares=False)
-        passed_s = time.perf_counter() - start
-        return 1e3 * (stretch.processor_s if threads == 1 else passed_s) / frames
+        stretches = [
+            synthesizer.stretch(place, *span, visibility, progress, shares=False) for span in spans
+        ]
+        spent_s = time.perf_counter() - start
+        if threads == 1:
+            spent_s = sum(stretch.processor_s for stretch in stretches)
+        return 1e3 * spent_s / sum(stop - start for start, stop in spans)
 
     def load_kernels(self, progress: Progress = silent) -> None:
         """Call the compiled kernels once, so that loading them from disk is not timed."""
@@ -191,17 +204,19 @@ class Trial:
         ):
             if plan.mask_stride == 1:
                 run = self.sample.runs[0]
-                self._counted(
-                    self.synthesizer(plan, progress=progress),
-                    [Run(run.start, run.start + 1, 0)],
-                    self._aside(),
-                    progress=progress,
-                )
+                first = [Run(run.start, run.start + 1, 0)]
+                synthesizer = self.synthesizer(plan, runs=first, progress=progress)
+                self._counted(synthesizer, first, self._aside(), progress=progress)
 
     def synthesizer(
-        self, plan: AccuracyPlan, threads: int | None = None, *, progress: Progress = silent
+        self,
+        plan: AccuracyPlan,
+        threads: int | None = None,
+        *,
+        runs: Sequence[Run] | None = None,
+        progress: Progress = silent,
     ) -> Synthesizer:
-        """Synthesizer of a plan for the sampled frames, with its blocks prepared."""
+        """Synthesizer of a plan for the sampled frames, prepared for some runs or for all."""
         key = plan.vertices_kept, plan.frame_rate_factor
         like = self._prepared.get(key)
         made = Synthesizer(
@@ -209,8 +224,9 @@ class Trial:
             plan.options(self._unsmoothed),
             blocks_of=like,
             threads=threads,
+            block_frames=_BLOCK_FRAMES,
         )
-        made.prepare(progress)
+        made.prepare(progress, None if runs is None else _spans(runs))
         self._prepared.setdefault(key, made)
         return made
 
@@ -279,6 +295,10 @@ class Trial:
         points = self._sampled(1.0).frame(self.sample.runs[0].start).astype(np.float64)
         middle: NDArray[np.float64] = points.mean(axis=0)
         return middle
+
+
+def _spans(runs: Sequence[Run]) -> list[tuple[int, int]]:
+    return [(run.start, run.stop) for run in runs]
 
 
 def _joined(parts: Sequence[Columns]) -> Columns:

@@ -61,7 +61,7 @@ class FrameCounts:
         place = self.prepared.sensor(position_m)
         totals[:] = self.totals(block, rows)
         pairs = self.prepared.moving(block, self.counting)
-        if pairs is not None and np.isfinite(place.astype(pairs.places.dtype) ** 2).all():
+        if pairs is not None and pairs.hold_from(place):
             quality = self._count_moving(
                 pairs, block, rows, position_m, visibility, into, parts, shares
             )
@@ -83,6 +83,22 @@ class FrameCounts:
             into.histogram[:] *= self.frame_law(block, rows, position_m)[:, None, None]
         return quality
 
+    def prepare(self, index: int, occluded: bool) -> None:
+        """Make all that counting a block takes and that no sensor changes."""
+        prepared = self.prepared
+        block = prepared.counted(index, self.counting, points=occluded)
+        pairs = prepared.moving(block, self.counting)
+        facing = self.mesh.faces is not None
+        if pairs is None:
+            self._of_all(block, slice(None), None, facing)
+        else:
+            self._of_pairs(block, pairs, None, facing and not occluded)
+            if occluded:
+                prepared.normals(block)
+        self.totals(block, slice(0, 0))
+        if self.options.range_law == "frame":
+            prepared.middles(block)
+
     def _count_moving(
         self,
         pairs: MovingPairs,
@@ -95,25 +111,16 @@ class FrameCounts:
         shares: bool,
     ) -> Quality:
         """Count the pairs that move only; the others lie in emptied bins."""
-        prepared, weight = self.prepared, self.options.weight
-        place = prepared.sensor(position_m)
+        prepared, place = self.prepared, self.prepared.sensor(position_m)
         mask, quality = self.masks.for_rows(block, rows, position_m, visibility)
         facing = mask is None and quality == "facing"
-        scatterers = Scatterers(
-            normals=prepared.moving_normals(block, pairs) if facing else None,
-            mask=mask,
-            areas=prepared.moving_areas(block, pairs) if weight == "area" else None,
-            area_vectors=(
-                prepared.moving_area_vectors(block, pairs) if weight == "projected" else None
-            ),
-            vertex_counts=prepared.heads,
-            parts=parts,
-        )
-        frames = block.frames.rows(rows)
-        count_moving(pairs, rows, frames.duration_s, place, self.counting, scatterers, into)
+        scatterers = replace(self._of_pairs(block, pairs, mask, facing), parts=parts)
+        duration_s = block.frames.duration_s[rows]
+        count_moving(pairs, rows, duration_s, place, self.counting, scatterers, into)
         if shares:
+            points = prepared.points(block)[rows]
             normals = prepared.normals(block)[rows] if facing else None
-            into.visible[:] = visible_counts(frames, place, mask, normals, prepared.heads)
+            into.visible[:] = visible_counts(points, place, mask, normals, prepared.heads)
         return quality
 
     def totals(self, block: Block, rows: slice) -> NDArray[np.float64]:
@@ -137,14 +144,31 @@ class FrameCounts:
         self, block: Block, rows: slice, position_m: Position, visibility: Visibility
     ) -> tuple[Scatterers, Quality]:
         """Scatterers of some of a block's frames, and the visibility that was used."""
-        weight = self.options.weight
         mask, quality = self.masks.for_rows(block, rows, position_m, visibility)
         facing = mask is None and quality == "facing"
-        scatterers = Scatterers(
-            normals=self.prepared.normals(block)[rows] if facing else None,
+        return self._of_all(block, rows, mask, facing), quality
+
+    def _of_all(
+        self, block: Block, rows: slice, mask: NDArray[np.uint8] | None, facing: bool
+    ) -> Scatterers:
+        prepared, weight = self.prepared, self.options.weight
+        return Scatterers(
+            normals=prepared.normals(block)[rows] if facing else None,
             mask=mask,
-            areas=self.prepared.areas(block)[rows] if weight == "area" else None,
-            area_vectors=self.prepared.area_vectors(block)[rows] if weight == "projected" else None,
-            vertex_counts=self.prepared.heads,
+            areas=prepared.areas(block)[rows] if weight == "area" else None,
+            area_vectors=prepared.area_vectors(block)[rows] if weight == "projected" else None,
+            vertex_counts=prepared.heads,
         )
-        return scatterers, quality
+
+    def _of_pairs(
+        self, block: Block, pairs: MovingPairs, mask: NDArray[np.uint8] | None, facing: bool
+    ) -> Scatterers:
+        prepared, weight = self.prepared, self.options.weight
+        vectors = prepared.moving_area_vectors
+        return Scatterers(
+            normals=prepared.moving_normals(block, pairs) if facing else None,
+            mask=mask,
+            areas=prepared.moving_areas(block, pairs) if weight == "area" else None,
+            area_vectors=vectors(block, pairs) if weight == "projected" else None,
+            vertex_counts=prepared.heads,
+        )

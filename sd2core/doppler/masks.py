@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from sd2core.doppler import histogram, vid2doppler
 from sd2core.doppler.histogram import Counting
-from sd2core.doppler.prepared import Block, PreparedMesh, near_points
+from sd2core.doppler.moving import mark_needed_moving
+from sd2core.doppler.prepared import Block, PreparedMesh
 from sd2core.numerics.compiled import kernels_ready
 from sd2core.scattering import depth_plain, exact_plain
 from sd2core.scattering.depth import depth_visibility_kernel
@@ -98,7 +99,7 @@ class VisibilityMasks:
         if quality == "none":
             return np.ones(self._prepared.mesh.vertex_count, bool), quality
         if mask is None:
-            mask = _facing(_view(block, rows, place), self._prepared.normals(block)[rows])
+            mask = _facing(self._view(block, rows, place), self._prepared.normals(block)[rows])
         return mask[0] > 0, quality
 
     def kept(
@@ -173,7 +174,7 @@ class VisibilityMasks:
         mask = self._block_mask(block.index, position_m, occlusion)
         if not mask.done[rows].all():
             place = self._prepared.sensor(position_m)
-            view = _view(block, rows, place)
+            view = self._view(block, rows, place)
             visible = _facing(view, self._prepared.normals(block)[rows])
             self._test(view, self._needed(block, rows, place), visible, occlusion)
             mask.visible[rows] = visible
@@ -200,9 +201,9 @@ class VisibilityMasks:
                 start, stop = self._prepared.span(index)
                 low, high = max(int(served[0]), start), min(int(served[-1]) + 1, stop)
                 rows = slice(low - start, high - start)
-                needed |= self._needed(self._prepared.block(index), rows, place).max(axis=0)
+                needed |= self._needed(self._counted(index), rows, place).max(axis=0)
             view = self._view_of(frame, place)
-            normals = self._prepared.normals(self._prepared.block(home))[local : local + 1]
+            normals = self._prepared.normals(self._counted(home))[local : local + 1]
             visible = _facing(view, normals)
             self._test(view, needed, visible, occlusion)
             mask.visible[local] = visible[0]
@@ -212,7 +213,14 @@ class VisibilityMasks:
     def _view_of(self, frame: int, place: NDArray[np.float64]) -> _View:
         """View of one frame of the clip."""
         home, local = divmod(frame, self._prepared.block_frames)
-        return _view(self._prepared.block(home), slice(local, local + 1), place)
+        return self._view(self._counted(home), slice(local, local + 1), place)
+
+    def _view(self, block: Block, rows: slice, place: NDArray[np.float64]) -> _View:
+        points, around_m = self._prepared.near_points(block, rows)
+        return _View(points, place - around_m)
+
+    def _counted(self, index: int) -> Block:
+        return self._prepared.counted(index, self._counting, points=True)
 
     def _block_mask(self, index: int, position_m: Position, occlusion: Occlusion) -> _BlockMask:
         """Mask of a block from a place, as far as it has been computed."""
@@ -234,8 +242,13 @@ class VisibilityMasks:
             velocity = self._prepared.velocities_vid2doppler(block, rows, place)
             edges_mps = options.axis.edges_mps
             return self._live[vid2doppler.place_in_bins(velocity, edges_mps, self._counting)[0]]
+        pairs = self._prepared.moving(block, self._counting)
+        if pairs is not None and pairs.hold_from(place):
+            duration_s = block.frames.duration_s[rows]
+            return mark_needed_moving(pairs, rows, duration_s, place, self._counting, self._live)
         mark = histogram.mark_needed if kernels_ready() else histogram.mark_needed_plain
-        return mark(block.frames.rows(rows), place, self._counting, self._live)
+        frames = self._prepared.whole(block).frames
+        return mark(frames.rows(rows), place, self._counting, self._live)
 
     def _test(
         self,
@@ -280,11 +293,6 @@ class _View:
         if (self.places_m == self.places_m[0]).all():
             return [(0, len(self.points))]
         return [(t, t + 1) for t in range(len(self.points))]
-
-
-def _view(block: Block, rows: slice, place: NDArray[np.float64]) -> _View:
-    points, around_m = near_points(block, rows)
-    return _View(points, place - around_m)
 
 
 def _facing(view: _View, normals: NDArray[np.int8]) -> NDArray[np.uint8]:

@@ -30,6 +30,7 @@ from sd2core.doppler.moving_kernels import (
     add_moving_kernel,
     facing_counts_kernel,
     moving_kernel,
+    needed_moving_kernel,
     places_kernel,
 )
 
@@ -68,6 +69,10 @@ class MovingPairs:
     def nbytes(self) -> int:
         """Size in memory."""
         return self.vertex.nbytes + self.first.nbytes + self.places.nbytes
+
+    def hold_from(self, place_m: NDArray[np.float64]) -> bool:
+        """True if they are all that can enter a kept bin: unless ranges overflow from there."""
+        return bool(np.isfinite(place_m.astype(self.places.dtype) ** 2).all())
 
     def of(self, values: NDArray[Any]) -> NDArray[Any]:
         """Values of the pairs, (..., N), of what (n, ..., V) all vertices have."""
@@ -148,23 +153,50 @@ def count_moving(
     )
 
 
+def mark_needed_moving(
+    pairs: MovingPairs,
+    rows: slice,
+    duration_s: NDArray[np.float64],
+    sensor: NDArray[np.float64],
+    counting: Counting,
+    live: NDArray[np.uint8],
+) -> NDArray[np.uint8]:
+    """Mark vertices (n, V) of some frames as :func:`sd2core.doppler.histogram.mark_needed` does."""
+    needed = np.zeros((rows.stop - rows.start, pairs.vertices), np.uint8)
+    precision = pairs.places.dtype
+    needed_moving_kernel(
+        pairs.vertex,
+        pairs.first[rows.start : rows.stop + 1],
+        pairs.places,
+        counting.scale(duration_s, precision),
+        sensor.astype(precision),
+        counting.bins,
+        counting.beyond,
+        live,
+        needed,
+    )
+    return needed
+
+
 def visible_counts(
-    frames: Frames,
+    points: NDArray[Any],
     sensor: NDArray[np.float64],
     mask: NDArray[np.uint8] | None,
     normals: NDArray[np.int8] | None,
     heads: NDArray[np.float32] | None,
 ) -> NDArray[np.float64]:
-    """Number of all visible vertices in each frame, (n,): marked, facing the sensor, or all."""
-    vertices = frames.positions.shape[2]
+    """Number of all visible vertices in each frame, (n,): marked, facing the sensor, or all.
+
+    ``points`` (n, 3, V) are their positions.
+    """
+    vertices = points.shape[2]
     stands_for = np.ones(vertices) if heads is None else heads.astype(np.float64)
     if mask is not None:
         return (mask > 0) @ stands_for
-    visible = np.full(len(frames), stands_for.sum())
+    visible = np.full(len(points), stands_for.sum())
     if normals is not None:
         own = _NO_AREAS if heads is None else heads
-        place = sensor.astype(frames.positions.dtype)
-        facing_counts_kernel(frames.positions, frames.centre, normals, own, place, visible)
+        facing_counts_kernel(points, normals, own, sensor.astype(points.dtype), visible)
     return visible
 
 

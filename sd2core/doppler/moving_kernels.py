@@ -183,11 +183,41 @@ def add_moving_kernel(  # type: ignore[no-untyped-def]
 
 
 @compiled
-def facing_counts_kernel(positions, centre, normals, heads, sensor, visible):  # type: ignore[no-untyped-def]
+def needed_moving_kernel(  # type: ignore[no-untyped-def]
+    vertex, first, places, scale, sensor, bins, beyond, live, needed
+):
+    """Mark what :func:`sd2core.doppler.kernels.needed_kernel` marks, of the pairs."""
+    samples = scale.shape[1]
+    sx, sy, sz = sensor[0], sensor[1], sensor[2]
+    offset, distance = np.float32(0.5 * bins), distance_of(sensor)
+    f = np.empty(RUN, places.dtype)
+    near, far = np.empty(RUN, places.dtype), np.empty(RUN, places.dtype)
+    seen, slot = np.ones(RUN, np.uint8), np.empty(RUN, np.uint8)
+    for t in range(first.shape[0] - 1):
+        pairs = first[t + 1] - first[t]
+        stretch = 3 * (1 + 2 * samples)
+        here = places[stretch * first[t] : stretch * first[t + 1]].reshape((stretch, pairs))
+        for sample in range(samples):
+            if scale[t, sample] <= 0:
+                continue
+            a, b = here[3 + 6 * sample :], here[6 + 6 * sample :]
+            for p in range(0, pairs, RUN):
+                q = min(p + RUN, pairs)
+                n = q - p
+                relative_ranges(a[0, p:q], a[1, p:q], a[2, p:q], sx, sy, sz, distance, near[:n])
+                relative_ranges(b[0, p:q], b[1, p:q], b[2, p:q], sx, sy, sz, distance, far[:n])
+                axis_positions(near[:n], far[:n], scale[t, sample], offset, f[:n])
+                slots_of(f[:n], seen[:n], bins, beyond, slot[:n])
+                for i in range(n):
+                    needed[t, vertex[first[t] + p + i]] |= live[slot[i]]
+
+
+@compiled
+def facing_counts_kernel(points, normals, heads, sensor, visible):  # type: ignore[no-untyped-def]
     """Number of vertices that face the sensor in each frame, or of those that they stand for."""
-    seen = np.empty(positions.shape[2], np.uint8)
-    for t in range(centre.shape[0]):
-        x, y, z = positions[centre[t], 0], positions[centre[t], 1], positions[centre[t], 2]
+    seen = np.empty(points.shape[2], np.uint8)
+    for t in range(points.shape[0]):
+        x, y, z = points[t, 0], points[t, 1], points[t, 2]
         facing_kernel(
             x, y, z, normals[t, 0], normals[t, 1], normals[t, 2],
             sensor[0], sensor[1], sensor[2], seen,
@@ -217,7 +247,11 @@ def compile_kernels() -> None:
             np.zeros(3, precision), ALL, HEADS, 32, DROP, 4.0, np.float32(2.2),
             np.zeros((1, 1, 32)), np.zeros(1),
         )  # fmt: skip
+        needed_moving_kernel(
+            vertex, first, np.ones(36, precision), np.ones((1, 1), precision),
+            np.zeros(3, precision), 32, DROP, np.ones(33, np.uint8), np.zeros((1, 4), np.uint8),
+        )  # fmt: skip
         facing_counts_kernel(
-            np.ones((1, 3, 4), precision), knots[0], normals[None], heads,
+            np.ones((1, 3, 4), precision), normals[None], heads,
             np.zeros(3, precision), np.zeros(1),
         )  # fmt: skip

@@ -25,6 +25,7 @@ from sd2core.scattering.velocity import moments
 
 _BLOCK_BYTES = 16 << 20
 _FEWEST_FRAMES = 8
+_KNOTS_AT_ONCE = 16
 
 
 class ByteBudget:
@@ -95,6 +96,7 @@ class PreparedMesh:
     mesh: MeshSequence
     options: SynthesisOptions
     budget: ByteBudget
+    block_frames: int | None = None  # in a block; by default some megabytes of them
     reach_m: float = field(init=False)  # largest coordinate in the first frame
     origin_m: NDArray[np.float64] = field(init=False)  # of the prepared positions
 
@@ -127,7 +129,8 @@ class PreparedMesh:
         per_frame = self.mesh.vertex_count * 12 * self.options.oversampling
         # Several blocks with their normals must fit, or each would push out the other.
         bytes_per_block = min(_BLOCK_BYTES, self.budget.limit_bytes // 8)
-        self.block_frames = max(_FEWEST_FRAMES, bytes_per_block // per_frame)
+        usual = max(_FEWEST_FRAMES, bytes_per_block // per_frame)
+        self.block_frames = self.block_frames or usual
 
     def with_options(self, options: SynthesisOptions) -> PreparedMesh | None:
         """Same blocks, in the same budget, for other options.
@@ -179,29 +182,54 @@ class PreparedMesh:
         block: Block = self.budget.get_or_make(("block", index), make)
         return block
 
-    def light(self, index: int, counting: Counting) -> Block | None:
-        """Block without positions, where counting what moves needs a fraction of them only.
+    def counted(self, index: int, counting: Counting, *, points: bool = False) -> Block:
+        """Block for counting: without positions where only what moves is counted.
 
-        Everything that is asked of it besides is made of positions that are read again.
+        With ``points``, those of its frames are kept while they are at hand; otherwise, the
+        normals of what moves.
         """
 
         def make() -> tuple[tuple[Block | None], int]:
-            whole: Block = self.budget.get(("block", index)) or self._prepare(index)
+            whole = self._read(index)
             pairs = self.moving(whole, counting)
-            if pairs is None:
+            if pairs is None or (points and self.options.oversampling == 1):
                 self.budget.put(("block", index), whole, whole.frames.positions.nbytes)
+            if pairs is None:
                 return (None,), 0
-            if self.faces is not None:
+            if points and self.options.oversampling > 1:
+                self._kept("points", whole, self._points)
+            elif not points and self.faces is not None:
                 self.moving_normals(whole, pairs)
             frames = replace(whole.frames, positions=whole.frames.positions[:0].copy())
             return (replace(whole, frames=frames),), 0
 
-        kept: tuple[Block | None] = self.budget.get_or_make(self._moving_key("light", index), make)
-        return kept[0]
+        kept: tuple[Block | None] = self.budget.get_or_make(self._moving_key("sparse", index), make)
+        return kept[0] or self.block(index)
 
     def whole(self, block: Block) -> Block:
         """Block with its positions."""
         return block if len(block.frames.positions) else self.block(block.index)
+
+    def points(self, block: Block) -> NDArray[Any]:
+        """Positions in the middle of a block's frames, (n, 3, V)."""
+        if len(block.frames.positions) or self.options.oversampling == 1:
+            return self._points(self.whole(block))
+        return self._kept("points", block, lambda block: self._points(self._read(block.index)))
+
+    def near_points(
+        self, block: Block, rows: slice
+    ) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
+        """Vertices of some of a block's frames in single precision, relative to a point near them.
+
+        Returns the vertices (n, 3, V) and that point for each frame, float64 (n, 3), which is
+        zero if the block is in single precision.
+        """
+        points = self.points(block)[rows]
+        place_m = np.zeros((len(points), 3))
+        if points.dtype == np.float64:
+            place_m = 0.5 * (points.min(axis=2) + points.max(axis=2))
+            points = points - place_m[:, :, None]
+        return np.ascontiguousarray(points, np.float32), place_m
 
     def normals(self, block: Block) -> NDArray[np.int8]:
         """Vertex normals of a block's frames, int8 (n, 3, V)."""
@@ -234,7 +262,8 @@ class PreparedMesh:
             return None
 
         def make() -> tuple[tuple[MovingPairs | None], int]:
-            found = find_moving(self.whole(block).frames, counting, still)
+            whole = block if len(block.frames.positions) else self._read(block.index)
+            found = find_moving(whole.frames, counting, still)
             return (found,), 0 if found is None else found.nbytes
 
         kept = self.budget.get_or_make(self._moving_key("pairs", block.index), make)
@@ -271,7 +300,7 @@ class PreparedMesh:
     ) -> NDArray[Any]:
         def make() -> tuple[NDArray[Any], int]:
             known = self.budget.get((what, block.index))
-            made = pairs.of(every(self.whole(block)) if known is None else known)
+            made = pairs.of(every(block) if known is None else known)
             return made, made.nbytes
 
         kept: NDArray[Any] = self.budget.get_or_make(self._moving_key(what, block.index), make)
@@ -296,7 +325,7 @@ class PreparedMesh:
         """Derived array of a block, from memory or computed now."""
 
         def sized() -> tuple[NDArray[Any], int]:
-            made = make(self.whole(block))
+            made = make(block)
             return made, made.nbytes
 
         kept: NDArray[Any] = self.budget.get_or_make((what, block.index), sized)
@@ -319,10 +348,9 @@ class PreparedMesh:
         return vectors
 
     def _middles(self, block: Block) -> NDArray[np.float64]:
-        frames = block.frames
         heads = np.ones(self.mesh.vertex_count) if self.heads is None else self.heads
         share = heads / heads.sum(dtype=np.float64)
-        return np.stack([frames.positions[knot] @ share for knot in frames.centre])
+        return np.stack([points @ share for points in self.points(block)])
 
     def _areas(self, block: Block) -> NDArray[np.float32]:
         points, faces = self._at_frames(block), self._faces()
@@ -339,7 +367,19 @@ class PreparedMesh:
 
     def _at_frames(self, block: Block) -> NDArray[np.float32]:
         """Vertices of the block's own frames relative to each body, float32 (n, 3, V)."""
-        return near_points(block, slice(None))[0]
+        return self.near_points(block, slice(None))[0]
+
+    def _points(self, block: Block) -> NDArray[Any]:
+        """Those of a block with positions; a copy where they are a part of them."""
+        first, last = block.frames.centre[[0, -1]].tolist()
+        return np.ascontiguousarray(
+            block.frames.positions[first : last + 1 : self.options.oversampling]
+        )
+
+    def _read(self, index: int) -> Block:
+        """Block with its positions, from memory or read now and not kept."""
+        block: Block = self.budget.get(("block", index)) or self._prepare(index)
+        return block
 
     def _prepare(self, index: int) -> Block:
         start, stop = self.span(index)
@@ -376,11 +416,9 @@ class PreparedMesh:
         with self._reading:
             vertices = self.mesh.read(low, high)
         refuse_missing(vertices, low, self.mesh.source)
-        knots = self._trajectory.knots(vertices, low, first, last)
         if self._compatible:
-            precision = np.float32 if knots.dtype == np.float32 else np.float64
-            return self._around_origin(knots, precision)
-        positions = self._around_origin(knots, np.float32)
+            return self._around_origin(vertices, low, first, last, None)
+        positions = self._around_origin(vertices, low, first, last, np.float32)
         measured = duration_s[duration_s > 0]
         if single_is_enough(
             extent_m=float(max(positions.max(), -positions.min())),
@@ -391,30 +429,32 @@ class PreparedMesh:
             nearest_range_m=amplitude.NEAREST_RANGE_M,
         ):
             return positions
-        return self._around_origin(knots, np.float64)
+        return self._around_origin(vertices, low, first, last, np.float64)
 
-    def _around_origin(self, knots: NDArray[Any], precision: Any) -> NDArray[Any]:
-        """Knots less the clip's origin, (knots, 3, V)."""
-        positions = np.empty((len(knots), 3, self.mesh.vertex_count), precision)
-        origin = self.origin_m.astype(knots.dtype)
-        # What single precision cannot even hold is infinite in it, and then not enough.
-        with np.errstate(over="ignore"):
-            for axis in range(3):
-                np.subtract(
-                    knots[:, :, axis], origin[axis], out=positions[:, axis], casting="same_kind"
-                )
+    def _around_origin(
+        self, vertices: NDArray[Any], low: int, first: int, last: int, precision: Any
+    ) -> NDArray[Any]:
+        """Knots ``first`` to ``last`` less the clip's origin, (knots, 3, V).
+
+        Vertices are those of the frames from ``low``. Without a precision, in the mesh's own.
+        """
+        positions: NDArray[Any] | None = None
+        # A few at a time, which stay in a core's own cache.
+        for start in range(first, last, _KNOTS_AT_ONCE):
+            stop = min(start + _KNOTS_AT_ONCE, last)
+            a, b = self._trajectory.frames_needed(start, stop)
+            knots = self._trajectory.knots(vertices[a - low : b - low], a, start, stop)
+            origin = self.origin_m.astype(knots.dtype)
+            if positions is None:
+                shape = last - first, 3, self.mesh.vertex_count
+                single = knots.dtype == np.float32
+                positions = np.empty(shape, precision or (np.float32 if single else np.float64))
+            into = positions[start - first : stop - first]
+            # What single precision cannot even hold is infinite in it, and then not enough.
+            with np.errstate(over="ignore"):
+                for axis in range(3):
+                    np.subtract(
+                        knots[:, :, axis], origin[axis], out=into[:, axis], casting="same_kind"
+                    )
+        assert positions is not None
         return positions
-
-
-def near_points(block: Block, rows: slice) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
-    """Vertices of some of a block's frames in single precision, relative to a point near them.
-
-    Returns the vertices (n, 3, V) and that point for each frame, float64 (n, 3), which is zero if
-    the block is in single precision.
-    """
-    points = block.frames.positions[block.frames.centre[rows]]
-    place_m = np.zeros((len(points), 3))
-    if points.dtype == np.float64:
-        place_m = 0.5 * (points.min(axis=2) + points.max(axis=2))
-        points = points - place_m[:, :, None]
-    return np.ascontiguousarray(points, np.float32), place_m

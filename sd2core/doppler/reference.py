@@ -52,11 +52,11 @@ def reference_stretch(
         seen = _visible(mesh, points, place, middle)
         weight = weight[seen]
         edges_mps = options.axis.edges_mps
-        for velocity in velocities:
-            folded = _on_axis(velocity[seen], edges_mps, options)
-            ends_mps = float(edges_mps[0]), float(edges_mps[-1])
-            raw[:, column] += np.histogram(folded, options.axis.bins, ends_mps, weights=weight)[0]
-        raw[:, column] /= len(velocities) * total
+        folded = _on_axis(velocities[:, seen], edges_mps, options)  # (moments, seen)
+        ends_mps = float(edges_mps[0]), float(edges_mps[-1])
+        weights = np.broadcast_to(weight, folded.shape)
+        counted, _ = np.histogram(folded, options.axis.bins, ends_mps, weights=weights)
+        raw[:, column] = counted / (len(velocities) * total)
     raw[list(options.null_bins)] = 0
     return raw
 
@@ -103,14 +103,11 @@ def _at_frames(
                 points[centre[row] - low],
             )
             continue
-        found = [
-            radial_velocity(points[one - low], points[two - low], place, duration_s)
-            for one, two, duration_s in zip(
-                between.before[row], between.after[row], moments_s, strict=True
-            )
-            if duration_s > 0
-        ]
-        yield np.array(found).reshape(-1, mesh.vertex_count), points[centre[row] - low]
+        measured = moments_s > 0
+        before, after = between.before[row, measured] - low, between.after[row, measured] - low
+        duration_s = moments_s[measured][:, None]
+        found = radial_velocity(points[before], points[after], place, duration_s)
+        yield found, points[centre[row] - low]
 
 
 def _range_law(

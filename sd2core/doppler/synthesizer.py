@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from itertools import pairwise
 
@@ -118,6 +118,9 @@ class Synthesizer:
     threads : int, optional
         Number of worker threads; by default one per core. With 1 all work is done in the
         calling thread.
+    block_frames : int, optional
+        Number of frames that are prepared together; by default some megabytes of them. Fewer
+        are better where only a few frames of a clip are looked at.
     blocks_of : Synthesizer, optional
         Another synthesizer of the same mesh, whose prepared blocks and budget are shared
         where the options allow it.
@@ -144,6 +147,7 @@ class Synthesizer:
         *,
         memory_budget_bytes: int = _MEMORY_BUDGET_BYTES,
         threads: int | None = None,
+        block_frames: int | None = None,
         blocks_of: Synthesizer | None = None,
     ) -> None:
         if isinstance(preset, str) and preset not in PRESETS:
@@ -153,12 +157,14 @@ class Synthesizer:
             raise _no_surface(mesh, "Area weighting")
         if threads is not None and threads < 1:
             raise Sd2Error(f"threads is {threads}", "1 or more, or None for all cores")
+        if block_frames is not None and block_frames < 1:
+            raise Sd2Error(f"block_frames is {block_frames}", "1 or more, or None")
         self.mesh = mesh
         self.options = options
         self._threads = threads
         shared = blocks_of.prepared.with_options(options) if blocks_of is not None else None
         if shared is None or shared.mesh is not mesh:
-            shared = PreparedMesh(mesh, options, ByteBudget(memory_budget_bytes))
+            shared = PreparedMesh(mesh, options, ByteBudget(memory_budget_bytes), block_frames)
         self.prepared: PreparedMesh = shared
         self._frames = FrameCounts(shared)
 
@@ -182,32 +188,32 @@ class Synthesizer:
         areas = {"count": 0, "area": 4, "projected": 12}[self.options.weight]
         return 12 * self.options.oversampling + 3 + areas
 
-    def prepare(self, progress: Progress = silent) -> None:
-        """Read and prepare as many blocks as the budget holds, ahead of their use."""
-        prepared = self.prepared
-        bytes_per_block = prepared.block_frames * self.mesh.vertex_count * self._bytes_per_vertex
-        fitting = max(1, prepared.budget.limit_bytes // bytes_per_block)
-        blocks = range(min(fitting, prepared.block_count))
+    def prepare(
+        self, progress: Progress = silent, frames: Sequence[tuple[int, int]] | None = None
+    ) -> None:
+        """Read and prepare what maps need of a clip, ahead of their use.
+
+        Of ``frames``, half-open, or as much of the clip as the budget holds.
+        """
+        prepared, occluded = self.prepared, self.options.visibility in ("depth", "exact")
+        if frames is None:
+            of_block = prepared.block_frames * self.mesh.vertex_count * self._bytes_per_vertex
+            fitting = max(1, prepared.budget.limit_bytes // of_block)
+            blocks = set(range(min(fitting, prepared.block_count)))
+        else:
+            blocks = {
+                index for span in frames for index, *_ in self._frames.blocks_between(*span)
+            }
 
         def job(index: int) -> Callable[[Ticket], None]:
             def work(ticket: Ticket) -> None:
                 ticket.advance(0)
-                block = prepared.block(index)
-                if self.mesh.faces is not None:
-                    prepared.normals(block)
-                if self.options.weight == "area":
-                    prepared.areas(block)
-                elif self.options.weight == "projected":
-                    prepared.area_vectors(block)
-                if self.options.weight != "count":
-                    prepared.surface(block)
-                if self.options.range_law == "frame":
-                    prepared.middles(block)
+                self._frames.prepare(index, occluded)
                 ticket.advance(1)
 
             return work
 
-        run_jobs([job(index) for index in blocks], len(blocks), progress, self._threads)
+        run_jobs([job(index) for index in sorted(blocks)], len(blocks), progress, self._threads)
 
     def map(
         self,
@@ -482,11 +488,9 @@ class Synthesizer:
             def work(ticket: Ticket) -> None:
                 step = high - low if quick else at_once
                 ticket.advance(0)
-                block = None
-                if quick and not shares:
-                    block = self.prepared.light(index, self._frames.counting)
-                if block is None:
-                    block = self.prepared.block(index)
+                block = self.prepared.counted(
+                    index, self._frames.counting, points=shares or not quick
+                )
                 for first in range(low, high, step):
                     last = min(first + step, high)
                     rows = slice(first - block.start, last - block.start)

@@ -83,7 +83,7 @@ class Trajectory:
             return vertices[first_knot - first_frame : last_knot - first_frame]
         frames = slice(first_frame, first_frame + len(vertices))
         weights = self._weights(frames, first_knot, last_knot)
-        flat = vertices.reshape(len(vertices), -1).astype(np.float64)
+        flat = vertices.reshape(len(vertices), -1).astype(np.float64, copy=False)
         path: NDArray[Any] = (weights @ flat).reshape(last_knot - first_knot, -1, 3)
         return path
 

@@ -37,10 +37,14 @@ class AccuracyLibrary:
         return survey_scene(mesh, sensor, options, progress, like=like)
 
     def choose(self, mesh: MeshSequence, sensor: VirtualSensor, **wish: Any) -> Choice:
-        """Choose a plan."""
+        """Choose a plan. What was prepared for a survey is dropped: it takes longer to ask again."""
         from sd2core.accuracy.choosing import choose
 
-        return choose(mesh, sensor, **wish)
+        chosen = choose(mesh, sensor, **wish)
+        survey: Survey | None = wish.get("survey")
+        if survey is not None:
+            survey.trial.forget()
+        return chosen
 
     def measure(self, mesh: MeshSequence, sensor: VirtualSensor, **wish: Any) -> Measurement:
         """Measure all plans of a family but for their memory: the window's other threads work."""
