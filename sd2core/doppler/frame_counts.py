@@ -11,7 +11,7 @@ from sd2core.doppler import histogram, vid2doppler
 from sd2core.doppler.histogram import Counting, Counts, Scatterers
 from sd2core.doppler.kernels import CLIP, DROP, WRAP
 from sd2core.doppler.masks import Position, Quality, Visibility, VisibilityMasks
-from sd2core.doppler.moving import MovingPairs, count_moving, visible_counts
+from sd2core.doppler.moving import MovingVertices, count_moving, visible_counts
 from sd2core.doppler.prepared import Block, PreparedMesh
 from sd2core.numerics.compiled import kernels_ready
 from sd2core.scattering.amplitude import range_weight
@@ -60,10 +60,10 @@ class FrameCounts:
         """
         place = self.prepared.sensor(position_m)
         totals[:] = self.totals(block, rows)
-        pairs = self.prepared.moving(block, self.counting)
-        if pairs is not None and pairs.hold_from(place):
+        moving = self.prepared.moving(block, self.counting)
+        if moving is not None and moving.hold_from(place):
             quality = self._count_moving(
-                pairs, block, rows, position_m, visibility, into, parts, shares
+                moving, block, rows, position_m, visibility, into, parts, shares
             )
             if self.options.range_law == "frame":
                 into.histogram[:] *= self.frame_law(block, rows, position_m)[:, None, None]
@@ -87,12 +87,12 @@ class FrameCounts:
         """Make all that counting a block takes and that no sensor changes."""
         prepared = self.prepared
         block = prepared.counted(index, self.counting, points=occluded)
-        pairs = prepared.moving(block, self.counting)
+        moving = prepared.moving(block, self.counting)
         facing = self.mesh.faces is not None
-        if pairs is None:
+        if moving is None:
             self._of_all(block, slice(None), None, facing)
         else:
-            self._of_pairs(block, pairs, None, facing and not occluded)
+            self._of_moving(block, moving, None, facing and not occluded)
             if occluded:
                 prepared.normals(block)
         self.totals(block, slice(0, 0))
@@ -101,7 +101,7 @@ class FrameCounts:
 
     def _count_moving(
         self,
-        pairs: MovingPairs,
+        moving: MovingVertices,
         block: Block,
         rows: slice,
         position_m: Position,
@@ -110,13 +110,13 @@ class FrameCounts:
         parts: NDArray[np.uint8] | None,
         shares: bool,
     ) -> Quality:
-        """Count the pairs that move only; the others lie in emptied bins."""
+        """Count what moves only; the other vertices lie in emptied bins."""
         prepared, place = self.prepared, self.prepared.sensor(position_m)
         mask, quality = self.masks.for_rows(block, rows, position_m, visibility)
         facing = mask is None and quality == "facing"
-        scatterers = replace(self._of_pairs(block, pairs, mask, facing), parts=parts)
+        scatterers = replace(self._of_moving(block, moving, mask, facing), parts=parts)
         duration_s = block.frames.duration_s[rows]
-        count_moving(pairs, rows, duration_s, place, self.counting, scatterers, into)
+        count_moving(moving, rows, duration_s, place, self.counting, scatterers, into)
         if shares:
             points = prepared.points(block)[rows]
             normals = prepared.normals(block)[rows] if facing else None
@@ -160,15 +160,15 @@ class FrameCounts:
             vertex_counts=prepared.heads,
         )
 
-    def _of_pairs(
-        self, block: Block, pairs: MovingPairs, mask: NDArray[np.uint8] | None, facing: bool
+    def _of_moving(
+        self, block: Block, moving: MovingVertices, mask: NDArray[np.uint8] | None, facing: bool
     ) -> Scatterers:
         prepared, weight = self.prepared, self.options.weight
         vectors = prepared.moving_area_vectors
         return Scatterers(
-            normals=prepared.moving_normals(block, pairs) if facing else None,
+            normals=prepared.moving_normals(block, moving) if facing else None,
             mask=mask,
-            areas=prepared.moving_areas(block, pairs) if weight == "area" else None,
-            area_vectors=vectors(block, pairs) if weight == "projected" else None,
+            areas=prepared.moving_areas(block, moving) if weight == "area" else None,
+            area_vectors=vectors(block, moving) if weight == "projected" else None,
             vertex_counts=prepared.heads,
         )

@@ -242,10 +242,10 @@ class VisibilityMasks:
             velocity = self._prepared.velocities_vid2doppler(block, rows, place)
             edges_mps = options.axis.edges_mps
             return self._live[vid2doppler.place_in_bins(velocity, edges_mps, self._counting)[0]]
-        pairs = self._prepared.moving(block, self._counting)
-        if pairs is not None and pairs.hold_from(place):
+        moving = self._prepared.moving(block, self._counting)
+        if moving is not None and moving.hold_from(place):
             duration_s = block.frames.duration_s[rows]
-            return mark_needed_moving(pairs, rows, duration_s, place, self._counting, self._live)
+            return mark_needed_moving(moving, rows, duration_s, place, self._counting, self._live)
         mark = histogram.mark_needed if kernels_ready() else histogram.mark_needed_plain
         frames = self._prepared.whole(block).frames
         return mark(frames.rows(rows), place, self._counting, self._live)

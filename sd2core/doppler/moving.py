@@ -1,9 +1,9 @@
-"""Vertices that move: those of each frame that can enter a bin that is kept.
+"""Vertices that move: those that can enter a bin that is kept.
 
 A vertex cannot change its range faster than it moves, |v_radial| ≤ |v|. One whose displacement,
 in bins, stays below the distance from zero velocity to the nearest bin that is kept lies in an
-emptied bin for *every* place of the sensor. The others are found once per block, and kept as
-columns of their own, in the order of the vertices. Counting them alone gives every kept bin the
+emptied bin for *every* place of the sensor. The others are found once per block, and kept apart,
+in the order of the vertices. Counting them alone gives every kept bin the
 same number, bit by bit: the same loops of :mod:`sd2core.doppler.kernels` go over them, and the
 same values are added up in the same order (docs/decisions/0057).
 """
@@ -27,15 +27,18 @@ from sd2core.doppler.kernels import (
     PROJECTED,
 )
 from sd2core.doppler.moving_kernels import (
+    GROUP,
     add_moving_kernel,
     facing_counts_kernel,
+    gather_kernel,
     moving_kernel,
+    moving_normals_kernel,
     needed_moving_kernel,
     places_kernel,
 )
 
-_LARGEST_SHARE = 0.33
-"""Share of moving pairs up to which they are counted faster than everything
+_LARGEST_SHARE = 0.6
+"""Share of moving vertices up to which they are counted faster than everything
 (``tests/benchmarks/test_moving_speed.py``)."""
 
 _ROUNDINGS = 48.0
@@ -55,14 +58,22 @@ def still_bins(bins: int, null_bins: Collection[int]) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class MovingPairs:
-    """Pairs of vertex and frame of a block that can enter a kept bin, frame after frame."""
+class MovingVertices:
+    """Vertices of a block that can enter a kept bin, by groups of consecutive frames.
 
-    vertex: NDArray[np.int32]  # (N,), ascending within a frame
-    first: NDArray[np.int64]  # (n + 1,): number of the first pair of every frame
+    A vertex that moves in one frame mostly moves in the next, and the frames of a group share the
+    knots between which their velocities are measured. Where it does not move it is in an emptied
+    bin, and does no harm.
+    """
+
+    vertex: NDArray[np.int32]  # (N,), ascending within a group
+    first: NDArray[np.int64]  # (groups + 1,): number of the first of every group
     places: NDArray[Any]
-    """Frame after frame, so that memory is read from front to back: x, y and z of its n pairs in
-    the middle of the frame, then before and after each velocity sample, (1 + 2 samples, 3, n)."""
+    """Group after group, so that memory is read from front to back: the positions of its n
+    vertices at the group's knots, (knots, 3, n)."""
+    centre: NDArray[np.int64]  # (frames,): knot of every frame, counted within its group
+    before: NDArray[np.int64]  # (frames, samples), like that
+    after: NDArray[np.int64]
     vertices: int  # V
 
     @property
@@ -70,48 +81,79 @@ class MovingPairs:
         """Size in memory."""
         return self.vertex.nbytes + self.first.nbytes + self.places.nbytes
 
+    @property
+    def pairs(self) -> int:
+        """Number of pairs of a vertex and a frame."""
+        return GROUP * len(self.vertex)
+
     def hold_from(self, place_m: NDArray[np.float64]) -> bool:
         """True if they are all that can enter a kept bin: unless ranges overflow from there."""
         return bool(np.isfinite(place_m.astype(self.places.dtype) ** 2).all())
 
     def of(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Values of the pairs, (..., N), of what (n, ..., V) all vertices have."""
-        frame = np.repeat(np.arange(len(self.first) - 1), np.diff(self.first))
-        return np.ascontiguousarray(np.moveaxis(values[frame, ..., self.vertex], 0, -1))
+        """Values of what moves, of what (frames, ..., V) all vertices have.
+
+        Group after group, frame after frame, (..., n).
+        """
+        columns = values.reshape(len(values), -1, self.vertices)
+        width = columns.shape[1]
+        found = np.empty(GROUP * width * len(self.vertex), values.dtype)
+        gather_kernel(columns, self.vertex, self.first, found)
+        return found
+
+    def normals(self, points: NDArray[np.float32], faces: NDArray[np.int32]) -> NDArray[np.int8]:
+        """Normals of what moves, as :meth:`of` orders them; ``points`` (frames, 3, V) are of all."""
+        found = np.empty(GROUP * 3 * len(self.vertex), np.int8)
+        moving_normals_kernel(points, faces, self.vertex, self.first, found)
+        return found
 
 
-def find_moving(frames: Frames, counting: Counting, still: float) -> MovingPairs | None:
-    """Pairs that can enter a bin ``still`` bins or more from zero; None where most of them can.
+def find_moving(
+    frames: Frames, reach_m: float, counting: Counting, still: float
+) -> MovingVertices | None:
+    """Vertices that can enter a bin ``still`` bins or more from zero; None where most of them can.
 
-    The bound holds for what the kernels compute, roundings included, from any place.
+    ``reach_m`` is the largest coordinate of the frames. The bound holds for what the kernels compute, roundings included, from any place.
     """
     precision = frames.positions.dtype
     scale = counting.scale(frames.duration_s, precision).astype(np.float64)  # bins per metre
-    reach_m = np.sqrt(3.0) * float(max(frames.positions.max(), -frames.positions.min()))
+    away_m = np.sqrt(3.0) * reach_m
     rounding = 0.5 * float(np.finfo(precision).eps)
-    room = still - rounding * (_ROUNDINGS * reach_m * scale + 8.0 * counting.bins)
+    room = still - rounding * (_ROUNDINGS * away_m * scale + 8.0 * counting.bins)
     measured = scale > 0
     if still <= 0 or not (room[measured] > 0).all():
         return None
     limit_m = np.divide(room, scale, out=np.full_like(scale, np.inf), where=measured)
     vertices = frames.positions.shape[2]
-    marks = np.zeros((len(frames), vertices), np.bool_)
+    starts = np.arange(0, len(frames), GROUP)
+    marks = np.zeros((len(starts), vertices), np.bool_)
     moving_kernel(frames.positions, frames.before, frames.after, limit_m, marks)
     if np.count_nonzero(marks) > _LARGEST_SHARE * marks.size:
         return None
-    frame, vertex = np.nonzero(marks)
-
-    first = np.searchsorted(frame, np.arange(len(frames) + 1))
+    group, vertex = np.nonzero(marks)
     number = vertex.astype(np.int32)
-    places = np.empty((1 + 2 * frames.before.shape[1]) * 3 * len(vertex), precision)
-    places_kernel(
-        frames.positions, frames.centre, frames.before, frames.after, number, first, places
+    first = np.searchsorted(group, np.arange(len(starts) + 1))
+
+    low = np.minimum.reduceat(np.minimum(frames.before.min(axis=1), frames.centre), starts)
+    high = np.maximum.reduceat(np.maximum(frames.after.max(axis=1), frames.centre), starts)
+    knots = low[:, None] + np.arange(int((high - low).max()) + 1)  # (groups, knots)
+    knots = np.minimum(knots, high[:, None])
+    places = np.empty(3 * knots.shape[1] * len(number), precision)
+    places_kernel(frames.positions, knots, number, first, places)
+    base = np.repeat(low, GROUP)[: len(frames)]
+    return MovingVertices(
+        number,
+        first,
+        places,
+        frames.centre - base,
+        frames.before - base[:, None],
+        frames.after - base[:, None],
+        vertices,
     )
-    return MovingPairs(number, first, places, vertices)
 
 
 def count_moving(
-    pairs: MovingPairs,
+    moving: MovingVertices,
     rows: slice,
     duration_s: NDArray[np.float64],
     sensor: NDArray[np.float64],
@@ -119,28 +161,33 @@ def count_moving(
     scatterers: Scatterers,
     into: Counts,
 ) -> None:
-    """Count the pairs of some frames, as :func:`sd2core.doppler.histogram.count` does.
+    """Count what moves in some frames, as :func:`sd2core.doppler.histogram.count` does.
 
-    Of ``scatterers`` normals and area vectors are those of the pairs, (3, N), areas (N,).
-    Bins that are not kept get less than their share, and ``into.visible`` nothing.
+    Of ``scatterers`` normals, areas and area vectors are those of what moves, as
+    :meth:`MovingVertices.of` gives them. Bins that are not kept get less than their share, and
+    ``into.visible`` nothing.
     """
     normals, mask, areas = scatterers.normals, scatterers.mask, scatterers.areas
     vectors, heads, parts = scatterers.area_vectors, scatterers.vertex_counts, scatterers.parts
     which = MASK if mask is not None else FACING if normals is not None else ALL
     weighting = PROJECTED if vectors is not None else AREA if areas is not None else HEADS
-    precision = pairs.places.dtype
+    precision = moving.places.dtype
     add_moving_kernel(
-        pairs.vertex,
-        pairs.first[rows.start : rows.stop + 1],
-        pairs.places,
+        moving.vertex,
+        moving.first,
+        moving.places,
+        moving.centre,
+        moving.before,
+        moving.after,
+        rows.start,
         counting.scale(duration_s, precision),
         _NO_NORMALS if normals is None else normals,
         _NO_MASK if mask is None else mask,
         _NO_AREAS if areas is None else areas,
-        _NO_VECTORS if vectors is None else vectors,
+        _NO_AREAS if vectors is None else vectors,
         _NO_AREAS if heads is None else heads,
         _NO_PARTS if parts is None else parts,
-        pairs.vertices,
+        moving.vertices,
         sensor.astype(precision),
         which,
         weighting,
@@ -154,7 +201,7 @@ def count_moving(
 
 
 def mark_needed_moving(
-    pairs: MovingPairs,
+    moving: MovingVertices,
     rows: slice,
     duration_s: NDArray[np.float64],
     sensor: NDArray[np.float64],
@@ -162,12 +209,15 @@ def mark_needed_moving(
     live: NDArray[np.uint8],
 ) -> NDArray[np.uint8]:
     """Mark vertices (n, V) of some frames as :func:`sd2core.doppler.histogram.mark_needed` does."""
-    needed = np.zeros((rows.stop - rows.start, pairs.vertices), np.uint8)
-    precision = pairs.places.dtype
+    needed = np.zeros((rows.stop - rows.start, moving.vertices), np.uint8)
+    precision = moving.places.dtype
     needed_moving_kernel(
-        pairs.vertex,
-        pairs.first[rows.start : rows.stop + 1],
-        pairs.places,
+        moving.vertex,
+        moving.first,
+        moving.places,
+        moving.before,
+        moving.after,
+        rows.start,
         counting.scale(duration_s, precision),
         sensor.astype(precision),
         counting.bins,
@@ -200,8 +250,7 @@ def visible_counts(
     return visible
 
 
-_NO_NORMALS = np.empty((3, 0), np.int8)
+_NO_NORMALS = np.empty(0, np.int8)
 _NO_MASK = np.empty((0, 0), np.uint8)
 _NO_AREAS = np.empty(0, np.float32)
-_NO_VECTORS = np.empty((3, 0), np.float32)
 _NO_PARTS = np.empty(0, np.uint8)

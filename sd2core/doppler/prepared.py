@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 
 from sd2core.doppler import vid2doppler
 from sd2core.doppler.histogram import Counting, Frames
-from sd2core.doppler.moving import MovingPairs, find_moving, still_bins
+from sd2core.doppler.moving import MovingVertices, find_moving, still_bins
 from sd2core.doppler.options import STEEPEST_RANGE_LAW, SynthesisOptions
 from sd2core.mesh.sequence import MeshSequence, refuse_missing
 from sd2core.numerics.compiled import kernels_ready
@@ -87,6 +88,7 @@ class Block:
     stop: int
     frames: Frames
     first_knot: int  # number, in the whole clip, of the first knot in "frames.positions"
+    reach_m: float  # largest of their coordinates
 
 
 @dataclass(eq=False)
@@ -191,15 +193,15 @@ class PreparedMesh:
 
         def make() -> tuple[tuple[Block | None], int]:
             whole = self._read(index)
-            pairs = self.moving(whole, counting)
-            if pairs is None or (points and self.options.oversampling == 1):
+            moving = self.moving(whole, counting)
+            if moving is None or (points and self.options.oversampling == 1):
                 self.budget.put(("block", index), whole, whole.frames.positions.nbytes)
-            if pairs is None:
+            if moving is None:
                 return (None,), 0
             if points and self.options.oversampling > 1:
                 self._kept("points", whole, self._points)
             elif not points and self.faces is not None:
-                self.moving_normals(whole, pairs)
+                self.moving_normals(whole, moving)
             frames = replace(whole.frames, positions=whole.frames.positions[:0].copy())
             return (replace(whole, frames=frames),), 0
 
@@ -255,52 +257,64 @@ class PreparedMesh:
         """Vertex area vectors of a block's frames in m², float32 (n, 3, V)."""
         return self._kept("area vectors", block, self._area_vectors)
 
-    def moving(self, block: Block, counting: Counting) -> MovingPairs | None:
-        """Pairs of a block that can enter a kept bin; None where counting all is as fast."""
+    def moving(self, block: Block, counting: Counting) -> MovingVertices | None:
+        """Vertices of a block that can enter a kept bin; None where counting all is as fast."""
         still = still_bins(counting.bins, self.options.null_bins)
         if self._compatible or still <= 0 or not kernels_ready():
             return None
 
-        def make() -> tuple[tuple[MovingPairs | None], int]:
+        def make() -> tuple[tuple[MovingVertices | None], int]:
             whole = block if len(block.frames.positions) else self._read(block.index)
-            found = find_moving(whole.frames, counting, still)
+            found = find_moving(whole.frames, whole.reach_m, counting, still)
             return (found,), 0 if found is None else found.nbytes
 
-        kept = self.budget.get_or_make(self._moving_key("pairs", block.index), make)
-        pairs: MovingPairs | None = kept[0]
-        return pairs
+        kept = self.budget.get_or_make(self._moving_key("moving", block.index), make)
+        moving: MovingVertices | None = kept[0]
+        return moving
 
     def pairs_moving(self, index: int) -> int | None:
-        """Number of moving pairs of a block; None where that is not known yet, or all count."""
-        kept = self.budget.get(self._moving_key("pairs", index))
-        return None if kept is None or kept[0] is None else len(kept[0].vertex)
+        """Number of pairs of a frame and a vertex that moves in a block; None where that is not
+        known yet, or all count."""
+        kept = self.budget.get(self._moving_key("moving", index))
+        return None if kept is None or kept[0] is None else kept[0].pairs
 
     def _moving_key(self, what: str, index: int) -> Hashable:
         # Blocks are shared by options with the same bin width.
         return what, "moving", self.options.axis.bins, self.options.null_bins, index
 
-    def moving_normals(self, block: Block, pairs: MovingPairs) -> NDArray[np.int8]:
-        """Normals of the moving pairs of a block, int8 (3, N)."""
-        return self._of_pairs("normals", block, pairs, self._normals)
+    def moving_normals(self, block: Block, moving: MovingVertices) -> NDArray[np.int8]:
+        """Normals of what moves in a block, as :meth:`MovingVertices.of` orders them."""
 
-    def moving_areas(self, block: Block, pairs: MovingPairs) -> NDArray[np.float32]:
-        """Areas of the moving pairs of a block in m², float32 (N,)."""
-        return self._of_pairs("areas", block, pairs, self._areas)
+        def make() -> tuple[NDArray[np.int8], int]:
+            every = self.budget.get(("normals", block.index))
+            if every is not None:
+                made = moving.of(every)
+            else:
+                made = moving.normals(self._at_frames(block), self._faces())
+            return made, made.nbytes
 
-    def moving_area_vectors(self, block: Block, pairs: MovingPairs) -> NDArray[np.float32]:
-        """Area vectors of the moving pairs of a block in m², float32 (3, N)."""
-        return self._of_pairs("area vectors", block, pairs, self._area_vectors)
+        key = self._moving_key("normals", block.index)
+        normals: NDArray[np.int8] = self.budget.get_or_make(key, make)
+        return normals
 
-    def _of_pairs(
+    def moving_areas(self, block: Block, moving: MovingVertices) -> NDArray[np.float32]:
+        """Areas of what moves in a block in m², like that."""
+        return self._of_moving("areas", block, moving, self._areas)
+
+    def moving_area_vectors(self, block: Block, moving: MovingVertices) -> NDArray[np.float32]:
+        """Area vectors of what moves in a block in m², like that."""
+        return self._of_moving("area vectors", block, moving, self._area_vectors)
+
+    def _of_moving(
         self,
         what: str,
         block: Block,
-        pairs: MovingPairs,
+        moving: MovingVertices,
         every: Callable[[Block], NDArray[Any]],
     ) -> NDArray[Any]:
         def make() -> tuple[NDArray[Any], int]:
             known = self.budget.get((what, block.index))
-            made = pairs.of(every(block) if known is None else known)
+            made = moving.of(every(block) if known is None else known)
             return made, made.nbytes
 
         kept: NDArray[Any] = self.budget.get_or_make(self._moving_key(what, block.index), make)
@@ -392,7 +406,7 @@ class PreparedMesh:
         last = min((stop - 1) * every + reach_after + 1, len(self._knot_times_s))
         centre = np.arange(start, stop) * every
         between = moments(self._knot_times_s, centre, every, self.mesh.presence)
-        positions = self._positions(first, last, between.duration_s)
+        positions, reach_m = self._positions(first, last, between.duration_s)
         return Block(
             index,
             start,
@@ -405,50 +419,52 @@ class PreparedMesh:
                 between.duration_s,
             ),
             first,
+            reach_m,
         )
 
-    def _positions(self, first: int, last: int, duration_s: NDArray[np.float64]) -> NDArray[Any]:
-        """Knots ``first`` to ``last`` around the clip's origin, (knots, 3, V).
+    def _positions(
+        self, first: int, last: int, duration_s: NDArray[np.float64]
+    ) -> tuple[NDArray[Any], float]:
+        """Knots ``first`` to ``last`` around the clip's origin, (knots, 3, V), and their extent.
 
         In single precision where that is enough for velocities over ``duration_s``.
         """
         low, high = self._trajectory.frames_needed(first, last)
         with self._reading:
             vertices = self.mesh.read(low, high)
-        refuse_missing(vertices, low, self.mesh.source)
-        if self._compatible:
-            return self._around_origin(vertices, low, first, last, None)
-        positions = self._around_origin(vertices, low, first, last, np.float32)
+        precision: Any = np.float32
+        if self._compatible and (vertices.dtype != np.float32 or self._trajectory.smoothing_s > 0):
+            precision = np.float64
+        positions, reach_m = self._around_origin(vertices, low, first, last, precision)
+        if not math.isfinite(reach_m):
+            refuse_missing(vertices, low, self.mesh.source)
         measured = duration_s[duration_s > 0]
-        if single_is_enough(
-            extent_m=float(max(positions.max(), -positions.min())),
+        if self._compatible or single_is_enough(
+            extent_m=reach_m,
             size_m=float((positions[0].max(axis=1) - positions[0].min(axis=1)).max()),
             duration_s=float(measured.min(initial=np.inf)),
             bin_width_mps=self.options.axis.bin_width_mps,
             range_exponent=STEEPEST_RANGE_LAW,
             nearest_range_m=amplitude.NEAREST_RANGE_M,
         ):
-            return positions
+            return positions, reach_m
         return self._around_origin(vertices, low, first, last, np.float64)
 
     def _around_origin(
         self, vertices: NDArray[Any], low: int, first: int, last: int, precision: Any
-    ) -> NDArray[Any]:
-        """Knots ``first`` to ``last`` less the clip's origin, (knots, 3, V).
+    ) -> tuple[NDArray[Any], float]:
+        """Knots ``first`` to ``last`` less the clip's origin, (knots, 3, V), and their extent.
 
-        Vertices are those of the frames from ``low``. Without a precision, in the mesh's own.
+        The extent is the largest coordinate. Vertices are those of the frames from ``low``.
         """
-        positions: NDArray[Any] | None = None
+        positions = np.empty((last - first, 3, self.mesh.vertex_count), precision)
+        reach_m = 0.0
         # A few at a time, which stay in a core's own cache.
         for start in range(first, last, _KNOTS_AT_ONCE):
             stop = min(start + _KNOTS_AT_ONCE, last)
             a, b = self._trajectory.frames_needed(start, stop)
             knots = self._trajectory.knots(vertices[a - low : b - low], a, start, stop)
             origin = self.origin_m.astype(knots.dtype)
-            if positions is None:
-                shape = last - first, 3, self.mesh.vertex_count
-                single = knots.dtype == np.float32
-                positions = np.empty(shape, precision or (np.float32 if single else np.float64))
             into = positions[start - first : stop - first]
             # What single precision cannot even hold is infinite in it, and then not enough.
             with np.errstate(over="ignore"):
@@ -456,5 +472,6 @@ class PreparedMesh:
                     np.subtract(
                         knots[:, :, axis], origin[axis], out=into[:, axis], casting="same_kind"
                     )
-        assert positions is not None
-        return positions
+            # Missing coordinates stay missing here.
+            reach_m = float(np.max([reach_m, into.max(), -into.min()]))
+        return positions, reach_m

@@ -201,9 +201,7 @@ class Synthesizer:
             fitting = max(1, prepared.budget.limit_bytes // of_block)
             blocks = set(range(min(fitting, prepared.block_count)))
         else:
-            blocks = {
-                index for span in frames for index, *_ in self._frames.blocks_between(*span)
-            }
+            blocks = {index for span in frames for index, *_ in self._frames.blocks_between(*span)}
 
         def job(index: int) -> Callable[[Ticket], None]:
             def work(ticket: Ticket) -> None:
