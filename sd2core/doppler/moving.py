@@ -102,7 +102,10 @@ class MovingVertices:
         return found
 
     def normals(self, points: NDArray[np.float32], faces: NDArray[np.int32]) -> NDArray[np.int8]:
-        """Normals of what moves, as :meth:`of` orders them; ``points`` (frames, 3, V) are of all."""
+        """Normals of what moves, as :meth:`of` orders them.
+
+        ``points`` (frames, 3, V) are those of all vertices.
+        """
         found = np.empty(GROUP * 3 * len(self.vertex), np.int8)
         moving_normals_kernel(points, faces, self.vertex, self.first, found)
         return found
@@ -113,7 +116,8 @@ def find_moving(
 ) -> MovingVertices | None:
     """Vertices that can enter a bin ``still`` bins or more from zero; None where most of them can.
 
-    ``reach_m`` is the largest coordinate of the frames. The bound holds for what the kernels compute, roundings included, from any place.
+    ``reach_m`` is the largest coordinate of the frames. The bound holds for what the kernels
+    compute, roundings included, from any place.
     """
     precision = frames.positions.dtype
     scale = counting.scale(frames.duration_s, precision).astype(np.float64)  # bins per metre

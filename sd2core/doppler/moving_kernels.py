@@ -27,7 +27,6 @@ from sd2core.doppler.kernels import (
 from sd2core.numerics.compiled import compiled
 from sd2core.scattering.visibility import add_cross_product, facing_kernel, set_normal
 
-
 GROUP = 4
 """Frames whose moving vertices are kept together. With more, knots are shared by more frames, but
 more vertices are kept that do not move in all of them."""

@@ -98,7 +98,8 @@ class PreparedMesh:
     mesh: MeshSequence
     options: SynthesisOptions
     budget: ByteBudget
-    block_frames: int | None = None  # in a block; by default some megabytes of them
+    asked_frames: int | None = None  # in a block; by default some megabytes of them
+    block_frames: int = field(init=False)
     reach_m: float = field(init=False)  # largest coordinate in the first frame
     origin_m: NDArray[np.float64] = field(init=False)  # of the prepared positions
 
@@ -132,7 +133,7 @@ class PreparedMesh:
         # Several blocks with their normals must fit, or each would push out the other.
         bytes_per_block = min(_BLOCK_BYTES, self.budget.limit_bytes // 8)
         usual = max(_FEWEST_FRAMES, bytes_per_block // per_frame)
-        self.block_frames = self.block_frames or usual
+        self.block_frames = self.asked_frames or usual
 
     def with_options(self, options: SynthesisOptions) -> PreparedMesh | None:
         """Same blocks, in the same budget, for other options.
@@ -273,8 +274,10 @@ class PreparedMesh:
         return moving
 
     def pairs_moving(self, index: int) -> int | None:
-        """Number of pairs of a frame and a vertex that moves in a block; None where that is not
-        known yet, or all count."""
+        """Number of pairs of a frame and a vertex that moves in a block.
+
+        None where that is not known yet, or all count.
+        """
         kept = self.budget.get(self._moving_key("moving", index))
         return None if kept is None or kept[0] is None else kept[0].pairs
 

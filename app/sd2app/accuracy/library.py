@@ -37,7 +37,7 @@ class AccuracyLibrary:
         return survey_scene(mesh, sensor, options, progress, like=like)
 
     def choose(self, mesh: MeshSequence, sensor: VirtualSensor, **wish: Any) -> Choice:
-        """Choose a plan. What was prepared for a survey is dropped: it takes longer to ask again."""
+        """Choose a plan, and drop what was prepared for its survey."""
         from sd2core.accuracy.choosing import choose
 
         chosen = choose(mesh, sensor, **wish)
