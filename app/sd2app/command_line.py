@@ -9,6 +9,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from sd2app.plain_imports import plain_imports
 from sd2core.cli import build_parser, run
 from sd2core.cli.options import add_command
 from sd2core.errors import Sd2Error
@@ -90,7 +91,8 @@ def _show(paths: Sequence[Path], screenshot: Path | None) -> int:
             "There is no display to open a window on",
             remedy="Draw the same window into a picture with --screenshot FILE.png",
         )
-    from sd2app.shell.app import run as run_window
+    with plain_imports():
+        from sd2app.shell.app import run as run_window
 
     # Qt's event loop gives Python no turn to raise KeyboardInterrupt.
     previous = signal.signal(signal.SIGINT, signal.SIG_DFL)

@@ -92,7 +92,11 @@ class VisibilityMasks:
         place = self._prepared.sensor(position_m)
         if visibility == "exact" or visibility == "depth":
             visible = np.empty((1, self._prepared.mesh.vertex_count), np.uint8)
-            view = self._view_of(int(self._serving(block.start + local)), place)
+            serving = int(self._serving(block.start + local)) - block.start
+            if 0 <= serving < block.stop - block.start:
+                view = self._view(block, slice(serving, serving + 1), place)
+            else:
+                view = self._view_of(block.start + serving, place)
             self._test(view, np.ones_like(visible), visible, visibility)
             return visible[0] > 0, visibility
         mask, quality = self.for_rows(block, rows, position_m, visibility)

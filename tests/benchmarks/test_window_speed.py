@@ -26,8 +26,10 @@ SECONDS = 5.0
 START = """
 import json, sys, time
 from pathlib import Path
-from PySide6.QtCore import QTimer
-from PySide6.QtWidgets import QApplication
+from sd2app.plain_imports import plain_imports
+with plain_imports():
+    from PySide6.QtCore import QTimer
+    from PySide6.QtWidgets import QApplication
 from sd2app.settings import Settings
 from sd2app.widgets.theme import apply_theme
 from sd2app.shell.window import MainWindow

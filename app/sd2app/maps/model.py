@@ -128,8 +128,11 @@ class SynthesisModel(QObject):
 
     @property
     def frame(self) -> FrameScattering | None:
-        """Velocity, range and visibility of every vertex in the frame on screen."""
-        if self._synthesizers is None:
+        """Velocity, range and visibility of every vertex in the frame on screen.
+
+        None while a recording opens, until there is a map: that comes first.
+        """
+        if self._synthesizers is None or self._track.map is None:
             return None
         full = self._synthesizers.full
         if full.options.visibility == "none":
@@ -379,9 +382,12 @@ class SynthesisModel(QObject):
         self._go_on()
 
     def _take(self, part: Part) -> None:
+        first = self._track.map is None
         self._shown_map.take(part)
         self._say_quality()
         self.painted.emit(part)
+        if first:
+            self.frame_changed.emit()
         self.readout_changed.emit()
 
     def _say_quality(self) -> None:

@@ -17,15 +17,13 @@ from sd2core.maps import DopplerMap
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Progress
 from sd2core.recording.recording import Recording, open_recording
-from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 
 if TYPE_CHECKING:
     from sd2core.io.radar import RadarCapture
     from sd2core.io.video import VideoReader
-    from sd2core.radar_config import Clutter
 
-PARTS = ("video", "mesh", "radar", "Doppler map of the radar")
+PARTS = ("video", "mesh", "radar")
 """Parts of a recording in the order in which they are read, each a share of the progress."""
 
 UNTITLED = Path()
@@ -105,15 +103,13 @@ def recording_of(paths: Sequence[Path], base: Recording | None = None) -> Record
     return recording
 
 
-def load_content(recording: Recording, clutter: Clutter, progress: Progress) -> Content:
-    """Open every part of a recording.
+def load_content(recording: Recording, progress: Progress) -> Content:
+    """Open every part of a recording; the Doppler map of a capture is made later.
 
     A part that is missing or damaged does not keep the others from being
     shown; it is named in ``problems``. Only when nothing can be opened the
     first problem is raised.
     """
-    from sd2core.fmcw.processing import doppler_map
-
     problems: list[Sd2Error] = []
 
     recording.learn_camera()
@@ -136,9 +132,9 @@ def load_content(recording: Recording, clutter: Clutter, progress: Progress) -> 
             return None
 
     def step(number: int) -> Progress:
-        """Progress of one of four parts; it is also where cancelling takes effect."""
+        """Progress of one of the parts; it is also where cancelling takes effect."""
         return lambda done, total: progress(
-            100 * number + (100 * min(done, total) // total if total else 0), 400
+            100 * number + (100 * min(done, total) // total if total else 0), 100 * len(PARTS)
         )
 
     video = attempt(recording.video, lambda: recording.open_video(step(0)))
@@ -148,12 +144,8 @@ def load_content(recording: Recording, clutter: Clutter, progress: Progress) -> 
         recorded = attempt(recording.radar, recording.load_radar_map)
         radar_map = None if recorded is None else recorded.doppler
     else:
-        capture = attempt(recording.radar, recording.load_capture)
-        radar_map = attempt(
-            capture,
-            lambda: doppler_map(capture, axis=VelocityAxis(), clutter=clutter, progress=step(3)),
-        )
-    progress(400, 400)
+        capture, radar_map = attempt(recording.radar, recording.load_capture), None
+    progress(100 * len(PARTS), 100 * len(PARTS))
     parts = [part for part in (video, mesh, capture, recorded) if part is not None]
     if not parts:
         raise (

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QUndoStack
 
-from sd2app.background.latest import Emit, LatestRunner
+from sd2app.background.latest import Emit
 from sd2app.session.content import PARTS, UNTITLED, Content, load_content, recording_of
 from sd2app.session.tasks import Job, ListedRunner, TaskList
 from sd2core.body.camera import PinholeCamera
@@ -44,7 +44,7 @@ class DocumentModel(QObject):
         self.goes_on = False  # the recording is the one that was open before, with other files
         self._base: Recording | None = None
         self._runner = ListedRunner("open", jobs, self, self._receive)
-        self._maps = LatestRunner("radar", self, self._receive_map)
+        self._maps = ListedRunner("radar", jobs, self, self._receive_map)
         for runner in (self._runner, self._maps):
             runner.failed.connect(lambda error: self.failed.emit(str(error)))
 
@@ -161,12 +161,11 @@ class DocumentModel(QObject):
 
     def _start(self, base: Recording | None, paths: list[Path]) -> None:
         name = paths[0].name if paths else (base.title if base else "")
-        clutter = self.clutter
         self._base = base
 
         def read(emit: Emit) -> Content:
             recording = recording_of(paths, base) if paths or base is None else base
-            return load_content(recording, clutter, lambda done, total: emit((done, total)))
+            return load_content(recording, lambda done, total: emit((done, total)))
 
         self._runner.submit(read, f"Opening {name}")
 
@@ -187,6 +186,7 @@ class DocumentModel(QObject):
             self.failed.emit(problem)
         if content.notes:
             self.noted.emit(" ".join(content.notes))
+        self._process_capture()
 
     # --- changing -------------------------------------------------------------------------
 
@@ -204,19 +204,27 @@ class DocumentModel(QObject):
         if clutter == self.clutter:
             return
         self.clutter = clutter
-        capture = self.capture
         self.changed.emit()
+        self._process_capture()
+
+    def _process_capture(self) -> None:
+        """Make the Doppler map of the capture in the background."""
+        capture, clutter = self.capture, self.clutter
         if capture is None:
+            self._maps.cancel()
             return
 
         def process(emit: Emit) -> DopplerMap:
             from sd2core.fmcw.processing import doppler_map
 
             return doppler_map(
-                capture, axis=VelocityAxis(), clutter=clutter, progress=lambda *_: emit(None)
+                capture,
+                axis=VelocityAxis(),
+                clutter=clutter,
+                progress=lambda done, total: emit((done, total)),
             )
 
-        self._maps.submit(process)
+        self._maps.submit(process, "Doppler map of the radar")
 
     def _receive_map(self, radar_map: DopplerMap) -> None:
         if self.content is not None:

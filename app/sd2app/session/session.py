@@ -80,9 +80,13 @@ class Session:
             real.set_offset(self.document.recording.radar_offset_s)
         if radar_map is real.map and not new:
             return
-        real.title = "Radar (simulated)" if radar_map and radar_map.kind == "simulated" else "Real"
+        capture = self.document.capture
+        simulated = capture is not None and capture.simulated
+        if radar_map is not None:
+            simulated = radar_map.kind == "simulated"
+        real.title = "Radar (simulated)" if simulated else "Real"
         # A map with its clutter removed in another manner is compared at the same 0 dB.
-        if radar_map is not None and new:
+        if radar_map is not None and (new or real.map is None):
             real.set_reference(reference_of(radar_map.values, radar_map.null_bins))
         real.set_map(radar_map)
 

@@ -7,6 +7,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.files.resources import resource_path
+
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 _TINT = np.array([1.0, 0.72, 0.42])
 """Amber, relative per channel; scaled to the luminance of each colour."""
@@ -40,8 +42,7 @@ def signed_table(negative: str, middle: str, positive: str) -> NDArray[np.uint32
 
 @cache
 def lookup_table(name: str) -> NDArray[np.uint32]:
-    """256 opaque colours of a matplotlib map as 0xAARRGGBB, shape (256,)."""
-    from matplotlib import colormaps
-
-    rgb = colormaps[name](np.arange(256), bytes=True).astype(np.uint32)  # (256, 4)
+    """256 opaque colours of a map as 0xAARRGGBB, shape (256,)."""
+    with np.load(resource_path("colour_maps.npz")) as tables:
+        rgb = tables[name].astype(np.uint32)  # (256, 3)
     return (0xFF000000 | rgb[:, 0] << 16 | rgb[:, 1] << 8 | rgb[:, 2]).astype(np.uint32)

@@ -72,7 +72,7 @@ def test_a_radar_file_with_a_map_shows_it_and_brings_its_labels(tmp_path):
         file["LABEL"] = np.isin(np.arange(10), (2, 3)).astype(np.uint16)[:, None]
     recording = recording_of([path])
     recording.radar_offset_s = 0.5
-    content = load_content(recording, "mean", lambda *_: None)
+    content = load_content(recording, lambda *_: None)
     assert content.capture is None
     assert content.radar_map.kind == "real"
     assert content.timebase.start_s == 0.5
@@ -84,4 +84,4 @@ def test_a_damaged_radar_file_is_the_problem_that_is_named(tmp_path):
     path = tmp_path / "swing.h5"
     path.write_bytes(b"nothing of the kind")
     with pytest.raises(Sd2Error, match=r"swing\.h5 cannot be read as HDF5"):
-        load_content(recording_of([path]), "mean", lambda *_: None)
+        load_content(recording_of([path]), lambda *_: None)

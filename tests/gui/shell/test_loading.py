@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,11 +16,14 @@ from PySide6.QtWidgets import QApplication, QLabel
 from window_models import models_of
 
 from sd2app.session import document
+from sd2app.session.content import reference_of
 from sd2app.settings import Settings
 from sd2app.shell import app
 from sd2app.shell.loading import LoadingCover
 from sd2app.shell.parts import Parts
 from sd2app.shell.window import MainWindow
+from sd2core.fmcw import processing
+from sd2core.maps import DopplerMap
 
 
 def words(cover: LoadingCover) -> str:
@@ -68,11 +72,11 @@ def test_reading_that_takes_long_shows_how_far_it_is(
     monkeypatch.setattr(document, "recording_of", lambda *_: gate.wait(20))
     cover._patience.setInterval(0)
     empty_window.open_paths([small_recording])
-    c.jobs.report(c.document.reading, 250, 400)
+    c.jobs.report(c.document.reading, 250, 300)
     qtbot.waitUntil(cover.bar.isVisible, timeout=5000)
     assert "Reading the radar" in words(cover)
     gate.set()
-    assert cover.bar.maximum() == 400
+    assert cover.bar.maximum() == 300
     QTest.mouseClick(cover.cancel, Qt.MouseButton.LeftButton)
     assert not cover.isVisible()
     assert c.document.content is None
@@ -114,3 +118,23 @@ def test_a_screenshot_is_whole_or_not_there(qtbot, empty_window, tmp_path, capsy
     assert [path.read_bytes() for path in tmp_path.iterdir()] == [b"as before"]
     assert not empty_window.isVisible()
     assert capsys.readouterr().out == ""
+
+
+def test_the_map_of_a_capture_comes_after_the_recording(
+    empty_window, qtbot, small_recording, monkeypatch
+) -> None:
+    """A long capture takes minutes; its track is there meanwhile, under its own name."""
+    c, gate, doppler_map = models_of(empty_window), threading.Event(), processing.doppler_map
+
+    def slow(*args: Any, **options: Any) -> DopplerMap:
+        gate.wait(20)
+        return doppler_map(*args, **options)
+
+    monkeypatch.setattr(processing, "doppler_map", slow)
+    with qtbot.waitSignal(c.document.opened, timeout=20_000):
+        empty_window.open_paths([small_recording])
+    assert c.real.title == "Radar (simulated)"
+    assert c.real.map is None
+    gate.set()
+    qtbot.waitUntil(lambda: c.real.map is not None, timeout=20_000)
+    assert c.real.reference == reference_of(c.real.map.values, c.real.map.null_bins)

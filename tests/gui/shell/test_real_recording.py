@@ -54,6 +54,7 @@ def test_a_real_capture_shows_a_person_receding(empty_window, shared_data, qtbot
     c = models_of(empty_window)
     with qtbot.waitSignal(c.document.opened, timeout=30_000):
         empty_window.open_paths([shared_data / "radar" / "infineon_people"])
+    qtbot.waitUntil(lambda: c.real.map is not None, timeout=30_000)
     assert c.real.title == "Real"
     assert c.real.map.kind == "real"
     assert c.synthetic.map is None
