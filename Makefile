@@ -124,7 +124,8 @@ scale: setup
 
 MINUTES ?= 60
 soak: system-packages-for-tests setup
-	scripts/on_display.sh $(BIN)/python -m tools.documentation.soak --minutes $(MINUTES)
+	scripts/on_display.sh $(BIN)/python -m tools.documentation.soak --minutes $(MINUTES) \
+		$(if $(TRAINING),--training $(TRAINING))
 
 clean:
 	rm -rf .venv build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .benchmarks \

@@ -1,8 +1,9 @@
 """Use the real window for minutes, and print what it takes of the machine: `make soak MINUTES=60`.
 
 Mouse and keys play, label, drag the sensor, undo, save and open another recording, over and over,
-on two copies of the sample. Every tenth of the time a row is measured, always with the window at
-rest. The exit code is 1 where Python raised anything.
+on two copies of the sample; with TRAINING=PAIRS a denoiser learns from these pairs beside it. Every
+tenth of the time a row is measured, always with the window at rest. The exit code is 1 where Python
+raised anything.
 """
 
 from __future__ import annotations
@@ -180,6 +181,22 @@ class Hand:
         self.rest()
         self._save()
 
+    def train(self, pairs: Path) -> None:
+        """Start a training on pairs, and wait until it has learnt from all of them once."""
+        training = self._window.features.training.model
+        training.setup.add(pairs)
+        self._until(lambda: not training.setup.problem, "take the pairs")
+        training.start()
+        self._until(lambda: training.run.history.epoch >= 1, "train")
+
+    def end_training(self) -> None:
+        """Cancel the training; RuntimeError if it has ended by itself."""
+        training = self._window.features.training.model
+        if training.run.phase != "running":
+            raise RuntimeError(f"The training is {training.run.phase}: give it more pairs")
+        training.tell("cancel")
+        self._until(lambda: not training.under_way, "end the training")
+
     def _press(self, name: str, modifier: Qt.KeyboardModifier = _NONE) -> None:
         QTest.keyClick(self._window, getattr(Qt.Key, f"Key_{name}"), modifier)
 
@@ -231,10 +248,13 @@ class Raised:
         traceback.print_exception(*raised)
 
 
-def soak(minutes: float, folder: Path, say: Callable[[Row], None]) -> float:
+def soak(
+    minutes: float, folder: Path, say: Callable[[Row], None], training: Path | None = None
+) -> float:
     """Use a window for so long, then open 50 times more; returns the MB that these added.
 
-    ``say`` is given every row; two copies of the sample go to ``folder``.
+    ``say`` is given every row; two copies of the sample go to ``folder``. A denoiser may learn from
+    pairs beside it.
     """
     recordings = [folder / "left.sd2", folder / "right.sd2"]
     for copy in recordings:
@@ -246,6 +266,8 @@ def soak(minutes: float, folder: Path, say: Callable[[Row], None]) -> float:
     window.activateWindow()
     hand, meter, rounds, rows = Hand(window), Meter(), 0, 1
     hand.open(recordings[0])
+    if training is not None:
+        hand.train(training)
     say(meter.row(rounds))
     while meter.minute < minutes:
         hand.round()
@@ -254,6 +276,8 @@ def soak(minutes: float, folder: Path, say: Callable[[Row], None]) -> float:
         if meter.minute >= minutes * rows / ROWS:
             say(meter.row(rounds))
             rows += 1
+    if training is not None:
+        hand.end_training()
     before_mb = meter.resident_mb()
     for number in range(1, REOPENINGS + 1):
         hand.open(recordings[(rounds + number) % 2])
@@ -266,6 +290,7 @@ def main() -> int:
     """Use the window and print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--minutes", type=float, default=60.0)
+    parser.add_argument("--training", type=Path, help="pairs that a denoiser learns from beside it")
     parser.add_argument("--json", action="store_true", help="one row a line, as JSON")
     options = parser.parse_args()
     raised = Raised()
@@ -284,7 +309,7 @@ def main() -> int:
     apply_theme(application, False)
     with tempfile.TemporaryDirectory(prefix="sd2-soak-") as name:
         os.environ["XDG_DATA_HOME"] = name
-        added_mb = soak(options.minutes, Path(name), say)
+        added_mb = soak(options.minutes, Path(name), say, options.training)
     print(f"\n{REOPENINGS} more openings of a recording added {added_mb:.0f} MB.")
     return 1 if raised.count else 0
 
