@@ -175,3 +175,24 @@ def test_memory_that_threads_have_freed_goes_back_to_the_system() -> None:
         return float(run.stdout)
 
     assert left_mb("little") < 30 < 60 < left_mb("much")
+
+
+FREED = """
+import psutil
+from sd2core.processes import return_free_memory
+
+def resident_mb():
+    return psutil.Process().memory_info().rss / 1e6
+
+kept = [bytes(2000) for _ in range(50_000)]
+del kept[:-1]  # the last one lies above what is free
+before_mb = resident_mb()
+return_free_memory()
+print(before_mb - resident_mb())
+"""
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="of the GNU C library")
+def test_freed_memory_below_what_is_kept_goes_back_when_asked() -> None:
+    run = subprocess.run([sys.executable, "-c", FREED], capture_output=True, text=True, check=True)
+    assert float(run.stdout) > 50

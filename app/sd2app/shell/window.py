@@ -34,6 +34,7 @@ from sd2app.widgets.layouts import column_of
 from sd2app.widgets.notices import Notice, NoticeStack
 from sd2app.widgets.panel import fill, panel, replace_content, sentence, splitter
 from sd2app.widgets.theme import apply_theme
+from sd2core.processes import return_free_memory
 
 if TYPE_CHECKING:
     from sd2app.maps.stack import MapStack
@@ -215,6 +216,8 @@ class MainWindow(QMainWindow):
         # Without a person in the frame there is nothing to aim at.
         features.maps.synthesis.frame_changed.connect(lambda: self._menus.refresh_one("aim_sensor"))
         s.display.theme_changed.connect(self._restyle)
+        # What computing a map has freed; the window rests now.
+        features.maps.synthesis.completed.connect(return_free_memory)
 
     def _mark_training(self) -> None:
         runs = self.features.training.model, self.features.classify.training
