@@ -39,7 +39,7 @@ _ORDER = 4
 _EVEN = 1e-3
 """Share of a frame duration by which frames may come early or late and still be evenly spaced."""
 _SETTLED = 3.0
-"""Periods of the cut-off by which a stretch is continued, mirrored about its ends, to filter it."""
+"""Periods of the cut-off by which a stretch is continued at its ends to filter it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,7 +195,7 @@ def unit_up(up: Vector) -> Floats:
 
 
 def low_pass(values: Floats, rate_hz: float, cutoff_hz: float) -> Floats:
-    """Low pass along the first axis that delays nothing; half of the amplitude at the cut-off.
+    """Low pass of columns (T, n) that delays nothing; half of the amplitude at the cut-off.
 
     A Butterworth filter of fourth order, run forwards and backwards.
     """
@@ -203,7 +203,27 @@ def low_pass(values: Floats, rate_hz: float, cutoff_hz: float) -> Floats:
 
     sections = butter(_ORDER, cutoff_hz, fs=rate_hz, output="sos")
     beyond = min(int(np.ceil(_SETTLED * rate_hz / cutoff_hz)), len(values) - 1)
-    return np.asarray(sosfiltfilt(sections, values, axis=0, padlen=beyond))
+    continued = np.concatenate(
+        [
+            _before(values, beyond, rate_hz, cutoff_hz),
+            values,
+            _before(values[::-1], beyond, rate_hz, cutoff_hz)[::-1],
+        ]
+    )
+    filtered = sosfiltfilt(sections, continued, axis=0, padtype=None)
+    return np.asarray(filtered[beyond : beyond + len(values)])
+
+
+def _before(values: Floats, count: int, rate_hz: float, cutoff_hz: float) -> Floats:
+    """Values (count, n) that continue a stretch before its start.
+
+    They are mirrored through its first value, which keeps the slope, and bent as the parabola
+    through its first period of the cut-off: without that the acceleration would end at zero.
+    """
+    near = min(max(int(rate_hz / cutoff_hz), _ORDER) + 1, len(values))
+    bend = np.polynomial.polynomial.polyfit(np.arange(near), values[:near], 2)[2]
+    steps = np.arange(count, 0, -1.0)[:, None]
+    return np.asarray(2.0 * values[0] - values[count:0:-1] + 2.0 * bend * steps**2)
 
 
 def _felt_on_end(
