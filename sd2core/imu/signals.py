@@ -88,10 +88,14 @@ class InertialSignals:
         return Timebase(self.times_s).frames_per_s
 
     @property
+    def channels(self) -> NDArray[np.float32]:
+        """Accelerations, then turn rates, (N, 6)."""
+        return np.hstack([self.acceleration_mps2, self.turn_rate_radps]).astype(np.float32)
+
+    @property
     def known(self) -> NDArray[np.bool_]:
         """Samples that are known, (N,)."""
-        both = np.concatenate([self.acceleration_mps2, self.turn_rate_radps], axis=1)
-        return np.asarray(np.isfinite(both).all(axis=1))
+        return np.asarray(np.isfinite(self.channels).all(axis=1))
 
 
 @dataclass(frozen=True, eq=False)
