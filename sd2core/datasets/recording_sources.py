@@ -101,13 +101,8 @@ class Making:
     def pace_kind(self) -> Kind:
         """Kind of work whose items are segments of recordings, see :mod:`sd2core.runs.pace`."""
         told = (self.synthesis.visibility, self.tolerance, self.model, self.simulation is not None)
-        return (
-            "export",
-            *self.kinds,
-            *map(str, told),
-            *(["limbs"] if self.limbs else []),
-            *self.imu,
-        )
+        more = (["limbs"] if self.limbs else []) + (["imu"] if self.imu else [])
+        return ("export", *self.kinds, *map(str, told), *more)
 
 
 def recording_sources(

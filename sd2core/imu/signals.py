@@ -35,10 +35,12 @@ LEAST_FRAMES = 6
 _USUAL_CUTOFF_HZ = 6.0
 _USUAL_SHARE = 5.0
 """Frames per second, over the highest usual cut-off."""
+_HIGHEST_SHARE = 0.45
+"""Highest cut-off, over the frame rate: nothing above half of it is in the frames."""
 _ORDER = 4
 _EVEN = 1e-3
 """Share of a frame duration by which frames may come early or late and still be evenly spaced."""
-_SETTLED = 3.0
+_SETTLED = 8.0
 """Periods of the cut-off by which a stretch is continued at its ends to filter it."""
 
 
@@ -145,7 +147,7 @@ def felt(
     Raises
     ------
     Sd2Error
-        When the cut-off is not below half of the frame rate, or there is no direction upwards.
+        When the cut-off is above 0.45 of the frame rate, or there is no direction upwards.
 
     Examples
     --------
@@ -166,10 +168,10 @@ def felt(
     """
     rate_hz = path.timebase.frames_per_s
     cutoff_hz = usual_cutoff_hz(rate_hz) if cutoff_hz is None else cutoff_hz
-    if not 0 < cutoff_hz < rate_hz / 2:
+    if not 0 < cutoff_hz <= _HIGHEST_SHARE * rate_hz:
         raise Sd2Error(
             f"The cut-off is {cutoff_hz:g} Hz, of {rate_hz:.4g} frames/s",
-            f"above 0 and below {rate_hz / 2:.4g} Hz, half of the frame rate",
+            f"above 0, up to {_HIGHEST_SHARE * rate_hz:.4g} Hz",
             "Motion that is faster is not in these frames",
         )
     upwards = unit_up(up)
@@ -201,12 +203,14 @@ def unit_up(up: Vector) -> Floats:
 def low_pass(values: Floats, rate_hz: float, cutoff_hz: float) -> Floats:
     """Low pass of columns (T, n) that delays nothing; half of the amplitude at the cut-off.
 
-    A Butterworth filter of fourth order, run forwards and backwards.
+    A Butterworth filter of fourth order, run forwards and backwards. A parabola passes as it is.
     """
     from scipy.signal import butter, sosfiltfilt
 
     sections = butter(_ORDER, cutoff_hz, fs=rate_hz, output="sos")
-    beyond = min(int(np.ceil(_SETTLED * rate_hz / cutoff_hz)), len(values) - 1)
+    parabola = _parabola(values)
+    values = values - parabola
+    beyond = min(round(_SETTLED * rate_hz / cutoff_hz), len(values) - 1)
     continued = np.concatenate(
         [
             _before(values, beyond, rate_hz, cutoff_hz),
@@ -215,7 +219,13 @@ def low_pass(values: Floats, rate_hz: float, cutoff_hz: float) -> Floats:
         ]
     )
     filtered = sosfiltfilt(sections, continued, axis=0, padtype=None)
-    return np.asarray(filtered[beyond : beyond + len(values)])
+    return np.asarray(filtered[beyond : beyond + len(values)] + parabola)
+
+
+def _parabola(values: Floats) -> Floats:
+    """Parabolas nearest to columns (T, n), by least squares."""
+    powers = np.vander(np.linspace(-1.0, 1.0, len(values)), 3)
+    return np.asarray(powers @ np.linalg.lstsq(powers, values, rcond=None)[0])
 
 
 def _before(values: Floats, count: int, rate_hz: float, cutoff_hz: float) -> Floats:
@@ -224,10 +234,10 @@ def _before(values: Floats, count: int, rate_hz: float, cutoff_hz: float) -> Flo
     They are mirrored through its first value, which keeps the slope, and bent as the parabola
     through its first period of the cut-off: without that the acceleration would end at zero.
     """
-    near = min(max(int(rate_hz / cutoff_hz), _ORDER) + 1, len(values))
-    bend = np.polynomial.polynomial.polyfit(np.arange(near), values[:near], 2)[2]
+    near = min(max(round(rate_hz / cutoff_hz), _ORDER) + 1, len(values))
+    bend = np.diff(_parabola(values[:near])[:3], n=2, axis=0)  # (1, n)
     steps = np.arange(count, 0, -1.0)[:, None]
-    return np.asarray(2.0 * values[0] - values[count:0:-1] + 2.0 * bend * steps**2)
+    return np.asarray(2.0 * values[0] - values[count:0:-1] + bend * steps**2)
 
 
 def _felt_on_end(
