@@ -56,8 +56,9 @@ def test_the_comparison_finds_a_known_rotation_shift_and_offset(recording: Path)
     inner[400:-400] = True
     found = beside(virtual, real, inner)
     assert found.shift_s == pytest.approx(0.02, abs=1e-9)
-    assert found.acceleration_rms_mps2 < 0.01
-    assert found.turn_rate_rms_radps < 0.01
+    # What is left: a low pass of the path, then of what is felt on it, are not quite the same.
+    assert found.acceleration_rms_mps2 < 0.02
+    assert found.turn_rate_rms_radps < 0.005
 
 
 def test_a_quintic_spline_differentiates_best() -> None:
