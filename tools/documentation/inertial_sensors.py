@@ -30,7 +30,7 @@ import sd2core as sd2
 from sd2core.files.hdf5_files import open_hdf5_file
 from sd2core.files.tables import markdown_table
 from sd2core.imu.mounting import mounted
-from sd2core.imu.signals import InertialSignals, RigidPath, felt, low_pass
+from sd2core.imu.signals import GRAVITY_MPS2, InertialSignals, RigidPath, felt, low_pass
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.timebase import Timebase
 
@@ -186,19 +186,23 @@ def _columns(path: Path) -> dict[tuple[str, str], Floats]:
 
 def fit_rows(true: MeshSequence, fitted: MeshSequence) -> list[list[str]]:
     """Errors of virtual sensors on a fitted body, of one on the true body at the same place."""
-    rows = [
-        ["place", "\\|a − g\\|", "error", "across", "along the line of sight", "turn rate", "error"]
-    ]
+    rows = [["place", "moves", "off", "across", "along", "turns", "off", "turned by"]]
+    rows.append(["", "m/s²", "m/s²", "m/s²", "m/s²", "rad/s", "rad/s", "°"])
     times_s = true.times_s[true.times_s <= fitted.times_s[-1]]
     for place in PLACES:
         paths = [mounted(mesh, place).path(mesh) for mesh in (true, fitted)]
         own = [felt(path, times_s, CUTOFF_HZ) for path in paths]
         world = [felt(_unturned(path), times_s, CUTOFF_HZ).acceleration_mps2 for path in paths]
         known = own[0].known & own[1].known
-        moved = (world[0] - [0.0, -9.81, 0.0])[known]
+        moved = (world[0] - [0.0, -GRAVITY_MPS2, 0.0])[known]
         off = (world[1] - world[0])[known]
         rates = [one.turn_rate_radps[known] for one in own]
         felt_off = (own[1].acceleration_mps2 - own[0].acceleration_mps2)[known]
+        frames = [np.searchsorted(path.timebase.times_s, times_s[known]) for path in paths]
+        turns = [
+            Rotation.from_matrix(path.rotation[numbers])
+            for path, numbers in zip(paths, frames, strict=True)
+        ]
         values = (
             _length_rms(moved),
             _length_rms(felt_off),
@@ -207,7 +211,8 @@ def fit_rows(true: MeshSequence, fitted: MeshSequence) -> list[list[str]]:
             _length_rms(rates[0]),
             _length_rms(rates[1] - rates[0]),
         )
-        rows.append([place, *(f"{value:.2f}" for value in values)])
+        turned_deg = np.degrees((turns[0].inv() * turns[1]).magnitude()).mean()
+        rows.append([place, *(f"{value:.2f}" for value in values), f"{turned_deg:.0f}"])
     return rows
 
 
