@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from sd2core.imu.sensor_errors import SensorErrors
     from sd2core.imu.signals import InertialSignals
 
-_SUFFIXES = (".csv", ".sto", ".npz")
-
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``imu``."""
@@ -181,9 +179,9 @@ def _told(signals: InertialSignals) -> dict[str, Any]:
 def _check_output(path: Path) -> None:
     """Refuse an output that cannot be written, or is a file of something else."""
     from sd2core.cli.reading import check_output
-    from sd2core.imu.files import read_signals
+    from sd2core.imu.files import SUFFIXES, read_signals
 
-    check_output(path, *_SUFFIXES)
+    check_output(path, *SUFFIXES)
     # `mktemp` leaves an empty file to be filled.
     if path.exists() and path.stat().st_size:
         try:

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -77,7 +78,7 @@ def read_signals(
         When the file is no such file or damaged.
     """
     path = Path(path)
-    if not path.is_file() and not path.exists():
+    if not path.exists():
         raise Sd2Error(f"{path} does not exist", "samples of an inertial sensor", "Check the path")
 
     def read_csv(path: Path) -> InertialSignals:
@@ -147,8 +148,8 @@ def _write_sto(path: Path, signals: InertialSignals) -> None:
             signals.turn_rate_radps.tolist(),
             strict=True,
         ):
-            cells = (",".join(f"{value:.9g}" for value in vector) for vector in vectors)
-            stream.write(f"{time_s:.9f}\t{chr(9).join(cells)}\n".encode())
+            cells = [",".join(f"{value:.9g}" for value in vector) for vector in vectors]
+            stream.write("\t".join([f"{time_s:.9f}", *cells]).encode() + b"\n")
 
 
 def _read_sto(path: Path) -> InertialSignals:
@@ -161,12 +162,13 @@ def _read_sto(path: Path) -> InertialSignals:
                 name.endswith(end) for name, end in zip(names[1:], _STO_ENDS, strict=True)
             ):
                 raise Sd2Error(f"{path} has the columns {str(names)[:200]}", _EXPECTED_STO)
-            rows = [
-                [float(text) for text in line.replace("\t", ",").split(",")]
-                for line in lines
-                if line
-            ]
-            table = np.array(rows, np.float64).reshape(len(rows), 7)
+            rows = (line.replace("\t", ",") for line in lines if line)
+            first = next(rows, None)
+            if first is None:
+                raise Sd2Error(f"{path} holds no rows", _EXPECTED_STO)
+            table = np.loadtxt(chain([first], rows), delimiter=",", comments=None, ndmin=2)
+            if table.shape[1] != 7:
+                raise Sd2Error(f"{path} has {table.shape[1]} numbers in a row", "seven")
         except ValueError as error:
             raise Sd2Error(f"{path} cannot be read ({str(error)[:200]})", _EXPECTED_STO) from error
     try:
@@ -176,9 +178,9 @@ def _read_sto(path: Path) -> InertialSignals:
         raise error.within(path) from error
 
 
-def _sto_header(path: Path, lines: Any) -> dict[str, str]:
+def _sto_header(path: Path, lines: Iterator[str]) -> dict[str, str]:
     """Axes that the header states; Sd2Error if its table is not of vectors."""
-    facts = {}
+    facts: dict[str, str] = {}
     for _ in range(_LONGEST_HEADER):
         line = next(lines, None)
         if line is None or line == "endheader":

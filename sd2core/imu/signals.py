@@ -97,7 +97,8 @@ class InertialSignals:
     @property
     def known(self) -> NDArray[np.bool_]:
         """Samples that are known, (N,)."""
-        return np.asarray(np.isfinite(self.channels).all(axis=1))
+        both = np.isfinite(self.acceleration_mps2) & np.isfinite(self.turn_rate_radps)
+        return np.asarray(both.all(axis=1))
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,6 @@ import re
 from array import array
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import chain
 from pathlib import Path
 from typing import Literal
 
@@ -98,19 +97,20 @@ def read_table(
     with open_regular(path) as stream:
         rate_text, heading, lines = _heading(path, lines_of(stream))
         separator = max(",;\t", key=heading.count)
-        titles = [title.strip().strip('"') for title in heading.split(separator)]
+        titles = [_cell(title) for title in heading.split(separator)]
         columns = _columns_of(path, titles)
-        chosen, factors = _chosen(path, columns, given)
-        values = _numbers(path, lines, separator, chosen)  # (N, 6 or 7)
-    values *= factors
+        factors = _factors(path, columns, given)
+        values = _numbers(path, lines, separator, columns)  # (N, 6 or 7)
+    with np.errstate(over="ignore"):  # what becomes infinite is refused
+        values *= factors
     if values.shape[1] == 7:
         times_s = values[:, 6]
     else:
         rate_hz = _rate(path, rate_text) if rate_hz is None else rate_hz
         times_s = np.arange(len(values)) / _plausible(path, rate_hz)
-    with_place = {"source": path.name, "columns": [one.title for one in chosen]}
+    meta = {"source": path.name, "columns": [one.title for one in columns]}
     try:
-        signals = InertialSignals(times_s, values[:, :3], values[:, 3:6], with_place)
+        signals = InertialSignals(times_s, values[:, :3], values[:, 3:6], meta)
     except Sd2Error as error:
         raise error.within(path) from error
     if len(times_s) > 1:
@@ -125,7 +125,7 @@ def _heading(path: Path, lines: Iterable[bytes]) -> tuple[str, str, Iterator[tup
         if not line.startswith("#"):
             if len(line) > _LONGEST_HEADING:
                 break
-            return rate, line, chain(one for one in numbered if not one[1].startswith("#"))
+            return rate, line, (one for one in numbered if not one[1].startswith("#"))
         if found := _RATE.fullmatch(line.encode()):
             rate = found[1].decode()
     raise Sd2Error(f"{path} has no heading", EXPECTED, "Name the columns in the first line")
@@ -191,23 +191,26 @@ def _column(number: int, title: str) -> _Column | None:
     return None
 
 
-def _chosen(
-    path: Path, columns: list[_Column], given: dict[str, str]
-) -> tuple[list[_Column], NDArray[np.float64]]:
-    """The columns, and what makes m/s², rad/s and s of their values."""
+def _factors(path: Path, columns: list[_Column], given: dict[str, str]) -> NDArray[np.float64]:
+    """Factors that make m/s², rad/s and s of the columns' values."""
     factors = []
     for column in columns:
         known = _UNITS[column.quantity]
         unit = column.unit or given.get(column.quantity, "s")
         if unit not in known:
-            stated = f"the unit {column.unit!r}" if column.unit else "no unit"
+            stated = f"the unit {unit!r}" if unit else "no unit"
             raise Sd2Error(
-                f"{path}: the column {column.title!r} states {stated}",
+                f"{path}: the column {column.title!r} has {stated}",
                 f"{_WORDS[column.quantity]} in {', '.join(known)}",
-                f"Call it {column.title.split()[0]} ({next(iter(known))}), or as it is",
+                f"State it in the heading, such as {f'{column.quantity} {column.axis}'.strip()}"
+                f" ({next(iter(known))})",
             )
         factors.append(known[unit])
-    return columns, np.array(factors)
+    return np.array(factors)
+
+
+def _cell(text: str) -> str:
+    return text.strip().strip('"')
 
 
 def _numbers(
@@ -224,7 +227,7 @@ def _numbers(
                 "Copy the file again, or delete that line",
             )
         for column in columns:
-            text = cells[column.number].strip().strip('"')
+            text = _cell(cells[column.number])
             try:
                 values.append(float(text) if text else math.nan)
             except ValueError:
