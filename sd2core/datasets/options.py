@@ -8,7 +8,7 @@ from typing import Any, Literal, get_args
 
 from sd2core.datasets.source import KINDS
 from sd2core.errors import Sd2Error
-from sd2core.imu.mounting import names_of
+from sd2core.imu.mounting import checked_places
 from sd2core.imu.signals import LEAST_FRAMES
 from sd2core.maps import MapKind
 from sd2core.mesh.vertex_parts import PARTS
@@ -85,7 +85,7 @@ class DatasetOptions:
             raise Sd2Error(
                 f"Limb maps of {', '.join(self.kinds)} maps", "the kind synthetic, which they split"
             )
-        names_of(self.imu)
+        checked_places(self.imu)
         least = LEAST_FRAMES if self.imu else 1
         if self.length < least:
             raise Sd2Error(f"Segments are {self.length} frames long", f"{least} or more")

@@ -276,7 +276,7 @@ def _source(mesh: MeshSequence) -> str:
     return mesh.source or "The mesh"
 
 
-def names_of(places: Sequence[str]) -> tuple[str, ...]:
+def checked_places(places: Sequence[str]) -> tuple[str, ...]:
     """Names of places, each once; Sd2Error for one that is none."""
     if not {*places} <= {*PLACES} or len(set(places)) < len(places):
         raise Sd2Error(

@@ -118,7 +118,13 @@ class RigidPath:
 
 
 def usual_cutoff_hz(frames_per_s: float) -> float:
-    """Cut-off of the low pass unless another is asked for: 6 Hz, or a fifth of the frame rate."""
+    """Cut-off of the low pass unless another is asked for: 6 Hz, or a fifth of the frame rate.
+
+    Examples
+    --------
+    >>> usual_cutoff_hz(120.0), usual_cutoff_hz(10.0)
+    (6.0, 2.0)
+    """
     return min(_USUAL_CUTOFF_HZ, frames_per_s / _USUAL_SHARE)
 
 

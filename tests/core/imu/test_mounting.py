@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from sd2core.body.model import Body, Resolution
 from sd2core.errors import Sd2Error
-from sd2core.imu.mounting import PLACES, mounted, names_of
+from sd2core.imu.mounting import PLACES, checked_places, mounted
 from sd2core.imu.virtual import imu_at_frames, virtual_imu
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.timebase import Timebase
@@ -191,9 +191,9 @@ def test_what_can_be_asked_for_is_said(body: Body) -> None:
     with pytest.raises(Sd2Error, match="at '-1'"):
         mounted(mesh, -1)
     with pytest.raises(Sd2Error, match="each once"):
-        names_of(("head", "head"))
+        checked_places(("head", "head"))
     with pytest.raises(Sd2Error, match="some of head"):
-        names_of(("knee",))
+        checked_places(("knee",))
 
 
 def test_what_has_no_surface_is_refused() -> None:
