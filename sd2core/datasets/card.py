@@ -336,7 +336,7 @@ def _imu(card: dict[str, Any]) -> str:
     return (
         f"\n\nThe array `imu` holds inertial sensors at {', '.join(card['imu'])}, *simulated* on"
         f" the mesh: at every frame ({card['frame_rate_hz']:g} Hz), acceleration with gravity in"
-        " m/s² and turn rate in rad/s along x, y, z of the sensor, with nothing above"
+        " m/s² and turn rate in rad/s along x, y, z of the sensor, low-passed at"
         f" {lowest if lowest == highest else f'{lowest} to {highest}'} Hz."
     )
 

@@ -37,6 +37,9 @@ from sd2core.timebase import Timebase
 Floats = NDArray[np.float64]
 
 CUTOFF_HZ = 6.0
+CUTOFFS_HZ = (3.0, 6.0, 12.0)
+INSTEP, FOREFOOT = 3, 4
+"""Vertices of a shoe besides its markers."""
 FROM_EAST_NORTH_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 """Turns a frame whose z axis points up into ours: right, down, forward."""
 
@@ -79,11 +82,16 @@ def board(path: Path) -> tuple[MeshSequence, InertialSignals, NDArray[np.bool_]]
     return mesh, InertialSignals(times.times_s, acceleration, turn_rate), moved & there
 
 
-def beside(virtual: InertialSignals, real: InertialSignals, counted: NDArray[np.bool_]) -> Beside:
+def beside(
+    virtual: InertialSignals,
+    real: InertialSignals,
+    counted: NDArray[np.bool_],
+    cutoff_hz: float = CUTOFF_HZ,
+) -> Beside:
     """Align by one rotation, one time shift and one offset of each quantity, and compare."""
     rate_hz = real.rate_hz
-    acceleration = low_pass(real.acceleration_mps2, rate_hz, CUTOFF_HZ)[counted]
-    turn_rate = low_pass(real.turn_rate_radps, rate_hz, CUTOFF_HZ)[counted]
+    acceleration = low_pass(real.acceleration_mps2, rate_hz, cutoff_hz)[counted]
+    turn_rate = low_pass(real.turn_rate_radps, rate_hz, cutoff_hz)[counted]
     known = virtual.known
     curve = make_interp_spline(
         virtual.times_s[known],
@@ -108,11 +116,11 @@ def beside(virtual: InertialSignals, real: InertialSignals, counted: NDArray[np.
     return min((compared(shift) for shift in SHIFTS_S), key=lambda one: one.acceleration_rms_mps2)
 
 
-def board_beside(path: Path) -> Beside:
+def board_beside(path: Path, cutoff_hz: float = CUTOFF_HZ) -> Beside:
     """The virtual sensor in the middle of the board beside the real one, where it is moved."""
     mesh, real, moved = board(path)
-    virtual = felt(mounted(mesh, 0).path(mesh), mesh.times_s, CUTOFF_HZ)
-    return beside(virtual, real, moved & virtual.known)
+    virtual = felt(mounted(mesh, 0).path(mesh), mesh.times_s, cutoff_hz)
+    return beside(virtual, real, moved & virtual.known, cutoff_hz)
 
 
 # -- A foot ----------------------------------------------------------------------------------------
@@ -121,8 +129,8 @@ def board_beside(path: Path) -> Beside:
 def foot(folder: Path, side: str) -> tuple[MeshSequence, InertialSignals]:
     """Markers of a shoe with its instep, and the real sensor on it; side is left or right.
 
-    Where the sensor sits on the shoe is not recorded: vertex 3 is half way between the heel and the
-    middle of the other two markers.
+    Where the sensor sits on the shoe is not recorded: the instep is half way between the heel and
+    the middle of the other two markers, the forefoot half way between the toe and that of the rest.
     """
     markers = _columns(folder / "mocap_sample.csv")
     letter = side[0].upper()
@@ -130,10 +138,11 @@ def foot(folder: Path, side: str) -> tuple[MeshSequence, InertialSignals]:
         np.stack([markers[f"{letter}_{name}", axis] for axis in "xyz"], axis=1) / 1000.0
         for name in ("FCC", "TOE", "FM5")
     )
-    corners = np.stack([heel, toe, outside, heel / 2 + toe / 4 + outside / 4], axis=1)
+    quarters = (heel + toe + outside) / 4
+    corners = np.stack([heel, toe, outside, quarters + heel / 4, quarters + toe / 4], axis=1)
     mesh = MeshSequence(
         corners @ FROM_EAST_NORTH_UP.T,
-        np.array([[0, 1, 3], [1, 2, 3], [2, 0, 3]]),
+        np.array([[a, b, top] for top in (INSTEP, FOREFOOT) for a, b in ((0, 1), (1, 2), (2, 0))]),
         Timebase.regular(len(corners), 100.0),
         f"the {side} shoe",
     )
@@ -146,10 +155,10 @@ def foot(folder: Path, side: str) -> tuple[MeshSequence, InertialSignals]:
     return mesh, InertialSignals(times_s, acceleration, np.radians(turn_rate))
 
 
-def foot_beside(folder: Path, side: str) -> tuple[float, float, float]:
+def foot_beside(folder: Path, side: str, vertex: int = INSTEP) -> tuple[float, float, float]:
     """Correlations of |a| and of |ω| of a virtual and a real sensor, and the time between them."""
     mesh, real = foot(folder, side)
-    virtual = felt(mounted(mesh, 3).path(mesh), mesh.times_s, CUTOFF_HZ)
+    virtual = felt(mounted(mesh, vertex).path(mesh), mesh.times_s, CUTOFF_HZ)
     magnitudes = [np.linalg.norm(one, axis=1) for one in _both(virtual)]
     smooth = [low_pass(one, real.rate_hz, CUTOFF_HZ) for one in _both(real)]
     inner = slice(50, -50)  # what the shift leaves of both recordings
@@ -272,22 +281,30 @@ def _error(found: Floats, truth: Floats) -> float:
 
 
 def _print_board(path: Path) -> None:
-    one = board_beside(path)
-    print(
-        f"{one.samples:,} samples in which the board is moved: acceleration"
-        f" {one.acceleration_rms_mps2:.4f} m/s² RMS per axis (correlation"
-        f" {one.acceleration_correlation:.4f}), turn rate {one.turn_rate_rms_radps:.4f} rad/s RMS,"
-        f" below {CUTOFF_HZ:g} Hz, after a shift of {1000 * one.shift_s:.1f} ms"
-    )
+    rows = [["below", "acceleration, m/s²", "correlation", "turn rate, rad/s", "shift", "samples"]]
+    for cutoff_hz in CUTOFFS_HZ:
+        one = board_beside(path, cutoff_hz)
+        rows.append(
+            [
+                f"{cutoff_hz:g} Hz",
+                f"{one.acceleration_rms_mps2:.4f}",
+                f"{one.acceleration_correlation:.4f}",
+                f"{one.turn_rate_rms_radps:.4f}",
+                f"{1000 * one.shift_s:.1f} ms",
+                f"{one.samples:,}",
+            ]
+        )
+    print(*markdown_table(rows), sep="\n")
 
 
 def _print_foot(folder: Path) -> None:
-    for side in ("left", "right"):
-        acceleration, turn_rate, shift_s = foot_beside(folder, side)
-        print(
-            f"{side} foot: |a| correlates at {acceleration:.3f}, |ω| at {turn_rate:.3f}, below"
-            f" {CUTOFF_HZ:g} Hz, after a shift of {1000 * shift_s:.1f} ms"
-        )
+    rows = [["foot", "\\|a\\| correlates at", "\\|ω\\| correlates at", "shift"]]
+    for place, vertex in (("instep", INSTEP), ("forefoot", FOREFOOT)):
+        for side in ("left", "right"):
+            acceleration, turn_rate, shift_s = foot_beside(folder, side, vertex)
+            values = f"{acceleration:.3f}", f"{turn_rate:.3f}", f"{1000 * shift_s:.1f} ms"
+            rows.append([f"{side}, {place}", *values])
+    print(*markdown_table(rows), sep="\n")
 
 
 def main() -> None:

@@ -15,10 +15,13 @@ from sd2core.datasets.forecast import Counting
 from sd2core.datasets.layout import Header, row_shapes
 from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.reading import open_dataset
+from sd2core.datasets.recording_sources import Making
 from sd2core.datasets.source import Source
+from sd2core.datasets.sources import gather
 from sd2core.datasets.writing import write_dataset
 from sd2core.errors import Sd2Error
 from sd2core.imu.signals import InertialSignals
+from tests.small_pairs import write_pairs
 
 PLACES = ("left-wrist", "right-foot")
 OPTIONS = DatasetOptions(length=24, overlap=4, imu=PLACES)
@@ -65,7 +68,7 @@ def test_the_card_states_places_rate_and_cut_off(tmp_path: Path) -> None:
     words = (tmp_path / "set.card.md").read_text(encoding="utf-8")
     assert "inertial sensors at left-wrist, right-foot, *simulated*" in words
     assert "(30 Hz)" in words
-    assert "nothing above 6 Hz" in words
+    assert "low-passed at 6 Hz" in words
     card = json.loads((tmp_path / "set.card.json").read_text(encoding="utf-8"))
     assert (card["imu"], card["imu_cutoff_hz"]) == (list(PLACES), [6.0, 6.0])
 
@@ -95,6 +98,13 @@ def test_a_source_without_them_is_refused(tmp_path: Path) -> None:
     assert "no inertial sensor at right-foot" in written.failed[1].reason
     with pytest.raises(Sd2Error, match="begun with inertial sensors at"):
         write_dataset(tmp_path / "set.zarr", sources, replace(OPTIONS, imu=PLACES[:1]))
+
+
+def test_pairs_have_no_body_to_put_them_on(tmp_path: Path) -> None:
+    pairs = tmp_path / "pairs.zarr"
+    write_pairs(pairs, ("s1",))
+    with pytest.raises(Sd2Error, match=r"pairs\.zarr: no body"):
+        gather([pairs], Making(imu=PLACES))
 
 
 def test_sensors_are_part_of_what_a_source_is_made_of() -> None:
