@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
     from sd2core.errors import Sd2Error
     from sd2core.fmcw import doppler_map
+    from sd2core.imu.virtual import virtual_imu
     from sd2core.io.mesh import load_mesh, save_mesh
     from sd2core.io.radar import RadarCapture, load_capture
     from sd2core.io.video import VideoReader, open_video
@@ -57,6 +58,7 @@ __all__ = [
     "open_recording",
     "open_video",
     "save_mesh",
+    "virtual_imu",
 ]
 
 _HOME = {
@@ -82,6 +84,7 @@ _HOME = {
     "open_recording": "recording.recording",
     "open_video": "io.video",
     "save_mesh": "io.mesh",
+    "virtual_imu": "imu.virtual",
 }
 
 

@@ -28,6 +28,7 @@ from sd2core.progress import Progress, silent
 from sd2core.sensor import VirtualSensor
 
 if TYPE_CHECKING:
+    from scipy.sparse import csr_array
     from scipy.spatial import cKDTree
 
     from sd2core.doppler import Synthesizer
@@ -141,6 +142,18 @@ def parts_by_shape(points_m: Floats, faces: NDArray[np.int32]) -> NDArray[np.uin
     return np.asarray(parts[beside], np.uint8)
 
 
+def edge_lengths(points_m: Floats, faces: NDArray[np.int32]) -> csr_array:
+    """Graph of a surface: lengths of the edges between vertices, (V, V), each once."""
+    from scipy.sparse import csr_array
+
+    ends = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    ends = np.unique(np.sort(ends, axis=1), axis=0)
+    lengths_m = np.linalg.norm(points_m[ends[:, 0]] - points_m[ends[:, 1]], axis=1)
+    # A sparse array takes a length of zero for no edge at all.
+    lengths_m = np.maximum(lengths_m, 1e-9)
+    return csr_array((lengths_m, (ends[:, 0], ends[:, 1])), (len(points_m),) * 2)
+
+
 @dataclass(frozen=True, eq=False)
 class _Surface:
     """Largest connected piece of a surface, with distances along it."""
@@ -157,17 +170,11 @@ class _Surface:
     @classmethod
     def of(cls, points_m: Floats, faces: NDArray[np.int32]) -> _Surface | None:
         """None if the surface is in pieces, or its points are not finite."""
-        from scipy.sparse import csr_array
         from scipy.sparse.csgraph import connected_components, dijkstra
 
-        ends = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-        ends = np.unique(np.sort(ends, axis=1), axis=0)
-        lengths_m = np.linalg.norm(points_m[ends[:, 0]] - points_m[ends[:, 1]], axis=1)
-        if not np.isfinite(lengths_m).all():
+        graph = edge_lengths(points_m, faces)
+        if not np.isfinite(graph.data).all():
             return None
-        # A sparse array takes a length of zero for no edge at all.
-        lengths_m = np.maximum(lengths_m, 1e-9)
-        graph = csr_array((lengths_m, (ends[:, 0], ends[:, 1])), (len(points_m),) * 2)
         _, piece = connected_components(graph, directed=False)
         vertices = np.flatnonzero(piece == np.bincount(piece).argmax())
         if len(vertices) < max(_LEAST_SHARE * len(points_m), _TIPS + 1):

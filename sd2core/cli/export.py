@@ -85,6 +85,14 @@ def _add_content(parser: argparse.ArgumentParser) -> None:
     )
     add_limbs(group)
     group.add_argument(
+        "--imu",
+        type=name_list,
+        default=(),
+        metavar="PLACES",
+        help="also keep what inertial sensors there would feel at every frame, e.g."
+        " left-wrist,right-wrist; places as for `sd2 imu`",
+    )
+    group.add_argument(
         "--length", type=positive_int, default=72, metavar="N", help="frames (default: 72)"
     )
     group.add_argument(
@@ -234,6 +242,7 @@ def _dataset_options(options: argparse.Namespace) -> DatasetOptions:
         validation=options.validation_subjects,
         test=options.test_subjects,
         limbs=options.limbs,
+        imu=options.imu,
         title=options.title,
         provenance={"command": shlex.join(["sd2", *sys.argv[1:]])},
     )
@@ -257,6 +266,7 @@ def _making(options: argparse.Namespace) -> Making:
         simulation=None if options.simulate is None else Simulation(named_radar(options.simulate)),
         model=options.model,
         limbs=options.limbs,
+        imu=options.imu,
     )
 
 

@@ -151,6 +151,14 @@ def position(text: str) -> tuple[float, float, float]:
     return values[0], values[1], values[2]
 
 
+def vector(text: str) -> tuple[float, float, float]:
+    """Parse ``X,Y,Z`` of any unit."""
+    values = _numbers(text)
+    if len(values) != 3:
+        raise argparse.ArgumentTypeError(f"{text!r} is not X,Y,Z, e.g. 0,-1,0")
+    return values[0], values[1], values[2]
+
+
 def image_size(text: str) -> tuple[int, int]:
     """Parse ``WxH`` in pixels."""
     match = re.fullmatch(r"([1-9]\d*)x([1-9]\d*)", text)

@@ -14,6 +14,7 @@ from sd2core.cli import (
     export,
     fit,
     importing,
+    imu,
     info,
     labels,
     ladder,
@@ -44,6 +45,7 @@ examples:
   sd2 align walk.sd2 --save                   the radar's clock, from what both saw
   sd2 synth walk.npz --out map.npz --sensor 0,0,1
   sd2 radar capture/ --out real.npz
+  sd2 imu walk.zarr --at left-wrist --out wrist.csv    what an inertial sensor would feel
   sd2 denoise map.npz --out denoised.npz      what a radar would show
   sd2 labels suggest walk.sd2                 where something moves
   sd2 train pairs.zarr --out runs/s4          teach a denoiser from pairs
@@ -73,6 +75,7 @@ def build_parser() -> tuple[argparse.ArgumentParser, argparse._SubParsersAction]
         fit,
         synth,
         radar,
+        imu,
         denoise,
         classify,
         labels,

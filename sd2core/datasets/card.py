@@ -52,6 +52,7 @@ def describe_dataset(dataset: Dataset) -> dict[str, Any]:
     sources = _Sources()
     for entry in dataset.sources():
         sources.add(entry)
+    imu = {"imu_cutoff_hz": sources.imu_cutoff_hz} if header.imu else {}
     by_label = _named(header.labels, segments.sum(axis=1))
     return {
         "format": CARD_FORMAT,
@@ -83,6 +84,7 @@ def describe_dataset(dataset: Dataset) -> dict[str, Any]:
         "sources_without_segments": sources.empty,
         "simulated_recordings": sources.simulated,
         "how": sources.how(),
+        **imu,
     }  # fmt: skip
 
 
@@ -107,6 +109,7 @@ class _Sources:
         self.minutes = 0.0
         self.frames_without_person = 0
         self._views: Counter[int] = Counter()
+        self._cutoffs_hz: list[float] = []
         self._how: dict[str, Counter[str]] = {kind: Counter() for kind in KINDS}
 
     def add(self, entry: dict[str, Any]) -> None:
@@ -120,6 +123,8 @@ class _Sources:
             self.minutes += entry["frames"] / entry["frame_rate_hz"] / 60
             self.frames_without_person += entry["frames"] - entry["frames_with_person"]
             self.simulated += bool(provenance.get("simulated"))
+        for made in provenance.get("imu", {}).values():
+            self._cutoffs_hz.append(made["cutoff_hz"])
         for kind, made in provenance["maps"].items():
             self._how[kind][made_text(kind, made, provenance)] += 1
 
@@ -132,6 +137,11 @@ class _Sources:
     def placements(self) -> int:
         """Largest number of places from which a recording is seen."""
         return max(self._views.values(), default=0)
+
+    @property
+    def imu_cutoff_hz(self) -> list[float]:
+        """Lowest and highest cut-off of inertial sensors."""
+        return [min(self._cutoffs_hz), max(self._cutoffs_hz)]
 
     def how(self) -> dict[str, dict[str, int]]:
         """Count the sources of each kind by how their maps were made."""
@@ -214,7 +224,7 @@ def card_text(card: dict[str, Any]) -> str:
             (kind, f"{count:,}", "; ".join(card["units"].get(kind, [])) or "not stated",
              _WHAT[kind])
             for kind, count in card["segments_of_kind"].items()
-        )) + _limbs(card),
+        )) + _limbs(card) + _imu(card),
         "## Labels\n\n" + _labels(card),
         "## Splits\n\n" + _splits(card),
         "## Axes and sensors\n\n" + _axes(card),
@@ -317,6 +327,18 @@ def _limbs(card: dict[str, Any]) -> str:
         return ""
     parts = ", ".join(card["parts"])
     return f"\n\nThe array `limbs` holds the synthetic map split by the parts of the body: {parts}."
+
+
+def _imu(card: dict[str, Any]) -> str:
+    if not card.get("imu"):
+        return ""
+    lowest, highest = (f"{value:.3g}" for value in card["imu_cutoff_hz"])
+    return (
+        f"\n\nThe array `imu` holds inertial sensors at {', '.join(card['imu'])}, *simulated* on"
+        f" the mesh: at every frame ({card['frame_rate_hz']:g} Hz), acceleration with gravity in"
+        " m/s² and turn rate in rad/s along x, y, z of the sensor, low-passed at"
+        f" {lowest if lowest == highest else f'{lowest} to {highest}'} Hz."
+    )
 
 
 def _labels(card: dict[str, Any]) -> str:

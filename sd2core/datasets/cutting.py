@@ -91,8 +91,8 @@ def cut_source(
 
     ``null_bins`` are set to zero. ``label_numbers`` holds the data set's number of each label of
     the source. A block has, per segment (first axis), the kinds that the source has, ``limbs``
-    if they are wanted and its synthetic map has them, and ``available``, ``label``,
-    ``segment_label``, ``purity``, ``start_s``, ``start_frame``, ``resampled``.
+    if they are wanted and its synthetic map has them, ``imu`` if it is wanted, and ``available``,
+    ``label``, ``segment_label``, ``purity``, ``start_s``, ``start_frame``, ``resampled``.
     """
     known = source.known
     kinds = [kind for kind in options.kinds if kind in source.maps]
@@ -107,6 +107,9 @@ def cut_source(
         limbs = source.maps["synthetic"].limbs if options.limbs and "synthetic" in kinds else None
         if limbs is not None:
             split = _values(limbs.values, source.times_s, clip, null_bins)
+        if options.imu:
+            felt = np.stack([source.imu[name].channels for name in options.imu], axis=2)
+            channels = _values(felt.transpose(2, 1, 0), source.times_s, clip, ())
         for begun in range(0, len(clip.starts), _BLOCK):
             starts = clip.starts[begun : begun + _BLOCK]
             places = starts[:, None] + np.arange(length)  # (segments, length)
@@ -118,6 +121,8 @@ def cut_source(
                 if kind == "synthetic" and limbs is not None:
                     arrays["limbs"] = cut(split, starts, length) * whole[:, None, None, None]
                 arrays["available"][:, KINDS.index(kind)] = whole
+            if options.imu:
+                arrays["imu"] = cut(channels, starts, length)
             arrays["label"] = label[places]
             arrays["segment_label"], arrays["purity"] = label_of_segments(
                 arrays["label"], int(label_numbers.max()) + 1, options

@@ -99,6 +99,6 @@ class Counting:
             of_kind={kind: of_kind[kind] for kind in KINDS if kind in of_kind},
             split=split,
             frame_rate_hz=rate_hz,
-            total_bytes=segments * bytes_per_segment(options.length, bins, maps),
+            total_bytes=segments * bytes_per_segment(options.length, bins, maps, len(options.imu)),
             failed=tuple(self.failed),
         )

@@ -61,6 +61,7 @@ def header_of(source: Source, options: DatasetOptions) -> Header:
         min_share=options.min_share,
         kinds_wanted=options.kinds,
         parts=options.parts,
+        imu=options.imu,
         title=options.title,
         made_by=f"SD² Studio {__version__}",
         provenance=options.provenance,
@@ -84,6 +85,13 @@ def check_fits(source: Source, header: Header) -> None:
                 f"limb maps of {', '.join(header.parts)}",
                 "Make it with `sd2 synth --limbs`, or export without limbs",
             )
+    lacking = [name for name in header.imu if name not in source.imu]
+    if lacking:
+        raise Sd2Error(
+            f"{title} has no inertial sensor at {', '.join(lacking)}",
+            f"sensors at {', '.join(header.imu)}, as the data set has",
+            "Export recordings with a mesh, or without inertial sensors",
+        )
     for one in source.maps.values():
         if one.axis != header.axis:
             raise Sd2Error(
@@ -136,6 +144,7 @@ def refuse_other_settings(out: Path, there: Header, options: DatasetOptions) -> 
         ("an overlap of", there.overlap, options.overlap),
         ("kinds", list(there.kinds_wanted), list(options.kinds)),
         ("parts", list(there.parts), list(options.parts)),
+        ("inertial sensors at", list(there.imu), list(options.imu)),
         ("frames/s", there.frame_rate_hz, options.frame_rate_hz),
         ("null bins", there.null_bins, options.null_bins),
         ("the label rule", there.label_rule, options.label_rule),

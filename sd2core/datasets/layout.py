@@ -42,7 +42,11 @@ COLUMNS: dict[str, tuple[str, tuple[int, ...]]] = {
     "elevation_deg": ("float32", ()),
     "available": ("bool", (len(KINDS),)),
 }
-"""One row per segment: type, and shape of a row. ``label``, maps and limb maps are besides."""
+"""One row per segment: type, and shape of a row. ``label``, maps, limb maps and ``imu`` are
+besides."""
+
+IMU_CHANNELS = ("acc_x", "acc_y", "acc_z", "gyr_x", "gyr_y", "gyr_z")
+"""Last axis of the array ``imu``, in m/s² and rad/s."""
 
 CHUNK_SEGMENTS = 32
 CHUNK_ROWS = 8192
@@ -71,6 +75,7 @@ class Header:
     subjects: tuple[str, ...] = ()  # Numbers in ``subject`` are places in it.
     splits: dict[str, tuple[str, ...]] = field(default_factory=dict)  # Subjects of each split.
     parts: tuple[str, ...] = ()  # Parts of the body in ``limbs``; none: there are no limb maps.
+    imu: tuple[str, ...] = ()  # Places of the inertial sensors in ``imu``; none: no such array.
     # Meaning of the value 1 in each kind; several where sources differ.
     units: dict[str, tuple[str, ...]] = field(default_factory=dict)
     title: str = ""
@@ -86,6 +91,8 @@ class Header:
         """Return the header as JSON can hold it."""
         content = _HEADER.dump_python(self, mode="json")
         axis = content.pop("axis")
+        if not self.imu:  # Descriptions without it are as they were before there was any.
+            del content["imu"]
         return {"format": FORMAT, "version": VERSION, **axis, "all_kinds": list(KINDS), **content}
 
     @classmethod
@@ -96,7 +103,7 @@ class Header:
             axis = VelocityAxis(int(entry["bins"]), float(entry["v_max_mps"]))
             names = (one.name for one in fields(cls) if one.name != "axis")
             # Before there were limb maps, headers did not have parts.
-            content = {name: ({"parts": ()} | entry)[name] for name in names}
+            content = {name: ({"parts": (), "imu": ()} | entry)[name] for name in names}
             return _HEADER.validate_python({**content, "axis": axis})
         except Sd2Error as error:
             raise Sd2Error(f"{path}: {error.found}", error.expected) from error
@@ -138,6 +145,8 @@ def row_shapes(header: Header) -> dict[str, tuple[str, tuple[int, ...]]]:
     )
     if header.parts:
         maps["limbs"] = ("float32", (header.length, len(header.parts), header.axis.bins))
+    if header.imu:
+        maps["imu"] = ("float32", (header.length, len(header.imu), len(IMU_CHANNELS)))
     return maps | {"label": ("int16", (header.length,))} | COLUMNS
 
 
@@ -162,11 +171,15 @@ def chunk_of(row: tuple[int, ...]) -> tuple[int, ...]:
     return (CHUNK_SEGMENTS if len(row) >= 2 else CHUNK_ROWS, *row)
 
 
-def bytes_per_segment(header_length: int, bins: int, maps: int) -> int:
-    """Size of a segment in bytes before compression; limb maps are as many maps as parts."""
+def bytes_per_segment(header_length: int, bins: int, maps: int, imu: int = 0) -> int:
+    """Size of a segment in bytes before compression; limb maps are as many maps as parts.
+
+    ``imu`` is the number of inertial sensors.
+    """
     import numpy as np
 
     columns = sum(
         np.dtype(kind).itemsize * int(np.prod(row, dtype=int)) for kind, row in COLUMNS.values()
     )
-    return 4 * header_length * bins * maps + 2 * header_length + columns
+    values = bins * maps + len(IMU_CHANNELS) * imu
+    return 4 * header_length * values + 2 * header_length + columns

@@ -8,6 +8,8 @@ from typing import Any, Literal, get_args
 
 from sd2core.datasets.source import KINDS
 from sd2core.errors import Sd2Error
+from sd2core.imu.mounting import checked_places
+from sd2core.imu.signals import LEAST_FRAMES
 from sd2core.maps import MapKind
 from sd2core.mesh.vertex_parts import PARTS
 from sd2core.pairs.segments import LENGTH, OVERLAP, segment_starts
@@ -46,6 +48,9 @@ class DatasetOptions:
     validation, test : tuple of str, optional
         Subjects that validate and test; None: chosen by their names, see
         :mod:`sd2core.datasets.splitting`.
+    imu : tuple of str
+        Places of inertial sensors on the body (:data:`sd2core.imu.mounting.PLACES`), whose signals
+        at the frames are kept; a source without them is refused.
     provenance : dict
         Origin of the data set; kept as JSON.
 
@@ -65,6 +70,7 @@ class DatasetOptions:
     validation: tuple[str, ...] | None = None
     test: tuple[str, ...] | None = None
     limbs: bool = False
+    imu: tuple[str, ...] = ()
     title: str = ""
     provenance: dict[str, Any] = field(default_factory=dict)
 
@@ -79,8 +85,10 @@ class DatasetOptions:
             raise Sd2Error(
                 f"Limb maps of {', '.join(self.kinds)} maps", "the kind synthetic, which they split"
             )
-        if self.length < 1:
-            raise Sd2Error(f"Segments are {self.length} frames long", "1 or more")
+        checked_places(self.imu)
+        least = LEAST_FRAMES if self.imu else 1
+        if self.length < least:
+            raise Sd2Error(f"Segments are {self.length} frames long", f"{least} or more")
         segment_starts(0, self.length, self.overlap)  # refuses an overlap that cannot be
         if self.frame_rate_hz is not None and not 0 < self.frame_rate_hz < math.inf:
             raise Sd2Error(f"The frame rate is {self.frame_rate_hz}", "a positive number")

@@ -34,6 +34,9 @@ from sd2core.errors import Sd2Error
 from sd2core.files.digests import cached_digest
 from sd2core.files.paths import files_at
 from sd2core.fmcw.processing import doppler_map
+from sd2core.imu.mounting import mounted
+from sd2core.imu.signals import InertialSignals
+from sd2core.imu.virtual import imu_at_frames
 from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap, MapKind
 from sd2core.mesh.sequence import MeshSequence
@@ -81,6 +84,8 @@ class Making:
     limbs : bool
         Split the synthetic map by the parts of the body; a recording where they are not known
         fails.
+    imu : tuple of str
+        Places of inertial sensors on the body; a recording without the bundled body's mesh fails.
     """
 
     kinds: tuple[MapKind, ...] = KINDS
@@ -90,12 +95,14 @@ class Making:
     simulation: Simulation | None = None
     model: str | None = None
     limbs: bool = False
+    imu: tuple[str, ...] = ()
 
     @property
     def pace_kind(self) -> Kind:
         """Kind of work whose items are segments of recordings, see :mod:`sd2core.runs.pace`."""
         told = (self.synthesis.visibility, self.tolerance, self.model, self.simulation is not None)
-        return ("export", *self.kinds, *map(str, told), *(["limbs"] if self.limbs else []))
+        more = (["limbs"] if self.limbs else []) + (["imu"] if self.imu else [])
+        return ("export", *self.kinds, *map(str, told), *more)
 
 
 def recording_sources(
@@ -191,6 +198,8 @@ class _Opened:
 
     def outline(self, placement: int) -> Outline:
         timebase, present, radar_kind = self._clock
+        for place in self._making.imu:
+            mounted(self._body, place)  # or fail, as the source would
         kinds: list[MapKind] = []
         if self._mesh is not None:
             kinds += ["synthetic"]
@@ -253,7 +262,24 @@ class _Opened:
                 "radar_offset_s": self.recording.radar_offset_s,
                 **self._plan,
             },
+            self._imu,
         )
+
+    @property
+    def _body(self) -> MeshSequence:
+        """Mesh that inertial sensors are fixed to."""
+        if self._mesh is None:
+            raise Sd2Error(
+                f"{self.recording.folder} has no mesh",
+                "one, to which inertial sensors can be fixed",
+                "Fit a mesh with `sd2 fit`, or export without them",
+            )
+        return self._mesh
+
+    @cached_property
+    def _imu(self) -> dict[str, InertialSignals]:
+        """Inertial sensors at the frames of the mesh, the same from every placement."""
+        return {place: imu_at_frames(self._body, place) for place in self._making.imu}
 
     @cached_property
     def _model(self) -> Path | None:
@@ -360,6 +386,7 @@ def _fingerprint(recording: Recording, key: SourceKey, making: Making) -> str:
         "tolerance": making.tolerance,
         "simulation": None if making.simulation is None else making.simulation.as_json(),
         "kinds": making.kinds,
+        **({"imu": making.imu} if making.imu else {}),
         "files": [
             [cached_digest(file) for file in files_at(path)]
             for path in (recording.mesh, recording.faces, recording.radar, *models)

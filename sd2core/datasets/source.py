@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
+from sd2core.imu.signals import InertialSignals
 from sd2core.maps import DopplerMap, MapKind
 from sd2core.mesh.presence import Presence
 from sd2core.progress import Progress
@@ -75,6 +76,8 @@ class Source:
         Class that a classifier learns for a label; labels that are not learnt from are absent.
     target_m : tuple of 3 floats, optional
         Mean place of the body, from which range and angles of the sensor follow.
+    imu : mapping of str to InertialSignals
+        Inertial sensors by their places, sampled at the frames of the maps.
     provenance : dict
         Origin of the maps, as JSON can hold it, besides what the maps say of themselves.
 
@@ -94,6 +97,7 @@ class Source:
     classes: Mapping[str, str] = field(default_factory=dict)
     target_m: Vector | None = None
     provenance: dict[str, Any] = field(default_factory=dict)
+    imu: Mapping[str, InertialSignals] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         title = self.key.title
@@ -116,6 +120,9 @@ class Source:
                     f"{title}: the {kind} map holds values that are negative or not finite",
                     "finite values, zero or more",
                 )
+        for name, signals in self.imu.items():
+            if not np.array_equal(signals.times_s, first.times_s):
+                raise Sd2Error(f"{title}: the sensor {name} has a clock of its own", "one clock")
         _check_labels(title, self.label, self.labels, len(first.timebase))
 
     @property
@@ -165,7 +172,8 @@ class Source:
         }
         if {"synthetic", "denoised"} <= maps.keys():
             maps["denoised"].pop("input", None)  # said of the synthetic map itself
-        return _short(self.provenance) | {"maps": maps}
+        imu = {name: _short(one.meta) for name, one in self.imu.items()}
+        return _short(self.provenance) | {"maps": maps} | ({"imu": imu} if imu else {})
 
     def fingerprint(self) -> str:
         """Return a hash of maps, labels and sensor."""
@@ -181,6 +189,9 @@ class Source:
                 limbs = self.maps[kind].limbs
                 sums.update(b"" if limbs is None else limbs.values.data)
                 sums.update(self.known[kind].tobytes())
+        for name, signals in self.imu.items():
+            sums.update(name.encode())
+            sums.update(signals.channels.data)
         return sums.hexdigest()
 
 

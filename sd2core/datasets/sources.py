@@ -77,6 +77,13 @@ def gather(
         raise Sd2Error(
             f"{len(label_files)} label files are given for {len(maps)} maps", "one for each map"
         )
+    without_body = [*pairs, *maps] if making.imu else []
+    if without_body:
+        raise Sd2Error(
+            f"{', '.join(map(str, without_body))}: no body that inertial sensors could be fixed to",
+            "recordings with a mesh",
+            "Leave it out, or export without inertial sensors",
+        )
     labelled = dict(zip(maps, label_files, strict=False))
     found = pair_sources(pairs, making.kinds, making.model, limbs=making.limbs) if pairs else []
     recordings = {path: name for path, name in zip(single, names, strict=True) if path not in maps}

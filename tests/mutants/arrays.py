@@ -17,6 +17,8 @@ from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.sources import pair_sources
 from sd2core.datasets.writing import write_dataset
 from sd2core.denoise.files import load_model, save_model
+from sd2core.imu.files import read_signals, write_signals
+from sd2core.imu.signals import InertialSignals
 from sd2core.io.mesh import load_mesh, save_mesh
 from sd2core.io.radar import load_recorded_map
 from sd2core.maps import DopplerMap
@@ -73,6 +75,11 @@ def _read_mesh(path: Path) -> None:
     mesh.read(0, mesh.frame_count)
 
 
+def _write_imu(path: Path) -> None:
+    values = np.random.default_rng(2).normal(size=(2, 300, 3))
+    write_signals(path, InertialSignals(np.arange(300) / 100.0, *values, {"at": "vertex 7"}))
+
+
 def _write_pairs(path: Path) -> None:
     write_pairs(path, ("s1", "s2"))
 
@@ -107,6 +114,7 @@ TARGETS = [
     Target("body.obj", _write_surface, _read_mesh),
     Target("body.ply", _write_surface, _read_mesh),
     Target("body.glb", _write_surface, _read_mesh),
+    Target("imu.npz", _write_imu, read_signals),
     Target("map.npz", _write_map, DopplerMap.load),
     Target("model.safetensors", lambda path: save_model(path, trained("s4")), load_model),
     Target(

@@ -15,6 +15,8 @@ from sd2core.batch.plan_file import read_plan
 from sd2core.cli.parser import build_parser
 from sd2core.errors import Sd2Error
 from sd2core.files.recording_json import CameraEntry
+from sd2core.imu.files import read_signals, write_signals
+from sd2core.imu.signals import InertialSignals
 from sd2core.io.radar import write_capture
 from sd2core.io.radar.mars import mars_parts, read_mars
 from sd2core.io.video import open_video
@@ -166,6 +168,17 @@ def _read_mars(path: Path) -> None:
         read_mars(path, part)
 
 
+def _write_imu(path: Path) -> None:
+    values = np.random.default_rng(2).normal(size=(2, 50, 3))
+    meta = {"at": "left-wrist", "axes": "x along the bone", "simulated": True}
+    write_signals(path, InertialSignals(np.arange(50) / 100.0, *values, meta))
+
+
+_REAL_IMU = "time (ms);acc_x [g];acc_y [g];acc_z [g];gx_dps;gy_dps;gz_dps\n" + "".join(
+    f"{10 * row};0.1;0.2;1.0;1.5;;-3e1\n" for row in range(20)
+)
+
+
 def _read_video(path: Path) -> None:
     _sd2("info", path)
     with open_video(path) as video:
@@ -209,6 +222,9 @@ TARGETS = [
     Target("batch", _write_batch, lambda path: BatchFolder(path).status()),
     Target("infineon", _write_capture, _info),
     Target("mars", _write_mars, _read_mars),
+    Target("imu.csv", _write_imu, read_signals),
+    Target("imu.sto", _write_imu, read_signals),
+    _text("real.csv", _REAL_IMU, read_signals),
     Target("video.mp4", write_video, _read_video),
     Target("video.mkv", write_video, _read_video),
     Target("video.avi", lambda path: write_video(path, codec="mpeg4"), _read_video),

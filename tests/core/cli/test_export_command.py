@@ -13,6 +13,7 @@ from swinging_recordings import recording
 
 from sd2core.datasets.reading import open_dataset
 from sd2core.files.resources import resource_path
+from sd2core.imu.virtual import imu_at_frames
 from sd2core.io.mesh import load_mesh, save_mesh
 from sd2core.placements.placements import PlacementGrid, write_placements
 from sd2core.recording.recording import Recording
@@ -171,3 +172,44 @@ def test_what_cannot_be_is_explained(
     told = sd2("export", people, "--out", tmp_path / "s.zarr", "--dry-run", *arguments)
     assert told.code == 1
     assert message in told.err
+
+
+def test_inertial_sensors_are_exported_on_request(sd2: Sd2, tmp_path: Path) -> None:
+    octahedron = recording(tmp_path / "anna.sd2", radar=False).folder
+    mesh = load_mesh(resource_path("swipes.sd2") / "mesh.zarr").between(30, 70)
+    save_mesh(mesh, tmp_path / "mesh.npz")
+    body = Recording.create(tmp_path / "ben.sd2", mesh=tmp_path / "mesh.npz").folder
+    out = tmp_path / "set.zarr"
+    asked = ("export", body, octahedron, "--out", out, "--kinds", "synthetic", "--length", 20)
+    with_sensors = (*asked, "--imu", "right-wrist,chest")
+    told = sd2(*with_sensors, "--dry-run", "--json")
+    assert len(json.loads(told.out)["failed"]) == 1
+    told = sd2(*with_sensors)
+    assert told.code == 1
+    assert "left out anna" in told.err
+    assert "not the bundled body's surface" in told.err
+    with open_dataset(out) as dataset:
+        assert dataset["imu"].shape == (len(dataset), 20, 2, 6)
+        starts = dataset["start_frame"][:]
+        for number, place in enumerate(("right-wrist", "chest")):
+            expected = imu_at_frames(mesh, place).channels
+            for row, start in enumerate(starts.tolist()):
+                found = dataset["imu"][row, :, number]
+                np.testing.assert_array_equal(found, expected[start : start + 20])
+    assert "right-wrist, chest, *simulated*" in (tmp_path / "set.card.md").read_text("utf-8")
+    refused = sd2(*asked)
+    assert refused.code == 1
+    assert "begun with inertial sensors at" in refused.err
+
+
+def test_inertial_sensors_need_a_body(sd2: Sd2, tmp_path: Path) -> None:
+    radar = recording(tmp_path / "anna.sd2").folder
+    document = radar / "recording.json"
+    content = json.loads(document.read_text("utf-8"))
+    content["mesh"] = None
+    document.write_text(json.dumps(content), "utf-8")
+    told = sd2("export", radar, "--out", tmp_path / "a.zarr", "--imu", "head", "--length", 20)
+    assert told.code == 1
+    assert "has no mesh" in told.err
+    told = sd2("export", radar, "--out", tmp_path / "b.zarr", "--imu", "knee")
+    assert "some of head" in told.err

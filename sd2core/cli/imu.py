@@ -1,0 +1,194 @@
+"""``sd2 imu``: what an inertial sensor on the body would measure."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sd2core.cli.options import (
+    add_command,
+    add_json,
+    add_mesh_reading,
+    not_negative_float,
+    positive_float,
+    vector,
+)
+from sd2core.cli.output import print_facts, print_json, progress_bar
+from sd2core.errors import Sd2Error
+
+if TYPE_CHECKING:
+    from sd2core.imu.sensor_errors import SensorErrors
+    from sd2core.imu.signals import InertialSignals
+
+
+def add_commands(commands: argparse._SubParsersAction) -> None:
+    """Add ``imu``."""
+    parser = add_command(
+        commands,
+        "imu",
+        "what an inertial sensor on the body would measure (simulated)",
+        handler=_imu,
+        description=(
+            "Fixes an accelerometer and a gyroscope to the body and writes what they would feel:\n"
+            "m/s² with gravity (at rest 9.81 upwards) and rad/s, along the sensor's own axes. On\n"
+            "meshes of `sd2 fit` places have names: head, chest, pelvis, and left- or right- with\n"
+            "upper-arm, forearm, wrist, hand, thigh, shank, foot. There x runs along the bone,\n"
+            "away from the trunk or up it, and z points out of the body. On a vertex of any other\n"
+            "surface z points out of it, x as near to upwards as lies in it, in the first frame.\n"
+            "y completes them right-handed. Where there is no body for a while, the samples are\n"
+            "empty. See docs/imu.md."
+        ),
+        examples=(
+            "  sd2 imu walk.zarr --at left-wrist --out wrist.csv\n"
+            "  sd2 imu walk.npz --at 4711 --rate 200 --out spot.sto\n"
+            "  sd2 imu walk.sd2 --at right-foot --acc-noise 0.002 --acc-range 20 --out foot.npz"
+        ),
+    )
+    parser.add_argument("mesh", type=Path, metavar="MESH", help="a mesh, or a recording")
+    parser.add_argument(
+        "--at", required=True, metavar="PLACE|VERTEX", help="where on the body, or which vertex"
+    )
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="FILE", help="ends in .csv, .sto or .npz"
+    )
+    parser.add_argument(
+        "--rate", type=positive_float, default=100.0, metavar="F", help="in Hz (default: 100)"
+    )
+    parser.add_argument(
+        "--cutoff",
+        type=positive_float,
+        metavar="F",
+        help="where the zero-phase low pass leaves half of the amplitude, in Hz (default: 6, or a"
+        " fifth of the mesh's frame rate if that is lower)",
+    )
+    parser.add_argument(
+        "--up",
+        type=vector,
+        default=(0.0, -1.0, 0.0),
+        metavar="X,Y,Z",
+        help="upwards in the mesh's frame (default: 0,-1,0, as for a camera held level)",
+    )
+    _add_errors(parser)
+    add_mesh_reading(parser)
+    add_json(parser)
+    parser.set_defaults(sensor=None)
+
+
+def _add_errors(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("errors of the sensor (default: none)")
+    for short, long, unit in (
+        ("acc", "accelerometer", "m/s²"),
+        ("gyr", "gyroscope", "rad/s"),
+    ):
+        group.add_argument(
+            f"--{short}-bias",
+            type=vector,
+            default=(0.0, 0.0, 0.0),
+            metavar="X,Y,Z",
+            help=f"constant error of the {long}, in {unit}",
+        )
+        group.add_argument(
+            f"--{short}-noise",
+            type=not_negative_float,
+            default=0.0,
+            metavar="D",
+            help=f"density of its white noise, in {unit}/√Hz",
+        )
+        group.add_argument(
+            f"--{short}-range",
+            type=positive_float,
+            default=math.inf,
+            metavar="M",
+            help=f"its range: ±M {unit}; what is beyond is clipped",
+        )
+    group.add_argument("--seed", type=int, default=0, metavar="N", help="of the noise (default: 0)")
+
+
+def _imu(options: argparse.Namespace) -> None:
+    from sd2core.cli.reading import mesh_and_sensor
+    from sd2core.imu.files import write_signals
+    from sd2core.imu.virtual import virtual_imu
+
+    _check_output(options.out)
+    errors = _errors(options)
+    mesh, _ = mesh_and_sensor(options)
+    with progress_bar("Moving the sensor") as progress:
+        signals = virtual_imu(
+            mesh,
+            options.at,
+            rate_hz=options.rate,
+            cutoff_hz=options.cutoff,
+            up=options.up,
+            errors=errors,
+            progress=progress,
+        )
+    write_signals(options.out, signals)
+    told = _told(signals)
+    if options.json:
+        print_json({"file": str(options.out), **told, **signals.meta})
+        return
+    unknown = told["samples"] - told["known_samples"]
+    print_facts(
+        f"{options.out} (simulated)",
+        {
+            "at": str(signals.meta["at"]),
+            "axes": str(signals.meta["axes"]),
+            "samples": f"{told['samples']:,} at {options.rate:g} Hz"
+            + (f", of which {unknown:,} without a body are empty" if unknown else ""),
+            "low pass": f"{signals.meta['cutoff_hz']:g} Hz, of a mesh with"
+            f" {signals.meta['frames_per_s']:.4g} frames/s",
+            "acceleration": f"up to {told['largest_acceleration_mps2']:.1f} m/s², with gravity",
+            "turn rate": f"up to {told['largest_turn_rate_radps']:.2f} rad/s",
+        },
+    )
+
+
+def _errors(options: argparse.Namespace) -> SensorErrors | None:
+    from sd2core.imu.sensor_errors import SensorErrors
+
+    errors = SensorErrors(
+        acceleration_bias_mps2=options.acc_bias,
+        turn_rate_bias_radps=options.gyr_bias,
+        acceleration_noise=options.acc_noise,
+        turn_rate_noise=options.gyr_noise,
+        acceleration_range_mps2=options.acc_range,
+        turn_rate_range_radps=options.gyr_range,
+        seed=options.seed,
+    )
+    return None if errors == SensorErrors(seed=options.seed) else errors
+
+
+def _told(signals: InertialSignals) -> dict[str, Any]:
+    import numpy as np
+
+    known = signals.known
+    acceleration, turn_rate = (
+        float(np.linalg.norm(values[known], axis=1).max(initial=0.0))
+        for values in (signals.acceleration_mps2, signals.turn_rate_radps)
+    )
+    return {
+        "samples": len(known),
+        "known_samples": int(known.sum()),
+        "largest_acceleration_mps2": acceleration,
+        "largest_turn_rate_radps": turn_rate,
+    }
+
+
+def _check_output(path: Path) -> None:
+    """Refuse an output that cannot be written, or is a file of something else."""
+    from sd2core.cli.reading import check_output
+    from sd2core.imu.files import SUFFIXES, read_signals
+
+    check_output(path, *SUFFIXES)
+    # `mktemp` leaves an empty file to be filled.
+    if path.exists() and path.stat().st_size:
+        try:
+            read_signals(path)
+        except Sd2Error as error:
+            raise Sd2Error(
+                f"The output file {path} exists and holds no samples of an inertial sensor",
+                "a new name, or such a file to replace",
+                "Choose another name, or delete that file first",
+            ) from error

@@ -1,0 +1,1 @@
+"""Inertial sensors: what an accelerometer and a gyroscope on a moving body would measure."""
