@@ -216,13 +216,13 @@ DAMAGE: dict[str, tuple[Callable[[Path], object], str]] = {
         lambda f: edit_config(f, lambda s: s.update(start_frequency_Hz=60, end_frequency_Hz=61)),
         r"config\.json: The radar sweeps from 60 Hz to 61 Hz.*60 GHz is 60e9",
     ),
-    "transmitters in turn": (
-        lambda f: edit_config(f, lambda s: s.update(mimo_mode="tdm", tx_antennas=[1, 2])),
-        r"config\.json: mimo_mode is 'tdm' with 2 transmitters",
+    "unknown turns": (
+        lambda f: edit_config(f, lambda s: s.update(mimo_mode="bpm", tx_antennas=[1, 2])),
+        r"config\.json: mimo_mode is 'bpm' with 2 transmitters",
     ),
-    "two transmitters": (
-        lambda f: edit_config(f, lambda shape: shape.update(tx_antennas=[1, 2])),
-        r"config\.json: mimo_mode is 'off' with 2 transmitters",
+    "turns without end": (
+        lambda f: edit_config(f, lambda s: s.update(mimo_mode="tdm", tx_antennas=[1, 2])),
+        r"config\.json: 5 chirps per frame of 2 transmitters in turns\. Expected: a multiple of 2",
     ),
     "counts beyond the converter": (
         lambda f: (f / "meta.json").write_text('{"adc_resolution": 8}'),
