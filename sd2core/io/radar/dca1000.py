@@ -174,7 +174,6 @@ def _frame_count(
     """Number of frames by the size of the file; Sd2Error if it does not fit the configuration."""
     config, total = setup.config, sum(sizes)
     length = _frame_words(setup) * _WORD.itemsize
-    packed = 1 if config.sampling == "real" else 2 * setup.lanes
     frames, left = divmod(total, length)
     turns = f"{config.transmitters} transmitters x " if config.transmitters > 1 else ""
     told = (
@@ -183,7 +182,14 @@ def _frame_count(
         f" as {setup_path.name} says"
     )
     remedy = "Use the configuration that it was recorded with, and all parts of the recording"
-    if any(size % _WORD.itemsize for size in sizes) or _frame_words(setup) % packed:
+    if config.sampling != "real" and config.receivers * config.samples_per_chirp % setup.lanes:
+        raise Sd2Error(
+            f"{setup_path}: {config.samples_per_chirp} complex samples of {config.receivers}"
+            f" receivers do not fill {setup.lanes} lanes of LVDS",
+            f"a multiple of {setup.lanes} per chirp",
+            remedy,
+        )
+    if any(size % _WORD.itemsize for size in sizes):
         raise Sd2Error(f"{parts[0]} has {total:,} bytes", f"whole words and {told}", remedy)
     if not 0 < frames < _MOST_FRAMES or (left and setup.frames):
         raise Sd2Error(f"{parts[0]} has {total:,} bytes in {len(parts)} parts", told, remedy)

@@ -150,7 +150,7 @@ def write_described(
     folder : path
         Becomes the folder with ``radar.npy`` and ``radar.toml``.
     samples : complex64 array, shape (frames, receivers, chirps, samples)
-        Relative to full scale.
+        Relative to full scale, as a converter of up to 16 bits gives them.
     config : RadarConfig
         Of one transmitter, with complex samples.
     times_s : array_like, shape (frames,)
@@ -162,25 +162,27 @@ def write_described(
     folder = Path(folder)
     check_replaceable(folder)
     capture = RadarCapture(samples, config, Timebase(times_s))
+    half = 2.0 ** (config.adc_bits - 1)
     with_range = not config.is_continuous
     description = RadarDescription(
         name=config.name,
         simulated=simulated,
-        axes=_PLAIN[4],
+        axes=(*_PLAIN[4], "iq"),
         carrier_hz=config.centre_frequency_hz,
         bandwidth_hz=config.bandwidth_hz,
         sample_rate_hz=config.sample_rate_hz if with_range else None,
         chirp_repetition_s=config.chirp_repetition_s,
         frame_repetition_s=config.frame_repetition_s,
-        full_scale=1.0,
+        full_scale=half,
     )
+    parts = np.stack([capture.samples[:].real, capture.samples[:].imag], axis=-1)
     folder.parent.mkdir(parents=True, exist_ok=True)
     with atomic_folder(folder) as new:
         write_description(description, new / DATA_NAME)
         if meta:
             atomic_write_text(new / _META, json.dumps(meta, indent=2, ensure_ascii=False) + "\n")
         with atomic_write(new / DATA_NAME) as stream:
-            np.save(stream, np.asarray(capture.samples[:]), allow_pickle=False)
+            np.save(stream, np.rint(half * parts).astype(np.int16), allow_pickle=False)
     return folder
 
 
