@@ -146,9 +146,7 @@ def test_a_recording_without_radar_has_no_limits(sd2: Sd2, tmp_path: Path, plate
 
 
 @pytest.mark.parametrize("name", ["iwr6843", "wifi-5ghz"])
-def test_a_radar_is_simulated_by_its_name(
-    sd2: Sd2, tmp_path: Path, plate: Path, name: str
-) -> None:
+def test_a_radar_is_simulated_by_its_name(sd2: Sd2, tmp_path: Path, plate: Path, name: str) -> None:
     folder = tmp_path / "made"
     outcome = sd2("simulate", "radar", plate, folder, "--radar", name)
     assert outcome.code == 0, outcome.err

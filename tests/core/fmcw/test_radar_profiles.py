@@ -72,9 +72,7 @@ def test_limits_follow_from_the_carrier_and_the_times(name: str) -> None:
     carrier_hz = 0.5 * (config.start_frequency_hz + config.end_frequency_hz)
     told = limits(config)
     assert told["wavelength_m"] == pytest.approx(C_MPS / carrier_hz)
-    assert told["v_max_mps"] == pytest.approx(
-        C_MPS / carrier_hz / 4.0 / config.chirp_repetition_s
-    )
+    assert told["v_max_mps"] == pytest.approx(C_MPS / carrier_hz / 4.0 / config.chirp_repetition_s)
     burst_s = config.chirps_per_frame * config.chirp_repetition_s
     assert told["velocity_resolution_mps"] == pytest.approx(C_MPS / carrier_hz / 2.0 / burst_s)
     assert ("range_max_m" in told) == (config.end_frequency_hz > config.start_frequency_hz)

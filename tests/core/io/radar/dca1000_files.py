@@ -16,7 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 C_MPS = 299_792_458.0
-START_HZ, SLOPE_HZ_PER_S, RATE_HZ, IDLE_S, RAMP_S, ADC_START_S = 60e9, 60e12, 4e6, 20e-6, 30e-6, 5e-6
+START_HZ, SLOPE_HZ_PER_S, RATE_HZ, IDLE_S, RAMP_S, ADC_START_S = (
+    60e9,
+    60e12,
+    4e6,
+    20e-6,
+    30e-6,
+    5e-6,
+)
 
 
 @dataclass(frozen=True)
@@ -150,9 +157,7 @@ def json_of(recording: TiRecording) -> dict[str, Any]:
     return {"mmWaveDevices": [device]}
 
 
-def write_ti(
-    folder: Path, recording: TiRecording, *, parts: int = 1, studio: bool = False
-) -> Path:
+def write_ti(folder: Path, recording: TiRecording, *, parts: int = 1, studio: bool = False) -> Path:
     """Write a recording, in so many parts, and its configuration; returns the first file."""
     folder.mkdir(parents=True, exist_ok=True)
     words = words_of(recording, recording.beat()).tobytes()

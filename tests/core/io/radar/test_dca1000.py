@@ -111,7 +111,9 @@ def test_a_map_of_all_channels_is_the_mean_of_theirs(tmp_path: Path) -> None:
     found = doppler_map(capture, axis=axis)
     np.testing.assert_allclose(found.values, np.mean(each, axis=0), rtol=1e-4, atol=1e-9)
     assert found.carrier_hz == capture.config.centre_frequency_hz
-    with pytest.raises(Sd2Error, match=r"Receiver 3 of .*walk\.bin is asked for\. Expected: 1 to 2"):
+    with pytest.raises(
+        Sd2Error, match=r"Receiver 3 of .*walk\.bin is asked for\. Expected: 1 to 2"
+    ):
         capture.channel(receiver=3)
 
 
@@ -165,7 +167,9 @@ def test_a_recording_that_was_stopped_by_hand_is_read_up_to_its_last_frame(tmp_p
     assert any("The last 10 bytes are no whole frame" in note for note in capture.notes)
     path.with_suffix(".cfg").write_text(cfg_of(replace(PLAIN, frames=9)))
     os.truncate(path, path.stat().st_size - 10)
-    assert any("There are 3 frames; walk.cfg asks for 9" in note for note in load_capture(path).notes)
+    assert any(
+        "There are 3 frames; walk.cfg asks for 9" in note for note in load_capture(path).notes
+    )
 
 
 def _cfg(**changes: str) -> Callable[[Path], object]:
