@@ -18,8 +18,8 @@ from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.sources import pair_sources
 from sd2core.datasets.writing import write_dataset
 from sd2core.denoise.files import load_model, save_model
-from sd2core.io.mesh import load_mesh, save_mesh
 from sd2core.fmcw import doppler_map
+from sd2core.io.mesh import load_mesh, save_mesh
 from sd2core.io.radar import load_capture, load_recorded_map
 from sd2core.io.radar.described import RadarDescription, write_description
 from sd2core.maps import DopplerMap
