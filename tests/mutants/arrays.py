@@ -6,6 +6,7 @@ import json
 import pickle
 from pathlib import Path
 
+import h5py
 import joblib
 import numpy as np
 import trimesh
@@ -88,6 +89,14 @@ def _write_own(path: Path) -> None:
     write_description(_RADAR, path / "radar.npy")
 
 
+def _write_own_hdf5(path: Path) -> None:
+    path.mkdir()
+    values = np.random.default_rng(1).standard_normal((5, 2, 16, 20)).astype(np.complex64)
+    with h5py.File(path / "radar.h5", "w") as file:
+        file.create_dataset("adc", data=values, chunks=(2, 2, 16, 20), compression="gzip")
+    write_description(_RADAR, path / "radar.h5")
+
+
 def _write_sigmf(path: Path) -> None:
     path.mkdir()
     meta = {"global": {"core:datatype": "ci16_le"}, "captures": [{"core:frequency": 5.8e9}]}
@@ -157,6 +166,7 @@ TARGETS = [
     Target("a121.h5", write_a121, _read_capture),
     Target("dca1000", _write_dca1000, _read_capture),
     Target("own", _write_own, _read_capture),
+    Target("hdf5", _write_own_hdf5, lambda path: _read_capture(path / "radar.h5")),
     Target("sdk", lambda path: write_ti(path, TiRecording(lanes=4)), _read_capture),
     Target("sigmf", _write_sigmf, lambda path: _read_capture(path / "radar.sigmf-meta")),
 ]

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from sd2core.errors import Sd2Error
-from sd2core.files.hdf5_files import member_of, open_hdf5_file, unreadable_hdf5
+from sd2core.files.hdf5_files import member_of, open_hdf5_file, text_of, unreadable_hdf5
 from sd2core.files.texts import errors_in, first_fault, parse_json
 from sd2core.io.radar.capture import LazySamples, RadarCapture
 from sd2core.radar_config import SPEED_OF_LIGHT_MPS, RadarConfig
@@ -281,8 +281,7 @@ def _flags(file: h5py.File, path: Path, place: str, frames: int) -> int:
 
 
 def _text(file: h5py.File, path: Path, place: str) -> str:
-    value = _array(file, path, place, "OS", 0)[()]
-    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+    return text_of(_array(file, path, place, "OS", 0), path, place)
 
 
 def _parsed(model: type[Model], file: h5py.File, path: Path, place: str) -> Model:

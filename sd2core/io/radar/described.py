@@ -447,7 +447,9 @@ def _hdf5(path: Path, dataset: str | None) -> _Stored:
         except Exception as error:  # a damaged file fails in many ways
             raise unreadable_hdf5(path, error, expected) from error
     if dtype.fields is not None and set(dtype.fields) == {"real", "imag"}:
-        shape, dtype = shape, np.dtype(np.complex64)
+        if any(dtype[part].kind not in "iuf" for part in ("real", "imag")):
+            raise Sd2Error(f"{dataset} of {path} is of {dtype}", "numbers")
+        dtype = np.dtype(np.complex64)
     name = dataset
 
     def read(place: tuple[slice, ...]) -> NDArray[Any]:

@@ -82,7 +82,7 @@ def test_limits_follow_from_the_carrier_and_the_times(name: str) -> None:
 
 
 def test_a_name_that_is_none_is_refused_with_those_that_are() -> None:
-    with pytest.raises(Sd2Error, match="There is no radar 'k-bend'.*k-band.*wifi-5ghz"):
+    with pytest.raises(Sd2Error, match=r"There is no radar 'k-bend'.*k-band.*wifi-5ghz"):
         named_radar("k-bend")
 
 
@@ -137,7 +137,8 @@ def test_a_simulated_carrier_is_written_and_read_back(tmp_path) -> None:
         meta=capture.meta,
     )
     again = load_capture(folder)
-    assert again.simulated and again.config == config
+    assert again.simulated
+    assert again.config == config
     assert again.meta["simulation"] == capture.meta["simulation"]
     np.testing.assert_array_equal(again.read(0, 3), capture.read(0, 3))
     np.testing.assert_allclose(again.timebase.times_s, capture.timebase.times_s, atol=1e-9)

@@ -15,7 +15,7 @@ PARTS = np.dtype([("real", "<i2"), ("imag", "<i2")])
 
 
 def sweeps(velocity_mps: float) -> np.ndarray:
-    """A target at point 3 that approaches, (frames, sweeps, points); its phase is its distance's."""
+    """A target at point 3 that approaches, (frames, sweeps, points); the phase is the distance."""
     at_s = np.arange(FRAMES)[:, None] * 0.1 + np.arange(SWEEPS) / SWEEP_HZ
     turns = -2.0 * velocity_mps * at_s * 60.5e9 / 299_792_458.0
     values = np.zeros((FRAMES, SWEEPS, POINTS), np.complex128)

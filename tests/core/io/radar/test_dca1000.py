@@ -119,7 +119,8 @@ def test_a_map_of_all_channels_is_the_mean_of_theirs(tmp_path: Path) -> None:
 
 def test_what_was_assumed_is_said(tmp_path: Path) -> None:
     notes = " ".join(load_capture(write_ti(tmp_path / "a", replace(PLAIN, transmitters=2))).notes)
-    assert "2 transmitters take turns" in notes and "divides v_max by 2" in notes
+    assert "2 transmitters take turns" in notes
+    assert "divides v_max by 2" in notes
     assert "The file has no times" in notes
     path = write_ti(tmp_path / "b", PLAIN)
     path.with_suffix(".cfg").write_text(cfg_of(PLAIN, comment=""))
@@ -305,7 +306,7 @@ def test_gigabytes_open_at_once_and_are_read_by_frames(tmp_path: Path) -> None:
 
 
 def test_the_words_of_the_writer_are_those_of_the_data_sheet() -> None:
-    """Four samples of one receiver over two lanes: I0 I1 Q0 Q1 I2 I3 Q2 Q3; over four: I, then Q."""
+    """Two lanes, four samples: I0 I1 Q0 Q1 I2 I3 Q2 Q3; four lanes, four receivers: I, then Q."""
     beat = (np.arange(1, 5) + 1j * np.arange(5, 9)) / 8000.0
     two = replace(PLAIN, receivers=1, samples=4)
     assert words_of(two, beat).tolist() == [1, 2, 5, 6, 3, 4, 7, 8]
