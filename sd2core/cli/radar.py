@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
@@ -11,6 +12,8 @@ from sd2core.cli.options import (
     add_command,
     add_json,
     add_map_output,
+    flag,
+    given,
     positive_int,
     span_m,
 )
@@ -89,6 +92,7 @@ def _radar(options: argparse.Namespace) -> None:
     if options.file is not None:
         if str(options.capture) != "describe":
             raise Sd2Error(f"Two files are given, {options.capture} and {options.file}", "one")
+        _refuse(_of_maps(options), "to describe a file", "without describe")
         describe(options)
         return
     refuse_description(options)
@@ -108,9 +112,9 @@ def _show_limits(options: argparse.Namespace) -> None:
     if is_recording(path):
         recording = open_recording(path)
         path = recording.radar or path
-    _refuse_without_map(options)
+    _refuse(_of_processing(options), "without --out", "together with --out")
     if holds_map(path):
-        _refuse_channel(options, path)
+        _refuse(_of_channels(options), f"and {path} holds a finished map", "for raw samples only")
         description = describe_radar(path)
     else:
         capture = load_capture(path).channel(options.receiver, options.transmitter)
@@ -159,38 +163,32 @@ def _write_recorded(recorded: RecordedMap, offset_s: float, options: argparse.Na
     """Write a map that the radar made itself: there are no samples to choose anything for."""
     from sd2core.cli.info.description import describe_map, show
 
-    for name, given in _of_maps(options):
-        if given:
-            raise Sd2Error(
-                f"{name} is given, and {recorded.source} holds a finished map",
-                f"{name} for raw samples only",
-            )
-    _refuse_channel(options, recorded.source)
+    finished = f"and {recorded.source} holds a finished map"
+    _refuse((*_of_processing(options), *_of_channels(options)), finished, "for raw samples only")
     doppler = recorded.doppler.shifted(offset_s)
     doppler.save(options.out)
     show(describe_map(options.out, doppler), as_json=options.json)
 
 
-def _of_maps(options: argparse.Namespace) -> tuple[tuple[str, bool], ...]:
-    """Options of the processing to a map, and whether each is given."""
-    return (
-        ("--bins", options.bins is not None),
-        ("--v-max", options.v_max is not None),
-        ("--clutter", options.clutter != "none"),
-        ("--range", options.range is not None),
-    )
+def _of_maps(options: argparse.Namespace) -> list[str]:
+    """Options about a map that are given."""
+    out = ["--out"] if options.out is not None else []
+    return [*out, *_of_processing(options), *_of_channels(options)]
 
 
-def _refuse_without_map(options: argparse.Namespace) -> None:
-    for name, given in _of_maps(options):
-        if given:
-            raise Sd2Error(f"{name} is given without --out", f"{name} together with --out")
+def _of_processing(options: argparse.Namespace) -> list[str]:
+    """Options of the processing to a map that are given."""
+    clutter = ["--clutter"] if options.clutter != "none" else []
+    return [*map(flag, given(options, ("bins", "v_max", "range"))), *clutter]
 
 
-def _refuse_channel(options: argparse.Namespace, source: str | Path) -> None:
-    for name, number in (("--receiver", options.receiver), ("--transmitter", options.transmitter)):
-        if number is not None:
-            raise Sd2Error(
-                f"{name} is given, and {source} holds a finished map",
-                f"{name} for raw samples only",
-            )
+def _of_channels(options: argparse.Namespace) -> list[str]:
+    """Options that choose a channel and are given."""
+    return [flag(name) for name in given(options, ("receiver", "transmitter"))]
+
+
+def _refuse(names: Iterable[str], why: str, where: str) -> None:
+    """Raise Sd2Error for the first option of those given."""
+    for name in names:
+        comma = "," if why.startswith("and ") else ""
+        raise Sd2Error(f"{name} is given{comma} {why}", f"{name} {where}")

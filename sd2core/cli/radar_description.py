@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from sd2core.cli.options import finite_float, flag, positive_float, positive_int
@@ -100,7 +101,7 @@ def describe(options: argparse.Namespace) -> None:
     show(shown, as_json=options.json)
 
 
-def _told_by_sigmf(path: Any) -> dict[str, Any]:
+def _told_by_sigmf(path: Path) -> dict[str, Any]:
     from sd2core.io.radar.sigmf import DATA, META, read_sigmf_meta
 
     if path.suffix.lower() not in (META, DATA):

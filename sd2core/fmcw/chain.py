@@ -50,7 +50,8 @@ class ProcessingOptions:
         Gates whose cell overlaps this stretch count; None takes all. Gates
         within the window's main lobe around zero range (0 and 1 for Hann) hold
         the transmitter's own leakage and never count, nor does the gate at
-        R_max, where beat frequencies fold.
+        R_max, where beat frequencies fold. Of samples that are distances those
+        within count. A continuous wave has no ranges to choose.
     window : {"hann", "blackman", "none"}
         For both FFTs.
     """

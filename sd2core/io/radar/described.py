@@ -218,20 +218,20 @@ def capture_of(path: Path, description: RadarDescription) -> RadarCapture:
         config, averaged = _config(stored, description, sizes)
     axes = description.axes
     streamed = "stream" in axes
-    at = [axes.index("stream" if streamed else "frame")]
+    along = axes.index("stream" if streamed else "frame")
     frame_samples = sizes["chirp"] * sizes["sample"]
     is_complex = config.sampling != "real"
     scale = np.float32(1.0 / (description.full_scale or 1.0))
     falling = (description.slope_hz_per_s or 0.0) < 0
     # Order of the axes of the file that are there, as ours.
-    present = ["frame", "chirp", "sample", *axes[1:]] if streamed and at == [0] else list(axes)
+    present = ["frame", "chirp", "sample", *axes[1:]] if streamed else list(axes)
     order = [present.index(name) for name in _ORDER if name in present]
 
     def read(some: slice) -> NDArray[Any]:
         start, stop, _ = some.indices(sizes["frame"])
         each = frame_samples if streamed else 1
         place = [slice(None)] * len(stored.shape)
-        place[at[0]] = slice(start * each, stop * each)
+        place[along] = slice(start * each, stop * each)
         raw = np.asarray(stored.read(tuple(place)))
         if streamed:
             raw = raw.reshape(-1, sizes["chirp"], sizes["sample"], *raw.shape[1:])

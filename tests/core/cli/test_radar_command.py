@@ -116,6 +116,10 @@ def test_entries_of_a_description_are_for_describing(sd2: Sd2, tmp_path: Path) -
     outcome = sd2("radar", path, "--carrier-hz", "24e9")
     assert outcome.code == 1
     assert "--carrier-hz is given" in outcome.err
+    np.save(tmp_path / "own.npy", np.zeros((2, 8, 8), np.float32))
+    outcome = sd2("radar", "describe", tmp_path / "own.npy", *DESCRIBED, "--receiver", 1)
+    assert outcome.code == 1
+    assert "--receiver is given to describe a file" in outcome.err
     outcome = sd2("radar", path, path)
     assert outcome.code == 1
     assert "Two files are given" in outcome.err
