@@ -150,8 +150,10 @@ class RadarCapture:
     def channel(self, receiver: int | None = None, transmitter: int | None = None) -> RadarCapture:
         """One receiver or one transmitter, or one of each, by their numbers from 1 on.
 
-        Raises Sd2Error if there is none of this number.
+        Without a number it is the capture itself. Raises Sd2Error if there is none of this number.
         """
+        if receiver is None and transmitter is None:
+            return self
         config = self.config
         parts = []
         for name, number, there in (

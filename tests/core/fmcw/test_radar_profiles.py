@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -125,7 +127,7 @@ def test_noise_of_complex_samples_is_that_of_both_parts(snr_db: float) -> None:
     assert 10.0 * np.log10(np.mean(np.abs(signal) ** 2) / noise) == pytest.approx(snr_db, abs=0.2)
 
 
-def test_a_simulated_carrier_is_written_and_read_back(tmp_path) -> None:
+def test_a_simulated_carrier_is_written_and_read_back(tmp_path: Path) -> None:
     config = RADARS["wifi-5ghz"]
     capture = simulate_radar(plate(0.9), config, options=QUIET)
     folder = write_described(
@@ -139,7 +141,8 @@ def test_a_simulated_carrier_is_written_and_read_back(tmp_path) -> None:
     again = load_capture(folder)
     assert again.simulated
     assert again.config == config
-    assert again.meta["simulation"] == capture.meta["simulation"]
+    as_stored = json.loads(json.dumps(capture.meta["simulation"]))
+    assert again.meta["simulation"] == as_stored
     np.testing.assert_array_equal(again.read(0, 3), capture.read(0, 3))
     np.testing.assert_allclose(again.timebase.times_s, capture.timebase.times_s, atol=1e-9)
 
