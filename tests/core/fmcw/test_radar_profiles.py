@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sd2core.datasets.simulating import Simulation, simulated_map
 from sd2core.errors import Sd2Error
 from sd2core.fmcw import (
     LinkBudget,
@@ -25,7 +26,7 @@ from sd2core.io.radar import load_capture, named_radar, write_described
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.radar_config import PAPER_RADAR, RadarConfig
 from sd2core.radar_profiles import RADARS
-from sd2core.sensor import VelocityAxis
+from sd2core.sensor import VelocityAxis, VirtualSensor
 from sd2core.timebase import Timebase
 
 C_MPS = 299_792_458.0
@@ -81,6 +82,19 @@ def test_limits_follow_from_the_carrier_and_the_times(name: str) -> None:
     assert ("unverified" in config.name) == (name not in ("paper", "bgt60"))
     assert ("no range" in config.name) == config.is_continuous
     assert named_radar(name) == config
+
+
+@pytest.mark.parametrize("name", ["bgt60", "k-band", "cw-5.8ghz"])
+def test_data_sets_hold_maps_of_any_of_them(name: str) -> None:
+    """A rough surface with gain and noise of a link budget, at the times of the mesh."""
+    mesh = plate(0.9, range_m=1.0)
+    axis = VelocityAxis(16, 3.0)
+    doppler = simulated_map(mesh, VirtualSensor(), Simulation(RADARS[name]), axis)
+    assert len(doppler.times_s) == len(mesh.times_s)
+    middle = doppler.peak_velocity_mps()[len(mesh.times_s) // 2]
+    width_mps = max(RADARS[name].velocity_resolution_mps, axis.bin_width_mps)
+    assert abs(middle - 0.9) <= width_mps
+    assert Simulation(RADARS[name]).as_json()["radar"]["name"] == RADARS[name].name
 
 
 def test_a_name_that_is_none_is_refused_with_those_that_are() -> None:

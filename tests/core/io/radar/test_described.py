@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from sd2core.errors import Sd2Error
 from sd2core.fmcw import doppler_map, range_doppler
 from sd2core.io.kinds import kind_of
-from sd2core.io.radar import companions, holds_map, load_capture
+from sd2core.io.radar import companions, holds_map, load_capture, load_recorded_map
 from sd2core.io.radar.described import (
     RadarDescription,
     description_of,
@@ -288,6 +288,10 @@ def test_what_has_no_description_is_told_how_to_get_one(tmp_path: Path) -> None:
     np.save(tmp_path / "mine.npy", CUBE)
     with pytest.raises(Sd2Error, match=r"sd2 radar describe mine\.npy"):
         load_capture(tmp_path / "mine.npy")
+    with h5py.File(tmp_path / "mine.h5", "w") as file:
+        file["adc"] = CUBE
+    with pytest.raises(Sd2Error, match=r"has no DS1; it holds adc.*sd2 radar describe mine\.h5"):
+        load_recorded_map(tmp_path / "mine.h5")
     (tmp_path / "mine.toml").write_text("[project]\n")
     with pytest.raises(Sd2Error, match=r"mine\.toml is there, and is no description"):
         _described(tmp_path / "mine.npy", CUBE)
