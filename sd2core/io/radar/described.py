@@ -69,19 +69,21 @@ class RadarDescription(BaseModel):
     simulated: bool = False
     dataset: str | None = None
     axes: tuple[Axis, ...]
-    carrier_hz: float = Field(gt=0)  # middle of the samples of a chirp
-    bandwidth_hz: float | None = Field(default=None, ge=0)  # of them; 0: a continuous wave
-    slope_hz_per_s: float | None = None  # instead; negative for chirps that fall
-    sample_rate_hz: float | None = Field(default=None, gt=0)
-    chirp_repetition_s: float | None = Field(default=None, gt=0)
-    frame_repetition_s: float | None = Field(default=None, gt=0)
+    carrier_hz: float = Field(gt=0, le=1e15)  # middle of the samples of a chirp
+    bandwidth_hz: float | None = Field(default=None, ge=0, le=1e15)  # of them; 0: a continuous wave
+    slope_hz_per_s: float | None = Field(
+        default=None, ge=-1e24, le=1e24
+    )  # instead; negative for chirps that fall
+    sample_rate_hz: float | None = Field(default=None, ge=1e-9, le=1e15)
+    chirp_repetition_s: float | None = Field(default=None, ge=1e-15, le=1e9)
+    frame_repetition_s: float | None = Field(default=None, ge=1e-15, le=1e9)
     samples_per_chirp: int | None = Field(default=None, ge=1, le=2**24)
     chirps_per_frame: int | None = Field(default=None, ge=2, le=2**24)
     sign: Literal[1, -1] = 1
-    zero: float = 0.0
-    full_scale: float | None = Field(default=None, gt=0)
-    range_start_m: float | None = None
-    range_step_m: float | None = Field(default=None, gt=0)
+    zero: float = Field(default=0.0, ge=-1e12, le=1e12)
+    full_scale: float | None = Field(default=None, ge=1e-12, le=1e12)
+    range_start_m: float | None = Field(default=None, ge=-1e9, le=1e9)
+    range_step_m: float | None = Field(default=None, ge=1e-9, le=1e9)
 
 
 class _Stored(NamedTuple):
@@ -175,14 +177,18 @@ def write_described(
         frame_repetition_s=config.frame_repetition_s,
         full_scale=half,
     )
-    parts = np.stack([capture.samples[:].real, capture.samples[:].imag], axis=-1)
+    shape = (*capture.samples.shape, 2)
     folder.parent.mkdir(parents=True, exist_ok=True)
     with atomic_folder(folder) as new:
         write_description(description, new / DATA_NAME)
         if meta:
             atomic_write_text(new / _META, json.dumps(meta, indent=2, ensure_ascii=False) + "\n")
         with atomic_write(new / DATA_NAME) as stream:
-            np.save(stream, np.rint(half * parts).astype(np.int16), allow_pickle=False)
+            header = {"descr": "<i2", "fortran_order": False, "shape": shape}
+            np.lib.format.write_array_header_1_0(stream, header)
+            for frame in range(shape[0]):
+                parts = capture.read(frame, frame + 1).view(np.float32)
+                stream.write(np.rint(np.float32(half) * parts).astype("<i2").tobytes())
     return folder
 
 

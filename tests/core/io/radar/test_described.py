@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from pydantic import ValidationError
 
 from sd2core.errors import Sd2Error
 from sd2core.fmcw import doppler_map, range_doppler
@@ -21,6 +22,7 @@ from sd2core.io.kinds import kind_of
 from sd2core.io.radar import companions, holds_map, load_capture, load_recorded_map
 from sd2core.io.radar.described import (
     RadarDescription,
+    capture_of,
     description_of,
     plain_axes,
     read_description,
@@ -128,8 +130,8 @@ descriptions = st.builds(
     samples_per_chirp=st.none() | st.integers(1, 10**6),
     chirps_per_frame=st.none() | st.integers(2, 10**6),
     sign=st.sampled_from([1, -1]),
-    zero=st.floats(-1e9, 1e9),
-    full_scale=st.none() | st.floats(1e-9, 1e9),
+    zero=st.floats(-1e12, 1e12),
+    full_scale=st.none() | st.floats(1e-12, 1e12),
     range_start_m=st.none() | st.floats(-10.0, 10.0),
     range_step_m=st.none() | st.floats(1e-6, 10.0),
 )
@@ -142,6 +144,48 @@ def test_a_description_reads_back_as_it_was_written(
 ) -> None:
     path = write_description(description, tmp_path / "radar.npy")
     assert read_description(path) == description
+
+
+def _mostly(usual: float | None, *others: float) -> st.SearchStrategy[float | None]:
+    return st.sampled_from([usual] * (2 * len(others)) + list(others))
+
+
+extreme = st.fixed_dictionaries(
+    {
+        "axes": st.sampled_from([("frame", "chirp", "sample"), ("frame", "sample", "chirp")]),
+        "carrier_hz": _mostly(60e9, 1e-300, 1e8, 1e12, 1e15),
+        "sample_rate_hz": _mostly(1e6, 1e-9, 1.0, 1e15),
+        "chirp_repetition_s": _mostly(1e-4, 1e-15, 1e-9, 1.0, 1e9),
+        "frame_repetition_s": _mostly(0.1, 1e-9, 1e3, 1e9),
+        "sign": st.sampled_from([1, -1]),
+        "zero": _mostly(0.0, -1e12, 1e12, 1e-300),
+        "full_scale": _mostly(None, 1e-12, 1.0, 1e12),
+    }
+)
+sweeps = st.one_of(
+    st.fixed_dictionaries({"bandwidth_hz": _mostly(1e9, 0.0, 1e-9, 1e8, 1e11, 1e15)}),
+    st.fixed_dictionaries({"slope_hz_per_s": _mostly(-1e14, 0.0, 1e-9, -1e24, 1e24)}),
+)
+places = st.just({}) | st.fixed_dictionaries(
+    {"range_start_m": _mostly(0.3, -1e9, 1e9), "range_step_m": _mostly(0.1, 1e-9, 1e9)}
+)
+
+
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    told=st.tuples(extreme, sweeps, places).map(lambda parts: parts[0] | parts[1] | parts[2]),
+    stored=st.sampled_from(["<f4", "<c8", "<i2", ">f8", "<u2"]),
+)
+def test_extreme_descriptions_are_read_or_refused(
+    tmp_path: Path, told: dict[str, Any], stored: str
+) -> None:
+    path = tmp_path / f"{next(_numbers)}.npy"
+    np.save(path, np.arange(2 * 8 * 8).reshape(2, 8, 8).astype(stored))
+    try:
+        doppler = doppler_map(capture_of(path, RadarDescription(**told)))
+    except (Sd2Error, ValidationError):
+        return
+    assert np.isfinite(doppler.values).all()
 
 
 @given(velocity_mps=st.floats(-4.0, 4.0))
