@@ -14,8 +14,8 @@ from sd2core.io.radar.acconeer import is_acconeer, load_acconeer
 from sd2core.io.radar.capture import RadarCapture
 from sd2core.io.radar.described import (
     DATA_NAME,
-    SUFFIXES,
     description_of,
+    is_describable,
     is_described,
     load_described,
     write_described,
@@ -98,7 +98,7 @@ def load_capture(path: Path | str) -> RadarCapture:
         return load_infineon(folder)
     if path.is_dir() and any(one.suffix.lower() == dca1000.SUFFIX for one in path.iterdir()):
         return dca1000.load_dca1000(path)
-    if path.is_file() and path.suffix.lower() in SUFFIXES:
+    if path.is_file() and is_describable(path):
         raise Sd2Error(
             f"{path} does not say what radar it is from",
             f"its description, {description_of(path).name}, beside it",

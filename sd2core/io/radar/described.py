@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,22 +18,17 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_folder, atomic_write, atomic_write_text
-from sd2core.files.hdf5_files import member_of, open_hdf5_file, unreadable_hdf5
-from sd2core.files.limits import check_regular
 from sd2core.files.texts import errors_in, first_fault, read_json, read_toml
 from sd2core.files.toml import toml_lines
 from sd2core.io.radar.capture import LazySamples, RadarCapture
 from sd2core.io.radar.infineon import check_replaceable
-from sd2core.io.radar.sigmf import DATA, META, read_sigmf_meta
+from sd2core.io.radar.sigmf import DATA, META
+from sd2core.io.radar.stored_arrays import SUFFIXES, StoredArray, open_stored
 from sd2core.radar_config import RadarConfig
 from sd2core.timebase import Timebase
 
 DATA_NAME = "radar.npy"
 """Name of the samples in a folder of their own."""
-HDF5_SUFFIXES = (".h5", ".hdf5")
-SUFFIXES = (".npy", *HDF5_SUFFIXES, META, DATA)
-"""Files that a description may belong to."""
-
 Axis = Literal["frame", "transmitter", "receiver", "chirp", "sample", "iq", "stream"]
 
 _META = "meta.json"
@@ -84,14 +78,6 @@ class RadarDescription(BaseModel):
     full_scale: float | None = Field(default=None, ge=1e-12, le=1e12)
     range_start_m: float | None = Field(default=None, ge=-1e9, le=1e9)
     range_step_m: float | None = Field(default=None, ge=1e-9, le=1e9)
-
-
-class _Stored(NamedTuple):
-    """Array in a file."""
-
-    shape: tuple[int, ...]
-    dtype: np.dtype[Any]
-    read: Callable[[tuple[slice, ...]], NDArray[Any]]
 
 
 def description_of(path: Path) -> Path:
@@ -194,7 +180,7 @@ def write_described(
 
 def plain_axes(path: Path, dataset: str | None) -> tuple[Axis, ...]:
     """Axes of the array in a file where nobody names others, by its dimensions and type."""
-    stored = _open(path, dataset)
+    stored = open_stored(path, dataset)
     last: tuple[Axis, ...] = ()
     dimensions = len(stored.shape)
     if path.suffix.lower() in (META, DATA) and dimensions == 2:
@@ -218,7 +204,7 @@ def load_described(path: Path) -> RadarCapture:
 
 def capture_of(path: Path, description: RadarDescription) -> RadarCapture:
     """Open a file by a description; Sd2Error as :func:`load_described`."""
-    stored = _open(path, description.dataset)
+    stored = open_stored(path, description.dataset)
     with errors_in(description_of(path)):
         sizes = _sizes(stored, description)
         config, averaged = _config(stored, description, sizes)
@@ -302,7 +288,7 @@ def _of_simulation(path: Path, description: RadarDescription) -> dict[str, Any]:
     return content
 
 
-def _sizes(stored: _Stored, description: RadarDescription) -> dict[str, int]:
+def _sizes(stored: StoredArray, description: RadarDescription) -> dict[str, int]:
     """Length of every axis, by name; 1 of those that are not there."""
     axes = description.axes
     named: dict[str, int] = dict(zip(axes, stored.shape, strict=False))
@@ -336,7 +322,7 @@ def _sizes(stored: _Stored, description: RadarDescription) -> dict[str, int]:
 
 
 def _config(
-    stored: _Stored, description: RadarDescription, sizes: dict[str, int]
+    stored: StoredArray, description: RadarDescription, sizes: dict[str, int]
 ) -> tuple[RadarConfig, bool]:
     """Configuration, and True if the samples of a chirp are averaged to one."""
     samples, told = sizes["sample"], description
@@ -399,102 +385,3 @@ def _config(
         ranges_m=ranges_m,
     )
     return config, averaged
-
-
-# --- arrays in files -------------------------------------------------------------------------
-
-
-def _open(path: Path, dataset: str | None) -> _Stored:
-    suffix = path.suffix.lower()
-    check_regular(path)
-    if not path.is_file():
-        raise Sd2Error(f"There is no file {path}", "samples of a radar", "Check the path")
-    if suffix in HDF5_SUFFIXES:
-        return _hdf5(path, dataset)
-    if dataset is not None:
-        raise Sd2Error(f"{path} is given with the dataset {dataset!r}", "datasets of HDF5 files")
-    return _sigmf(path) if suffix in (META, DATA) else _numpy(path)
-
-
-def _numpy(path: Path) -> _Stored:
-    try:
-        array = np.load(path, mmap_mode="r", allow_pickle=False)
-        return _Stored(array.shape, array.dtype, array.__getitem__)
-    except Exception as error:  # a damaged header fails in many ways
-        raise Sd2Error(
-            f"{path} ({path.stat().st_size} bytes) cannot be read as an array ({error})",
-            "a whole .npy of numbers",
-            "It may be cut off: copy it again",
-        ) from error
-
-
-def _hdf5(path: Path, dataset: str | None) -> _Stored:
-    import h5py
-
-    expected = "samples of a radar (.h5)"
-    with open_hdf5_file(path, expected) as file:
-        try:
-            if dataset is None:
-                names = [
-                    name for name in file if isinstance(member_of(file, path, name), h5py.Dataset)
-                ]
-                if len(names) != 1:
-                    raise Sd2Error(
-                        f"{path} holds {len(names)} datasets ({', '.join(names[:6]) or 'none'})",
-                        "the name of one, as dataset",
-                    )
-                dataset = names[0]
-            found = member_of(file, path, dataset)
-            if not isinstance(found, h5py.Dataset) or found.shape is None:
-                raise Sd2Error(f"{path} has no dataset {dataset!r}", "the name of one, as dataset")
-            shape, dtype = found.shape, found.dtype
-        except Sd2Error:
-            raise
-        except Exception as error:  # a damaged file fails in many ways
-            raise unreadable_hdf5(path, error, expected) from error
-    if dtype.fields is not None and set(dtype.fields) == {"real", "imag"}:
-        if any(dtype[part].kind not in "iuf" for part in ("real", "imag")):
-            raise Sd2Error(f"{dataset} of {path} is of {dtype}", "numbers")
-        dtype = np.dtype(np.complex64)
-    name = dataset
-
-    def read(place: tuple[slice, ...]) -> NDArray[Any]:
-        with open_hdf5_file(path, expected) as file:
-            try:
-                values = file[name][place]
-            except Exception as error:  # a damaged chunk fails in many ways
-                raise unreadable_hdf5(path, error, expected) from error
-        if values.dtype.fields is None:
-            return np.asarray(values)
-        return values["real"] + np.complex64(1j) * values["imag"].astype(np.float32)
-
-    return _Stored(shape, dtype, read)
-
-
-def _sigmf(path: Path) -> _Stored:
-    meta, data = read_sigmf_meta(path), path.with_suffix(DATA)
-    check_regular(data)
-    if not data.is_file():
-        raise Sd2Error(f"There is no file {data}", "the samples beside their metadata")
-    each = meta.channels * (2 if meta.is_complex else 1)
-    count, left = divmod(data.stat().st_size, each * meta.word.itemsize)
-    if left or not count:
-        raise Sd2Error(
-            f"{data} has {data.stat().st_size:,} bytes",
-            f"a multiple of {each * meta.word.itemsize}, as core:datatype says",
-            "It may be cut off: copy it again",
-        )
-    dtype = np.dtype(np.complex64) if meta.is_complex else meta.word
-    shape = (count,) if meta.channels == 1 else (count, meta.channels)
-
-    def read(place: tuple[slice, ...]) -> NDArray[Any]:
-        start, stop, _ = place[0].indices(count)
-        words = np.fromfile(
-            data, meta.word, (stop - start) * each, offset=start * each * meta.word.itemsize
-        )
-        if meta.is_complex:
-            parts = words.reshape(-1, 2).astype(np.float32)
-            words = parts[:, 0] + np.complex64(1j) * parts[:, 1]
-        return words.reshape(-1, *shape[1:])
-
-    return _Stored(shape, dtype, read)
