@@ -176,6 +176,15 @@ class DopplerMap:
             )
 
     @property
+    def carrier_hz(self) -> float | None:
+        """Centre frequency of the radar that the map is of; None if its provenance names none."""
+        match self.meta.get("radar"):
+            case {"start_frequency_hz": float() as low, "end_frequency_hz": float() as high}:
+                return 0.5 * (low + high)
+            case _:
+                return None
+
+    @property
     def times_s(self) -> NDArray[np.float64]:
         """Time of every frame, shape (frames,)."""
         return self.timebase.times_s

@@ -246,9 +246,15 @@ class _Look:
                 "title": recording.title,
                 "simulated": recording.simulated,
                 "radar_offset_s": recording.radar_offset_s,
-                "radar": None if radar is None else self._digest(radar),
+                "radar": None if radar is None else self._radar_digest(radar),
             },
         )
+
+    def _radar_digest(self, radar: Path) -> str:
+        """Identity of a radar recording: of its file, and of those that describe it."""
+        from sd2core.io.radar import companions
+
+        return " ".join(map(self._digest, [radar, *companions(radar)]))
 
     def _digest(self, path: Path) -> str:
         return "" if self._folder is None else self._digests.of(path)

@@ -152,7 +152,7 @@ class Denoise(_Section):
 class Simulate(_Section):
     """Section ``[simulate]``: options of ``sd2 export --simulate``."""
 
-    radar: Text = "paper"  # "paper", or the config.json of a capture
+    radar: Text = "paper"  # a name, or the config.json of a capture
     seed: Annotated[int, Field(ge=0)] = 0  # of phases and noise
 
 

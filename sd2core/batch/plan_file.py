@@ -16,7 +16,7 @@ from sd2core.files.atomic import atomic_write_text
 from sd2core.files.paths import is_absolute, located_path, stored_path
 from sd2core.files.texts import parse_toml, read_text
 from sd2core.files.toml import toml_lines
-from sd2core.io.radar import PAPER
+from sd2core.radar_profiles import RADARS
 
 _HEADER = re.compile(r"\s*\[+\s*([^\[\]]+?)\s*\]+")
 _KEY = re.compile(r"""\s*([A-Za-z0-9_."'* /\\-]+?)\s*=""")
@@ -92,7 +92,7 @@ def _with_paths(plan: BatchPlan, changed: Any) -> BatchPlan:
         updates["fit"] = plan.fit.model_copy(update={"models": changed(plan.fit.models)})
     if plan.denoise is not None and plan.denoise.model and _is_path(plan.denoise.model):
         updates["denoise"] = plan.denoise.model_copy(update={"model": changed(plan.denoise.model)})
-    if plan.simulate is not None and plan.simulate.radar != PAPER:
+    if plan.simulate is not None and plan.simulate.radar not in RADARS:
         update = {"radar": changed(plan.simulate.radar)}
         updates["simulate"] = plan.simulate.model_copy(update=update)
     return plan.model_copy(update=updates)

@@ -165,8 +165,9 @@ def _add_making(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument(
         "--simulate",
-        metavar="paper|CONFIG.json",
-        help="simulate this radar at every place, which takes far longer than everything else"
+        metavar="NAME|CONFIG.json",
+        help="simulate this radar (see sd2 simulate radar --help) at every place, which takes far"
+        " longer than everything else"
         " (default: only the maps in radar files)",
     )
     group.add_argument(

@@ -71,10 +71,10 @@ def add_mesh_and_sensor(parser: argparse.ArgumentParser) -> None:
     add_sensor(parser)
 
 
-def add_map_output(parser: argparse.ArgumentParser) -> None:
+def add_map_output(parser: argparse.ArgumentParser, *, required: bool = True) -> None:
     """Add ``--out`` for a Doppler map."""
     parser.add_argument(
-        "--out", type=Path, required=True, metavar="FILE.npz", help="the map to write"
+        "--out", type=Path, required=required, metavar="FILE.npz", help="the map to write"
     )
 
 

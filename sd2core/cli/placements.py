@@ -233,10 +233,12 @@ def _print(
     cost: PlacementCost,
     choice: Choice,
 ) -> None:
+    from sd2core.radar_config import range_in_words
+
     listed = _listed(placements, sensors, coverage, radar)
     numbers = {name: sum(one[name] for one in listed) for name, _ in _LIMITS}
     beyond = [f"{numbers[name]} {words}" for name, words in _LIMITS if numbers[name]]
-    limits = f"{radar.range_max_m:.1f} m, ±{radar.v_max_mps:.2f} m/s"
+    limits = f"{range_in_words(radar.range_max_m)}, ±{radar.v_max_mps:.2f} m/s"
     print_facts(
         f"{counted(len(sensors), 'placement')} around the body of {path}",
         {

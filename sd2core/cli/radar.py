@@ -1,13 +1,24 @@
-"""``sd2 radar``: raw capture to Doppler map."""
+"""``sd2 radar``: raw capture to Doppler map, and descriptions of captures of one's own."""
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
-from sd2core.cli.options import add_axis, add_command, add_json, add_map_output, span_m
+from sd2core.cli.options import (
+    add_axis,
+    add_command,
+    add_json,
+    add_map_output,
+    flag,
+    given,
+    positive_int,
+    span_m,
+)
 from sd2core.cli.output import progress_bar
+from sd2core.cli.radar_description import add_description, describe, refuse_description
 from sd2core.errors import Sd2Error
 from sd2core.radar_config import Clutter
 
@@ -20,13 +31,19 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     parser = add_command(
         commands,
         "radar",
-        "turn a raw radar capture into a Doppler map",
+        "turn a raw radar capture into a Doppler map, or say what limits it has",
         handler=_radar,
         description=(
-            "Prints the resolution and limits of the radar by its configuration, and a note if\n"
-            "the velocity axis extends beyond them."
+            "Prints the resolution and limits of the radar by its configuration, what was\n"
+            "assumed, and a note if the velocity axis extends beyond the limits. What files\n"
+            "each radar needs is in docs/radar-files.md. `sd2 radar describe FILE` writes a\n"
+            "description of samples of one's own (.npy, .h5, .sigmf-meta), and asks for what\n"
+            "no option says."
         ),
         examples=(
+            "  sd2 radar capture/                   (limits, and what was assumed)\n"
+            "  sd2 radar adc_data_Raw_0.bin --out real.npz --receiver 1\n"
+            "  sd2 radar describe walk.npy --carrier-hz 60.5e9 --bandwidth-hz 1e9\n"
             "  sd2 radar capture/ --out real.npz\n"
             "  sd2 radar capture/ --out real.npz --clutter mean --range 0.5,4\n"
             "  sd2 radar walk.sd2 --out real.npz    (the capture of a recording)\n"
@@ -37,9 +54,12 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         "capture",
         type=Path,
         metavar="CAPTURE",
-        help="the capture's folder, the .h5 of a K60168A, or a recording",
+        help="a capture's file or folder, the .h5 of a K60168A, a recording, or the word describe",
     )
-    add_map_output(parser)
+    parser.add_argument(
+        "file", type=Path, nargs="?", metavar="FILE", help="after describe: the samples"
+    )
+    add_map_output(parser, required=False)
     add_axis(parser)
     parser.add_argument(
         "--clutter",
@@ -55,10 +75,54 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         metavar="LO,HI",
         help="count only echoes from this range in metres (default: all)",
     )
+    parser.add_argument(
+        "--receiver",
+        type=positive_int,
+        metavar="N",
+        help="take this receiver, counted from 1 (default: the mean power of all)",
+    )
+    parser.add_argument(
+        "--transmitter", type=positive_int, metavar="N", help="take this transmitter, likewise"
+    )
     add_json(parser)
+    add_description(parser)
 
 
 def _radar(options: argparse.Namespace) -> None:
+    if options.file is not None:
+        if str(options.capture) != "describe":
+            raise Sd2Error(f"Two files are given, {options.capture} and {options.file}", "one")
+        _refuse(_of_maps(options), "to describe a file", "without describe")
+        describe(options)
+        return
+    refuse_description(options)
+    if options.out is None:
+        _show_limits(options)
+    else:
+        _write_map(options)
+
+
+def _show_limits(options: argparse.Namespace) -> None:
+    """Say what a capture's radar can tell apart, and what was assumed of it."""
+    from sd2core.cli.info.description import describe_capture, describe_radar, show
+    from sd2core.io.radar import holds_map, load_capture
+    from sd2core.recording.recording import is_recording, open_recording
+
+    path = options.capture
+    if is_recording(path):
+        recording = open_recording(path)
+        path = recording.radar or path
+    _refuse(_of_processing(options), "without --out", "together with --out")
+    if holds_map(path):
+        _refuse(_of_channels(options), f"and {path} holds a finished map", "for raw samples only")
+        description = describe_radar(path)
+    else:
+        capture = load_capture(path).channel(options.receiver, options.transmitter)
+        description = describe_capture(path, capture)
+    show(description, as_json=options.json)
+
+
+def _write_map(options: argparse.Namespace) -> None:
     from sd2core.cli.info.description import describe_map, limit_facts, show
     from sd2core.cli.reading import check_map_output, chosen_axis
     from sd2core.fmcw import doppler_map, limits
@@ -78,6 +142,7 @@ def _radar(options: argparse.Namespace) -> None:
         return
     else:
         capture = load_capture(options.capture)
+    capture = capture.channel(options.receiver, options.transmitter)
     with progress_bar("Processing") as progress:
         doppler = doppler_map(
             capture,
@@ -98,17 +163,32 @@ def _write_recorded(recorded: RecordedMap, offset_s: float, options: argparse.Na
     """Write a map that the radar made itself: there are no samples to choose anything for."""
     from sd2core.cli.info.description import describe_map, show
 
-    for name, given in (
-        ("--bins", options.bins is not None),
-        ("--v-max", options.v_max is not None),
-        ("--clutter", options.clutter != "none"),
-        ("--range", options.range is not None),
-    ):
-        if given:
-            raise Sd2Error(
-                f"{name} is given, and {recorded.source} holds a finished map",
-                f"{name} for raw samples only",
-            )
+    finished = f"and {recorded.source} holds a finished map"
+    _refuse((*_of_processing(options), *_of_channels(options)), finished, "for raw samples only")
     doppler = recorded.doppler.shifted(offset_s)
     doppler.save(options.out)
     show(describe_map(options.out, doppler), as_json=options.json)
+
+
+def _of_maps(options: argparse.Namespace) -> list[str]:
+    """Options about a map that are given."""
+    out = ["--out"] if options.out is not None else []
+    return [*out, *_of_processing(options), *_of_channels(options)]
+
+
+def _of_processing(options: argparse.Namespace) -> list[str]:
+    """Options of the processing to a map that are given."""
+    clutter = ["--clutter"] if options.clutter != "none" else []
+    return [*map(flag, given(options, ("bins", "v_max", "range"))), *clutter]
+
+
+def _of_channels(options: argparse.Namespace) -> list[str]:
+    """Options that choose a channel and are given."""
+    return [flag(name) for name in given(options, ("receiver", "transmitter"))]
+
+
+def _refuse(names: Iterable[str], why: str, where: str) -> None:
+    """Raise Sd2Error for the first option of those given."""
+    for name in names:
+        comma = "," if why.startswith("and ") else ""
+        raise Sd2Error(f"{name} is given{comma} {why}", f"{name} {where}")

@@ -156,11 +156,14 @@ def _add_radar(kinds: argparse._SubParsersAction) -> None:
 
 def add_radar_choice(parser: argparse.ArgumentParser) -> None:
     """Add ``--radar``."""
+    from sd2core.radar_profiles import RADARS
+
     parser.add_argument(
         "--radar",
         default="paper",
-        metavar="paper|CONFIG.json",
-        help="the paper's 60 GHz radar, or that of a capture's config.json (default: paper)",
+        metavar="NAME|CONFIG.json",
+        help=f"a radar by its name ({', '.join(RADARS)}; docs/radar-files.md), or that of a"
+        " capture's config.json (default: paper)",
     )
 
 
@@ -207,7 +210,7 @@ def _radar(options: argparse.Namespace) -> None:
     from sd2core.cli.info.description import describe_capture, show
     from sd2core.cli.reading import mesh_and_sensor
     from sd2core.fmcw import LinkBudget, Mirror, SignalOptions, WaveOptions
-    from sd2core.io.radar import check_replaceable, named_radar, write_capture
+    from sd2core.io.radar import check_replaceable, named_radar, write_capture, write_described
 
     check_replaceable(options.out)
     if not options.out.absolute().parent.is_dir():
@@ -247,9 +250,10 @@ def _radar(options: argparse.Namespace) -> None:
             link=LinkBudget() if options.link_budget else None,
         ),
     )
-    folder = write_capture(
+    write = write_capture if config.sampling == "real" else write_described
+    folder = write(
         options.out,
-        capture.samples,
+        capture.samples[:],
         capture.config,
         capture.timebase.times_s,
         simulated=True,

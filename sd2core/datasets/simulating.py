@@ -40,7 +40,12 @@ class Simulation:
 
     def as_json(self) -> dict[str, Any]:
         """Return all settings that maps depend on."""
-        return {**asdict(self), "link": asdict(LinkBudget()), "clutter": CLUTTER}
+        return {
+            "radar": self.radar.as_dict(),
+            "seed": self.seed,
+            "link": asdict(LinkBudget()),
+            "clutter": CLUTTER,
+        }
 
 
 def seed_of(mesh: MeshSequence, sensor: VirtualSensor, simulation: Simulation) -> int:

@@ -147,7 +147,10 @@ def draw_maps(
         level = levels.of(row.doppler.values, row.reference)
         low, high = levels.ends
         shown = _draw(axes, row, level, levels.colour_map, low, high)
-        _title(axes, row.title, f"0 dB: {row.reference:.3g} {row.doppler.unit}".rstrip())
+        carrier_hz = row.doppler.carrier_hz
+        carrier = "" if carrier_hz is None else f"{carrier_hz / 1e9:.4g} GHz · "
+        unit = f"0 dB: {row.reference:.3g} {row.doppler.unit}".rstrip()
+        _title(axes, row.title, carrier + unit)
     bar = figure.colorbar(
         shown, ax=list(all_axes[: len(rows)]), pad=0.01, aspect=12 * len(rows), fraction=0.05
     )

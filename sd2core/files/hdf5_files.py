@@ -3,16 +3,26 @@
 from __future__ import annotations
 
 import math
+import os
+import struct
 import zlib
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from sd2core.errors import Sd2Error
-from sd2core.files.limits import check_chunk_count, check_regular, check_size, read_limit_bytes
+from sd2core.files.limits import (
+    check_chunk_count,
+    check_regular,
+    check_size,
+    open_regular,
+    read_limit_bytes,
+)
 
 _DEFLATE = 1
 _FILTERS = {_DEFLATE, 2, 3, 32000}
 """Known to h5py everywhere: deflate, shuffle, fletcher32, lzf."""
+_TEXT_PART = 64
+"""Part of the limit on memory that a text may have."""
 _DEFLATE_MOST = 1032
 """Bytes that deflate can make of one."""
 
@@ -54,6 +64,52 @@ def member_of(file: Any, path: Path, name: str) -> Any:
             raise Sd2Error(f"{name} of {path} lies in another file", f"{name} in the file itself")
         _check_array(found, path, name)
     return found
+
+
+def text_of(array: Any, path: Path, name: str) -> str:
+    """Text of a dataset that holds one, of fixed or of variable length.
+
+    The HDF5 library believes any length that stands in a file, and any size of a heap, and takes
+    memory or time without end. So the few bytes of a heap are read here (HDF5 File Format
+    Specification 3.0, section III.E, global heap). Raises Sd2Error if they cannot be.
+    """
+    if array.dtype.kind == "S":
+        return str(array[()].decode("utf-8", "replace"))
+    place, expected = f"{name} of {path}", "a text of HDF5's default layout"
+    start = array.id.get_offset()
+    file_plan = array.file.id.get_create_plist()
+    if start is None or file_plan.get_userblock() or file_plan.get_sizes() != (8, 8):
+        raise Sd2Error(f"{place} is stored in an unusual way", expected)
+    with open_regular(path) as stream:
+        length, address, number = struct.unpack("<IQI", _exactly(stream, start, 16, place))
+        if not length:
+            return ""
+        head = _exactly(stream, address, 16, place)
+        size = int.from_bytes(head[8:], "little")
+        check_size(place, size)
+        if head[:4] != b"GCOL" or length * _TEXT_PART > read_limit_bytes():
+            raise Sd2Error(f"{place} has {length:,} bytes, in a damaged heap", expected)
+        at, end = 16, size
+        heap = head + _exactly(stream, address + 16, max(size - 16, 0), place)
+    while at + 16 <= end:
+        found, _, _, stored = struct.unpack_from("<HHIQ", heap, at)
+        if found == number and found:
+            if length > stored or at + 16 + length > end:
+                break
+            return heap[at + 16 : at + 16 + length].decode("utf-8", "replace")
+        at += 16 + -(-stored // 8) * 8
+    raise Sd2Error(f"{place} is not in its heap", expected, "Copy or download it again")
+
+
+def _exactly(stream: BinaryIO, start: int, count: int, place: str) -> bytes:
+    """Bytes at a place in a file; Sd2Error if they are not all there."""
+    there = stream.seek(0, os.SEEK_END)
+    if start + count > there:
+        raise Sd2Error(
+            f"{place} lies beyond the end of the file", "a whole file", "Copy or download it again"
+        )
+    stream.seek(start)
+    return stream.read(count)
 
 
 def _check_array(array: Any, path: Path, name: str) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
-from sd2core.io.radar.capture import RadarCapture
+from sd2core.io.radar.capture import RadarCapture, Signal
 from sd2core.radar_config import Clutter, RadarConfig
 
 Window = Literal["hann", "blackman", "none"]
@@ -50,7 +50,8 @@ class ProcessingOptions:
         Gates whose cell overlaps this stretch count; None takes all. Gates
         within the window's main lobe around zero range (0 and 1 for Hann) hold
         the transmitter's own leakage and never count, nor does the gate at
-        R_max, where beat frequencies fold.
+        R_max, where beat frequencies fold. Of samples that are distances those
+        within count. A continuous wave has no ranges to choose.
     window : {"hann", "blackman", "none"}
         For both FFTs.
     """
@@ -83,43 +84,63 @@ def taper(window: Window, length: int) -> NDArray[np.float32]:
 class FrameChain:
     """Processing of single frames for one radar and one set of options.
 
-    ``range_m`` (gates,) are the centres of the gates that count, ``doppler_bins``
-    the length of the zero-padded Doppler FFT.
+    ``range_m`` (gates,) are the centres of the gates that count, none for a continuous wave;
+    ``doppler_bins`` is the length of the zero-padded Doppler FFT.
     """
 
     def __init__(self, config: RadarConfig, options: ProcessingOptions) -> None:
         self.config = config
         self.options = options
         self.doppler_bins = _ZERO_PADDING * config.chirps_per_frame
-        self.gates = _gates(config, options)
-        self.range_m = np.arange(self.gates.start, self.gates.stop) * config.range_resolution_m
-        fast = taper(options.window, config.samples_per_chirp).astype(np.float64)
+        self.gates: slice | NDArray[np.intp]
         slow = taper(options.window, config.chirps_per_frame).astype(np.float64)
-        # One-sided spectrum (2), sine power 1/2 (2), window energies, zero padding.
-        norm = 4.0 / (
-            config.samples_per_chirp
-            * config.chirps_per_frame
-            * (fast**2).sum()
-            * (slow**2).sum()
-            * _ZERO_PADDING
+        if config.has_beat:
+            self.gates = _gates(config, options)
+            self.range_m = np.arange(self.gates.start, self.gates.stop) * config.range_resolution_m
+            fast = taper(options.window, config.samples_per_chirp).astype(np.float64)
+            samples = config.samples_per_chirp
+        else:
+            self.gates, self.range_m = _points(config, options)
+            fast, samples = np.ones(1), 1
+        # One-sided spectrum (2) and sine power 1/2 (2), which are 1 for a phasor; window
+        # energies, zero padding.
+        norm = (4.0 if config.sampling == "real" else 1.0) / (
+            samples * config.chirps_per_frame * (fast**2).sum() * (slow**2).sum() * _ZERO_PADDING
         )
         self._fast = fast.astype(np.float32)
         self._slow = (slow * np.sqrt(norm)).astype(np.float32)[:, None]
 
-    def spectra(self, signal: NDArray[np.float32]) -> NDArray[np.complex64]:
-        """Spectra (n, receivers, doppler, gates) of frames (n, receivers, chirps, samples).
+    def without_own_clutter(self, signal: Signal) -> Signal:
+        """Frames without what a frame knows of clutter by itself, in place.
+
+        That is the mean of every chirp, where it is no echo, and the courses of the option.
+        """
+        self._remove_offset(signal)
+        if (courses := clutter_courses(self.options.clutter, signal.shape[2])) is not None:
+            signal -= courses @ (courses.T @ signal)
+        return signal
+
+    def _remove_offset(self, signal: Signal) -> None:
+        if self.config.has_beat:
+            signal -= signal.mean(axis=3, keepdims=True)
+
+    def spectra(self, signal: Signal) -> NDArray[np.complex64]:
+        """Spectra (n, channels, doppler, gates) of frames (n, channels, chirps, samples).
 
         The signal, without clutter, is overwritten.
         """
         import scipy.fft
 
-        signal *= self._fast
-        profiles = scipy.fft.rfft(signal, axis=3)[..., self.gates] * self._slow
+        if self.config.has_beat:
+            signal *= self._fast
+            transform = scipy.fft.fft if np.iscomplexobj(signal) else scipy.fft.rfft
+            signal = transform(signal, axis=3)
+        profiles = signal[..., self.gates] * self._slow
         spectra: NDArray[np.complex64] = scipy.fft.fft(profiles, n=self.doppler_bins, axis=2)
         return spectra
 
-    def power_over_doppler(self, signal: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Power of :meth:`spectra` summed over receivers and gates, (n, doppler)."""
+    def power_over_doppler(self, signal: Signal) -> NDArray[np.float32]:
+        """Power of :meth:`spectra` summed over channels and gates, (n, doppler)."""
         parts = self.spectra(signal).view(np.float32)  # real, imaginary, real …
         summed: NDArray[np.float32] = np.einsum("nrdk,nrdk->nd", parts, parts)
         return summed
@@ -151,10 +172,10 @@ class Chain(FrameChain):
     def blocks(self) -> Iterator[tuple[int, int]]:
         """Half-open runs of frames that fit into a few megabytes."""
         config = self.capture.config
-        gates = len(self.range_m)
+        gates = max(len(self.range_m), 1)
         per_frame = (
             8
-            * config.receivers
+            * config.channels
             * max(self.doppler_bins * gates, config.chirps_per_frame * config.samples_per_chirp)
         )
         # A block reads its neighbourhood as well, so it may not be much shorter.
@@ -164,49 +185,44 @@ class Chain(FrameChain):
             yield start, min(start + size, frames)
 
     def doppler_power(self, start: int, stop: int) -> NDArray[np.float32]:
-        """Power of frames [start, stop) summed over receivers and gates, (n, doppler)."""
+        """Power of frames [start, stop) summed over channels and gates, (n, doppler)."""
         return self.power_over_doppler(self._without_clutter(start, stop))
 
     def cell_power(self, frame: int) -> NDArray[np.float32]:
-        """Power of one frame summed over receivers, (doppler, gates)."""
+        """Power of one frame summed over channels, (doppler, gates)."""
         spectra = self.spectra(self._without_clutter(frame, frame + 1))[0]
         power: NDArray[np.float32] = (spectra.real**2 + spectra.imag**2).sum(axis=0)
         return power
 
-    def _without_clutter(self, start: int, stop: int) -> NDArray[np.float32]:
+    def _without_clutter(self, start: int, stop: int) -> Signal:
         signal = self.capture.read(start, stop)
-        top = 1.0 - 2.0 ** (1 - self.capture.config.adc_bits)
-        self._clipped += int(np.count_nonzero((signal <= -1.0) | (signal >= top)))
-        self._read += signal.size
+        if self.capture.full_scale_known:
+            top = 1.0 - 2.0 ** (1 - self.capture.config.adc_bits)
+            parts = signal.view(np.float32)
+            self._clipped += int(np.count_nonzero((parts <= -1.0) | (parts >= top)))
+            self._read += parts.size
         if self.options.clutter != "moving":
-            return own_clutter_removed(signal, self.options.clutter)
-        signal -= signal.mean(axis=3, keepdims=True)
+            return self.without_own_clutter(signal)
+        self._remove_offset(signal)
         first = max(start - self._reach, 0)
         last = min(stop + self._reach, self.capture.frame_count)
         around = [self._mean_chirp(k, min(k + 64, last)) for k in range(first, last, 64)]
-        # float64, or the running sum would lose the small samples of a long stretch.
-        total = np.cumsum(np.concatenate(around), axis=0, dtype=np.float64)
+        # Double precision, or the running sum would lose the small samples of a long stretch.
+        chirps = np.concatenate(around)
+        total = np.cumsum(chirps, axis=0, dtype=np.result_type(chirps, np.float64))
         total = np.concatenate([np.zeros_like(total[:1]), total])  # (frames + 1, rx, samples)
         frames = np.arange(start, stop)
         low = np.maximum(frames - self._reach, 0) - first
         high = np.minimum(frames + self._reach + 1, self.capture.frame_count) - first
         mean = (total[high] - total[low]) / (high - low)[:, None, None]
-        signal -= mean[:, :, None, :].astype(np.float32)
+        signal -= mean[:, :, None, :].astype(signal.dtype)
         return signal
 
-    def _mean_chirp(self, start: int, stop: int) -> NDArray[np.float32]:
+    def _mean_chirp(self, start: int, stop: int) -> Signal:
         signal = self.capture.read(start, stop)
-        signal -= signal.mean(axis=3, keepdims=True)
-        mean: NDArray[np.float32] = signal.mean(axis=2)  # (n, rx, samples)
+        self._remove_offset(signal)
+        mean: Signal = signal.mean(axis=2)  # (n, rx, samples)
         return mean
-
-
-def own_clutter_removed(signal: NDArray[np.float32], clutter: Clutter) -> NDArray[np.float32]:
-    """Frames without the mean of every chirp and what else they tell of clutter, in place."""
-    signal -= signal.mean(axis=3, keepdims=True)
-    if (courses := clutter_courses(clutter, signal.shape[2])) is not None:
-        signal -= courses @ (courses.T @ signal)
-    return signal
 
 
 @cache
@@ -231,7 +247,10 @@ def clutter_courses(clutter: Clutter, chirps: int) -> NDArray[np.float32] | None
 
 def _gates(config: RadarConfig, options: ProcessingOptions) -> slice:
     first = len(_COSINES[options.window])
-    end = (config.samples_per_chirp + 1) // 2
+    # Of complex samples, the last gates are below zero range, within the main lobe.
+    end = config.samples_per_chirp - first + 1
+    if config.sampling != "complex":
+        end = (config.samples_per_chirp + 1) // 2
     step_m = config.range_resolution_m
     if options.range_m is not None:
         # Gate k is the cell from (k - 1/2) to (k + 1/2) times the resolution.
@@ -249,3 +268,27 @@ def _gates(config: RadarConfig, options: ProcessingOptions) -> slice:
             "Choose other ranges, or window='none' for a radar with very few samples",
         )
     return slice(first, end)
+
+
+def _points(
+    config: RadarConfig, options: ProcessingOptions
+) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """Samples that count of a radar without a beat frequency, and their distances if it has any."""
+    places = np.array(config.ranges_m, dtype=np.float64)
+    if options.range_m is None:
+        return np.arange(config.samples_per_chirp), places
+    low, high = options.range_m
+    if config.is_continuous:
+        raise Sd2Error(
+            f"Ranges from {low:g} m to {high:g} m are asked of {config.name}, a continuous wave,"
+            " which tells no ranges apart",
+            "no limits of range",
+        )
+    chosen = np.flatnonzero((places >= low) & (places <= high))
+    if not chosen.size:
+        raise Sd2Error(
+            f"No distance lies between {low:g} m and {high:g} m",
+            f"ranges that hold some of the sensor's points, {places.min():.3g} m to"
+            f" {places.max():.3g} m",
+        )
+    return chosen, places[chosen]

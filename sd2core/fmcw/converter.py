@@ -32,18 +32,19 @@ def store(shape: tuple[int, ...], dtype: DTypeLike, memory_bytes: int) -> NDArra
 
 
 def digitise(
-    signal: NDArray[np.floating[Any]],
+    signal: NDArray[Any],
     peak: float,
     power: float,
     config: RadarConfig,
     options: SignalOptions,
-    samples: NDArray[np.uint16],
+    samples: NDArray[Any],
     go_on: Callable[[], None] = lambda: None,
     first: int = 0,
 ) -> dict[str, float]:
     """Apply gain and thermal noise and round to converter counts around mid-scale.
 
-    ``samples``, of the shape of the signal, (frames, receivers, chirps, samples), gets the result.
+    ``samples``, of the shape of the signal, (frames, receivers, chirps, samples), gets the result:
+    counts, or relative to half the range where they are complex, with I and Q rounded each.
     ``peak`` is the signal's largest magnitude, ``power`` the mean square of the moving scene's part
     over the frames with a person. ``first`` is the number of the first of these frames in the
     recording, which selects its noise. ``go_on`` is called once per frame and may raise to stop.
@@ -60,25 +61,33 @@ def digitise(
         noise = gain * math.sqrt(power) * 10.0 ** (-options.snr_db / 20.0)
     else:
         noise = _NOISE_WITHOUT_ECHO_COUNTS
+    is_complex = np.iscomplexobj(signal)
+    if is_complex and options.link is None:
+        noise /= math.sqrt(2.0)  # one part of two
     clipped = 0
     for frame, values in enumerate(signal):
         go_on()
         random = np.random.default_rng([options.seed, first + frame])
+        parts = values.view(np.float32) if is_complex else values
         counts = np.rint(
-            middle + gain * values.astype(np.float64) + noise * random.standard_normal(values.shape)
+            middle + gain * parts.astype(np.float64) + noise * random.standard_normal(parts.shape)
         )
         clipped += int(np.count_nonzero((counts < 0) | (counts > 2 * middle - 1)))
-        samples[frame] = np.clip(counts, 0, 2 * middle - 1)
+        counts = np.clip(counts, 0, 2 * middle - 1, out=counts)
+        if is_complex:
+            samples[frame] = ((counts - middle) / middle).astype(np.float32).view(np.complex64)
+        else:
+            samples[frame] = counts
     return {
         # Rounded, so that the last bits of a machine's arithmetic are not in the file.
         "counts_per_unit": float(f"{gain:.9g}"),
         "noise_rms_counts": float(f"{noise:.9g}"),
-        "clipped_share": clipped / samples.size,
+        "clipped_share": clipped / (samples.size * (2 if is_complex else 1)),
     }
 
 
 def simulated_capture(
-    samples: NDArray[np.uint16],
+    samples: NDArray[Any],
     config: RadarConfig,
     times_s: NDArray[np.float64],
     source: str,
@@ -130,6 +139,12 @@ def _told(options: SignalOptions) -> dict[str, Any]:
 
 
 def check_converter(config: RadarConfig) -> None:
-    """Raise Sd2Error for a converter of more than 16 bits."""
+    """Raise Sd2Error for a radar that cannot be simulated, or a converter of over 16 bits."""
+    if config.ranges_m or config.transmitters > 1:
+        what = "forms range itself" if config.ranges_m else "has several transmitters"
+        raise Sd2Error(
+            f"{config.name} {what}, which is not simulated",
+            "one transmitter, and samples of a beat signal",
+        )
     if config.adc_bits > 16:
         raise Sd2Error(f"The converter has {config.adc_bits} bits", "16 or fewer")

@@ -35,14 +35,14 @@ class LinkBudget:
     full_scale: float = 0.02
 
     def noise_rms(self, config: RadarConfig) -> float:
-        """Thermal noise of one real sample, in the unit of amplitudes.
+        """Thermal noise of one real sample, or of I and Q each, in the unit of amplitudes.
 
         The radar equation with a plate's cross section, 4 π A² / λ²: an amplitude A / R²
         receives P G G A² / ((4 π)² R⁴), of which a real sample has the mean square.
         """
         gain_db = self.transmitted_dbm + self.transmit_gain_dbi + self.receive_gain_dbi
         gain_db += 10.0 * math.log10(self.reflected) - 20.0 * math.log10(4.0 * math.pi)
-        bandwidth_hz = 0.5 * config.sample_rate_hz
+        bandwidth_hz = (0.5 if config.sampling == "real" else 1.0) * config.sample_rate_hz
         # kT at 290 K is -174 dBm/Hz.
         noise_dbm = -174.0 + 10.0 * math.log10(bandwidth_hz)
         noise_dbm += self.noise_figure_db + self.losses_db

@@ -1,17 +1,20 @@
 """Doppler maps from raw FMCW samples, measured or simulated.
 
 Steps per frame: mean of every chirp removed, static clutter removed, range FFT,
-Doppler FFT, power summed over range gates and receivers, brought onto the
-velocity axis. After M. A. Richards, *Fundamentals of Radar Signal Processing*,
+Doppler FFT, power summed over range gates and averaged over receivers and
+transmitters, brought onto the velocity axis. Where the samples of a chirp are
+distances already, or there is one of a continuous wave, they are the range gates.
+After M. A. Richards, *Fundamentals of Radar Signal Processing*,
 and F. J. Harris, "On the use of windows" (Proc. IEEE 66, 1978).
 
 **Sign.** For a beat signal cos(2 pi (f_c tau + S tau t)) the phase grows with the
 delay tau, so a forward FFT over the chirps gives a receding target a positive
 frequency. Maps turn this round: positive is approaching.
 
-**Unit.** A power of 1 is that of a sine over the converter's full range; windows
-are divided out. Summed over bins and gates, the map is twice the mean square of
-the samples relative to half the range (Parseval), and rebinning keeps it.
+**Unit.** A power of 1 is that of a sine over the converter's full range, or of a
+complex phasor; windows are divided out. Summed over bins and gates, the map is twice
+the mean square of the samples relative to half the range (Parseval), or once that of
+complex ones, and rebinning keeps it.
 """
 
 from __future__ import annotations
@@ -32,11 +35,13 @@ from sd2core.sensor import VelocityAxis
 from sd2core.version import __version__
 
 UNIT = "power (1 = full-scale sine)"
+UNKNOWN_UNIT = "power (unit of the file, squared)"
+"""Unit where a file does not say what fills its converter."""
 
 
 @dataclass(frozen=True, eq=False)
 class RangeDoppler:
-    """Power of one frame over range and velocity, summed over receivers."""
+    """Power of one frame over range and velocity, averaged over channels."""
 
     values: NDArray[np.float32]  # (gates, bins); velocity ascending, positive when approaching.
     range_m: NDArray[np.float64]  # Centre of every gate, (gates,).
@@ -101,7 +106,7 @@ def doppler_map(
     config = capture.config
     axis = _axis(config, axis, bins, v_max_mps)
     chain = Chain(capture, options)
-    weights = rebinning(config, axis, chain.doppler_bins).astype(np.float32)  # (bins, doppler)
+    weights = _weights(config, axis, chain)  # (bins, doppler)
     values = np.empty((axis.bins, capture.frame_count), dtype=np.float32)
     inside = everything = 0.0
     progress(0, capture.frame_count)
@@ -109,7 +114,7 @@ def doppler_map(
         power = chain.doppler_power(start, stop)  # (n, doppler)
         values[:, start:stop] = weights @ power.T
         inside += float(values[:, start:stop].sum(dtype=np.float64))
-        everything += float(power.sum(dtype=np.float64))
+        everything += float(power.sum(dtype=np.float64)) / config.channels
         progress(stop, capture.frame_count)
     beyond = max(0.0, 1.0 - inside / everything) if everything > 0 else 0.0
     unseen = _unseen(config, axis)
@@ -118,12 +123,12 @@ def doppler_map(
         axis=axis,
         timebase=capture.timebase,
         kind="simulated" if capture.simulated else "real",
-        unit=UNIT,
+        unit=UNIT if capture.full_scale_known else UNKNOWN_UNIT,
         unseen_bins=unseen,
         meta={
             "source": capture.source,
             "simulated": capture.simulated,
-            "radar": {**asdict(config), **limits(config)},
+            "radar": {**config.as_dict(), **limits(config)},
             "options": asdict(options),
             "range_gates_m": [float(value) for value in chain.range_m],
             "beyond_share": beyond,
@@ -154,22 +159,34 @@ def range_doppler(
     """
     if not 0 <= frame < capture.frame_count:
         raise IndexError(f"frame {frame} of {capture.frame_count}")
+    if capture.config.is_continuous:
+        raise Sd2Error(
+            f"{capture.config.name} is a continuous wave, which tells no ranges apart",
+            "a radar that measures range, or a Doppler map",
+        )
     axis = _axis(capture.config, axis, None, None)
     chain = Chain(capture, ProcessingOptions(clutter, clutter_window_s, range_m, window))
-    weights = rebinning(capture.config, axis, chain.doppler_bins).astype(np.float32)
+    weights = _weights(capture.config, axis, chain)
     power = chain.cell_power(frame)  # (doppler, gates)
     return RangeDoppler((weights @ power).T, chain.range_m, axis, capture.timebase.time_of(frame))
 
 
 def limits(config: RadarConfig) -> dict[str, float]:
-    """Limits of a radar in range and velocity, for provenance and read-outs."""
-    return {
+    """Limits of a radar in velocity and, if it has any, range, for provenance and read-outs."""
+    found = {
         "wavelength_m": config.wavelength_m,
         "v_max_mps": config.v_max_mps,
         "velocity_resolution_mps": config.velocity_resolution_mps,
-        "range_resolution_m": config.range_resolution_m,
-        "range_max_m": config.range_max_m,
     }
+    if not config.is_continuous:
+        found["range_resolution_m"] = config.range_resolution_m
+        found["range_max_m"] = config.range_max_m
+    return found
+
+
+def _weights(config: RadarConfig, axis: VelocityAxis, chain: Chain) -> NDArray[np.float32]:
+    """Weights of the rebinning of power that is summed over channels, (bins, doppler)."""
+    return (rebinning(config, axis, chain.doppler_bins) / config.channels).astype(np.float32)
 
 
 def rebinning(config: RadarConfig, axis: VelocityAxis, doppler_bins: int) -> NDArray[np.float64]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from sd2core.fmcw.chain import taper
 from sd2core.fmcw.sums import recurrent
-from sd2core.fmcw.wave import GoOn, WaveScene
+from sd2core.fmcw.wave import BeatSignal, GoOn, WaveScene
 
 CONVERGED_L1 = 2e-3
 """A tenth of the error that is looked for, 0.02."""
@@ -66,7 +66,7 @@ def converged_frame(
     return Converged(signal, tuple(pieces), tuple(changes), tolerance)
 
 
-def doppler_marginal(signal: NDArray[np.float64]) -> NDArray[np.float64]:
+def doppler_marginal(signal: BeatSignal) -> NDArray[np.float64]:
     """Share of a frame's power per Doppler bin, (chirps,), over all ranges and receivers.
 
     Hann windows in both directions, no clutter filter. The signal is (receivers, chirps, samples);
@@ -75,7 +75,8 @@ def doppler_marginal(signal: NDArray[np.float64]) -> NDArray[np.float64]:
     _, chirps, samples = signal.shape
     peak = np.abs(signal).max()
     tapered = signal / (peak or 1.0) * taper("hann", chirps)[:, None] * taper("hann", samples)
-    power = np.abs(np.fft.fft(np.fft.rfft(tapered, axis=2), axis=1)) ** 2
+    over_range = np.fft.fft if np.iscomplexobj(signal) else np.fft.rfft
+    power = np.abs(np.fft.fft(over_range(tapered, axis=2), axis=1)) ** 2
     share: NDArray[np.float64] = power.sum(axis=(0, 2))
     return share / (share.sum() or 1.0)
 
@@ -90,7 +91,7 @@ def subdivided(corners: NDArray[np.float64], cuts: int) -> NDArray[np.float64]:
     return corners
 
 
-def _cut(scene: WaveScene, time_s: float, cuts: int, go_on: GoOn | None) -> NDArray[np.float64]:
+def _cut(scene: WaveScene, time_s: float, cuts: int, go_on: GoOn | None) -> BeatSignal:
     """Beat signal with every facet in 4^cuts pieces, (receivers, chirps, samples)."""
     if not scene.scene.there(time_s):
         return scene.silence()
@@ -102,7 +103,7 @@ def _cut(scene: WaveScene, time_s: float, cuts: int, go_on: GoOn | None) -> NDAr
         for receiver in range(shape[0]):
             if not cuts:
                 echoes = scene.echoes(position, velocity, visible, receiver)
-                total[receiver] = recurrent(echoes, scene.config, chirps).real
+                total[receiver] = scene.sampled(recurrent(echoes, scene.config, chirps))
                 continue
             shown = scene.faces if visible is None else scene.faces[visible]
             step = max(1, _FACETS_PER_STEP // 4**cuts)
@@ -114,6 +115,6 @@ def _cut(scene: WaveScene, time_s: float, cuts: int, go_on: GoOn | None) -> NDAr
                 motion = subdivided(velocity[some], cuts).reshape(-1, 3)
                 loose = np.arange(len(corners), dtype=np.int32).reshape(-1, 3)
                 echoes = scene.echoes(corners, motion, None, receiver, loose)
-                total[receiver] += recurrent(echoes, scene.config, chirps).real
+                total[receiver] += scene.sampled(recurrent(echoes, scene.config, chirps))
         rows.append(total)
     return np.concatenate(rows, axis=1)

@@ -18,6 +18,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.errors import Sd2Error
 from sd2core.fmcw.converter import check_converter, digitise, simulated_capture
 from sd2core.fmcw.options import SignalOptions
 from sd2core.fmcw.scene import MeshScene, Scatterers, point_scatterers
@@ -102,6 +103,8 @@ def capture_scene(
     """
     sensor, options = sensor or VirtualSensor(), options or SignalOptions()
     check_converter(config)
+    if config.sampling != "real":
+        raise Sd2Error(f"{config.name} samples I and Q", "a radar with real samples")
     frames = len(times_s)
     shape = (frames, config.receivers, config.chirps_per_frame, config.samples_per_chirp)
     signal = np.empty(shape)

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from sd2core.fmcw.converter import check_converter, digitise, simulated_capture, store
 from sd2core.fmcw.options import SignalOptions, WaveOptions
 from sd2core.fmcw.scene import FacetsSeen
-from sd2core.fmcw.wave import WaveScene
-from sd2core.io.radar.capture import RadarCapture
+from sd2core.fmcw.wave import BeatSignal, WaveScene
+from sd2core.io.radar.capture import RadarCapture, Signal
 from sd2core.mesh.presence import runs
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics.compiled import worker_count, workers
@@ -90,10 +90,11 @@ def simulate_radar(
     shape = (count, config.receivers, config.chirps_per_frame, config.samples_per_chirp)
     # The gain is known when the last frame is. Single precision rounds the strongest sample
     # by a 2^9th of a count of 16 bits.
-    signal = store(shape, np.float32, memory_bytes)
+    real = config.sampling == "real"
+    signal = store(shape, np.float32 if real else np.complex64, memory_bytes)
     there = np.array([scene.scene.there(time_s) for time_s in times_s.tolist()])
     power, peak = _fill(scene, times_s, scene.static(options.reflectors), signal, progress)
-    samples = store(shape, np.uint16, memory_bytes)
+    samples = store(shape, np.uint16 if real else np.complex64, memory_bytes)
     mean_power = float(power[there].mean()) if there.any() else 0.0
     levels = digitise(
         signal, peak, mean_power, config, options, samples, lambda: progress(count, count), start
@@ -118,8 +119,8 @@ def simulate_radar(
 def _fill(
     scene: WaveScene,
     times_s: NDArray[np.float64],
-    static: NDArray[np.float64],
-    signal: NDArray[np.float32],
+    static: BeatSignal,
+    signal: Signal,
     progress: Progress,
 ) -> tuple[NDArray[np.float64], float]:
     """Fill in the beat signals of all frames on worker threads; returns mean squares and peak.
@@ -137,7 +138,7 @@ def _fill(
     def fill(frame: int) -> None:
         go_on()
         found = scene.frame(float(times_s[frame]), go_on)
-        power[frame] = np.mean(np.square(found))
+        power[frame] = np.mean(np.square(np.abs(found)))
         found += static
         peak[frame] = np.abs(found).max()
         signal[frame] = found

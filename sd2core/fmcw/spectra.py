@@ -13,12 +13,11 @@ from sd2core.fmcw.chain import (
     FrameChain,
     ProcessingOptions,
     clutter_courses,
-    own_clutter_removed,
     taper,
 )
 from sd2core.fmcw.options import WaveOptions
 from sd2core.fmcw.processing import rebinning
-from sd2core.fmcw.wave import WaveScene
+from sd2core.fmcw.wave import BeatSignal, WaveScene
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics.compiled import workers
 from sd2core.radar_config import RadarConfig
@@ -71,10 +70,10 @@ def frame_spectra(
     times = np.asarray(times_s, dtype=np.float64)
     scene = WaveScene(mesh, config, sensor or VirtualSensor(), visibility, wave, seed)
 
-    def signal(time_s: float) -> NDArray[np.float64]:
+    def signal(time_s: float) -> BeatSignal:
         return scene.frame(time_s)
 
-    found: Iterable[NDArray[np.float64]]
+    found: Iterable[BeatSignal]
     found = map(signal, times.tolist()) if threads == 1 else workers().map(signal, times.tolist())
     return signal_spectra(np.stack(list(found)), config, axis=axis, processing=processing)
 
@@ -128,7 +127,7 @@ def _refuse_moving(options: ProcessingOptions) -> None:
 
 
 def signal_spectra(
-    signal: NDArray[np.float64],
+    signal: BeatSignal,
     config: RadarConfig,
     *,
     axis: VelocityAxis | None = None,
@@ -143,8 +142,9 @@ def signal_spectra(
     _refuse_moving(options)
     chain = FrameChain(config, options)
     # Brought to 1, or far echoes would be lost below the smallest float32.
-    scaled = (signal / (np.abs(signal).max() or 1.0)).astype(np.float32)
-    power = chain.power_over_doppler(own_clutter_removed(scaled, options.clutter))
+    single = np.complex64 if np.iscomplexobj(signal) else np.float32
+    scaled = (signal / (np.abs(signal).max() or 1.0)).astype(single)
+    power = chain.power_over_doppler(chain.without_own_clutter(scaled))
     weights = rebinning(config, axis or VelocityAxis(), chain.doppler_bins).astype(np.float32)
     columns: NDArray[np.float32] = weights @ power.T
     return columns

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,9 @@ from sd2core.sensor import VirtualSensor
 
 GoOn = Callable[[], None]
 """Called every few ten milliseconds; raises when the result is no longer wanted."""
+
+BeatSignal = NDArray[Any]
+"""Samples (receivers, chirps, samples): float64, or complex128 where a radar samples I and Q."""
 
 _NO_PLANE = np.array([0.0, 0.0, 0.0, 1.0])
 
@@ -53,7 +57,7 @@ class WaveScene:
             turns = np.random.default_rng([seed, 0, 1]).random(len(faces))
             self._random = np.exp(2j * np.pi * turns)
 
-    def frame(self, time_s: float, go_on: GoOn | None = None) -> NDArray[np.float64]:
+    def frame(self, time_s: float, go_on: GoOn | None = None) -> BeatSignal:
         """Beat signal of the frame around a time, (receivers, chirps, samples).
 
         Zero where there is no person.
@@ -67,10 +71,17 @@ class WaveScene:
         ]
         return rows[0] if len(rows) == 1 else np.concatenate(rows, axis=1)
 
-    def silence(self) -> NDArray[np.float64]:
+    def silence(self) -> BeatSignal:
         """Zero beat signal of a frame without echoes."""
-        config = self.config
-        return np.zeros((config.receivers, config.chirps_per_frame, config.samples_per_chirp))
+        return self._blank(self.config.chirps_per_frame)
+
+    def _blank(self, chirps: int) -> BeatSignal:
+        sampled = np.float64 if self.config.sampling == "real" else np.complex128
+        return np.zeros((len(self.paths), chirps, self.config.samples_per_chirp), sampled)
+
+    def sampled(self, total: NDArray[np.complex128]) -> BeatSignal:
+        """What the radar samples of a sum of phasors."""
+        return total.real if self.config.sampling == "real" else total
 
     def bursts(self, time_s: float) -> Iterator[tuple[tuple[NDArray[np.float64], ...], int]]:
         """Yield vertices and velocities, and the number of chirps of a frame that they hold for."""
@@ -103,13 +114,13 @@ class WaveScene:
         ]
         return parts[0] if len(parts) == 1 else _joined(parts)
 
-    def static(self, reflectors: tuple[Reflector, ...]) -> NDArray[np.float64]:
+    def static(self, reflectors: tuple[Reflector, ...]) -> BeatSignal:
         """Beat signal of static points, (receivers, chirps, samples)."""
         found = self.silence()
         if reflectors:
             for receiver, pairs in enumerate(self.paths):
                 parts = [self._points(reflectors, out, back) for out, back in pairs]
-                found[receiver] = direct(_joined(parts), self.config).real
+                found[receiver] = self.sampled(direct(_joined(parts), self.config))
         return found
 
     def _signal(
@@ -119,8 +130,8 @@ class WaveScene:
         visible: NDArray[np.bool_] | None,
         chirps: int,
         go_on: GoOn | None,
-    ) -> NDArray[np.float64]:
-        signal = np.empty((len(self.paths), chirps, self.config.samples_per_chirp))
+    ) -> BeatSignal:
+        signal = self._blank(chirps)
         for receiver in range(len(self.paths)):
             if go_on is not None:
                 go_on()
@@ -129,7 +140,7 @@ class WaveScene:
                 total = direct(echoes, self.config, chirps, go_on)
             else:
                 total = nufft(echoes, self.config, self.wave.blocks, chirps)
-            signal[receiver] = total.real
+            signal[receiver] = self.sampled(total)
         return signal
 
     def _facets(

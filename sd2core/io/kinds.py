@@ -18,6 +18,7 @@ DATASET_FORMAT = "sd2-dataset"
 
 VIDEO_SUFFIXES = frozenset({".mp4", ".mkv", ".mov", ".avi", ".webm", ".m4v", ".mpg", ".ts", ".wmv"})
 RADAR_MAP_SUFFIXES = frozenset({".h5", ".hdf5"})
+RADAR_SUFFIXES = frozenset({".npy", ".bin", ".sigmf-meta", ".sigmf-data"}) | RADAR_MAP_SUFFIXES
 MESH_SUFFIXES = frozenset({".obj", ".ply", ".glb", ".pkl", ".pickle", ".joblib"})
 
 
@@ -40,7 +41,7 @@ def kind_of(path: Path) -> Kind:
         return "video"
     if suffix in MESH_SUFFIXES or path.name.endswith(".zarr.zip"):
         return "mesh"
-    if suffix == ".npy" or suffix in RADAR_MAP_SUFFIXES:
+    if suffix in RADAR_SUFFIXES:
         return "radar"
     if suffix == ".safetensors":
         return "model"
@@ -49,7 +50,8 @@ def kind_of(path: Path) -> Kind:
     raise Sd2Error(
         f"{path} is of no kind that is known",
         "a recording (.sd2), a video (.mp4, .mkv …), a mesh (.npz, .zarr, .obj, .ply, .glb, .pkl)"
-        " or a radar capture (a folder with radar.npy, or the .h5 of a K60168A)",
+        " or a radar capture (a folder with radar.npy, the .h5 of a K60168A or an A121, the .bin of"
+        " a DCA1000, or samples with a description: .npy, .h5, .sigmf-meta)",
     )
 
 
@@ -84,8 +86,11 @@ def _kind_of_folder(folder: Path) -> Kind:
         return "mesh"
     if (folder / "radar.npy").exists() or any(folder.glob("*/radar.npy")):
         return "radar"
-    if any(entry.suffix.lower() in MESH_SUFFIXES for entry in folder.iterdir()):
+    suffixes = {entry.suffix.lower() for entry in folder.iterdir()}
+    if suffixes & MESH_SUFFIXES:
         return "mesh"
+    if ".bin" in suffixes and suffixes & {".cfg", ".json"}:
+        return "radar"
     raise Sd2Error(
         f"The folder {folder} holds nothing that is known",
         "recording.json, zarr.json, radar.npy, or .obj/.ply/.glb files",

@@ -559,6 +559,8 @@ def _copied(
     files: dict[Role, Path], folder: Path, made: list[Path], progress: Progress
 ) -> dict[Role, Path]:
     """Copy what lies outside ``folder`` into it; ``made`` lists the copies, for undoing."""
+    from sd2core.io.radar import companions
+
     inside: dict[Role, Path] = {}
     for done, (role, source) in enumerate(files.items()):
         progress(done, len(files))
@@ -569,17 +571,24 @@ def _copied(
         if source.is_relative_to(folder):
             inside[role] = source
             continue
-        target = free_path(folder, source.name, role, reserved=FILE_NAME)
+        beside = companions(source) if role == "radar" else []
+        # Files that belong together keep their names, in a folder of their own.
+        name = source.stem if beside else source.name
+        target = free_path(folder, name, role, reserved=FILE_NAME)
         temporary = Path(tempfile.mkdtemp(prefix=".copy-", dir=folder))
         made.append(temporary)
         with full_disk_named(target):
             if source.is_dir():
                 shutil.copytree(source, temporary / target.name)
+            elif beside:
+                (temporary / target.name).mkdir()
+                for one in (source, *beside):
+                    shutil.copy2(one, temporary / target.name / one.name)
             else:
                 shutil.copy2(source, temporary / target.name)
         (temporary / target.name).rename(target)
         made.append(target)
         temporary.rmdir()
-        inside[role] = target
+        inside[role] = target / source.name if beside else target
     progress(len(files), len(files))
     return inside

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import pickle
 from pathlib import Path
 
+import h5py
 import joblib
 import numpy as np
 import trimesh
@@ -17,10 +19,12 @@ from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.sources import pair_sources
 from sd2core.datasets.writing import write_dataset
 from sd2core.denoise.files import load_model, save_model
+from sd2core.fmcw import doppler_map
 from sd2core.imu.files import read_signals, write_signals
 from sd2core.imu.signals import InertialSignals
 from sd2core.io.mesh import load_mesh, save_mesh
-from sd2core.io.radar import load_recorded_map
+from sd2core.io.radar import load_capture, load_recorded_map
+from sd2core.io.radar.described import RadarDescription, write_description
 from sd2core.maps import DopplerMap
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.pairs.store import read_pairs
@@ -28,6 +32,8 @@ from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 from tests.core.classify.classifiers import classifier
 from tests.core.denoise.denoisers import trained
+from tests.core.io.radar.acconeer_files import write_a121
+from tests.core.io.radar.dca1000_files import TiRecording, write_ti
 from tests.core.io.radar.kkt_files import write_kkt
 from tests.mutants.target import Target
 from tests.small_pairs import write_pairs
@@ -57,6 +63,50 @@ def _person() -> dict[object, object]:
     mesh = _mesh(12)
     person = {"verts": list(mesh.vertices[:]), "frame_ids": list(range(12))}
     return {1: person, 2: {**person, "frame_ids": np.arange(12)}, "fps": 30.0}
+
+
+def _read_capture(path: Path) -> None:
+    doppler_map(load_capture(path))
+
+
+def _write_dca1000(path: Path) -> None:
+    write_ti(path, TiRecording(transmitters=2), parts=2, studio=True)
+
+
+_RADAR = RadarDescription(
+    axes=("frame", "receiver", "chirp", "sample"),
+    carrier_hz=24e9,
+    bandwidth_hz=2e8,
+    sample_rate_hz=1e6,
+    chirp_repetition_s=5e-4,
+    frame_repetition_s=0.05,
+    full_scale=2048.0,
+)
+
+
+def _write_own(path: Path) -> None:
+    path.mkdir()
+    values = np.random.default_rng(1).integers(-2048, 2048, (5, 2, 16, 20)).astype(np.int16)
+    np.save(path / "radar.npy", values)
+    write_description(_RADAR, path / "radar.npy")
+
+
+def _write_own_hdf5(path: Path) -> None:
+    path.mkdir()
+    values = np.random.default_rng(1).standard_normal((5, 2, 16, 20)).astype(np.complex64)
+    with h5py.File(path / "radar.h5", "w") as file:
+        file.create_dataset("adc", data=values, chunks=(2, 2, 16, 20), compression="gzip")
+    write_description(_RADAR, path / "radar.h5")
+
+
+def _write_sigmf(path: Path) -> None:
+    path.mkdir()
+    meta = {"global": {"core:datatype": "ci16_le"}, "captures": [{"core:frequency": 5.8e9}]}
+    (path / "radar.sigmf-meta").write_text(json.dumps(meta))
+    np.arange(1600, dtype="<i2").tofile(path / "radar.sigmf-data")
+    stream = {"axes": ("stream",), "bandwidth_hz": 0.0, "samples_per_chirp": 5}
+    times = {"chirps_per_frame": 16, "chirp_repetition_s": None, "frame_repetition_s": None}
+    write_description(_RADAR.model_copy(update=stream | times), path / "radar.sigmf-meta")
 
 
 def _write_surface(path: Path) -> None:
@@ -121,4 +171,10 @@ TARGETS = [
         "gestures.safetensors", lambda path: save_classifier(path, classifier()), load_classifier
     ),
     Target("radar.h5", write_kkt, load_recorded_map),
+    Target("a121.h5", write_a121, _read_capture),
+    Target("dca1000", _write_dca1000, _read_capture),
+    Target("own", _write_own, _read_capture),
+    Target("hdf5", _write_own_hdf5, lambda path: _read_capture(path / "radar.h5")),
+    Target("sdk", lambda path: write_ti(path, TiRecording(lanes=4)), _read_capture),
+    Target("sigmf", _write_sigmf, lambda path: _read_capture(path / "radar.sigmf-meta")),
 ]

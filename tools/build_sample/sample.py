@@ -108,7 +108,7 @@ def _fill(folder: Path, times_s: NDArray[np.float64], progress: Progress) -> Non
     )
     write_capture(
         folder / "radar",
-        capture.samples,
+        capture.samples[:],
         capture.config,
         capture.timebase.times_s,
         simulated=True,

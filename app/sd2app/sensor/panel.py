@@ -15,7 +15,7 @@ from sd2app.session.session import Session
 from sd2app.widgets.inputs import Choice, NumberBox
 from sd2app.widgets.layouts import STRETCH, column_of, form_of, pane, row_of
 from sd2app.widgets.panel import outlined, rule, sentence, show_words, title
-from sd2core.radar_config import RadarConfig
+from sd2core.radar_config import RadarConfig, range_in_words
 from sd2core.sensor import aimed_at, position_from_spherical, spherical_from_position
 
 _CLUTTER_TEXT = {
@@ -34,8 +34,8 @@ _LIMITS: dict[str, tuple[str, Callable[[RadarConfig], str]]] = {
         lambda radar: f"±{radar.v_max_mps:.2f} m/s",
     ),
     "Δv": ("Velocity resolution", lambda radar: f"{radar.velocity_resolution_mps:.3f} m/s"),
-    "ΔR": ("Range resolution, c / 2 B", lambda radar: f"{radar.range_resolution_m:.2f} m"),
-    "R max": ("Largest unambiguous range", lambda radar: f"{radar.range_max_m:.1f} m"),
+    "ΔR": ("Range resolution, c / 2 B", lambda radar: range_in_words(radar.range_resolution_m, 2)),
+    "R max": ("Largest unambiguous range", lambda radar: range_in_words(radar.range_max_m)),
 }
 """Limits of a radar: their meaning and value."""
 

@@ -8,9 +8,9 @@ from PySide6.QtWidgets import QDialog, QFileDialog, QWidget
 
 from sd2app.fit.request import REQUEST_NAME
 from sd2core.errors import Sd2Error
-from sd2core.io.kinds import MESH_SUFFIXES, RADAR_MAP_SUFFIXES, VIDEO_SUFFIXES, kind_of
+from sd2core.io.kinds import MESH_SUFFIXES, RADAR_SUFFIXES, VIDEO_SUFFIXES, kind_of
 
-_SUFFIXES = sorted(VIDEO_SUFFIXES | MESH_SUFFIXES | RADAR_MAP_SUFFIXES | {".npz", ".npy", ".zip"})
+_SUFFIXES = sorted(VIDEO_SUFFIXES | MESH_SUFFIXES | RADAR_SUFFIXES | {".npz", ".zip"})
 _FILES = (
     f"Recordings, videos, meshes, radar ({' '.join(f'*{one}' for one in _SUFFIXES)}"
     " recording.json);;All files (*)"

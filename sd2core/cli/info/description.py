@@ -197,6 +197,9 @@ def describe_capture(path: Path, capture: RadarCapture) -> Description:
         "simulated": capture.simulated,
         "radar": config.name,
         "receivers": config.receivers,
+        "transmitters": config.transmitters,
+        "sampling": config.sampling,
+        "carrier_hz": config.centre_frequency_hz,
         "chirps_per_frame": config.chirps_per_frame,
         "samples_per_chirp": config.samples_per_chirp,
         **limits(config),
@@ -206,8 +209,9 @@ def describe_capture(path: Path, capture: RadarCapture) -> Description:
     }
     facts = {
         "radar": config.name + (" (simulated)" if capture.simulated else ""),
-        "samples": f"{config.samples_per_chirp} per chirp,"
-        f" {config.chirps_per_frame} chirps per frame, receivers: {config.receivers}",
+        "samples": f"{config.samples_per_chirp} {'' if config.sampling == 'real' else 'complex '}"
+        f"per chirp, {config.chirps_per_frame} chirps per frame, receivers: {config.receivers}"
+        + (f", transmitters: {config.transmitters}" if config.transmitters > 1 else ""),
         "time": _clock(capture.timebase),
         **limit_facts(config),
     }
@@ -233,6 +237,7 @@ def describe_map(path: Path, doppler: DopplerMap) -> Description:
     }
     facts = {
         "kind": doppler.kind,
+        "carrier": "" if doppler.carrier_hz is None else f"{doppler.carrier_hz / 1e9:.4g} GHz",
         "velocity": axis_in_words(doppler.axis),
         "time": _clock(doppler.timebase),
         "no person": _gaps(doppler.present, doppler.timebase),
@@ -293,12 +298,18 @@ def _synthesis_facts(provenance: dict[str, Any]) -> dict[str, str]:
 
 def limit_facts(config: RadarConfig) -> dict[str, str]:
     """Limits that follow from a radar's configuration, for people."""
+    reach = (
+        "none: a continuous wave tells no ranges apart"
+        if config.is_continuous
+        else f"up to R_max {config.range_max_m:.2f} m,"
+        f" in steps ΔR of {config.range_resolution_m:.3f} m"
+    )
     return {
-        "wavelength λ": f"{config.wavelength_m * 1e3:.3f} mm",
+        "wavelength λ": f"{config.wavelength_m * 1e3:.3f} mm,"
+        f" at {config.centre_frequency_hz / 1e9:.4g} GHz",
         "radar velocity": f"up to v_max ±{config.v_max_mps:.3f} m/s,"
         f" in steps Δv of {config.velocity_resolution_mps:.3f} m/s",
-        "radar range": f"up to R_max {config.range_max_m:.2f} m,"
-        f" in steps ΔR of {config.range_resolution_m:.3f} m",
+        "radar range": reach,
     }
 
 

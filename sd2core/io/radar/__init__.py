@@ -2,12 +2,26 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 from sd2core.errors import Sd2Error
+from sd2core.files.hdf5_files import open_hdf5_file
 from sd2core.io.kinds import RADAR_MAP_SUFFIXES
+from sd2core.io.radar import dca1000
+from sd2core.io.radar.acconeer import is_acconeer, load_acconeer
 from sd2core.io.radar.capture import RadarCapture
+from sd2core.io.radar.described import (
+    DATA_NAME,
+    description_of,
+    is_describable,
+    is_described,
+    load_described,
+    write_described,
+)
 from sd2core.io.radar.infineon import (
+    INFINEON_FILES,
     check_replaceable,
     find_recording,
     load_infineon,
@@ -15,7 +29,9 @@ from sd2core.io.radar.infineon import (
     write_capture,
 )
 from sd2core.io.radar.kkt import RecordedMap, load_kkt
-from sd2core.radar_config import PAPER_RADAR, RadarConfig
+from sd2core.io.radar.sigmf import DATA, META
+from sd2core.radar_config import RadarConfig
+from sd2core.radar_profiles import PAPER, RADARS
 
 __all__ = [
     "PAPER",
@@ -23,20 +39,20 @@ __all__ = [
     "RadarCapture",
     "RecordedMap",
     "check_replaceable",
+    "companions",
     "holds_map",
     "load_capture",
     "load_recorded_map",
     "named_radar",
     "read_radar_config",
     "write_capture",
+    "write_described",
 ]
-
-PAPER = "paper"
-"""Name of the paper's radar."""
 
 SUPPORTED = (
     "an Infineon recording: the folder with radar.npy, config.json and radar_timestamp.csv"
-    " (or the folder above it, or its radar.npy)"
+    " (or the folder above it, or its radar.npy); an A121's .h5; a DCA1000's .bin with the .cfg or"
+    " .json of the radar; or .npy, .h5 or SigMF samples with a description (docs/radar-files.md)"
 )
 
 
@@ -64,23 +80,72 @@ def load_capture(path: Path | str) -> RadarCapture:
     path = Path(path).expanduser()
     if not path.exists():
         raise Sd2Error(f"{path} does not exist", SUPPORTED, "Check the path")
+    for one in (path, path / DATA_NAME):
+        if is_described(one):
+            return load_described(one)
+    if _is_acconeer(path):
+        return load_acconeer(path)
     if holds_map(path):
         raise Sd2Error(
             f"{path} holds maps of a radar and no raw samples",
             SUPPORTED,
             "Open it in the window, or write its map with `sd2 radar FILE --out map.npz`",
         )
+    if path.suffix.lower() == dca1000.SUFFIX:
+        return dca1000.load_dca1000(path)
     folder = find_recording(path)
-    if folder is None:
-        holds = sorted(entry.name for entry in path.iterdir())[:6] if path.is_dir() else []
-        found = f"; it holds {', '.join(holds) or 'nothing'}" if path.is_dir() else ""
-        raise Sd2Error(f"{path} is not a radar recording that can be read{found}", SUPPORTED)
-    return load_infineon(folder)
+    if folder is not None:
+        return load_infineon(folder)
+    if path.is_dir() and any(one.suffix.lower() == dca1000.SUFFIX for one in path.iterdir()):
+        return dca1000.load_dca1000(path)
+    if path.is_file() and is_describable(path):
+        raise Sd2Error(
+            f"{path} does not say what radar it is from",
+            f"its description, {description_of(path).name}, beside it",
+            f"Write it with `sd2 radar describe {path.name}`",
+        )
+    holds = sorted(entry.name for entry in path.iterdir())[:6] if path.is_dir() else []
+    found = f"; it holds {', '.join(holds) or 'nothing'}" if path.is_dir() else ""
+    raise Sd2Error(f"{path} is not a radar recording that can be read{found}", SUPPORTED)
+
+
+def companions(path: Path) -> list[Path]:
+    """Other files that belong to a radar file and lie beside it, as far as they are there."""
+    found: list[Path] = []
+    if path.is_dir():
+        return found
+    if is_described(path):
+        found.append(description_of(path))
+    if path.suffix.lower() in (META, DATA):
+        found += [path.with_suffix(suffix) for suffix in (META, DATA)]
+    elif path.suffix.lower() == dca1000.SUFFIX:
+        with suppress(Sd2Error):
+            found += dca1000.parts_of(path)
+            found.append(dca1000.setup_of(path))
+    elif path.suffix == ".npy" and not found:
+        found += [path.with_name(name) for name in INFINEON_FILES]
+    return [one for one in dict.fromkeys(found) if one != path and one.is_file()]
 
 
 def holds_map(path: Path | str) -> bool:
-    """True if a radar recording, by its name, holds maps: read it by `load_recorded_map`."""
-    return Path(path).suffix.lower() in RADAR_MAP_SUFFIXES
+    """True if a radar recording holds maps: read it by `load_recorded_map`.
+
+    That is so of HDF5 files which are no capture; a file that is not there goes by its name.
+    """
+    path = Path(path).expanduser()
+    if path.suffix.lower() not in RADAR_MAP_SUFFIXES:
+        return False
+    return not (is_described(path) or _is_acconeer(path))
+
+
+def _is_acconeer(path: Path) -> bool:
+    if path.suffix.lower() not in RADAR_MAP_SUFFIXES or not path.is_file():
+        return False
+    try:
+        with open_hdf5_file(path, SUPPORTED) as file:
+            return is_acconeer(file)
+    except Exception:  # a damaged file fails in many ways, again where it is read
+        return False
 
 
 def load_recorded_map(path: Path | str) -> RecordedMap:
@@ -92,8 +157,23 @@ def load_recorded_map(path: Path | str) -> RecordedMap:
 
 
 def named_radar(name: str) -> RadarConfig:
-    """Radar by its name: ``paper``, or the path of a capture's ``config.json``.
+    """Radar to simulate, by its name or a file.
 
-    Raises Sd2Error if there is no such file, or it describes no possible radar.
+    Names are those of :data:`~sd2core.radar_profiles.RADARS`; a file is a capture's
+    ``config.json``, of which one transmitter is simulated. Raises Sd2Error if there is no such
+    file, or it describes no possible radar.
+
+    Examples
+    --------
+    >>> from sd2core.io.radar import named_radar
+    >>> named_radar("iwr6843").sampling
+    'complex'
     """
-    return PAPER_RADAR if name == PAPER else read_radar_config(Path(name))
+    if name in RADARS:
+        return RADARS[name]
+    path = Path(name)
+    if not path.exists() and not path.suffix:
+        raise Sd2Error(
+            f"There is no radar {name!r}", f"{', '.join(RADARS)}, or a capture's config.json"
+        )
+    return replace(read_radar_config(path), transmitters=1)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,15 +13,65 @@ from sd2core.errors import Sd2Error
 from sd2core.radar_config import RadarConfig
 from sd2core.timebase import Timebase
 
+Signal = NDArray[Any]
+"""Samples relative to full scale, float32 or complex64 (frames, channels, chirps, samples)."""
+
+_LARGEST = 1e9
+"""What is larger, or infinite, is no sample in any unit."""
+
+
+class Samples(Protocol):
+    """Array that is read by frames, which may lie in files."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(frames, channels, chirps, samples)."""
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """Type of what is read: uint16 counts around mid-scale, or float32 or complex64."""
+
+    def __getitem__(self, frames: slice) -> NDArray[Any]:
+        """Read some frames."""
+
+
+@dataclass(frozen=True, eq=False)
+class LazySamples:
+    """Samples that a function reads, and brings into this shape and type, some frames at a time."""
+
+    shape: tuple[int, ...]
+    dtype: np.dtype[Any]
+    read: Callable[[slice], NDArray[Any]]
+
+    def __getitem__(self, frames: slice) -> NDArray[Any]:
+        return self.read(frames)
+
+
+def by_transmitter(samples: Samples, transmitters: int) -> LazySamples:
+    """Channels of each transmitter, of chirps that transmitters send in turns.
+
+    From (frames, receivers, chirps of all, samples) to (frames, channels, chirps of one, samples).
+    """
+    frames, receivers, chirps, length = samples.shape
+    each = chirps // transmitters
+
+    def read(some: slice) -> NDArray[Any]:
+        turns = np.asarray(samples[some]).reshape(-1, receivers, each, transmitters, length)
+        return turns.transpose(0, 3, 1, 2, 4).reshape(-1, transmitters * receivers, each, length)
+
+    return LazySamples((frames, transmitters * receivers, each, length), samples.dtype, read)
+
 
 @dataclass(frozen=True, eq=False)
 class RadarCapture:
-    """Raw samples of an FMCW radar with what is needed to read them.
+    """Raw samples of a radar with what is needed to read them.
 
     Parameters
     ----------
-    samples : uint16 array, shape (frames, receivers, chirps, samples)
-        Converter counts around mid-scale; may be a memory map.
+    samples : array of uint16, float32 or complex64, shape (frames, channels, chirps, samples)
+        Converter counts around mid-scale, or samples relative to full scale, whose phase grows
+        with the distance; may be a memory map or read as needed. Channels are the receivers of
+        the first transmitter, those of the second, and so on.
     config : RadarConfig
     timebase : Timebase
         One time per frame, the first at 0 s. A frame is the burst of
@@ -35,6 +86,8 @@ class RadarCapture:
         What the reader found odd and wants the user to know.
     meta : dict
         The recording's own description; holds the truth of a simulated one.
+    full_scale_known : bool
+        False where samples are in a unit of their own, so that nothing is known of clipping.
 
     Examples
     --------
@@ -49,7 +102,7 @@ class RadarCapture:
     0.0
     """
 
-    samples: NDArray[np.uint16]
+    samples: Samples
     config: RadarConfig
     timebase: Timebase
     start_unix_s: float | None = None
@@ -57,9 +110,10 @@ class RadarCapture:
     source: str = ""
     notes: tuple[str, ...] = ()
     meta: dict[str, Any] = field(default_factory=dict)
+    full_scale_known: bool = True
 
     def __post_init__(self) -> None:
-        check_cube(self.samples, self.config, self.source)
+        _check_samples(self.samples, self.config, self.source)
         frames = self.samples.shape[0]
         if len(self.timebase) != frames:
             raise Sd2Error(
@@ -93,21 +147,64 @@ class RadarCapture:
                     )
         return present
 
-    def read(self, start: int, stop: int) -> NDArray[np.float32]:
+    def channel(self, receiver: int | None = None, transmitter: int | None = None) -> RadarCapture:
+        """One receiver or one transmitter, or one of each, by their numbers from 1 on.
+
+        Without a number it is the capture itself. Raises Sd2Error if there is none of this number.
+        """
+        if receiver is None and transmitter is None:
+            return self
+        config = self.config
+        parts = []
+        for name, number, there in (
+            ("transmitter", transmitter, config.transmitters),
+            ("receiver", receiver, config.receivers),
+        ):
+            if number is not None and not 1 <= number <= there:
+                raise Sd2Error(
+                    f"{name.capitalize()} {number} of {self.source or 'a capture'} is asked for",
+                    f"1 to {there}" if there > 1 else f"1: there is one {name}",
+                )
+            parts.append(np.arange(there) if number is None else np.array([number - 1]))
+        kept = (parts[0][:, None] * config.receivers + parts[1]).ravel()
+        samples = self.samples
+        shape = (samples.shape[0], len(kept), *samples.shape[2:])
+        return replace(
+            self,
+            samples=LazySamples(shape, samples.dtype, lambda some: samples[some][:, kept]),
+            config=replace(config, transmitters=len(parts[0]), receivers=len(parts[1])),
+            notes=(
+                *self.notes,
+                *(f"Transmitter {n} only." for n in (transmitter,) if n is not None),
+                *(f"Receiver {n} only." for n in (receiver,) if n is not None),
+            ),
+        )
+
+    def read(self, start: int, stop: int) -> Signal:
         """Frames ``start`` to ``stop`` (exclusive) relative to full scale.
 
         Returns
         -------
-        float32 array, shape (n, receivers, chirps, samples)
+        float32 or complex64 array, shape (n, channels, chirps, samples)
             Mid-scale is 0, the ends of the converter's range are -1 and (nearly) 1.
 
         Raises
         ------
         Sd2Error
-            When a count is larger than the converter can give.
+            When a count is larger than the converter can give, or a sample is not finite.
         """
         if not 0 <= start < stop <= self.frame_count:
             raise IndexError(f"frames {start} to {stop} of {self.frame_count}")
+        if self.samples.dtype.kind != "u":
+            signal: Signal = np.array(self.samples[start:stop], self.samples.dtype, order="C")
+            if not (np.abs(signal.view(np.float32)) < _LARGEST).all():
+                raise Sd2Error(
+                    f"{self.source or 'The radar cube'} holds a sample that is no finite number, or"
+                    f" larger than {_LARGEST:g}, in frames {start} to {stop - 1}",
+                    "finite samples",
+                    "Copy it again, or write it again",
+                )
+            return signal
         half = np.float32(2.0 ** (self.config.adc_bits - 1))
         raw = np.asarray(self.samples[start:stop])
         top = int(raw.max())
@@ -125,20 +222,39 @@ class RadarCapture:
         return counts
 
 
-def check_cube(samples: NDArray[np.uint16], config: RadarConfig, source: str) -> None:
-    """Raise Sd2Error for samples whose shape or type contradicts the configuration."""
-    shape = tuple(samples.shape)
-    cube = (config.receivers, config.chirps_per_frame, config.samples_per_chirp)
-    if len(shape) != 4 or shape[0] == 0 or shape[1:] != cube:
-        raise Sd2Error(
-            f"{source or 'The radar cube'} has shape {shape}",
-            f"(frames, {cube[0]} receivers, {cube[1]} chirps, {cube[2]} samples) as the"
-            " configuration says, at least one frame",
-            "Use the config.json that was recorded with this radar.npy",
-        )
+def check_cube(samples: Samples, config: RadarConfig, source: str) -> None:
+    """Raise Sd2Error for converter counts whose shape or type contradicts the configuration."""
+    _check_shape(samples, config, source)
     if samples.dtype.kind != "u" or samples.dtype.itemsize != 2:
         raise Sd2Error(
             f"{source or 'The radar cube'} holds {samples.dtype}",
             "uint16 converter counts",
             "Use the raw radar.npy of the recording, not a processed copy",
+        )
+
+
+def _check_samples(samples: Samples, config: RadarConfig, source: str) -> None:
+    if samples.dtype.kind not in "fc":
+        check_cube(samples, config, source)
+        is_real = True
+    else:
+        _check_shape(samples, config, source)
+        is_real = samples.dtype == np.float32
+    if is_real != (config.sampling == "real"):
+        raise Sd2Error(
+            f"{source or 'The radar cube'} holds {samples.dtype}",
+            f"{config.sampling} samples, as the configuration says",
+        )
+
+
+def _check_shape(samples: Samples, config: RadarConfig, source: str) -> None:
+    shape = tuple(samples.shape)
+    cube = (config.channels, config.chirps_per_frame, config.samples_per_chirp)
+    if len(shape) != 4 or shape[0] == 0 or shape[1:] != cube:
+        times = f" of {config.transmitters} transmitters" if config.transmitters > 1 else ""
+        raise Sd2Error(
+            f"{source or 'The radar cube'} has shape {shape}",
+            f"(frames, {config.receivers} receivers{times}, {cube[1]} chirps, {cube[2]} samples)"
+            " as the configuration says, at least one frame",
+            "Use the config.json that was recorded with this radar.npy",
         )

@@ -2,7 +2,8 @@
 
 A recording is a folder, usually called ``RadarIfxAvian_00``::
 
-    radar.npy            uint16 (frames, receivers, chirps, samples)
+    radar.npy            uint16 (frames, receivers, chirps, samples); of transmitters in turns,
+                         their chirps one after the other, or as many channels as pairs
     config.json          device_config.fmcw_single_shape
     radar_timestamp.csv  one unix time per frame, as the host received it
     meta.json            optional: adc_resolution, description; "simulated": true
@@ -11,6 +12,7 @@ A recording is a folder, usually called ``RadarIfxAvian_00``::
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +24,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_folder, atomic_write, atomic_write_text
 from sd2core.files.limits import check_regular, open_regular
 from sd2core.files.texts import errors_in, lines_of, read_json
-from sd2core.io.radar.capture import RadarCapture, check_cube
+from sd2core.io.radar.capture import RadarCapture, Samples, by_transmitter, check_cube
 from sd2core.radar_config import RadarConfig
 from sd2core.timebase import Timebase
 
@@ -30,6 +32,8 @@ ADC_BITS = 12
 """Resolution of every converter of this family, used when meta.json is silent."""
 
 _DATA, _CONFIG, _TIMES, _META = "radar.npy", "config.json", "radar_timestamp.csv", "meta.json"
+INFINEON_FILES = (_CONFIG, _TIMES, _META)
+"""What lies beside the samples."""
 _FIRST_PLAUSIBLE_UNIX_S = 1e8
 """Smaller start times are seconds since the start, not a date."""
 _LAST_PLAUSIBLE_UNIX_S = 1e11
@@ -99,9 +103,10 @@ def load_infineon(folder: Path) -> RadarCapture:
     """
     meta = _read_meta(folder / _META)
     config = _read_config(folder / _CONFIG, meta)
-    samples = _open_samples(folder / _DATA)
+    counts = _open_samples(folder / _DATA)
+    samples, config, about_turns = _in_turns(counts, config, folder)
     check_cube(samples, config, str(folder / _DATA))
-    timebase, start_unix_s, notes = _read_times(folder / _TIMES, len(samples), config)
+    timebase, start_unix_s, notes = _read_times(folder / _TIMES, len(counts), config)
     capture = RadarCapture(
         samples=samples,
         config=config,
@@ -109,7 +114,7 @@ def load_infineon(folder: Path) -> RadarCapture:
         start_unix_s=start_unix_s,
         simulated=meta.simulated,
         source=str(folder / _DATA),
-        notes=notes,
+        notes=(*about_turns, *notes),
         meta=meta.model_dump(),
     )
     capture.read(0, 1)  # refuses counts beyond the converter
@@ -247,26 +252,59 @@ def _read_config(path: Path, meta: _Meta) -> RadarConfig:
     except ValidationError as error:
         raise _explain(path, error) from error
     mode = (shape.mimo_mode or "off").lower()
-    if mode != "off" or len(shape.tx_antennas) > 1:
+    # Without MIMO, several transmitters send together, as one.
+    transmitters = len(shape.tx_antennas) if mode == "tdm" else 1
+    if mode not in ("off", "tdm") or transmitters < 1:
         raise Sd2Error(
-            f"{path}: mimo_mode is {mode!r} with {len(shape.tx_antennas)} transmitters. Chirps of"
-            " several transmitters take turns, so that velocities would come out wrong",
-            "a recording with one transmitter, mimo_mode 'off'",
-            "Record again with one transmitter, or keep the chirps of one and its repetition time",
+            f"{path}: mimo_mode is {mode!r} with {len(shape.tx_antennas)} transmitters",
+            "mimo_mode 'off', or 'tdm' with the transmitters that take turns",
+            "Record again with one transmitter",
+        )
+    if shape.num_chirps_per_frame % transmitters:
+        raise Sd2Error(
+            f"{path}: {shape.num_chirps_per_frame} chirps per frame of {transmitters} transmitters"
+            " in turns",
+            f"a multiple of {transmitters}",
+            "Use the file that was recorded with this radar.npy",
         )
     with errors_in(path):
         return RadarConfig(
             start_frequency_hz=shape.start_frequency_Hz,
             end_frequency_hz=shape.end_frequency_Hz,
             samples_per_chirp=shape.num_samples_per_chirp,
-            chirps_per_frame=shape.num_chirps_per_frame,
-            chirp_repetition_s=shape.chirp_repetition_time_s,
+            chirps_per_frame=shape.num_chirps_per_frame // transmitters,
+            chirp_repetition_s=shape.chirp_repetition_time_s * transmitters,
             frame_repetition_s=shape.frame_repetition_time_s,
             sample_rate_hz=shape.sample_rate_Hz,
             receivers=len(shape.rx_antennas),
             adc_bits=meta.adc_resolution,
             name=meta.description,
+            transmitters=transmitters,
         )
+
+
+def _in_turns(
+    counts: NDArray[np.uint16], config: RadarConfig, folder: Path
+) -> tuple[Samples, RadarConfig, tuple[str, ...]]:
+    """Channels of transmitters that take turns, by the shape of the file; what was assumed."""
+    turns = config.transmitters
+    if turns == 1:
+        return counts, config, ()
+    stated = turns * config.chirps_per_frame
+    assumed = (
+        f"{turns} transmitters take turns, chirp by chirp: each sends every"
+        f" {1e6 * config.chirp_repetition_s:.1f} µs, which divides v_max by {turns}."
+    )
+    shape = (config.receivers, stated, config.samples_per_chirp)
+    if counts.shape[1:] == shape:
+        return by_transmitter(counts, turns), config, (assumed,)
+    # A frame may also hold as many chirps of each.
+    with errors_in(folder / _CONFIG):
+        config = replace(config, chirps_per_frame=stated)
+    if counts.shape[1:] == (config.receivers, turns * stated, config.samples_per_chirp):
+        return by_transmitter(counts, turns), config, (assumed,)
+    order = "Channels are assumed to be the receivers of one transmitter, then those of the next."
+    return counts, config, (assumed, order)
 
 
 def _open_samples(path: Path) -> NDArray[np.uint16]:

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.rotations import Floats
-from sd2core.fmcw.chain import FrameChain, ProcessingOptions, own_clutter_removed
+from sd2core.fmcw.chain import FrameChain, ProcessingOptions
 from sd2core.fmcw.kernels import facet_echoes
 from sd2core.fmcw.link import LinkBudget
 from sd2core.fmcw.options import Reflector
@@ -103,7 +103,7 @@ def _power(
     samples: NDArray[np.float32], chain: FrameChain, weights: NDArray[np.float32]
 ) -> NDArray[np.float32]:
     """Power of samples (n, looks, chirps, samples), summed over looks, (n, bins)."""
-    power = chain.power_over_doppler(own_clutter_removed(samples, PROCESSING.clutter))
+    power = chain.power_over_doppler(chain.without_own_clutter(samples))
     return np.asarray(power @ weights.T)
 
 

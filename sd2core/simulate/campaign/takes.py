@@ -74,7 +74,7 @@ class Campaign:
             "simulated": True,
             "seed": self.seed,
             "take_seconds": self.take_seconds,
-            "radar": asdict(self.radar),
+            "radar": self.radar.as_dict(),
             "target": {**asdict(self.target), "clutter": PROCESSING.clutter},
             "surfaces": {"synthetic": FITTED, "radar": TRUE},
             "synthesis": asdict(OPTIONS),

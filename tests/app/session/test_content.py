@@ -8,7 +8,12 @@ from hypothesis import strategies as st
 
 from sd2app.session.content import common_clock, load_content, recording_of
 from sd2core.errors import Sd2Error
+from sd2core.fmcw.processing import doppler_map
+from sd2core.io.radar.described import RadarDescription, write_description
+from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
+from tests.core.io.radar.acconeer_files import write_a121
+from tests.core.io.radar.dca1000_files import TiRecording, write_ti
 
 
 def clock(start_s, frames, rate=30.0):
@@ -85,3 +90,27 @@ def test_a_damaged_radar_file_is_the_problem_that_is_named(tmp_path):
     path.write_bytes(b"nothing of the kind")
     with pytest.raises(Sd2Error, match=r"swing\.h5 cannot be read as HDF5"):
         load_content(recording_of([path]), lambda *_: None)
+
+
+@pytest.mark.parametrize("kind", ["dca1000", "a121", "described"])
+def test_a_capture_of_any_radar_is_shown(tmp_path, kind):
+    if kind == "dca1000":
+        path = write_ti(tmp_path / "ti", TiRecording(transmitters=2))
+    elif kind == "a121":
+        path = write_a121(tmp_path / "a.h5")
+    else:
+        path = tmp_path / "wave.npy"
+        np.save(path, np.ones((3, 20, 1), np.complex64))
+        wave = RadarDescription(
+            axes=("frame", "chirp", "sample"),
+            carrier_hz=5.8e9,
+            bandwidth_hz=0.0,
+            chirp_repetition_s=1e-3,
+            frame_repetition_s=0.05,
+        )
+        write_description(wave, path)
+    content = load_content(recording_of([path]), lambda done, total: None)
+    assert content.problems == ()
+    assert content.capture is not None
+    assert doppler_map(content.capture, axis=VelocityAxis()).axis.bins == 32
+    assert content.notes[: len(content.capture.notes)] == content.capture.notes

@@ -25,6 +25,7 @@ from sd2core.errors import Sd2Error
 from sd2core.io.mesh import load_mesh
 from sd2core.maps import DopplerMap, joined
 from sd2core.radar_config import PAPER_RADAR
+from sd2core.radar_profiles import RADARS
 from sd2core.runs.pace import keep_pace
 from sd2core.sensor import VelocityAxis, VirtualSensor
 
@@ -138,3 +139,11 @@ def test_a_radar_of_ones_own_is_read_and_written_with_the_plan(tmp_path: Path) -
         run(tmp_path, SIMULATED + 'radar = "nobody.json"\n')
     with pytest.raises(Sd2Error, match="synthesise"):
         plan_from_text(PLAN.replace("synthesise", "simulate"), tmp_path)
+
+
+def test_a_radar_by_its_name_stays_a_name(tmp_path: Path) -> None:
+    plan = plan_from_text(SIMULATED + 'radar = "k-band"\n', tmp_path)
+    assert plan.simulate is not None
+    assert plan.simulate.radar == "k-band"
+    assert plan_from_text(plan_text(plan, tmp_path), tmp_path) == plan
+    assert flow.simulation_of(plan.simulate).radar == RADARS["k-band"]

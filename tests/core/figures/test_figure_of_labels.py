@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -101,3 +103,16 @@ def test_spans_too_narrow_to_tell_apart_are_plain_and_leave_the_maps_alone(row) 
     maps, lanes = figure.axes[:2]
     assert [len(one.get_segments()) for one in maps.collections[-2:]] == [1, 1]
     assert [one.get_hatch() for one in lanes.collections] == [None, "...."]
+
+
+def test_a_radar_s_map_says_its_carrier(row) -> None:
+    """The title on the right; a map that was counted from a mesh has none."""
+
+    def title_of(one: MapRow) -> str:
+        figure = draw_maps([one], Levels(), start_s=0.0, end_s=3.0)
+        return figure.axes[0].get_title(loc="right")
+
+    assert "GHz" not in title_of(row)
+    swept = {"start_frequency_hz": 77.0e9, "end_frequency_hz": 81.0e9}
+    seen = replace(row.doppler, meta={"radar": swept})
+    assert title_of(replace(row, doppler=seen)).startswith("79 GHz · 0 dB: ")

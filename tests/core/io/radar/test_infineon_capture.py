@@ -216,13 +216,13 @@ DAMAGE: dict[str, tuple[Callable[[Path], object], str]] = {
         lambda f: edit_config(f, lambda s: s.update(start_frequency_Hz=60, end_frequency_Hz=61)),
         r"config\.json: The radar sweeps from 60 Hz to 61 Hz.*60 GHz is 60e9",
     ),
-    "transmitters in turn": (
-        lambda f: edit_config(f, lambda s: s.update(mimo_mode="tdm", tx_antennas=[1, 2])),
-        r"config\.json: mimo_mode is 'tdm' with 2 transmitters",
+    "unknown turns": (
+        lambda f: edit_config(f, lambda s: s.update(mimo_mode="bpm", tx_antennas=[1, 2])),
+        r"config\.json: mimo_mode is 'bpm' with 2 transmitters",
     ),
-    "two transmitters": (
-        lambda f: edit_config(f, lambda shape: shape.update(tx_antennas=[1, 2])),
-        r"config\.json: mimo_mode is 'off' with 2 transmitters",
+    "turns without end": (
+        lambda f: edit_config(f, lambda s: s.update(mimo_mode="tdm", tx_antennas=[1, 2])),
+        r"config\.json: 5 chirps per frame of 2 transmitters in turns\. Expected: a multiple of 2",
     ),
     "counts beyond the converter": (
         lambda f: (f / "meta.json").write_text('{"adc_resolution": 8}'),
@@ -368,3 +368,54 @@ def test_a_cube_that_contradicts_its_configuration_is_not_written(
     with pytest.raises(Sd2Error, match="has shape"):
         write_capture(tmp_path / "new", cube, other, np.arange(FRAMES), simulated=True)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("layout", ["chirps in turn", "chirps of each", "channels"])
+def test_transmitters_in_turns_are_told_apart_by_the_shape(tmp_path: Path, layout: str) -> None:
+    """Counts say their transmitter, receiver and chirp, so that every sample has one place."""
+    turns, receivers, chirps, samples, frames = 2, 3, 6, 9, 4
+    stated = chirps if layout == "chirps in turn" else chirps * turns
+    each = stated // turns if layout == "chirps in turn" else stated
+    turn, receiver, chirp, sample = np.ogrid[:turns, :receivers, :each, :samples]
+    named = 1000 * turn + 300 * receiver + 10 * chirp + sample  # (tx, rx, chirps, samples)
+    if layout == "channels":
+        cube = named.reshape(turns * receivers, each, samples)
+    else:
+        cube = named.transpose(1, 2, 0, 3).reshape(receivers, each * turns, samples)
+    plain = replace(
+        PAPER_RADAR,
+        receivers=len(cube),
+        chirps_per_frame=cube.shape[1],
+        samples_per_chirp=samples,
+        chirp_repetition_s=2e-4,
+    )
+    folder = write_capture(
+        tmp_path / "made",
+        np.repeat(cube[None], frames, axis=0).astype(np.uint16),
+        plain,
+        np.arange(frames) / 30.0,
+        simulated=True,
+    )
+    edit_config(
+        folder,
+        lambda shape: shape.update(
+            mimo_mode="tdm",
+            tx_antennas=[1, 2],
+            rx_antennas=[1, 2, 3],
+            num_chirps_per_frame=stated,
+        ),
+    )
+    capture = load_capture(folder)
+    assert (capture.config.transmitters, capture.config.receivers) == (turns, receivers)
+    assert capture.config.chirps_per_frame == each
+    assert capture.config.v_max_mps == pytest.approx(plain.v_max_mps / turns)
+    assert "divides v_max by 2" in capture.notes[0]
+    found = capture.channel(receiver=3, transmitter=2).read(1, 3) * 2048.0 + 2048.0
+    np.testing.assert_array_equal(found, np.stack([named[1, 2]] * 2)[:, None])
+
+
+def test_transmitters_that_send_together_are_one(folder: Path, cube: np.ndarray) -> None:
+    edit_config(folder, lambda shape: shape.update(tx_antennas=[1, 2]))
+    capture = load_capture(folder)
+    assert capture.config == CONFIG
+    np.testing.assert_array_equal(capture.samples, cube)

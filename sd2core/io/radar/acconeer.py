@@ -1,0 +1,293 @@
+"""Recordings of Acconeer's A121, a pulsed radar at 60.5 GHz, by its exploration tool.
+
+An HDF5 file holds sessions, in them groups and entries, one entry per sensor::
+
+    generation                                   "a121"
+    sessions/session_0/session_config            JSON: groups of sensors and their configuration
+    sessions/session_0/group_0/entry_0/metadata  JSON: length of a step, highest sweep rate
+    sessions/session_0/group_0/entry_0/sensor_id
+    …/entry_0/result/frame                       int16 real and imag, (frames, sweeps, points)
+    …/entry_0/result/tick                        time of every frame, in ticks of the server
+
+Every point is at a distance of its own: there is no range to be formed. Sweeps are slow time.
+Layout, carrier and widths of the pulses are those of Acconeer's exploration tool
+(github.com/acconeer/acconeer-python-exploration, ``a121/algo/_utils.py``).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from sd2core.errors import Sd2Error
+from sd2core.files.hdf5_files import member_of, open_hdf5_file, text_of, unreadable_hdf5
+from sd2core.files.texts import errors_in, first_fault, parse_json
+from sd2core.io.radar.capture import LazySamples, RadarCapture
+from sd2core.radar_config import SPEED_OF_LIGHT_MPS, RadarConfig
+from sd2core.timebase import Timebase
+
+if TYPE_CHECKING:
+    import h5py
+
+CARRIER_HZ = 60.5e9
+"""Carrier of the A121 (``RADIO_FREQUENCY`` of the exploration tool)."""
+PULSE_WIDTHS_M = {1: 0.04, 2: 0.07, 3: 0.14, 4: 0.19, 5: 0.32}
+"""Width of a profile's envelope at half its height (``ENVELOPE_FWHM_M``)."""
+
+_EXPECTED = "a complete recording of the A121 by Acconeer's exploration tool (.h5)"
+_PARTS = np.dtype([("real", "<i2"), ("imag", "<i2")])
+_FULL = np.float32(32768.0)
+Model = TypeVar("Model", bound=BaseModel)
+
+
+class _Subsweep(BaseModel):
+    """Equally spaced points of one profile; other keys are left alone."""
+
+    model_config = ConfigDict(extra="ignore", allow_inf_nan=False)
+
+    start_point: int = Field(ge=-(10**6), le=10**6)
+    num_points: int = Field(ge=1, le=10**5)
+    step_length: int = Field(ge=1, le=10**5)
+    profile: str = Field(pattern=r"^PROFILE_[1-5]$")
+
+    @property
+    def pulse_m(self) -> float:
+        """Width of the pulse."""
+        return PULSE_WIDTHS_M[int(self.profile[-1])]
+
+
+class _Sensor(BaseModel):
+    model_config = ConfigDict(extra="ignore", allow_inf_nan=False)
+
+    sweeps_per_frame: int = Field(ge=1)
+    sweep_rate: float | None = Field(default=None, gt=0)
+    frame_rate: float | None = Field(default=None, gt=0)
+    subsweeps: list[_Subsweep] = Field(min_length=1)
+
+
+class _Session(BaseModel):
+    groups: list[dict[str, _Sensor]] = Field(min_length=1)
+
+
+class _Metadata(BaseModel):
+    model_config = ConfigDict(extra="ignore", allow_inf_nan=False)
+
+    base_step_length_m: float = Field(gt=0, lt=1)
+    max_sweep_rate: float | None = Field(default=None, gt=0)
+
+
+class _Server(BaseModel):
+    ticks_per_second: float = Field(default=0.0, ge=0, allow_inf_nan=False)
+
+
+def is_acconeer(file: h5py.File) -> bool:
+    """True if an open HDF5 file looks like a recording of the exploration tool."""
+    return "sessions" in file and "generation" in file
+
+
+def load_acconeer(path: Path) -> RadarCapture:
+    """Open a recording; frames are read as they are needed.
+
+    Taken is the first entry of the first group of the first session, with all subsweeps; notes
+    say what else there is. Raises Sd2Error if the file is damaged, of another sensor, or
+    contradicts itself.
+    """
+    with open_hdf5_file(path, _EXPECTED) as file:
+        try:
+            return _read(file, path)
+        except Sd2Error:
+            raise
+        except Exception as error:  # a damaged file fails in many ways
+            raise unreadable_hdf5(path, error, _EXPECTED) from error
+
+
+def _read(file: h5py.File, path: Path) -> RadarCapture:
+    generation = _text(file, path, "generation")
+    if generation != "a121":
+        raise Sd2Error(f"{path} is of the sensor generation {generation!r:.40}", "a121")
+    session, sessions = _first(file, path, "sessions", "session_")
+    group, groups = _first(file, path, session, "group_")
+    entry, entries = _first(file, path, group, "entry_")
+    planned = _parsed(_Session, file, path, f"{session}/session_config")
+    found = _parsed(_Metadata, file, path, f"{entry}/metadata")
+    sensor_id = str(int(_array(file, path, f"{entry}/sensor_id", "iu", 0)[()]))
+    if sensor_id not in planned.groups[0]:
+        raise Sd2Error(
+            f"{path}: session_config has no sensor {sensor_id} in its first group",
+            f"one of {', '.join(planned.groups[0])}",
+        )
+    sensor = planned.groups[0][sensor_id]
+    frames = _array(file, path, f"{entry}/result/frame", "V", 3)
+    if frames.dtype != _PARTS or frames.shape[0] == 0:
+        raise Sd2Error(
+            f"{path}: result/frame is {frames.dtype} of shape {frames.shape}",
+            "int16 real and imag, (frames, sweeps, points)",
+        )
+    ranges_m = (
+        np.concatenate(
+            [
+                one.start_point + one.step_length * np.arange(one.num_points)
+                for one in sensor.subsweeps
+            ]
+        )
+        * found.base_step_length_m
+    )
+    shape = (len(frames), 1, sensor.sweeps_per_frame, len(ranges_m))
+    if frames.shape != (shape[0], *shape[2:]):
+        raise Sd2Error(
+            f"{path}: result/frame has shape {frames.shape}",
+            f"(frames, {shape[2]} sweeps, {shape[3]} points), as session_config says",
+        )
+    notes = [
+        "Assumed: the phase grows with the distance, as in the exploration tool; walk towards the"
+        " sensor to check.",
+        *_left_out(sessions, groups, entries),
+    ]
+    if len(sensor.subsweeps) > 1:
+        notes.append(
+            f"All {len(sensor.subsweeps)} subsweeps are taken as they are, with their own gains."
+        )
+    sweep_s = _sweep_s(sensor, found, path, notes)
+    timebase, frame_s = _clock(file, path, entry, sensor, sweep_s, shape[0], notes)
+    saturated = _flags(file, path, f"{entry}/result/data_saturated", shape[0])
+    if saturated:
+        notes.append(f"The sensor was saturated in {saturated} of {shape[0]} frames.")
+    width_m = max(one.pulse_m for one in sensor.subsweeps)
+    half_hz = 0.25 * SPEED_OF_LIGHT_MPS / width_m
+    with errors_in(path):
+        config = RadarConfig(
+            start_frequency_hz=CARRIER_HZ - half_hz,
+            end_frequency_hz=CARRIER_HZ + half_hz,
+            samples_per_chirp=shape[3],
+            chirps_per_frame=shape[2],
+            chirp_repetition_s=sweep_s,
+            # Ticks are rounded.
+            frame_repetition_s=max(frame_s, shape[2] * sweep_s),
+            sample_rate_hz=shape[3] / sweep_s,
+            adc_bits=16,
+            name="Acconeer A121, 60.5 GHz",
+            sampling="complex",
+            ranges_m=tuple(ranges_m.tolist()),
+        )
+    place = f"{entry}/result/frame"
+
+    def read(some: slice) -> NDArray[Any]:
+        with open_hdf5_file(path, _EXPECTED) as again:
+            try:
+                parts = again[place][some]
+            except Exception as error:  # a damaged chunk fails in many ways
+                raise unreadable_hdf5(path, error, _EXPECTED) from error
+        signal = np.empty((len(parts), 1, *shape[2:]), np.complex64)
+        signal.real[:, 0], signal.imag[:, 0] = parts["real"], parts["imag"]
+        signal /= _FULL
+        return signal
+
+    return RadarCapture(
+        samples=LazySamples(shape, np.dtype(np.complex64), read),
+        config=config,
+        timebase=timebase,
+        source=str(path),
+        notes=tuple(notes),
+        meta={"format": "Acconeer A121", "sensor": sensor_id, **sensor.model_dump()},
+        full_scale_known=False,
+    )
+
+
+def _left_out(sessions: int, groups: int, entries: int) -> list[str]:
+    others = (("session", sessions), ("group", groups), ("sensor", entries))
+    return [f"The first of {count} {name}s is taken." for name, count in others if count > 1]
+
+
+def _sweep_s(sensor: _Sensor, found: _Metadata, path: Path, notes: list[str]) -> float:
+    """Time between sweeps."""
+    if sensor.sweep_rate is not None:
+        return 1.0 / sensor.sweep_rate
+    if found.max_sweep_rate is None:
+        raise Sd2Error(f"{path} states no sweep rate", "sweep_rate, or max_sweep_rate")
+    notes.append(
+        "No sweep rate is set; sweeps are taken to follow at the highest of the configuration,"
+        f" {found.max_sweep_rate:.1f} Hz, as the sensor does then."
+    )
+    return 1.0 / found.max_sweep_rate
+
+
+def _clock(
+    file: h5py.File,
+    path: Path,
+    entry: str,
+    sensor: _Sensor,
+    sweep_s: float,
+    frames: int,
+    notes: list[str],
+) -> tuple[Timebase, float]:
+    """Times of the frames by the server's ticks, or by the stated rate; time between frames."""
+    stated_s = None if sensor.frame_rate is None else 1.0 / sensor.frame_rate
+    frame_s = stated_s or sensor.sweeps_per_frame * sweep_s
+    server = _parsed(_Server, file, path, "server_info")
+    ticks = _array(file, path, f"{entry}/result/tick", "iu", 1)
+    if len(ticks) != frames:
+        raise Sd2Error(f"{path} has {len(ticks)} ticks for {frames} frames", "one per frame")
+    steps = np.diff(ticks[...].astype(np.float64))
+    if server.ticks_per_second > 0 and frames > 1 and (steps > 0).all() and (steps < 1e15).all():
+        times_s = np.concatenate([[0.0], np.cumsum(steps)]) / server.ticks_per_second
+        if stated_s is None:
+            frame_s = float(np.median(steps)) / server.ticks_per_second
+            notes.append(
+                f"No frame rate is set; by the ticks a frame comes every {1e3 * frame_s:.1f} ms."
+            )
+        return Timebase(times_s), frame_s
+    if frames > 1:
+        notes.append(f"The ticks do not increase: frames are placed every {1e3 * frame_s:g} ms.")
+    return Timebase(np.arange(frames) * frame_s), frame_s
+
+
+def _first(file: h5py.File, path: Path, place: str, prefix: str) -> tuple[str, int]:
+    """Path of the first of numbered groups, and how many there are."""
+    import h5py
+
+    group = member_of(file, path, place)
+    if not isinstance(group, h5py.Group):
+        raise Sd2Error(f"{path} has no group {place}", _EXPECTED)
+    names = [name for name in group if name.startswith(prefix)]
+    if f"{prefix}0" not in names:
+        raise Sd2Error(f"{path} has no {prefix}0 in {place}", _EXPECTED)
+    return f"{place}/{prefix}0", len(names)
+
+
+def _array(file: h5py.File, path: Path, place: str, kinds: str, dimensions: int) -> h5py.Dataset:
+    import h5py
+
+    found = member_of(file, path, place)
+    if not isinstance(found, h5py.Dataset) or found.shape is None:
+        raise Sd2Error(f"{path} has no array {place}", _EXPECTED)
+    if found.dtype.kind not in kinds or len(found.shape) != dimensions:
+        raise Sd2Error(
+            f"{path}: {place} is {found.dtype} of shape {found.shape}",
+            f"an array of {dimensions} dimensions",
+        )
+    return found
+
+
+def _flags(file: h5py.File, path: Path, place: str, frames: int) -> int:
+    """Number of frames that are flagged; 0 where the file does not say."""
+    found = member_of(file, path, place)
+    if found is None or getattr(found, "shape", None) != (frames,):
+        return 0
+    return int(np.count_nonzero(found[...]))
+
+
+def _text(file: h5py.File, path: Path, place: str) -> str:
+    return text_of(_array(file, path, place, "OS", 0), path, place)
+
+
+def _parsed(model: type[Model], file: h5py.File, path: Path, place: str) -> Model:
+    where = f"{place} of {path}"
+    content = parse_json(_text(file, path, place), where, _EXPECTED)
+    try:
+        return model.model_validate(content)
+    except ValidationError as error:
+        raise Sd2Error(f"{where}: {first_fault(error)}", _EXPECTED) from error

@@ -1,0 +1,387 @@
+"""Radar samples of one's own: an array, and a small TOML beside it that describes it.
+
+The array is a NumPy file (``.npy``), a dataset of an HDF5 file (``.h5``) or the samples of a SigMF
+recording (``.sigmf-data``). The description has the same name with the suffix ``.toml``; see
+:class:`RadarDescription` and docs/radar-files.md.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from sd2core.errors import Sd2Error
+from sd2core.files.atomic import atomic_folder, atomic_write, atomic_write_text
+from sd2core.files.texts import errors_in, first_fault, read_json, read_toml
+from sd2core.files.toml import toml_lines
+from sd2core.io.radar.capture import LazySamples, RadarCapture
+from sd2core.io.radar.infineon import check_replaceable
+from sd2core.io.radar.sigmf import DATA, META
+from sd2core.io.radar.stored_arrays import SUFFIXES, StoredArray, open_stored
+from sd2core.radar_config import RadarConfig
+from sd2core.timebase import Timebase
+
+DATA_NAME = "radar.npy"
+"""Name of the samples in a folder of their own."""
+Axis = Literal["frame", "transmitter", "receiver", "chirp", "sample", "iq", "stream"]
+
+_META = "meta.json"
+_EXPECTED = "the description of radar samples (docs/radar-files.md)"
+_ORDER = ("frame", "transmitter", "receiver", "chirp", "sample", "iq")
+_PLAIN: dict[int, tuple[Axis, ...]] = {
+    1: ("stream",),
+    3: ("frame", "chirp", "sample"),
+    4: ("frame", "receiver", "chirp", "sample"),
+    5: ("frame", "transmitter", "receiver", "chirp", "sample"),
+}
+"""Axes of arrays that are not described otherwise, by the number of dimensions."""
+
+
+class RadarDescription(BaseModel):
+    """Content of a description; quantities in SI units.
+
+    ``axes`` name the dimensions of the array: ``frame``, ``chirp`` and ``sample``, and where there
+    are any ``transmitter``, ``receiver`` and ``iq`` (real and imaginary part); or ``stream``,
+    samples without gaps, with ``receiver`` where there are several, of which ``samples_per_chirp``
+    make a chirp and ``chirps_per_frame`` of these a frame. ``chirp_repetition_s`` is the time
+    between chirps of the same transmitter. ``sign`` is 1 where the phase grows with the distance,
+    and -1 where it falls. A value of ``zero`` is no signal, and ``full_scale`` more fills the
+    converter. With ``range_start_m`` and ``range_step_m`` samples are at distances already.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    format: Literal["sd2-radar"] = "sd2-radar"
+    version: Literal[1] = 1
+    name: str = Field(default="", max_length=200)
+    simulated: bool = False
+    dataset: str | None = None
+    axes: tuple[Axis, ...]
+    carrier_hz: float = Field(gt=0, le=1e15)  # middle of the samples of a chirp
+    bandwidth_hz: float | None = Field(default=None, ge=0, le=1e15)  # of them; 0: a continuous wave
+    slope_hz_per_s: float | None = Field(
+        default=None, ge=-1e24, le=1e24
+    )  # instead; negative for chirps that fall
+    sample_rate_hz: float | None = Field(default=None, ge=1e-9, le=1e15)
+    chirp_repetition_s: float | None = Field(default=None, ge=1e-15, le=1e9)
+    frame_repetition_s: float | None = Field(default=None, ge=1e-15, le=1e9)
+    samples_per_chirp: int | None = Field(default=None, ge=1, le=2**24)
+    chirps_per_frame: int | None = Field(default=None, ge=2, le=2**24)
+    sign: Literal[1, -1] = 1
+    zero: float = Field(default=0.0, ge=-1e12, le=1e12)
+    full_scale: float | None = Field(default=None, ge=1e-12, le=1e12)
+    range_start_m: float | None = Field(default=None, ge=-1e9, le=1e9)
+    range_step_m: float | None = Field(default=None, ge=1e-9, le=1e9)
+
+
+def description_of(path: Path) -> Path:
+    """Path of the description that belongs to a file."""
+    return path.with_suffix(".toml")
+
+
+def is_describable(path: Path) -> bool:
+    """True if a file is of a kind that can be described."""
+    return path.suffix.lower() in SUFFIXES
+
+
+def is_described(path: Path) -> bool:
+    """True if a file is of a kind that can be described, and a description is beside it."""
+    return is_describable(path) and description_of(path).is_file()
+
+
+def read_description(path: Path) -> RadarDescription:
+    """Read a description; Sd2Error if it is damaged."""
+    content = read_toml(path, _EXPECTED)
+    try:
+        return RadarDescription.model_validate(content)
+    except ValidationError as error:
+        raise Sd2Error(f"{path}: {first_fault(error)}", _EXPECTED) from error
+
+
+def write_description(description: RadarDescription, data: Path) -> Path:
+    """Write the description of a file beside it; Sd2Error if something else is there."""
+    path = description_of(data)
+    if path.exists():
+        try:
+            read_description(path)
+        except Sd2Error as error:
+            raise Sd2Error(
+                f"{path} is there, and is no description of radar samples",
+                "a name that is free",
+                "Move it away",
+            ) from error
+    told = description.model_dump(exclude_defaults=True)
+    content = {"format": description.format, "version": description.version, **told}
+    atomic_write_text(path, "\n".join(toml_lines(content, path.parent)) + "\n")
+    return path
+
+
+def write_described(
+    folder: Path | str,
+    samples: NDArray[np.complex64],
+    config: RadarConfig,
+    times_s: ArrayLike,
+    *,
+    simulated: bool,
+    meta: dict[str, Any] | None = None,
+) -> Path:
+    """Write a folder of complex samples with their description; an older recording is replaced.
+
+    Parameters
+    ----------
+    folder : path
+        Becomes the folder with ``radar.npy`` and ``radar.toml``.
+    samples : complex64 array, shape (frames, receivers, chirps, samples)
+        Relative to full scale, as a converter of up to 16 bits gives them.
+    config : RadarConfig
+        Of one transmitter, with complex samples.
+    times_s : array_like, shape (frames,)
+        Times of the frames, which follow one another regularly.
+    simulated : bool
+    meta : dict
+        Written to ``meta.json``, e.g. how it was simulated and the truth.
+    """
+    folder = Path(folder)
+    check_replaceable(folder)
+    capture = RadarCapture(samples, config, Timebase(times_s))
+    half = 2.0 ** (config.adc_bits - 1)
+    with_range = not config.is_continuous
+    description = RadarDescription(
+        name=config.name,
+        simulated=simulated,
+        axes=(*_PLAIN[4], "iq"),
+        carrier_hz=config.centre_frequency_hz,
+        bandwidth_hz=config.bandwidth_hz,
+        sample_rate_hz=config.sample_rate_hz if with_range else None,
+        chirp_repetition_s=config.chirp_repetition_s,
+        frame_repetition_s=config.frame_repetition_s,
+        full_scale=half,
+    )
+    shape = (*capture.samples.shape, 2)
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with atomic_folder(folder) as new:
+        write_description(description, new / DATA_NAME)
+        if meta:
+            atomic_write_text(new / _META, json.dumps(meta, indent=2, ensure_ascii=False) + "\n")
+        with atomic_write(new / DATA_NAME) as stream:
+            header = {"descr": "<i2", "fortran_order": False, "shape": shape}
+            np.lib.format.write_array_header_1_0(stream, header)
+            for frame in range(shape[0]):
+                parts = capture.read(frame, frame + 1).view(np.float32)
+                stream.write(np.rint(np.float32(half) * parts).astype("<i2").tobytes())
+    return folder
+
+
+def plain_axes(path: Path, dataset: str | None) -> tuple[Axis, ...]:
+    """Axes of the array in a file where nobody names others, by its dimensions and type."""
+    stored = open_stored(path, dataset)
+    last: tuple[Axis, ...] = ()
+    dimensions = len(stored.shape)
+    if path.suffix.lower() in (META, DATA) and dimensions == 2:
+        return ("stream", "receiver")
+    if dimensions > 3 and stored.shape[-1] == 2 and stored.dtype.kind != "c":
+        last, dimensions = ("iq",), dimensions - 1
+    if dimensions not in _PLAIN:
+        raise Sd2Error(
+            f"{path} has shape {stored.shape}", "(frames, chirps, samples), or other axes by name"
+        )
+    return _PLAIN[dimensions] + last
+
+
+def load_described(path: Path) -> RadarCapture:
+    """Open a file by the description beside it; frames are read as they are needed.
+
+    Raises Sd2Error if one of them is damaged, or they contradict each other.
+    """
+    return capture_of(path, read_description(description_of(path)))
+
+
+def capture_of(path: Path, description: RadarDescription) -> RadarCapture:
+    """Open a file by a description; Sd2Error as :func:`load_described`."""
+    stored = open_stored(path, description.dataset)
+    with errors_in(description_of(path)):
+        sizes = _sizes(stored, description)
+        config, averaged = _config(stored, description, sizes)
+    axes = description.axes
+    streamed = "stream" in axes
+    along = axes.index("stream" if streamed else "frame")
+    frame_samples = sizes["chirp"] * sizes["sample"]
+    is_complex = config.sampling != "real"
+    scale = np.float32(1.0 / (description.full_scale or 1.0))
+    falling = (description.slope_hz_per_s or 0.0) < 0
+    # Order of the axes of the file that are there, as ours.
+    present = ["frame", "chirp", "sample", *axes[1:]] if streamed else list(axes)
+    order = [present.index(name) for name in _ORDER if name in present]
+
+    def read(some: slice) -> NDArray[Any]:
+        start, stop, _ = some.indices(sizes["frame"])
+        each = frame_samples if streamed else 1
+        place = [slice(None)] * len(stored.shape)
+        place[along] = slice(start * each, stop * each)
+        raw = np.asarray(stored.read(tuple(place)))
+        if streamed:
+            raw = raw.reshape(-1, sizes["chirp"], sizes["sample"], *raw.shape[1:])
+        signal = raw.transpose(order).reshape(
+            stop - start, config.channels, sizes["chirp"], sizes["sample"], -1
+        )
+        with np.errstate(over="ignore", invalid="ignore"):  # refused when it is read
+            if "iq" in axes:
+                parts = signal.astype(np.float32)
+                parts -= np.float32(description.zero)
+                cube = parts[..., 0] + np.complex64(1j) * parts[..., 1]
+            else:
+                cube = signal[..., 0].astype(np.complex64 if is_complex else np.float32)
+                cube -= np.float32(description.zero)
+            cube *= scale
+            if averaged:
+                cube = cube.mean(axis=3, keepdims=True)
+        if description.sign < 0 and is_complex:
+            cube = cube.conj()
+        # Samples of a real chirp in reverse have the phases of its negative frequencies.
+        if falling != (description.sign < 0 and not is_complex):
+            cube = cube[..., ::-1]
+        return cube
+
+    shape = (sizes["frame"], config.channels, config.chirps_per_frame, config.samples_per_chirp)
+    notes = [
+        "The phase is taken to "
+        + ("grow" if description.sign > 0 else "fall")
+        + " with the distance, as the description says; walk towards the radar to check."
+    ]
+    if config.transmitters > 1:
+        notes.append(
+            f"{config.transmitters} transmitters take turns; a chirp of the same one every"
+            f" {1e6 * config.chirp_repetition_s:.1f} µs."
+        )
+    if averaged:
+        notes.append(f"Every {sizes['sample']} samples are averaged to one.")
+    return RadarCapture(
+        samples=LazySamples(shape, np.dtype(np.complex64 if is_complex else np.float32), read),
+        config=config,
+        timebase=Timebase(np.arange(sizes["frame"]) * config.frame_repetition_s),
+        simulated=description.simulated,
+        source=str(path),
+        notes=tuple(notes),
+        meta={
+            **_of_simulation(path, description),
+            "format": "described",
+            "description": description.model_dump(exclude_defaults=True),
+        },
+        full_scale_known=description.full_scale is not None,
+    )
+
+
+def _of_simulation(path: Path, description: RadarDescription) -> dict[str, Any]:
+    """What a simulated recording says of itself in a file beside it."""
+    beside = path.with_name(_META)
+    if not (description.simulated and path.name == DATA_NAME and beside.is_file()):
+        return {}
+    content = read_json(beside)
+    if not isinstance(content, dict):
+        raise Sd2Error(f"{beside} holds no table", "what a simulated recording says of itself")
+    return content
+
+
+def _sizes(stored: StoredArray, description: RadarDescription) -> dict[str, int]:
+    """Length of every axis, by name; 1 of those that are not there."""
+    axes = description.axes
+    named: dict[str, int] = dict(zip(axes, stored.shape, strict=False))
+    if len(axes) != len(stored.shape) or len(named) < len(axes):
+        raise Sd2Error(
+            f"axes are {', '.join(axes)}, for an array of shape {stored.shape}",
+            "one different name for every axis",
+        )
+    if named.get("iq", 2) != 2 or ("iq" in named and stored.dtype.kind == "c"):
+        raise Sd2Error(
+            f"The axis iq has {named['iq']} entries of {stored.dtype}", "2, of real numbers"
+        )
+    if "stream" in named:
+        if not set(axes) <= {"stream", "receiver"} or axes[0] != "stream":
+            raise Sd2Error(f"axes are {', '.join(axes)}", "stream, or stream and receiver")
+        chirps, samples = description.chirps_per_frame, description.samples_per_chirp
+        if chirps is None or samples is None:
+            raise Sd2Error(
+                "A stream has no frames of its own", "chirps_per_frame and samples_per_chirp"
+            )
+        named |= {
+            "frame": named["stream"] // (chirps * samples),
+            "chirp": chirps,
+            "sample": samples,
+        }
+    elif not {"frame", "chirp", "sample"} <= set(axes):
+        raise Sd2Error(f"axes are {', '.join(axes)}", "at least frame, chirp and sample")
+    if min(named.values()) < 1:
+        raise Sd2Error(f"The array has shape {stored.shape}", "at least one whole frame")
+    return {name: named.get(name, 1) for name in _ORDER}
+
+
+def _config(
+    stored: StoredArray, description: RadarDescription, sizes: dict[str, int]
+) -> tuple[RadarConfig, bool]:
+    """Configuration, and True if the samples of a chirp are averaged to one."""
+    samples, told = sizes["sample"], description
+    if stored.dtype.kind not in "iufc":
+        raise Sd2Error(f"The array is of {stored.dtype}", "numbers")
+    is_complex = stored.dtype.kind == "c" or "iq" in told.axes
+    if (told.bandwidth_hz is None) == (told.slope_hz_per_s is None):
+        raise Sd2Error(
+            f"bandwidth_hz is {told.bandwidth_hz}, slope_hz_per_s {told.slope_hz_per_s}",
+            "one of the two",
+        )
+    if (told.range_start_m is None) != (told.range_step_m is None):
+        raise Sd2Error("One of range_start_m and range_step_m is missing", "both, or none")
+    rate_hz, chirp_s, frame_s = (
+        told.sample_rate_hz,
+        told.chirp_repetition_s,
+        told.frame_repetition_s,
+    )
+    if "stream" in told.axes:
+        if rate_hz is None or chirp_s is not None or frame_s is not None:
+            raise Sd2Error(
+                "Chirps and frames of a stream follow one another",
+                "sample_rate_hz, and neither chirp_repetition_s nor frame_repetition_s",
+            )
+        chirp_s = samples / rate_hz
+        frame_s = chirp_s * sizes["chirp"]
+    if chirp_s is None or frame_s is None:
+        raise Sd2Error("It states no times", "chirp_repetition_s and frame_repetition_s")
+    has_beat = told.bandwidth_hz != 0 and told.range_step_m is None
+    if rate_hz is None:
+        if has_beat:
+            raise Sd2Error("It states no sample_rate_hz", "samples per second within a chirp")
+        rate_hz = samples / chirp_s
+    bandwidth_hz = told.bandwidth_hz
+    if bandwidth_hz is None:
+        assert told.slope_hz_per_s is not None
+        bandwidth_hz = abs(told.slope_hz_per_s) * samples / rate_hz
+    averaged = bandwidth_hz == 0 and samples > 1
+    if averaged:
+        samples, rate_hz = 1, 1.0 / chirp_s
+    ranges_m: tuple[float, ...] = ()
+    if told.range_start_m is not None and told.range_step_m is not None:
+        ranges_m = tuple((told.range_start_m + told.range_step_m * np.arange(samples)).tolist())
+    bits = 24
+    if told.full_scale is not None and stored.dtype.kind in "iu":
+        bits = max(1, round(math.log2(told.full_scale)) + 1)
+    config = RadarConfig(
+        start_frequency_hz=told.carrier_hz - 0.5 * bandwidth_hz,
+        end_frequency_hz=told.carrier_hz + 0.5 * bandwidth_hz,
+        samples_per_chirp=samples,
+        chirps_per_frame=sizes["chirp"],
+        chirp_repetition_s=chirp_s,
+        frame_repetition_s=frame_s,
+        sample_rate_hz=rate_hz,
+        receivers=sizes["receiver"],
+        adc_bits=bits,
+        name=told.name or f"{told.carrier_hz / 1e9:.4g} GHz radar",
+        sampling="complex" if is_complex else "real",
+        transmitters=sizes["transmitter"],
+        ranges_m=ranges_m,
+    )
+    return config, averaged

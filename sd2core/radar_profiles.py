@@ -1,0 +1,131 @@
+"""Radars by name, to simulate: typical settings of known devices, and carriers without range.
+
+Each is one of many settings that its device can be given; what holds for the device are its
+band, its way of sampling and its converter. Nothing here was compared with hardware, but for the
+paper's radar and the BGT60, whose recordings this program reads.
+
+Sources: Infineon, *BGT60TR13C* data sheet (57 to 63 GHz, 12 bits, 2 MHz); Texas Instruments,
+*IWR6843* (60 to 64 GHz), *IWR1443* and *AWR1843* (76 to 81 GHz) data sheets: complex samples;
+Acconeer, *A121* data sheet (60.5 GHz, pulsed); ITU Radio Regulations, article 5 (24 to 24.25 GHz
+and 5.725 to 5.875 GHz for industry, science and medicine); IEEE 802.11 (channels around 2.44 and
+5.25 GHz).
+"""
+
+from __future__ import annotations
+
+from sd2core.radar_config import PAPER_RADAR, SPEED_OF_LIGHT_MPS, RadarConfig, Sampling
+
+PAPER = "paper"
+"""Name of the paper's radar."""
+
+_UNVERIFIED = "unverified against hardware"
+
+
+def _sweep(
+    name: str,
+    band_hz: tuple[float, float],
+    *,
+    samples: int,
+    chirps: int,
+    v_max_mps: float,
+    frames_per_s: float,
+    sample_rate_hz: float,
+    sampling: Sampling = "complex",
+    bits: int = 16,
+) -> RadarConfig:
+    """FMCW radar whose chirps follow one another as v_max asks, λ / (4 v_max)."""
+    wavelength_m = 2.0 * SPEED_OF_LIGHT_MPS / sum(band_hz)
+    return RadarConfig(
+        start_frequency_hz=band_hz[0],
+        end_frequency_hz=band_hz[1],
+        samples_per_chirp=samples,
+        chirps_per_frame=chirps,
+        chirp_repetition_s=wavelength_m / (4.0 * v_max_mps),
+        frame_repetition_s=1.0 / frames_per_s,
+        sample_rate_hz=sample_rate_hz,
+        adc_bits=bits,
+        name=name,
+        sampling=sampling,
+    )
+
+
+def _carrier(name: str, carrier_hz: float, *, samples: int, frames_per_s: float) -> RadarConfig:
+    """Doppler of a carrier: complex samples of a continuous wave, without gaps."""
+    sample_s = 1.0 / (samples * frames_per_s)
+    return RadarConfig(
+        start_frequency_hz=carrier_hz,
+        end_frequency_hz=carrier_hz,
+        samples_per_chirp=1,
+        chirps_per_frame=samples,
+        chirp_repetition_s=sample_s,
+        frame_repetition_s=1.0 / frames_per_s,
+        sample_rate_hz=1.0 / sample_s,
+        adc_bits=16,
+        name=f"{name}, continuous wave, no range ({_UNVERIFIED})",
+        sampling="complex",
+    )
+
+
+RADARS: dict[str, RadarConfig] = {
+    PAPER: PAPER_RADAR,
+    "bgt60": _sweep(
+        "Infineon BGT60, 61 GHz",
+        (60.5e9, 61.5e9),
+        samples=64,
+        chirps=64,
+        v_max_mps=3.1,
+        frames_per_s=30.0,
+        sample_rate_hz=2e6,
+        sampling="real",
+        bits=12,
+    ),
+    "iwr6843": _sweep(
+        f"TI IWR6843, 60 to 64 GHz ({_UNVERIFIED})",
+        (60.25e9, 63.25e9),
+        samples=128,
+        chirps=64,
+        v_max_mps=3.5,
+        frames_per_s=20.0,
+        sample_rate_hz=4e6,
+    ),
+    "iwr1443": _sweep(
+        f"TI IWR1443 or AWR1843, 77 to 81 GHz ({_UNVERIFIED})",
+        (77.25e9, 80.25e9),
+        samples=128,
+        chirps=64,
+        v_max_mps=3.5,
+        frames_per_s=20.0,
+        sample_rate_hz=4e6,
+    ),
+    # Range is formed by a sweep as wide as a pulse of profile 3 (0.14 m); its shape is not that of
+    # the pulse.
+    "a121": _sweep(
+        f"Acconeer A121, 60.5 GHz, as a sweep ({_UNVERIFIED})",
+        (59.965e9, 61.035e9),
+        samples=32,
+        chirps=32,
+        v_max_mps=3.0,
+        frames_per_s=25.0,
+        sample_rate_hz=2e6,
+    ),
+    "k-band": _sweep(
+        f"24 GHz, K band ({_UNVERIFIED})",
+        (24.0e9, 24.25e9),
+        samples=64,
+        chirps=64,
+        v_max_mps=3.1,
+        frames_per_s=15.0,
+        sample_rate_hz=1e6,
+    ),
+    "cw-5.8ghz": _carrier("5.8 GHz", 5.8e9, samples=32, frames_per_s=10.0),
+    "wifi-5ghz": _carrier("Wi-Fi carrier at 5.25 GHz", 5.25e9, samples=32, frames_per_s=10.0),
+    "wifi-2.4ghz": _carrier("Wi-Fi carrier at 2.44 GHz", 2.44e9, samples=32, frames_per_s=5.0),
+}
+"""Radars by name.
+
+Examples
+--------
+>>> from sd2core.radar_profiles import RADARS
+>>> round(1e3 * RADARS["wifi-2.4ghz"].wavelength_m), RADARS["wifi-2.4ghz"].is_continuous
+(123, True)
+"""
