@@ -67,10 +67,11 @@ def _add_window_commands(commands: argparse._SubParsersAction) -> None:
 def _open(options: argparse.Namespace) -> int:
     from sd2app.fit.request import read_request
     from sd2core.io.kinds import kind_of
+    from sd2core.io.radar import without_companions
 
     # Says what is wrong before the window is there. A folder in which a fit was stopped
     # is no recording yet, and can be opened.
-    for path in options.paths:
+    for path in without_companions(options.paths):
         if read_request(path) is None:
             kind_of(path)
     return _show(options.paths, options.screenshot)

@@ -247,9 +247,10 @@ class HeatmapView(MapWidget):
         return width
 
     def _status(self) -> str:
-        """Quality of the map, and the reason where nothing shows."""
+        """Carrier and quality of the map, and the reason where nothing shows."""
         strongest_db, lowest_db = self._track.strongest_db, self._display.levels.low_db
-        parts = [self._track.status]
+        carrier_hz = None if self._track.map is None else self._track.map.carrier_hz
+        parts = ["" if carrier_hz is None else f"{1e-9 * carrier_hz:.4g} GHz", self._track.status]
         if gaps_s := self._track.gaps_s:
             parts.append(f"no person in {sum(end - start for start, end in gaps_s):.2f} s")
         if self._track.uncertainty is not None:

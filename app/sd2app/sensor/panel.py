@@ -143,7 +143,7 @@ class SensorPanel(QWidget):
 
     def _capture_part(self, find: QWidget) -> QWidget:
         edits = self._session.edits
-        self._capture_title = title("Radar capture")
+        self._capture_title, self._radar_name = title("Radar capture"), sentence("")
         self._offset = NumberBox(
             -1e5, 1e5, " s", "Time of the first radar frame here", decimals=3, step=0.01
         )
@@ -167,7 +167,10 @@ class SensorPanel(QWidget):
             limits.addWidget(label, line, 2 * left + 1)
             limits.setColumnStretch(2 * left + 1, 1)
         self._warning = sentence("", "warning")
-        return pane(rule(), self._capture_title, form, limits, self._warning, spacing_px=5)
+        return pane(
+            *(rule(), self._capture_title, self._radar_name, form, limits, self._warning),
+            spacing_px=5,
+        )
 
     # --- typing ---------------------------------------------------------------------------
 
@@ -236,7 +239,7 @@ class SensorPanel(QWidget):
         if capture is None or recording is None:
             return
         self._capture_title.setText("Simulated radar" if capture.simulated else "Real radar")
-        self._capture_title.setToolTip(capture.config.name)
+        self._radar_name.setText(capture.config.name)
         self._offset.show_value(recording.radar_offset_s)
         self._clutter.show_value(document.clutter)
         for name, (_, text_of) in _LIMITS.items():

@@ -72,8 +72,10 @@ def recording_of(paths: Sequence[Path], base: Recording | None = None) -> Record
     Raises Sd2Error if a path is of no known kind, two are of the same, or a recording is to
     be added.
     """
+    from sd2core.io.radar import without_companions
+
     kinds: dict[Kind, Path] = {}
-    for path in paths:
+    for path in without_companions(paths):
         kind = kind_of(path)
         if kind in _TOLD:
             words, remedy = _TOLD[kind]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -45,6 +46,7 @@ __all__ = [
     "load_recorded_map",
     "named_radar",
     "read_radar_config",
+    "without_companions",
     "write_capture",
     "write_described",
 ]
@@ -125,6 +127,23 @@ def companions(path: Path) -> list[Path]:
     elif path.suffix == ".npy" and not found:
         found += [path.with_name(name) for name in INFINEON_FILES]
     return [one for one in dict.fromkeys(found) if one != path and one.is_file()]
+
+
+def without_companions(paths: Sequence[Path]) -> list[Path]:
+    """Paths without those that only belong to another of them; of several parts, the first.
+
+    Who drops a radar file on the window, or names it on a command line, often takes along what
+    lies beside it.
+    """
+    beside = {path: companions(path) for path in paths}
+    return [
+        path
+        for place, path in enumerate(paths)
+        if not any(
+            path in beside[other] and (other not in beside[path] or before < place)
+            for before, other in enumerate(paths)
+        )
+    ]
 
 
 def holds_map(path: Path | str) -> bool:

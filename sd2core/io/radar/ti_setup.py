@@ -378,7 +378,7 @@ def _setup(
         sample_rate_hz=profile.sample_rate_hz,
         receivers=antennas,
         adc_bits=16,
-        name=f"TI mmWave, {first_hz / 1e9:.2f} GHz",
+        name=f"TI mmWave, {0.5e-9 * (first_hz + last_hz):.4g} GHz",
         sampling=_SAMPLINGS[output],
         transmitters=transmitters,
     )

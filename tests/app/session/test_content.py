@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from sd2app.session.content import common_clock, load_content, recording_of
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.processing import doppler_map
+from sd2core.io.radar import companions
 from sd2core.io.radar.described import RadarDescription, write_description
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
@@ -109,7 +110,7 @@ def test_a_capture_of_any_radar_is_shown(tmp_path, kind):
             frame_repetition_s=0.05,
         )
         write_description(wave, path)
-    content = load_content(recording_of([path]), lambda done, total: None)
+    content = load_content(recording_of([path, *companions(path)]), lambda *_: None)
     assert content.problems == ()
     assert content.capture is not None
     assert doppler_map(content.capture, axis=VelocityAxis()).axis.bins == 32
