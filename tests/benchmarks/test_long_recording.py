@@ -27,7 +27,9 @@ from PySide6.QtWidgets import QApplication
 from sd2app.settings import Settings
 from sd2app.widgets.theme import apply_theme
 from sd2app.shell.window import MainWindow
+from sd2core.processes import keep_little_free_memory
 
+keep_little_free_memory()
 application = QApplication(sys.argv[:1])
 apply_theme(application, False)
 window = MainWindow(Settings.forgetful())

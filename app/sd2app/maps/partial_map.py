@@ -61,7 +61,10 @@ class PartialMap:
         else:
             if self.limbs is None:
                 self.limbs = np.zeros((len(stretch.limbs), *self.values.shape), np.float32)
-            self.limbs[..., inside] = stretch.limbs
+            here = self.limbs[..., inside]
+            # Most parts stand still for long; what is zero and stays so takes no memory.
+            changes = stretch.limbs.any(axis=-1) | here.any(axis=-1)  # (parts, bins)
+            here[changes] = stretch.limbs[changes]
         self.quality[inside] = quality
 
     def mark_stale(self) -> None:

@@ -32,7 +32,7 @@ of the time left to drawing."""
 
 AT_ONCE = 12_000_000
 """Vertices times frames that are swept roughly in one go: a few ms up to some 20 ms."""
-_BUDGET_BYTES = 256 << 20
+_BUDGET_BYTES = 192 << 20
 """For prepared frames: more than a clip takes that is swept in one go; of a longer one, what is in
 view."""
 _EXACT_PARTS = 16

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
@@ -62,3 +64,18 @@ def test_another_plan_leaves_the_values_until_they_are_replaced():
     partial.mark_stale()
     assert partial.quality.tolist() == [PREVIEW] * 3 + [0]
     assert partial.values[0].tolist() == [1.0] * 3 + [0.0]
+
+
+@given(
+    st.lists(st.tuples(st.integers(0, 9), st.integers(1, 10), st.integers(0, 10**6)), max_size=12)
+)
+def test_parts_are_painted_whole_also_where_they_become_zero(strokes):
+    partial, wanted = PartialMap(2, 10), np.zeros((3, 2, 10), np.float32)
+    for start, frames, seed in strokes:
+        stop, rng = min(start + frames, 10), np.random.default_rng(seed)
+        limbs = rng.random((3, 2, stop - start)).astype(np.float32)
+        limbs[rng.random((3, 2)) < 0.6] = 0  # most parts stand still
+        painted = replace(stretch_of(stop - start, 1.0), limbs=limbs)
+        partial.paint(VirtualSensor(), start, painted, FINAL)
+        wanted[..., start:stop] = limbs
+        np.testing.assert_array_equal(partial.limbs, wanted)
