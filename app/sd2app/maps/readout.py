@@ -35,6 +35,7 @@ class FrameReader:
         """Drop what was read of an earlier recording."""
         self._frame: tuple[Any, FrameScattering] | None = None
         self._torso: tuple[int, Vector] | None = None
+        self._readout: tuple[FrameScattering, Any, Readout] | None = None
 
     def index(self) -> int | None:
         """Frame of the mesh on screen, None where there is no person."""
@@ -71,13 +72,18 @@ class FrameReader:
         torso = self.torso_m()
         if frame is None or torso is None:
             return None
-        offset = np.subtract(self._sensor.sensor.position_m, torso)
-        seen = np.abs(frame.velocity_mps[frame.visible])
-        return Readout(
-            torso_range_m=float(np.linalg.norm(offset)),
-            visible_share=float(frame.visible.mean()),
-            beyond_share=float((seen > v_max_mps).mean()) if seen.size else 0.0,
-        )
+        place = self._sensor.sensor.position_m
+        key, kept = (torso, place, v_max_mps), self._readout
+        # Several views ask for the same after each move.
+        if kept is None or kept[0] is not frame or kept[1] != key:
+            seen = np.abs(frame.velocity_mps[frame.visible])
+            readout = Readout(
+                torso_range_m=float(np.linalg.norm(np.subtract(place, torso))),
+                visible_share=float(frame.visible.mean()),
+                beyond_share=float((seen > v_max_mps).mean()) if seen.size else 0.0,
+            )
+            kept = self._readout = (frame, key, readout)
+        return kept[2]
 
 
 def reading_lines(reading: Reading) -> tuple[str, ...]:

@@ -125,7 +125,7 @@ class Overlay(Canvas):
         self._legend = QRectF()
         self._paint_legend(painter)
         names = self._paint_names(painter)
-        self._paint_metres(painter, [*names, self._legend, self._body_box()])
+        self._paint_metres(painter, [*names, self._legend], self._body_box())
         self._paint_axes(painter)
         position_m, marker = self._scene.sensor.position_m, self._navigator.marker
         if self._navigator.holds_sensor:
@@ -149,14 +149,14 @@ class Overlay(Canvas):
         painter.setPen(QColor(colour or self._colours.muted))
         painter.drawText(box, where, text)
 
-    def _paint_metres(self, painter: QPainter, occupied: list[QRectF]) -> None:
+    def _paint_metres(self, painter: QPainter, occupied: list[QRectF], body: QRectF) -> None:
         labels = self._scene.metre_labels
         if not labels:
             return
         texts = [label.text for label in labels]
+        left, right = [one.left_m for one in labels], [one.right_m for one in labels]
         sides = [
-            self._metre_boxes(painter, texts, [label.left_m for label in labels], occupied),
-            self._metre_boxes(painter, texts, [label.right_m for label in labels], occupied),
+            self._metre_boxes(painter, texts, places, occupied, body) for places in (left, right)
         ]
         for text, box in max(sides, key=len):
             self._write(painter, box, text)
@@ -167,11 +167,12 @@ class Overlay(Canvas):
         texts: list[str],
         places: list[tuple[float, float, float]],
         occupied: list[QRectF],
+        body: QRectF,
     ) -> list[tuple[str, QRectF]]:
         """Boxes of the labels that fit into the view without touching anything."""
         metrics = QFontMetricsF(painter.font())
-        view, middle = QRectF(self.rect()), self._body_box().center().x()
-        taken = list(occupied)
+        view, middle = QRectF(self.rect()), body.center().x()
+        taken = [*occupied, body]
         boxes: list[tuple[str, QRectF]] = []
         for text, (x, y, depth) in zip(texts, self._scene.pose.project(places), strict=True):
             if not depth > 0.1:
