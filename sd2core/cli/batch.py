@@ -126,13 +126,13 @@ def _run(plan: BatchPlan, options: argparse.Namespace) -> int:
 
 @contextmanager
 def _watching(options: argparse.Namespace) -> Iterator[Watch]:
-    """Show progress as lines on standard output, or as a bar on a terminal."""
+    """Show progress as JSON on standard output, or for people on standard error."""
     if options.progress_json:
         yield lambda event: print_event(**event)
         return
-    from tqdm import tqdm
+    from sd2core.cli.bars import bar as bar_of
 
-    with tqdm(desc="Batch", unit="task", file=sys.stderr, disable=None, leave=False) as bar:
+    with bar_of("Batch", "task") as bar:
 
         def watch(event: dict[str, Any]) -> None:
             if event["event"] == "progress":

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 import time
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -16,10 +15,10 @@ from sd2core.runs.pace import Pace
 
 @contextmanager
 def progress_bar(what: str, unit: str = "frame") -> Iterator[Progress]:
-    """Show a bar on standard error when that is a terminal."""
-    from tqdm import tqdm
+    """Show a bar on standard error; where that is no terminal, a line every few seconds."""
+    from sd2core.cli.bars import bar as bar_of
 
-    with tqdm(desc=what, unit=unit, file=sys.stderr, disable=None, leave=False) as bar:
+    with bar_of(what, unit) as bar:
 
         def report(done: int, total: int) -> None:
             bar.total = total or None

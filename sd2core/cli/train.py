@@ -320,10 +320,10 @@ def _config(options: argparse.Namespace) -> TrainConfig:
 
 @contextmanager
 def _bar(what: str) -> Iterator[Watch]:
-    """Steps, or seconds where time is the limit, on standard error when that is a terminal."""
-    from tqdm import tqdm
+    """Steps, or seconds where time is the limit, on standard error."""
+    from sd2core.cli.bars import bar as bar_of
 
-    with tqdm(desc=what, file=sys.stderr, disable=None, leave=False) as bar:
+    with bar_of(what, "step") as bar:
         minutes: float | None = None
 
         def watch(event: dict[str, Any]) -> None:

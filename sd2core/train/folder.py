@@ -54,7 +54,10 @@ class TrainingFolder(RunFolder):
         self.last_record = self.path / "last.json"  # description of the checkpoint
 
     def make(self) -> None:
-        """Make the folder. Raises Sd2Error if it exists with content, or cannot be made."""
+        """Make the folder, with those above it.
+
+        Raises Sd2Error if it exists with content, or lies in something that is no folder.
+        """
         if self.path.exists() and not self._is_empty():
             what = "a run" if self.exists else "something that is not an empty folder"
             raise Sd2Error(
@@ -63,12 +66,14 @@ class TrainingFolder(RunFolder):
                 "Choose another name"
                 + (f", or go on with it: `sd2 train --resume {self.path}`" if self.exists else ""),
             )
-        if not self.path.absolute().parent.is_dir():
+        above = next(one for one in self.path.absolute().parents if one.exists())
+        if not above.is_dir():
             raise Sd2Error(
-                f"The folder {self.path.absolute().parent} does not exist",
-                "an existing folder in which the run is made",
+                f"{above} is a file",
+                f"a folder in which {self.path.name} is made",
+                "Choose another place for the run",
             )
-        self.path.mkdir(exist_ok=True)
+        self.path.mkdir(parents=True, exist_ok=True)
 
     def create(self, model: str) -> None:
         """Make the folder and the description of the run. Raises Sd2Error as :meth:`make`."""

@@ -191,14 +191,12 @@ def _kept_out(
 @contextmanager
 def _watching(options: argparse.Namespace, steps: int) -> Iterator[Watch]:
     """Show a bar on standard error, or print a JSON line for every event."""
-    from tqdm import tqdm
+    from sd2core.cli.bars import bar as bar_of
 
     if options.progress_json:
         yield lambda event: print_event(**event)
         return
-    with tqdm(
-        total=steps, desc="Training", unit="step", file=sys.stderr, disable=None, leave=False
-    ) as bar:
+    with bar_of("Training", "step", total=steps) as bar:
 
         def watch(event: dict[str, Any]) -> None:
             if event["event"] == "step":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +15,7 @@ from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
     from sd2core.cutouts.source import CutSource
+    from sd2core.labels.spans import Labels
     from sd2core.maps import DopplerMap
     from sd2core.recording.recording import Recording
     from sd2core.timebase import Timebase
@@ -134,6 +136,22 @@ def add_cut(kinds: argparse._SubParsersAction) -> None:
     add_json(parser)
 
 
+def _nothing_to_cut(path: Path, labels: Labels, wanted: Sequence[str] | None) -> Sd2Error:
+    there = sorted({span.label for span in labels.spans if span.origin != "suggestion"})
+    if wanted is not None and there:
+        return Sd2Error(
+            f"{path} has no span of {' or '.join(wanted)}", f"one of {', '.join(there)}"
+        )
+    suggested = sum(span.origin == "suggestion" for span in labels.spans)
+    return Sd2Error(
+        f"{path} has no labelled spans"
+        + (f", only {counted(suggested, 'suggestion')}" if suggested else ""),
+        "spans to cut out",
+        "Mark some in the window (`sd2 open`), accept suggestions there, or name a label file with"
+        " --labels",
+    )
+
+
 def _cut(options: argparse.Namespace) -> None:
     from sd2core.cutouts.cutting import cut_out, plan_cuts
     from sd2core.recording.recording import open_recording
@@ -148,10 +166,7 @@ def _cut(options: argparse.Namespace) -> None:
         if span.origin != "suggestion" and (wanted is None or span.label in wanted)
     ]
     if not spans:
-        there = ", ".join(sorted({span.label for span in labels.spans})) or "nothing"
-        raise Sd2Error(
-            f"{options.labels or options.recording} has no span to cut out", f"one of {there}"
-        )
+        raise _nothing_to_cut(options.labels or options.recording, labels, wanted)
     source = _source(options, recording, clock)
     cuts = plan_cuts(source, spans, options.out)
     others = [cut for cut in cuts if cut.state == "other"]

@@ -343,6 +343,10 @@ def test_spans_are_cut_out(sd2: Sd2, moving_recording: Path, tmp_path: Path) -> 
     assert not (made / "synthetic.npz").exists()
     refused = sd2("labels", "cut", moving_recording, "--out", out, "--label", "push")
     assert "up-to-down, wave" in refused.err
+    unlabelled = written(tmp_path / "none.json")
+    refused = sd2("labels", "cut", moving_recording, "--out", out, "--labels", unlabelled)
+    assert "none.json has no labelled spans" in refused.err
+    assert "sd2 open" in refused.err
 
 
 @pytest.mark.parametrize(

@@ -148,8 +148,13 @@ class TestFolder:
         (tmp_path / "full" / "a").touch()
         with pytest.raises(Sd2Error, match="not an empty folder"):
             TrainingFolder(tmp_path / "full").create("gru")
-        with pytest.raises(Sd2Error, match="does not exist"):
-            TrainingFolder(tmp_path / "no" / "run").create("gru")
+        with pytest.raises(Sd2Error, match=r"a is a file.*a folder in which run is made"):
+            TrainingFolder(tmp_path / "full" / "a" / "runs" / "run").create("gru")
+
+    def test_the_folders_above_are_made_too(self, tmp_path: Path) -> None:
+        run = TrainingFolder(tmp_path / "runs" / "today" / "run")
+        run.create("gru")
+        assert run.exists
 
     def test_the_status_is_that_of_the_lines(self, tmp_path: Path) -> None:
         run = TrainingFolder(tmp_path / "run")
