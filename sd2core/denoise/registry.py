@@ -88,6 +88,7 @@ MODELS = tuple(name for name in _ENTRIES if name not in FILTERS)
 
 _LARGEST = 1024
 """No option is a larger number: a damaged file must not ask for all the memory."""
+_MOST_BINS = 65_536  # of a map, for the same reason
 
 
 def options(name: str) -> dict[str, Any]:
@@ -108,9 +109,11 @@ def build(name: str, bins: int = 32, parts: int = 1, **given: Any) -> Denoiser:
 
     ``parts`` is the number of maps in the input; filters take one. Options that are not given
     come from :func:`options`. Raises Sd2Error when there is no such model or option, or an
-    option is not of its kind.
+    option is not of its kind, or for more bins than a map has.
     """
     entry = _entry(name)
+    if not 1 <= bins <= _MOST_BINS:
+        raise Sd2Error(f"A model of maps of {bins} bins", f"from 1 to {_MOST_BINS:,} bins")
     for option, value in given.items():
         check_option(f"model {name}", option, value, entry.options, _LARGEST)
     module, _, class_name = entry.place.partition(".")

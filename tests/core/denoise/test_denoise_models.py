@@ -198,3 +198,10 @@ def test_every_model_says_what_it_is(name: str) -> None:
 def test_what_cannot_be_built(name: str, given: dict, words: str) -> None:
     with pytest.raises(Sd2Error, match=words):
         build(name, **given)
+
+
+@pytest.mark.parametrize("bins", [0, 10**6, 10**30])
+def test_no_model_is_made_of_more_bins_than_a_map_has(bins: int) -> None:
+    """A damaged file may ask for any number."""
+    with pytest.raises(Sd2Error, match="from 1 to 65,536 bins"):
+        build("gru", bins)
