@@ -10,8 +10,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from sd2app.plain_imports import plain_imports
+from sd2app.system_libraries import explain_missing, missing_libraries, uses_x11
 from sd2core.cli import build_parser, run
-from sd2core.cli.options import add_command
+from sd2core.cli.options import add_command, add_json
 from sd2core.errors import Sd2Error
 
 
@@ -63,6 +64,24 @@ def _add_window_commands(commands: argparse._SubParsersAction) -> None:
             help="draw the window into a picture instead of on the screen",
         )
 
+    examining = add_command(
+        commands,
+        "doctor",
+        "check the installation, and say how to mend it",
+        handler=_doctor,
+        description=(
+            "Looks at system libraries, display, OpenGL, fonts, compiled kernels, models, GPU and\n"
+            "room on the disk. The exit code is 1 where something must be mended."
+        ),
+    )
+    add_json(examining)
+
+
+def _doctor(options: argparse.Namespace) -> int:
+    from sd2app.doctor import report
+
+    return report(options.json)
+
 
 def _open(options: argparse.Namespace) -> int:
     from sd2app.fit.request import read_request
@@ -92,6 +111,8 @@ def _show(paths: Sequence[Path], screenshot: Path | None) -> int:
             "There is no display to open a window on",
             remedy="Draw the same window into a picture with --screenshot FILE.png",
         )
+    if missing := missing_libraries(uses_x11()):
+        raise explain_missing(missing)
     with plain_imports():
         from sd2app.shell.app import run as run_window
 

@@ -9,7 +9,6 @@ frames/s), and Qt's ``offscreen`` platform has no OpenGL window at all.
 
 from __future__ import annotations
 
-import ctypes
 import os
 import sys
 from collections.abc import Callable
@@ -19,6 +18,8 @@ from typing import Literal, Protocol
 from PySide6.QtGui import QGuiApplication, QOffscreenSurface, QOpenGLContext
 from PySide6.QtWidgets import QWidget
 from vtkmodules.vtkRenderingCore import vtkRenderer
+
+from sd2app.system_libraries import loads
 
 BackendName = Literal["gl", "image"]
 
@@ -110,8 +111,4 @@ def missing_library(backend: BackendName) -> str | None:
     if not sys.platform.startswith("linux"):
         return None
     library = "libGL.so.1" if backend == "gl" else "libEGL.so.1"
-    try:
-        ctypes.CDLL(library)
-    except OSError:
-        return library
-    return None
+    return None if loads(library) else library

@@ -1,0 +1,198 @@
+"""``sd2 doctor``: what an installation has and lacks, and how to mend it."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import shutil
+import subprocess
+import sys
+from dataclasses import asdict, dataclass
+from typing import Literal
+
+from sd2app.system_libraries import install_line, missing_libraries, uses_x11
+from sd2core.errors import Sd2Error
+from sd2core.files.paths import user_cache, user_data
+from sd2core.files.resources import resource_path
+from sd2core.numerics.compiled import kernels_ready, modules_compiled, worker_count
+from sd2core.version import __version__
+
+_FREE_GB = 2.0
+_PROBE_S = 120.0
+
+PROBE = """
+import json, sys
+from PySide6.QtGui import QFontDatabase
+from PySide6.QtWidgets import QApplication
+application = QApplication(sys.argv[:1])
+found = {"platform": application.platformName(), "fonts": len(QFontDatabase.families())}
+try:
+    from sd2app.scene.offscreen_backend import ImageBackend
+    ImageBackend()
+except RuntimeError as error:
+    found["gl"] = str(error)
+print(json.dumps(found))
+"""
+"""Opens what a window needs, in a process of its own: Qt ends it where something is missing."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that was looked at."""
+
+    about: str
+    state: Literal["ok", "note", "problem"]
+    found: str
+    remedy: str = ""
+
+
+def examine() -> list[Finding]:
+    """Look at the installation."""
+    return [
+        Finding(
+            "SD² Studio",
+            "ok",
+            f"{__version__}, Python {platform.python_version()}, {worker_count()} cores",
+        ),
+        _libraries(),
+        *_window(),
+        _kernels(),
+        _bundled(),
+        _landmark_models(),
+        _gpu(),
+        *_folders(),
+    ]
+
+
+def _libraries() -> Finding:
+    missing = missing_libraries(uses_x11())
+    if missing:
+        return Finding(
+            "System libraries",
+            "problem",
+            f"{', '.join(missing)} missing",
+            "On Debian or Ubuntu: " + install_line(missing.values()),
+        )
+    return Finding("System libraries", "ok", "all there")
+
+
+def _window() -> list[Finding]:
+    on_screen = any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
+    environment = dict(os.environ)
+    if not on_screen and sys.platform.startswith("linux"):
+        environment["QT_QPA_PLATFORM"] = "offscreen"
+    try:
+        run = subprocess.run(
+            [sys.executable, "-c", PROBE],
+            capture_output=True,
+            text=True,
+            timeout=_PROBE_S,
+            env=environment,
+            check=False,
+        )
+        seen = json.loads(run.stdout.splitlines()[-1])
+    except subprocess.TimeoutExpired:
+        return [Finding("Window", "problem", f"nothing within {_PROBE_S:.0f} s", "Try once more")]
+    except (IndexError, ValueError):
+        said = (run.stderr.strip().splitlines() or [f"it ended with code {run.returncode}"])[-1]
+        return [Finding("Window", "problem", said, "Install what is missing above, or named here")]
+    return [
+        Finding("Window", "ok", f"opens ({seen['platform']})")
+        if on_screen or not sys.platform.startswith("linux")
+        else Finding(
+            "Window",
+            "note",
+            "there is no display",
+            "Pictures can be drawn without: sd2 demo --screenshot window.png",
+        ),
+        Finding("3D view", "ok", "OpenGL answers")
+        if "gl" not in seen
+        else Finding("3D view", "problem", *seen["gl"].split(". ", 1)),
+        Finding("Fonts", "ok", f"{seen['fonts']} families")
+        if seen["fonts"]
+        else Finding(
+            "Fonts",
+            "problem",
+            "none: texts would be boxes",
+            "On Debian or Ubuntu: " + install_line(["fonts-dejavu-core"]),
+        ),
+    ]
+
+
+def _kernels() -> Finding:
+    if kernels_ready():
+        return Finding("Kernels", "ok", "compiled for this processor")
+    done, total = modules_compiled()
+    return Finding(
+        "Kernels",
+        "note",
+        f"{done} of {total} modules compiled",
+        "sd2 warm-up (half a minute; otherwise that is done in the background)",
+    )
+
+
+def _bundled() -> Finding:
+    try:
+        for name in ("body.npz", "denoiser.safetensors", "lifter.npz", "swipes.sd2"):
+            resource_path(name)
+    except Sd2Error as error:
+        return Finding("Bundled files", "problem", error.found, error.remedy)
+    return Finding("Bundled files", "ok", "body, denoisers, lifter and sample are there")
+
+
+def _landmark_models() -> Finding:
+    from sd2core.body.landmark_models import landmark_models
+
+    try:
+        models = landmark_models(download=False)
+    except Sd2Error as error:
+        return Finding(
+            "Landmark models",
+            "note",
+            error.found,
+            "sd2 fetch-models (36 MB, once; only fits of videos need them)",
+        )
+    return Finding("Landmark models", "ok", str(models.detector.parent))
+
+
+def _gpu() -> Finding:
+    try:
+        import torch
+    except (ImportError, OSError) as error:
+        return Finding(
+            "Learning", "problem", f"torch cannot be loaded ({error})", "Install it again"
+        )
+    if torch.cuda.is_available():
+        return Finding("Learning", "ok", f"on {torch.cuda.get_device_name()}")
+    return Finding("Learning", "ok", f"torch {torch.__version__} on the processor, no GPU")
+
+
+def _folders() -> list[Finding]:
+    found = []
+    for about, folder in (("Cache", user_cache("")), ("Data", user_data(""))):
+        there = next(one for one in (folder, *folder.parents) if one.exists())
+        free_gb = shutil.disk_usage(there).free / 1e9
+        if not os.access(there, os.W_OK):
+            finding = Finding(about, "problem", f"{there} cannot be written to", "Mend its rights")
+        elif free_gb < _FREE_GB:
+            finding = Finding(about, "problem", f"{free_gb:.1f} GB free at {there}", "Make room")
+        else:
+            finding = Finding(about, "ok", f"{folder}, {free_gb:,.0f} GB free")
+        found.append(finding)
+    return found
+
+
+def report(as_json: bool) -> int:
+    """Print what was found; returns 1 where something must be mended."""
+    found = examine()
+    if as_json:
+        print(json.dumps([asdict(one) for one in found], indent=2, ensure_ascii=False))
+    else:
+        width = max(len(one.about) for one in found)
+        for one in found:
+            mark = {"ok": "ok", "note": "note", "problem": "PROBLEM"}[one.state]
+            print(f"{mark:<8} {one.about:<{width}}  {one.found}")
+            if one.remedy:
+                print(f"{'':<8} {'':<{width}}  → {one.remedy}")
+    return int(any(one.state == "problem" for one in found))
