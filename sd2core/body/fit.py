@@ -19,7 +19,7 @@ from sd2core.body.lifter import Lifted, LiftedInParts, Lifter
 from sd2core.body.limbs import LIMBS
 from sd2core.body.rig import KeypointSpace, Rig
 from sd2core.body.rotations import Floats
-from sd2core.body.shape import BodyShape, ShapeSpace
+from sd2core.body.shape import DEFAULT_STATURE_M, BodyShape, ShapeSpace
 from sd2core.body.shaping import shape_of_lengths, shape_of_outlines
 from sd2core.body.solve import ROUNDS, solve, solve_stills
 from sd2core.body.track import LANDMARKS, PART_FRAMES, Landmarks, parts
@@ -28,8 +28,6 @@ from sd2core.progress import Progress, silent
 
 Lift = Callable[[Landmarks, PinholeCamera], Lifted]
 
-DEFAULT_STATURE_M = 1.72
-"""Body height if none is given; distances and speeds scale with it."""
 
 STATURES_M = (0.5, 2.6)
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.camera import PinholeCamera, Source, camera_of
-from sd2core.body.fit import DEFAULT_STATURE_M, fit_motion
+from sd2core.body.fit import fit_motion
 from sd2core.body.fitted import FittedMotion
 from sd2core.body.landmark_files import save_track
 from sd2core.body.landmark_models import landmark_models
@@ -26,6 +26,7 @@ from sd2core.body.landmarks import DEFAULT_MAX_GAP_S, SIGHTINGS, OnFrame, find_l
 from sd2core.body.limbs import LIMB_LANDMARKS, LIMBS
 from sd2core.body.model import Resolution
 from sd2core.body.person_selection import Rectangle
+from sd2core.body.shape import DEFAULT_STATURE_M
 from sd2core.body.solve import one_thread
 from sd2core.body.track import LANDMARK, Landmarks, parts
 from sd2core.errors import Sd2Error

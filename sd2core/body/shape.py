@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 from sd2core.body.model import Body, Resolution, Skeleton, load_skeleton, read_body_arrays
 from sd2core.errors import Sd2Error
 
+DEFAULT_STATURE_M = 1.72
+"""Body height if none is given; distances and speeds scale with it."""
+
 Floats = NDArray[np.float64]
 
 PHENOTYPES = ("gender", "muscle", "weight", "height", "proportions")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject
 
@@ -14,12 +15,15 @@ from sd2app.batch.run import BatchMonitor, plan_of
 from sd2app.batch.setup import BatchSetupModel
 from sd2app.settings import Settings
 from sd2app.widgets.text import counted
-from sd2core.batch.estimate import BatchEstimate, estimate
 from sd2core.batch.folder import BatchFolder
-from sd2core.batch.plan import BatchPlan
-from sd2core.batch.plan_file import write_plan
 from sd2core.errors import Sd2Error
+from sd2core.progress import Progress
 from sd2core.runs.command_folder import COMMAND, launch
+
+if TYPE_CHECKING:
+    # Imported where it is used: it takes long to load, and the window starts without.
+    from sd2core.batch.estimate import BatchEstimate
+    from sd2core.batch.plan import BatchPlan
 
 _SENTENCES = Sentences(
     busy="A process is at work in {} already.",
@@ -79,7 +83,7 @@ class BatchModel(Runs[BatchMonitor]):
         if asked != self._asked:
             self._forget_estimate()
             self._asked = asked
-            self._estimating.submit(lambda emit: estimate(*asked, lambda done, of: emit(None)))
+            self._estimating.submit(lambda emit: _estimate(*asked, lambda done, of: emit(None)))
             self.changed.emit()
 
     def _forget_estimate(self) -> None:
@@ -109,6 +113,8 @@ class BatchModel(Runs[BatchMonitor]):
 
     def start(self) -> None:
         """Begin as set up; Sd2Error if it cannot start, OSError if its plan cannot be written."""
+        from sd2core.batch.plan_file import write_plan
+
         if self.why_not_start:
             raise Sd2Error(self.why_not_start)
         plan = self.setup.plan()
@@ -160,3 +166,9 @@ class BatchModel(Runs[BatchMonitor]):
             self.noted.emit(f"{run.path.name} {but}. File → Batch… opens results.")
         else:
             super().say_ended(run)
+
+
+def _estimate(plan: BatchPlan, workers: int, progress: Progress) -> BatchEstimate:
+    from sd2core.batch.estimate import estimate
+
+    return estimate(plan, workers, progress)

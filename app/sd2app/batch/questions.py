@@ -19,7 +19,6 @@ from sd2app.sensor.placements import PlacementsModel
 from sd2app.session.session import Session
 from sd2app.widgets.dialogs import ask_file, ask_folder, ask_new
 from sd2app.widgets.text import counted
-from sd2core.batch.plan_file import write_plan
 from sd2core.denoise.card import ModelCard
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import plain_path
@@ -166,6 +165,8 @@ class BatchQuestions(QObject):
         out = self._batch.setup.out
         name = "plan.toml" if out is None else f"{out.name}.toml"
         if path := ask_new(self._over, "Save plan", name, kinds, ".toml"):
+            from sd2core.batch.plan_file import write_plan
+
             self._attempt(lambda: write_plan(path, self._batch.setup.plan()))
 
     def start(self) -> None:

@@ -5,18 +5,21 @@ from __future__ import annotations
 import glob
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from PySide6.QtCore import QObject
 
 from sd2app.background.run_setup import RunSetup
 from sd2app.settings import Settings, StoredChoices
-from sd2core.batch.plan import BatchPlan, Denoise, Export, Fit, Recordings, Synthesise
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import plain_path
 from sd2core.io.kinds import VIDEO_SUFFIXES, kind_of
 from sd2core.numerics.compiled import worker_count
 from sd2core.placements.placements import Placements
+
+if TYPE_CHECKING:
+    # Imported where it is used: it takes long to load, and the window starts without.
+    from sd2core.batch.plan import BatchPlan
 
 OptionalStep = Literal["fit", "denoise", "export"]
 Accuracy = Literal["exact", "tolerance"]
@@ -122,6 +125,8 @@ class BatchSetupModel(RunSetup[Entry]):
 
     def plan(self) -> BatchPlan:
         """Plan in the form that the library takes; Sd2Error if something is missing."""
+        from sd2core.batch.plan import BatchPlan, Denoise, Export, Fit, Recordings, Synthesise
+
         if self.problem:
             raise Sd2Error(self.problem)
         assert self.out is not None

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from sd2app.background.run_monitor import Phase
 from sd2app.batch.run import BatchMonitor, Failed
 from sd2app.batch.setup import Entry
 from sd2app.widgets.text import about, bytes_text, counted, duration_text, exact_text
-from sd2core.batch.estimate import BatchEstimate, StepEstimate
+
+if TYPE_CHECKING:
+    from sd2core.batch.estimate import BatchEstimate, StepEstimate
 
 STEP_WORDS = {
     "inspect": "Look at recordings",

@@ -6,7 +6,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QObject
 
@@ -14,17 +14,14 @@ from sd2app.background.run_setup import RunSetup
 from sd2app.settings import Settings, StoredChoices
 from sd2app.widgets.text import counted, duration_text
 from sd2core.classify.defaults import DELAY_S, LONGEST_DELAY_S, MODELS, WIDTH, pace_kind
-from sd2core.datasets.labelled import (
-    LabelledFacts,
-    LabelledSource,
-    labelled_facts,
-    people_of,
-    unfolded,
-)
 from sd2core.errors import Sd2Error
 from sd2core.files.texts import parse_json
 from sd2core.runs.pace import known_pace_s
-from sd2core.train.data import Split, split_subjects
+
+if TYPE_CHECKING:
+    # Imported where it is used: it takes long to load, and the window starts without.
+    from sd2core.datasets.labelled import LabelledFacts
+    from sd2core.train.data import Split
 
 MAPS = ("radar", "synthetic", "denoised")
 FEATURES = ("columns", "peak")
@@ -60,6 +57,8 @@ class DataSource:
     @property
     def people(self) -> tuple[str, ...]:
         """People in it."""
+        from sd2core.datasets.labelled import people_of
+
         return people_of(self.facts)
 
     @property
@@ -104,6 +103,8 @@ class ClassSetup(RunSetup[DataSource]):
 
     def look_into(self, source: DataSource) -> DataSource:
         """Read the content of a source of data."""
+        from sd2core.datasets.labelled import LabelledSource, labelled_facts, unfolded
+
         path, person = source.path, source.person
         try:
             facts = tuple(map(labelled_facts, unfolded([LabelledSource(path, person)])))
@@ -221,6 +222,9 @@ def division_of(data: Sequence[DataSource]) -> Split | None:
     Like ``sd2 classify train``: where there is nothing but data sets, they state it themselves.
     Raises Sd2Error if data sets contradict each other.
     """
+    from sd2core.datasets.labelled import people_of
+    from sd2core.train.data import split_subjects
+
     facts = [one for source in data for one in source.facts]
     people = people_of(facts)
     if not people:

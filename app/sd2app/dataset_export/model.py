@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from PySide6.QtCore import QObject
 
@@ -15,10 +15,6 @@ from sd2app.dataset_export.run import Exported, ExportRun
 from sd2app.session.tasks import Job, TaskList
 from sd2app.settings import Settings
 from sd2app.widgets.text import about, counted
-from sd2core.datasets.forecast import Counting, Forecast
-from sd2core.datasets.options import DatasetOptions
-from sd2core.datasets.recording_sources import Making
-from sd2core.datasets.sources import gather, recordings_in
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import user_data
 from sd2core.maps import MapKind
@@ -28,6 +24,11 @@ from sd2core.recording.recording import is_recording, open_recording
 from sd2core.runs.command_folder import COMMAND_IN_FOLDER, CommandFolder, commands_in
 from sd2core.runs.pace import known_pace_s
 from sd2core.sensor import VelocityAxis
+
+if TYPE_CHECKING:
+    # Imported where it is used: it takes long to load, and the window starts without.
+    from sd2core.datasets.forecast import Counting, Forecast
+    from sd2core.datasets.recording_sources import Making
 
 ENDINGS = (".zarr", ".h5", ".npz")
 
@@ -67,6 +68,8 @@ class ExportChoice:
     @property
     def making(self) -> Making:
         """Options for the maps."""
+        from sd2core.datasets.recording_sources import Making
+
         return Making(kinds=self.kinds, placements="planned" if self.planned else None)
 
     @property
@@ -277,6 +280,10 @@ class ExportModel(Runs[ExportRun]):
         place = choice.place
 
         def count(emit: Emit) -> _Counted:
+            from sd2core.datasets.forecast import Counting
+            from sd2core.datasets.options import DatasetOptions
+            from sd2core.datasets.sources import gather
+
             options = DatasetOptions(
                 kinds=choice.kinds, length=choice.length, overlap=choice.overlap
             )
@@ -307,6 +314,8 @@ class ExportModel(Runs[ExportRun]):
 
 def _places(place: Path | None) -> int:
     """Largest number of places that a recording plans; damaged ones plan none."""
+    from sd2core.datasets.sources import recordings_in
+
     if place is None:
         return 0
     most = 0

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from sd2core.datasets.forecast import Forecast
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from sd2core.datasets.forecast import Forecast
 
 
 def size_words(forecast: Forecast, length: int) -> str:

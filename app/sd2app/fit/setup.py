@@ -15,7 +15,7 @@ from PySide6.QtCore import QObject, Signal
 from sd2app.background.latest import Emit, LatestRunner
 from sd2app.fit.request import FitRequest, Person, read_request
 from sd2core.body.camera import DEFAULT_FIELD_OF_VIEW_DEG
-from sd2core.body.fit import DEFAULT_STATURE_M as DEFAULT_STATURE_M
+from sd2core.body.shape import DEFAULT_STATURE_M as DEFAULT_STATURE_M
 from sd2core.io.video import VideoReader, open_video
 from sd2core.recording.recording import FILE_NAME, SUFFIX, Recording
 
