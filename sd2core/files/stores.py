@@ -303,6 +303,9 @@ def array_in(
         return StoredArray(group[name], path, name, unit, sparse=sparse)
     except Sd2Error:
         raise
+    except KeyError as error:
+        missing = f"{path}: the array {name} is missing"
+        raise Sd2Error(missing, "a complete Zarr store", COPY_AGAIN) from error
     except Exception as error:
         raise _no_group(path / name, error) from error
 
