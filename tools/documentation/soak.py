@@ -182,19 +182,21 @@ class Hand:
         self._save()
 
     def train(self, pairs: Path) -> None:
-        """Start a training on pairs, and wait until it has learnt from all of them once."""
+        """Have a denoiser learn from pairs, again when it has ended; wait for its first epoch."""
         training = self._window.features.training.model
+        if training.under_way:
+            return
+        training.setup.keep(())
         training.setup.add(pairs)
         self._until(lambda: not training.setup.problem, "take the pairs")
         training.start()
         self._until(lambda: training.run.history.epoch >= 1, "train")
 
     def end_training(self) -> None:
-        """Cancel the training; RuntimeError if it has ended by itself."""
+        """Cancel what runs of a training."""
         training = self._window.features.training.model
-        if training.run.phase != "running":
-            raise RuntimeError(f"The training is {training.run.phase}: give it more pairs")
-        training.tell("cancel")
+        if training.under_way:
+            training.tell("cancel")
         self._until(lambda: not training.under_way, "end the training")
 
     def _press(self, name: str, modifier: Qt.KeyboardModifier = _NONE) -> None:
@@ -270,6 +272,8 @@ def soak(
         hand.train(training)
     say(meter.row(rounds))
     while meter.minute < minutes:
+        if training is not None:
+            hand.train(training)
         hand.round()
         rounds += 1
         hand.open(recordings[rounds % 2])
