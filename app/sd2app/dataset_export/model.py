@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from PySide6.QtCore import QObject
 
@@ -21,6 +21,7 @@ from sd2core.datasets.recording_sources import Making
 from sd2core.datasets.sources import gather, recordings_in
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import user_data
+from sd2core.imu.mounting import PLACES
 from sd2core.maps import MapKind
 from sd2core.pairs.segments import LENGTH, OVERLAP
 from sd2core.progress import Cancelled
@@ -58,6 +59,7 @@ class ExportChoice:
     length: int = LENGTH  # frames
     overlap: int = OVERLAP  # frames
     ending: str = ".zarr"  # one of ENDINGS
+    imu: tuple[str, ...] = ()  # named places of inertial sensors; empty: none are exported
 
     @property
     def kinds(self) -> tuple[MapKind, ...]:
@@ -67,12 +69,13 @@ class ExportChoice:
     @property
     def making(self) -> Making:
         """Options for the maps."""
-        return Making(kinds=self.kinds, placements="planned" if self.planned else None)
+        placements: Literal["planned"] | None = "planned" if self.planned else None
+        return Making(kinds=self.kinds, placements=placements, imu=self.imu)
 
     @property
     def sources(self) -> tuple[object, ...]:
         """Choices that decide which sources there are."""
-        return self.place, self.maps, self.planned, self.subjects
+        return self.place, self.maps, self.planned, self.subjects, self.imu
 
     def to_json(self) -> dict[str, Any]:
         """Choices by name."""
@@ -90,6 +93,7 @@ class ExportChoice:
             int(content["length"]),
             int(content["overlap"]),
             ENDINGS[ENDINGS.index(ending)],
+            tuple(map(str, content["imu"])),
         )
 
 
@@ -120,6 +124,7 @@ class ExportModel(Runs[ExportRun]):
         self.choice = ExportChoice()
         self.problem = ""  # why these choices cannot be exported
         self.places = 0  # planned besides the recordings' own sensors, the most of any
+        self.imu_places: tuple[str, ...] = ()  # named ones that the recordings have sensors at
         self.result: Exported | None = None  # written last, until something else is chosen
         self._counted: _Counted | None = None
         self._runner = LatestRunner("count segments", self, self._receive, self._refuse)
@@ -156,10 +161,11 @@ class ExportModel(Runs[ExportRun]):
     def begin(self, place: Path | None) -> None:
         """Choose a recording or a folder and read it again; other choices stay."""
         self._counted = None
-        self.places = _places(place)
+        self._look_into(place)
         planned = self.choice.planned and self.places > 0
+        imu = self.imu_places if self.choice.imu else ()
         self.result = None
-        self.choice = replace(self.choice, place=place, planned=planned, subjects=())
+        self.choice = replace(self.choice, place=place, planned=planned, subjects=(), imu=imu)
         self._count()
 
     def choose(self, **changes: object) -> None:
@@ -184,6 +190,7 @@ class ExportModel(Runs[ExportRun]):
             "--length", str(choice.length), "--overlap", str(choice.overlap), "--progress-json",
         ]  # fmt: skip
         words += ["--placements", "planned"] if choice.planned else []
+        words += ["--imu", ",".join(choice.imu)] if choice.imu else []
         words += ["--subjects", ",".join(choice.subjects)] if choice.subjects else []
         about = {"what": "export", "out": str(out), "choice": choice.to_json()}
         path = free_folder(self._folder, "export", [out])
@@ -224,7 +231,7 @@ class ExportModel(Runs[ExportRun]):
         except (KeyError, TypeError, ValueError):
             pass  # of another version: it is followed all the same
         else:
-            self.places = _places(self.choice.place)
+            self._look_into(self.choice.place)
             self._count()
         self.follow(run, under_way=True)  # until it is known, and said, how it has ended
         if one.live:
@@ -265,6 +272,22 @@ class ExportModel(Runs[ExportRun]):
 
     # --- inside ---------------------------------------------------------------------------
 
+    def _look_into(self, place: Path | None) -> None:
+        """Note what the recordings of a place plan and carry; damaged ones have nothing."""
+        self.places = 0
+        carried: set[str] = set()
+        folders = [] if place is None else [place] if is_recording(place) else recordings_in(place)
+        for folder in folders:
+            try:
+                recording = open_recording(folder)
+            except Sd2Error:
+                continue
+            if recording.mesh is not None:
+                carried.update(recording.imu_places)
+                if recording.placements is not None:
+                    self.places = max(self.places, len(recording.placements.places()))
+        self.imu_places = tuple(name for name in PLACES if name in carried)
+
     def _count(self) -> None:
         choice, known = self.choice, self._counted
         self.problem = ""
@@ -278,7 +301,7 @@ class ExportModel(Runs[ExportRun]):
 
         def count(emit: Emit) -> _Counted:
             options = DatasetOptions(
-                kinds=choice.kinds, length=choice.length, overlap=choice.overlap
+                kinds=choice.kinds, length=choice.length, overlap=choice.overlap, imu=choice.imu
             )
             if known is not None and known.sources == choice.sources:
                 counting = known.counting
@@ -303,18 +326,3 @@ class ExportModel(Runs[ExportRun]):
         self._counted = None
         self.problem = str(error)
         self.changed.emit()
-
-
-def _places(place: Path | None) -> int:
-    """Largest number of places that a recording plans; damaged ones plan none."""
-    if place is None:
-        return 0
-    most = 0
-    for folder in [place] if is_recording(place) else recordings_in(place):
-        try:
-            recording = open_recording(folder)
-        except Sd2Error:
-            continue
-        if recording.placements is not None and recording.mesh is not None:
-            most = max(most, len(recording.placements.places()))
-    return most
