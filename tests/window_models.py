@@ -119,6 +119,8 @@ def _named(session: Session, features: Features, **others: object) -> SimpleName
         training=f.training.model,
         training_use=f.training.adoption,
         export=f.dataset_export.model,
+        imu=f.imu.model,
+        placing=s.placing,
         close=close,
         **others,
     )

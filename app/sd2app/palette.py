@@ -1,4 +1,7 @@
-"""Colours of the two themes. Text on its background has a contrast of at least 4.5:1."""
+"""Colours of the two themes. Text on its background has a contrast of at least 4.5:1.
+
+Those of a sensor's axes have it on panels and wells, and differ to the colour-blind.
+"""
 
 from __future__ import annotations
 
@@ -25,6 +28,9 @@ class Palette:
     hatch: str
     warning: str
     overlay: str
+    axis_x: str
+    axis_y: str
+    axis_z: str
 
 
 LIGHT = Palette(
@@ -44,6 +50,9 @@ LIGHT = Palette(
     hatch="#9aa1ab",
     warning="#a33a00",
     overlay="#2fc6a8",
+    axis_x="#b83a00",
+    axis_y="#00786b",
+    axis_z="#4b3bc8",
 )
 DARK = Palette(
     window="#17191d",
@@ -62,6 +71,9 @@ DARK = Palette(
     hatch="#5a616c",
     warning="#ffb07a",
     overlay="#2fc6a8",
+    axis_x="#ff8a4c",
+    axis_y="#46e0b0",
+    axis_z="#9a9cff",
 )
 
 

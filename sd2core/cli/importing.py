@@ -48,6 +48,16 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         metavar="S",
         help="time in the video, in seconds, of the first radar frame (default: 0)",
     )
+    parser.add_argument(
+        "--imu", type=Path, metavar="FILE", help="samples of an inertial sensor (.csv, .sto, .npz)"
+    )
+    parser.add_argument(
+        "--imu-offset-s",
+        type=finite_float,
+        default=0.0,
+        metavar="S",
+        help="time in the video, in seconds, of their first sample (default: 0)",
+    )
     parser.add_argument("--title", default="", help="what to call it (default: its name)")
     parser.add_argument("--copy", action="store_true", help="copy the files into the recording")
     add_json(parser)
@@ -84,6 +94,8 @@ def _import(options: argparse.Namespace) -> None:
         radar=options.radar,
         mesh_reading=mesh_reading(options),
         radar_offset_s=options.radar_offset_s,
+        imu=options.imu,
+        imu_offset_s=options.imu_offset_s,
         title=options.title,
     )
     recording.learn_camera()

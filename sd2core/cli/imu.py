@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from sd2core.cli.options import (
     add_command,
@@ -20,7 +20,6 @@ from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
     from sd2core.imu.sensor_errors import SensorErrors
-    from sd2core.imu.signals import InertialSignals
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
@@ -107,6 +106,7 @@ def _add_errors(parser: argparse.ArgumentParser) -> None:
 
 
 def _imu(options: argparse.Namespace) -> None:
+    from sd2core.cli.info.description import signals_data
     from sd2core.cli.reading import mesh_and_sensor
     from sd2core.imu.files import write_signals
     from sd2core.imu.virtual import virtual_imu
@@ -125,7 +125,7 @@ def _imu(options: argparse.Namespace) -> None:
             progress=progress,
         )
     write_signals(options.out, signals)
-    told = _told(signals)
+    told = signals_data(signals)
     if options.json:
         print_json({"file": str(options.out), **told, **signals.meta})
         return
@@ -158,22 +158,6 @@ def _errors(options: argparse.Namespace) -> SensorErrors | None:
         seed=options.seed,
     )
     return None if errors == SensorErrors(seed=options.seed) else errors
-
-
-def _told(signals: InertialSignals) -> dict[str, Any]:
-    import numpy as np
-
-    known = signals.known
-    acceleration, turn_rate = (
-        float(np.linalg.norm(values[known], axis=1).max(initial=0.0))
-        for values in (signals.acceleration_mps2, signals.turn_rate_radps)
-    )
-    return {
-        "samples": len(known),
-        "known_samples": int(known.sum()),
-        "largest_acceleration_mps2": acceleration,
-        "largest_turn_rate_radps": turn_rate,
-    }
 
 
 def _check_output(path: Path) -> None:

@@ -34,6 +34,9 @@ PositiveFinite = Annotated[FiniteFloat, Field(gt=0)]
 StoredPath = Annotated[str, StringConstraints(pattern=r"\S")]
 """A path that names something: nothing at all would be the recording's own folder."""
 
+ImuPlace = Annotated[str, StringConstraints(pattern=r"^([a-z][a-z-]{0,39}|[0-9]{1,9})$")]
+"""Name of a place on the body, or the number of a vertex."""
+
 
 class Span(BaseModel):
     """A labelled stretch of time, half-open ``[start_s, end_s)``.
@@ -121,6 +124,9 @@ class Document(BaseModel):
     faces: StoredPath | None = None
     radar: StoredPath | None = None
     radar_offset_s: Time = 0.0
+    imu: StoredPath | None = None
+    imu_offset_s: Time = 0.0
+    imu_places: tuple[ImuPlace, ...] = ()
     denoiser: StoredPath | None = None
     bundled_denoiser: str | None = None
     sensor: SensorEntry = SensorEntry()

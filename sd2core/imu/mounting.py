@@ -17,12 +17,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.body.model import Body, own_resolution, vertex_normals
+from sd2core.body.model import Body, Resolution, own_resolution, vertex_normals
 from sd2core.body.rotations import Floats, aligning, frame
 from sd2core.errors import Sd2Error
 from sd2core.imu.signals import UP, RigidPath, unit_up
@@ -102,6 +103,7 @@ class Mounting:
     rows: NDArray[np.intp]  # (n,) vertices that carry it
     weights: Floats  # (n,) adding up to 1
     vertices_m: Floats  # (n, 3)
+    vertex: int  # that it sits on
     position_m: Floats  # (3,) of the sensor
     rotation: Floats  # (3, 3) from its axes to the world's
 
@@ -184,8 +186,55 @@ def mounted(mesh: MeshSequence, at: str | int, up: Vector = UP) -> Mounting:
     return _on_bone(mesh, points_m, Body.load(resolution), name)
 
 
+def place_near(mesh: MeshSequence, vertex: int) -> str:
+    """Find the named place nearest to a vertex of the bundled body.
+
+    Of the places whose bones carry the vertex, the one nearest to it on the body at rest; of all
+    places where none of them does, as on a finger. On any other surface the vertex itself is the
+    place: its number as text.
+
+    Examples
+    --------
+    >>> import sd2core as sd2
+    >>> from sd2core.files.resources import resource_path
+    >>> mesh = sd2.load_mesh(resource_path("swipes.sd2") / "mesh.zarr")
+    >>> place_near(mesh, mounted(mesh, "left-hand").vertex)
+    'left-hand'
+    """
+    resolution = own_resolution(mesh)
+    return str(vertex) if resolution is None else PLACES[_nearest_places(resolution)[vertex]]
+
+
+@lru_cache(maxsize=3)
+def _nearest_places(resolution: Resolution) -> NDArray[np.intp]:
+    """Number of the nearest place for every vertex of the bundled body, (V,)."""
+    body = Body.load(resolution)
+    away_m = np.empty((len(PLACES), len(body.vertices_m)))
+    carries = np.empty_like(away_m, bool)
+    for number, name in enumerate(PLACES):
+        carried, vertex, _ = _on_skin(body, _place(name))
+        away_m[number] = np.linalg.norm(body.vertices_m - body.vertices_m[vertex], axis=1)
+        carries[number] = carried >= _CARRIED
+    counts = carries | ~carries.any(axis=0)
+    return np.asarray(np.where(counts, away_m, np.inf).argmin(axis=0))
+
+
 def _on_bone(mesh: MeshSequence, points_m: Floats, body: Body, name: str) -> Mounting:
-    place = _place(name)
+    carried, vertex, axes = _on_skin(body, _place(name))
+    rows = np.flatnonzero(carried >= _CARRIED)
+    weights = carried[rows] / carried[rows].sum()
+    at_rest = body.vertices_m[rows]
+    turn = aligning(
+        (at_rest - weights @ at_rest)[None],
+        (points_m[rows] - weights @ points_m[rows])[None],
+        weights[None],
+    )[0]
+    at = vertex, points_m[vertex]
+    return Mounting(name, _BONE_AXES, rows, weights, points_m[rows], *at, turn @ axes)
+
+
+def _on_skin(body: Body, place: _Place) -> tuple[Floats, int, Floats]:
+    """Share of every vertex's motion by a place's bones (V,), its vertex, its axes (3, 3)."""
     number = body.skeleton.index
     carried = (body.weights * np.isin(body.bones, [number[bone] for bone in place.bones])).sum(1)
     rows = np.flatnonzero(carried >= _CARRIED)
@@ -196,14 +245,7 @@ def _on_bone(mesh: MeshSequence, points_m: Floats, body: Body, name: str) -> Mou
     out = axes[:, 2]
     beside = np.linalg.norm(away - (away @ out)[:, None] * out, axis=1)
     vertex = rows[np.argmin(np.where(away @ out > 0, beside, np.inf))]
-    weights = carried[rows] / carried[rows].sum()
-    at_rest = body.vertices_m[rows]
-    turn = aligning(
-        (at_rest - weights @ at_rest)[None],
-        (points_m[rows] - weights @ points_m[rows])[None],
-        weights[None],
-    )[0]
-    return Mounting(name, _BONE_AXES, rows, weights, points_m[rows], points_m[vertex], turn @ axes)
+    return carried, int(vertex), axes
 
 
 def _place(name: str) -> _Place:
@@ -251,7 +293,8 @@ def _on_vertex(mesh: MeshSequence, points_m: Floats, vertex: int, up: Floats) ->
     towards = np.eye(3)[np.argmin(np.abs(out))] if level else up
     axes = _axes(towards - (towards @ out) * out, out)
     weights = np.full(len(rows), 1.0 / len(rows))
-    return Mounting(f"vertex {vertex}", _PATCH_AXES, rows, weights, patch, points_m[vertex], axes)
+    at = vertex, points_m[vertex]
+    return Mounting(f"vertex {vertex}", _PATCH_AXES, rows, weights, patch, *at, axes)
 
 
 def _patch(points_m: Floats, faces: NDArray[np.int32], vertex: int) -> NDArray[np.intp]:

@@ -1,7 +1,6 @@
-"""Tables of an inertial sensor's samples as text: columns with units, found by their names.
+"""Tables of an inertial sensor's samples as text: columns with units, found by their titles.
 
-A column is called by its quantity and axis, with the unit after it or in brackets: ``acc_x_mps2``,
-``gyr_z (deg/s)``, ``Accelerometer X [g]``, ``time_s``, ``timestamp (ms)``.
+Titles are those of :mod:`sd2core.io.imu_columns`.
 """
 
 from __future__ import annotations
@@ -10,7 +9,6 @@ import math
 import re
 from array import array
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -21,6 +19,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.limits import open_regular
 from sd2core.files.texts import lines_of
 from sd2core.imu.signals import InertialSignals
+from sd2core.io.imu_columns import AXES, UNITS, Column, cell_text, column_of, titles_of
 
 AccelerationUnit = Literal["m/s²", "g"]
 TurnRateUnit = Literal["rad/s", "°/s"]
@@ -29,41 +28,10 @@ EXPECTED = (
     "a table of an inertial sensor: a heading with acc_x, acc_y, acc_z and gyr_x, gyr_y, gyr_z,"
     " then numbers"
 )
-STANDARD_GRAVITY_MPS2 = 9.80665
-"""The unit g (CGPM 1901)."""
-
-_UNITS: dict[str, dict[str, float]] = {
-    "acc": {
-        "m/s²": 1.0, "m/s2": 1.0, "m/s^2": 1.0, "mps2": 1.0, "ms-2": 1.0, "m/s/s": 1.0,
-        "g": STANDARD_GRAVITY_MPS2, "mg": STANDARD_GRAVITY_MPS2 / 1000,
-    },
-    "gyr": {
-        "rad/s": 1.0, "radps": 1.0, "rads": 1.0,
-        "°/s": math.pi / 180, "deg/s": math.pi / 180, "degps": math.pi / 180, "dps": math.pi / 180,
-    },
-    "time": {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9},
-}  # fmt: skip
-_NAMES = {
-    "acc": ("acc", "accel", "acceleration", "accelerometer", "a"),
-    "gyr": ("gyr", "gyro", "gyroscope", "angular velocity", "turn rate", "omega", "w", "g"),
-    "time": ("time", "timestamp", "t"),
-}
 _WORDS = {"acc": "accelerations", "gyr": "turn rates", "time": "times"}
-_PARTS = re.compile(r"(?P<name>.*?)[\s_]*(?:[\[(](?P<unit>[^\])]*)[\])])?\s*")
 _RATE = re.compile(rb"#\s*rate_hz\s*[:=]\s*(\S+)\s*")
 _SLOWEST_HZ, _FASTEST_HZ = 0.5, 50_000.0
 _LONGEST_HEADING = 10_000
-
-
-@dataclass(frozen=True)
-class _Column:
-    """Column that a heading has."""
-
-    number: int
-    title: str
-    quantity: str  # acc, gyr or time
-    axis: str  # x, y, z, or empty
-    unit: str  # empty if it is not stated
 
 
 def read_table(
@@ -96,8 +64,7 @@ def read_table(
     given: dict[str, str] = {"acc": acceleration_unit or "", "gyr": turn_rate_unit or ""}
     with open_regular(path) as stream:
         rate_text, heading, lines = _heading(path, lines_of(stream))
-        separator = max(",;\t", key=heading.count)
-        titles = [_cell(title) for title in heading.split(separator)]
+        separator, titles = titles_of(heading)
         columns = _columns_of(path, titles)
         factors = _factors(path, columns, given)
         values = _numbers(path, lines, separator, columns)  # (N, 6 or 7)
@@ -144,10 +111,10 @@ def _texts(path: Path, lines: Iterable[bytes]) -> Iterator[tuple[int, str]]:
             yield number, text
 
 
-def _columns_of(path: Path, titles: Sequence[str]) -> list[_Column]:
-    found: dict[tuple[str, str], _Column] = {}
+def _columns_of(path: Path, titles: Sequence[str]) -> list[Column]:
+    found: dict[tuple[str, str], Column] = {}
     for number, title in enumerate(titles):
-        column = _column(number, title)
+        column = column_of(number, title)
         if column is None:
             continue
         before = found.setdefault((column.quantity, column.axis), column)
@@ -158,8 +125,7 @@ def _columns_of(path: Path, titles: Sequence[str]) -> list[_Column]:
                 "one sensor per file",
                 "Leave the other columns out",
             )
-    wanted = [(quantity, axis) for quantity in ("acc", "gyr") for axis in "xyz"]
-    missing = [f"{quantity}_{axis}" for quantity, axis in wanted if (quantity, axis) not in found]
+    missing = [f"{quantity}_{axis}" for quantity, axis in AXES if (quantity, axis) not in found]
     if missing:
         shown = ", ".join(titles)[:200]
         raise Sd2Error(
@@ -168,34 +134,14 @@ def _columns_of(path: Path, titles: Sequence[str]) -> list[_Column]:
             "Name the columns so",
         )
     time = found.get(("time", ""))
-    return [found[one] for one in wanted] + ([time] if time else [])
+    return [found[one] for one in AXES] + ([time] if time else [])
 
 
-def _column(number: int, title: str) -> _Column | None:
-    """Quantity, axis and unit that a title states; None for a column of something else."""
-    parts = _PARTS.fullmatch(title)
-    assert parts is not None
-    words = [word for word in re.split(r"[\s_.\-:]+", parts["name"].lower()) if word]
-    unit = (parts["unit"] or "").strip().lower().replace("⁻²", "-2").replace("μ", "µ")
-    units = {name for table in _UNITS.values() for name in table}
-    if not unit and len(words) > 1 and words[-1] in units:
-        unit = words.pop()
-    name = " ".join(words)
-    for quantity, names in _NAMES.items():
-        for one in names:
-            if quantity == "time":
-                if name == one:
-                    return _Column(number, title, quantity, "", unit)
-            elif name in {f"{one}{gap}{axis}" for gap in ("", " ") for axis in "xyz"}:
-                return _Column(number, title, quantity, name[-1], unit)
-    return None
-
-
-def _factors(path: Path, columns: list[_Column], given: dict[str, str]) -> NDArray[np.float64]:
+def _factors(path: Path, columns: list[Column], given: dict[str, str]) -> NDArray[np.float64]:
     """Factors that make m/s², rad/s and s of the columns' values."""
     factors = []
     for column in columns:
-        known = _UNITS[column.quantity]
+        known = UNITS[column.quantity]
         unit = column.unit or given.get(column.quantity, "s")
         if unit not in known:
             stated = f"the unit {unit!r}" if unit else "no unit"
@@ -209,12 +155,8 @@ def _factors(path: Path, columns: list[_Column], given: dict[str, str]) -> NDArr
     return np.array(factors)
 
 
-def _cell(text: str) -> str:
-    return text.strip().strip('"')
-
-
 def _numbers(
-    path: Path, lines: Iterable[tuple[int, str]], separator: str, columns: list[_Column]
+    path: Path, lines: Iterable[tuple[int, str]], separator: str, columns: list[Column]
 ) -> NDArray[np.float64]:
     """Values of the columns, (N, columns)."""
     values, last = array("d"), max(one.number for one in columns)
@@ -227,7 +169,7 @@ def _numbers(
                 "Copy the file again, or delete that line",
             )
         for column in columns:
-            text = _cell(cells[column.number])
+            text = cell_text(cells[column.number])
             try:
                 values.append(float(text) if text else math.nan)
             except ValueError:

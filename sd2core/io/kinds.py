@@ -10,9 +10,10 @@ from sd2core.errors import Sd2Error
 from sd2core.files.limits import check_regular
 from sd2core.files.paths import is_pattern
 from sd2core.files.stores import read_attributes
+from sd2core.io.imu_columns import holds_inertial_signals
 from sd2core.pairs.store import is_pair_store
 
-Kind = Literal["recording", "video", "mesh", "radar", "map", "pairs", "model", "dataset"]
+Kind = Literal["recording", "video", "mesh", "radar", "map", "imu", "pairs", "model", "dataset"]
 
 DATASET_FORMAT = "sd2-dataset"
 
@@ -45,13 +46,16 @@ def kind_of(path: Path) -> Kind:
         return "radar"
     if suffix == ".safetensors":
         return "model"
+    if holds_inertial_signals(path):
+        return "imu"
     if suffix == ".npz":
         return "map" if _is_doppler_map(path) else "mesh"
     raise Sd2Error(
         f"{path} is of no kind that is known",
-        "a recording (.sd2), a video (.mp4, .mkv …), a mesh (.npz, .zarr, .obj, .ply, .glb, .pkl)"
-        " or a radar capture (a folder with radar.npy, the .h5 of a K60168A or an A121, the .bin of"
-        " a DCA1000, or samples with a description: .npy, .h5, .sigmf-meta)",
+        "a recording (.sd2), a video (.mp4, .mkv …), a mesh (.npz, .zarr, .obj, .ply, .glb, .pkl),"
+        " a radar capture (a folder with radar.npy, the .h5 of a K60168A or an A121, the .bin of a"
+        " DCA1000, or samples with a description: .npy, .h5, .sigmf-meta) or samples of an inertial"
+        " sensor (.csv, .sto)",
     )
 
 

@@ -26,6 +26,9 @@ WORDS = {
     "faces": "faces of the mesh",
     "mesh_reading": "way to read the mesh",
     "radar": "radar file",
+    "imu": "file of the inertial sensor",
+    "imu_offset_s": "offset of the inertial sensor",
+    "imu_places": "set of inertial sensors",
 }
 """Settings in ``recording.json``, and what a user calls them."""
 

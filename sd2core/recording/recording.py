@@ -41,7 +41,15 @@ from sd2core.labels.files import labels_of, read_labels, write_labels
 from sd2core.placements.placements import Placements, placements_from_dict
 from sd2core.progress import Progress, silent
 from sd2core.recording.divergence import WORDS, Divergence, State, digests_of
-from sd2core.recording.relinking import ROLES, Relinked, Role, exists, find_again, is_many
+from sd2core.recording.relinking import (
+    ROLES,
+    Relinked,
+    Role,
+    exists,
+    find_again,
+    is_many,
+    role_words,
+)
 from sd2core.sensor import VirtualSensor
 
 if TYPE_CHECKING:
@@ -58,7 +66,7 @@ _PLACED_BY_VIDEO = {".pkl", ".pickle", ".joblib"}
 
 _SENSOR = ("position_m", "azimuth_deg", "elevation_deg", "field_of_view_deg")
 
-_AIDS: set[Role] = {"faces", "denoiser"}
+_AIDS: set[Role] = {"faces", "denoiser", "imu"}
 """Files that are nothing to look at by themselves."""
 
 
@@ -95,6 +103,13 @@ class Recording:
     radar_offset_s : float
         Time on the recording's clock at which the first radar frame was taken.
         The clock is the video's, or the mesh's where there is no video.
+    imu : Path or None
+        Samples of a real inertial sensor; see :func:`sd2core.imu.files.read_signals`.
+    imu_offset_s : float
+        Time on the recording's clock at which the first of them was taken.
+    imu_places : tuple of str
+        Places of virtual inertial sensors: named ones, and numbers of vertices, each once; see
+        :func:`sd2core.imu.mounting.mounted`.
     denoiser : Path or None
         Model file that the synthetic map is denoised with.
     bundled_denoiser : str or None
@@ -135,6 +150,9 @@ class Recording:
     radar: Path | None = None
     mesh_reading: MeshReading = field(default_factory=MeshReading)
     radar_offset_s: float = 0.0
+    imu: Path | None = None
+    imu_offset_s: float = 0.0
+    imu_places: tuple[str, ...] = ()
     denoiser: Path | None = None
     bundled_denoiser: str | None = None
     sensor: VirtualSensor = field(default_factory=VirtualSensor)
@@ -217,7 +235,7 @@ class Recording:
             if not exists(role, Path(path)) and (copy or not self._is_gone):
                 if role == "denoiser":  # everything else can be shown without it
                     continue
-                raise Sd2Error(f"The {role} {path} does not exist", "a file or folder")
+                raise Sd2Error(f"The {role_words(role)} {path} does not exist", "a file or folder")
             files[role] = plain_path(Path(path))
         if not files.keys() - _AIDS:
             raise Sd2Error(
@@ -249,8 +267,8 @@ class Recording:
     def notes(self) -> tuple[str, ...]:
         """Hints for the user on the places of the files."""
         return tuple(
-            f"The {role} {path} is on another drive than the recording: its path is stored in"
-            " full and does not move with the recording."
+            f"The {role_words(role)} {path} is on another drive than the recording: its path is"
+            " stored in full and does not move with the recording."
             for role, path in self._files().items()
             if is_absolute(stored_path(path, self.folder))
         )
@@ -328,6 +346,8 @@ class Recording:
         document.mesh_reading = self.mesh_reading
         document.camera = self.camera
         document.radar_offset_s = _finite(self.radar_offset_s, "radar offset in seconds")
+        document.imu_offset_s = _finite(self.imu_offset_s, "inertial sensor's offset in seconds")
+        document.imu_places = self.imu_places
         document.bundled_denoiser = self.bundled_denoiser
         document.placements = None if self.placements is None else self.placements.as_dict()
         document.spans = () if self._writes_labels else tuple(self.spans)
@@ -520,6 +540,8 @@ def open_recording(path: Path) -> Recording:
         bundled_denoiser=document.bundled_denoiser,
         mesh_reading=document.mesh_reading,
         radar_offset_s=document.radar_offset_s,
+        imu_offset_s=document.imu_offset_s,
+        imu_places=tuple(dict.fromkeys(document.imu_places)),
         sensor=sensor,
         placements=placements,
         spans=document.spans,

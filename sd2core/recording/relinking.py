@@ -11,10 +11,15 @@ from sd2core.errors import Sd2Error
 from sd2core.files.paths import common_suffix_length, is_pattern, is_there, paths_named
 from sd2core.progress import Progress
 
-Role = Literal["video", "mesh", "faces", "radar", "denoiser"]
+Role = Literal["video", "mesh", "faces", "radar", "denoiser", "imu"]
 """Role of a file in a recording."""
 
 ROLES: tuple[Role, ...] = get_args(Role)
+
+
+def role_words(role: Role) -> str:
+    """Role of a file in a sentence, such as ``video`` or ``inertial sensor's file``."""
+    return "inertial sensor's file" if role == "imu" else role
 
 
 @dataclass(frozen=True)

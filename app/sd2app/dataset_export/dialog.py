@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
 )
 
 from sd2app.dataset_export.model import MAPS, ExportModel
-from sd2app.dataset_export.text import label_words, size_words, split_words
+from sd2app.dataset_export.text import inertial_words, label_words, size_words, split_words
 from sd2app.widgets.dialogs import ask_folder, with_suffix
 from sd2app.widgets.inputs import CheckBox, Choice, NumberBox
 from sd2app.widgets.layouts import STRETCH, column_of, form_of, row_of
@@ -75,6 +75,10 @@ class ExportDialog(QDialog):
             {False: "each recording's own", True: ""},
             lambda planned: model.choose(planned=planned),
         )
+        self._inertial = CheckBox(
+            "", self, lambda wanted: model.choose(imu=model.imu_places if wanted else ())
+        )
+        self._inertial.setAccessibleName("Inertial sensors")
         self._length = self._frames("Frames of a segment", 2)
         self._overlap = self._frames("Frames that neighbouring segments share", 0)
         self._length.valueChanged.connect(lambda _: self._choose_frames())
@@ -89,6 +93,7 @@ class ExportDialog(QDialog):
             ("People", self._people),
             ("Maps", side_by_side(*self._boxes.values(), spacing_px=16)),
             ("Sensors", side_by_side(self._sensors)),
+            ("Inertial sensors", side_by_side(self._inertial)),
             ("Segments", segments),
             ("Format", side_by_side(self._format)),
         )
@@ -139,12 +144,19 @@ class ExportDialog(QDialog):
             "From which sensors the maps are seen" if model.places
             else "No places are planned: Edit → Placements…"
         )  # fmt: skip
+        self._inertial.setText(inertial_words(model.imu_places))
+        self._inertial.show_checked(bool(choice.imu))
+        self._inertial.setToolTip(
+            "What ideal sensors there would feel, simulated, at the frames of the maps"
+            if model.imu_places
+            else "No recording has one at a named place of the body: Edit → Place inertial sensor…"
+        )
         self._length.show_value(choice.length)
         self._overlap.show_value(choice.overlap)
         self._format.show_value(choice.ending)
         for field in (
-            self._this, self._other, self._sensors, self._length, self._overlap, self._format,
-            self._people, *self._boxes.values(),
+            self._this, self._other, self._sensors, self._inertial, self._length, self._overlap,
+            self._format, self._people, *self._boxes.values(),
         ):  # fmt: skip
             field.setEnabled(self._may(field))
         self._show_counts()
@@ -153,7 +165,8 @@ class ExportDialog(QDialog):
     def _may(self, field: QWidget) -> bool:
         """True if a field can be changed now."""
         model = self._model
-        return not model.under_way and (field is not self._sensors or model.places > 0)
+        there = {self._sensors: model.places > 0, self._inertial: bool(model.imu_places)}
+        return not model.under_way and there.get(field, True)
 
     def _show_counts(self) -> None:
         model, forecast = self._model, self._model.forecast

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from PySide6.QtCore import QObject
 
@@ -17,6 +17,7 @@ from sd2app.settings import Settings
 from sd2app.widgets.text import about, counted
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import user_data
+from sd2core.imu.mounting import PLACES
 from sd2core.maps import MapKind
 from sd2core.pairs.segments import LENGTH, OVERLAP
 from sd2core.progress import Cancelled
@@ -59,6 +60,7 @@ class ExportChoice:
     length: int = LENGTH  # frames
     overlap: int = OVERLAP  # frames
     ending: str = ".zarr"  # one of ENDINGS
+    imu: tuple[str, ...] = ()  # named places of inertial sensors; empty: none are exported
 
     @property
     def kinds(self) -> tuple[MapKind, ...]:
@@ -70,12 +72,13 @@ class ExportChoice:
         """Options for the maps."""
         from sd2core.datasets.recording_sources import Making
 
-        return Making(kinds=self.kinds, placements="planned" if self.planned else None)
+        placements: Literal["planned"] | None = "planned" if self.planned else None
+        return Making(kinds=self.kinds, placements=placements, imu=self.imu)
 
     @property
     def sources(self) -> tuple[object, ...]:
         """Choices that decide which sources there are."""
-        return self.place, self.maps, self.planned, self.subjects
+        return self.place, self.maps, self.planned, self.subjects, self.imu
 
     def to_json(self) -> dict[str, Any]:
         """Choices by name."""
@@ -93,6 +96,7 @@ class ExportChoice:
             int(content["length"]),
             int(content["overlap"]),
             ENDINGS[ENDINGS.index(ending)],
+            tuple(map(str, content["imu"])),
         )
 
 
@@ -123,6 +127,7 @@ class ExportModel(Runs[ExportRun]):
         self.choice = ExportChoice()
         self.problem = ""  # why these choices cannot be exported
         self.places = 0  # planned besides the recordings' own sensors, the most of any
+        self.imu_places: tuple[str, ...] = ()  # named ones that the recordings have sensors at
         self.result: Exported | None = None  # written last, until something else is chosen
         self._counted: _Counted | None = None
         self._runner = LatestRunner("count segments", self, self._receive, self._refuse)
@@ -159,10 +164,11 @@ class ExportModel(Runs[ExportRun]):
     def begin(self, place: Path | None) -> None:
         """Choose a recording or a folder and read it again; other choices stay."""
         self._counted = None
-        self.places = _places(place)
+        self._look_into(place)
         planned = self.choice.planned and self.places > 0
+        imu = self.imu_places if self.choice.imu else ()
         self.result = None
-        self.choice = replace(self.choice, place=place, planned=planned, subjects=())
+        self.choice = replace(self.choice, place=place, planned=planned, subjects=(), imu=imu)
         self._count()
 
     def choose(self, **changes: object) -> None:
@@ -187,6 +193,7 @@ class ExportModel(Runs[ExportRun]):
             "--length", str(choice.length), "--overlap", str(choice.overlap), "--progress-json",
         ]  # fmt: skip
         words += ["--placements", "planned"] if choice.planned else []
+        words += ["--imu", ",".join(choice.imu)] if choice.imu else []
         words += ["--subjects", ",".join(choice.subjects)] if choice.subjects else []
         about = {"what": "export", "out": str(out), "choice": choice.to_json()}
         path = free_folder(self._folder, "export", [out])
@@ -227,7 +234,7 @@ class ExportModel(Runs[ExportRun]):
         except (KeyError, TypeError, ValueError):
             pass  # of another version: it is followed all the same
         else:
-            self.places = _places(self.choice.place)
+            self._look_into(self.choice.place)
             self._count()
         self.follow(run, under_way=True)  # until it is known, and said, how it has ended
         if one.live:
@@ -268,6 +275,24 @@ class ExportModel(Runs[ExportRun]):
 
     # --- inside ---------------------------------------------------------------------------
 
+    def _look_into(self, place: Path | None) -> None:
+        """Note what the recordings of a place plan and carry; damaged ones have nothing."""
+        from sd2core.datasets.sources import recordings_in
+
+        self.places = 0
+        carried: set[str] = set()
+        folders = [] if place is None else [place] if is_recording(place) else recordings_in(place)
+        for folder in folders:
+            try:
+                recording = open_recording(folder)
+            except Sd2Error:
+                continue
+            if recording.mesh is not None:
+                carried.update(recording.imu_places)
+                if recording.placements is not None:
+                    self.places = max(self.places, len(recording.placements.places()))
+        self.imu_places = tuple(name for name in PLACES if name in carried)
+
     def _count(self) -> None:
         choice, known = self.choice, self._counted
         self.problem = ""
@@ -285,7 +310,7 @@ class ExportModel(Runs[ExportRun]):
             from sd2core.datasets.sources import gather
 
             options = DatasetOptions(
-                kinds=choice.kinds, length=choice.length, overlap=choice.overlap
+                kinds=choice.kinds, length=choice.length, overlap=choice.overlap, imu=choice.imu
             )
             if known is not None and known.sources == choice.sources:
                 counting = known.counting
@@ -310,20 +335,3 @@ class ExportModel(Runs[ExportRun]):
         self._counted = None
         self.problem = str(error)
         self.changed.emit()
-
-
-def _places(place: Path | None) -> int:
-    """Largest number of places that a recording plans; damaged ones plan none."""
-    from sd2core.datasets.sources import recordings_in
-
-    if place is None:
-        return 0
-    most = 0
-    for folder in [place] if is_recording(place) else recordings_in(place):
-        try:
-            recording = open_recording(folder)
-        except Sd2Error:
-            continue
-        if recording.placements is not None and recording.mesh is not None:
-            most = max(most, len(recording.placements.places()))
-    return most

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from sd2core.datasets.forecast import Forecast
+
+_MOST_NAMED = 4
 
 
 def size_words(forecast: Forecast, length: int) -> str:
@@ -37,6 +40,14 @@ def split_words(forecast: Forecast) -> str:
     return "Split: " + " · ".join(
         f"{name} {count:,} ({_named(people[name])})" for name, count in forecast.of_split().items()
     )
+
+
+def inertial_words(places: Sequence[str]) -> str:
+    """Places of inertial sensors that can be exported: ``at head, left wrist``."""
+    names = [place.replace("-", " ") for place in places]
+    more = len(names) - _MOST_NAMED
+    listed = ", ".join(names[:_MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
+    return f"at {listed}" if names else "none placed"
 
 
 def bytes_words(count: int) -> str:

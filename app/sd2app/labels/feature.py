@@ -216,8 +216,8 @@ class LabelsFeature(Feature):
             ),
             Action(
                 "leave", "Labels", "Cancel", ("Esc",),
-                "Let go of what is dragged; else forget what is being marked; else end the loop of"
-                " a span; else select nothing",
+                "Let go of what is dragged; else place no sensor; else forget what is being marked;"
+                " else end the loop of a span; else select nothing",
                 self._cancel, self._can_cancel,
             ),
             Action(
@@ -284,12 +284,15 @@ class LabelsFeature(Feature):
         )  # fmt: skip
 
     def _can_cancel(self) -> bool:
-        at_work = self.dragging.dragging or self.loop.span is not None
+        placing = self._session.placing.active
+        at_work = self.dragging.dragging or placing or self.loop.span is not None
         return at_work or bool(self.model.marks or self.model.selected)
 
     def _cancel(self) -> None:
         if self.dragging.dragging:
             self.dragging.cancel_drag()
+        elif self._session.placing.active:
+            self._session.placing.end()
         elif self.model.marks:
             self.model.set_marks(())
         elif self.loop.span is not None:

@@ -20,6 +20,7 @@ from sd2app.widgets.inputs import Choice
 from sd2app.widgets.layouts import column_of, form_of
 from sd2app.widgets.panel import FactRows, rule, say, sentence, title
 from sd2app.widgets.text import counted
+from sd2core.io.imu_columns import holds_inertial_signals
 from sd2core.labels.formats import FORMATS, format_for, read_labels
 from sd2core.labels.formats.boris import observations
 from sd2core.labels.import_labels import Incoming, Way, set_after, take_in
@@ -35,8 +36,10 @@ _MOST_FACTS = 6
 
 
 def is_label_file(path: Path) -> bool:
-    """True for the name of a label file; a ``recording.json`` is none."""
-    return path.suffix.lower() in LABEL_SUFFIXES and path.name != "recording.json"
+    """True for a file of labels by its name; an inertial sensor's table is none by its heading."""
+    if path.suffix.lower() not in LABEL_SUFFIXES or path.name == "recording.json":
+        return False
+    return not holds_inertial_signals(path)
 
 
 def import_labels(shell: Shell, edits: LabelEdits, path: Path | None = None) -> None:

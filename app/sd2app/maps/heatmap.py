@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Literal
 
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QBrush, QColor, QMouseEvent, QPainter, QPen, QWheelEvent
@@ -19,8 +20,10 @@ from sd2app.session.session import Session
 from sd2app.widgets.canvas import AT_LEFT, AT_RIGHT, Overlay, clipped
 from sd2app.widgets.colour_maps import lookup_table
 from sd2app.widgets.time_axis import (
+    HANDLE_PX,
     MARGIN_PX,
     paint_cursor,
+    paint_handle,
     paint_readout,
     paint_title,
     signed_text,
@@ -28,9 +31,6 @@ from sd2app.widgets.time_axis import (
     turn_wheel,
 )
 from sd2core.maps import DopplerMap
-
-HANDLE_PX = 22
-"""Left end of the title row, which folds and moves the map."""
 
 
 def velocity_labels(
@@ -193,7 +193,9 @@ class HeatmapView(MapWidget):
 
     def _paint_header(self, painter: QPainter) -> None:
         colours = self._display.palette
-        self._paint_handle(painter, colours.muted)
+        # An enlarged map has an arrow back.
+        to: Literal["down", "right", "left"] = "right" if self.folded else "down"
+        paint_handle(painter, HEADER_PX, "left" if self.enlarged else to, colours.muted)
         box = QRectF(HANDLE_PX, 0, self.width() - HANDLE_PX - 8, HEADER_PX)
         left = HANDLE_PX + paint_title(painter, box, self.title(), colours.text) + 12
         painter.setPen(QColor(colours.muted))
@@ -203,21 +205,6 @@ class HeatmapView(MapWidget):
             self._status(), Qt.TextElideMode.ElideRight, int(max(room - 16, 40))
         )
         painter.drawText(QRectF(left, 0, self.width(), HEADER_PX), AT_LEFT, status)
-
-    def _paint_handle(self, painter: QPainter, colour: str) -> None:
-        """A triangle that folds; an enlarged map has an arrow back."""
-        corners = {
-            "down": ((-4, -2.5), (4, -2.5), (0, 3)),
-            "right": ((-2.5, -4), (-2.5, 4), (3, 0)),
-            "left": ((2.5, -4), (2.5, 4), (-3, 0)),
-        }["left" if self.enlarged else "right" if self.folded else "down"]
-        centre = QPointF(HANDLE_PX / 2 + 2, HEADER_PX / 2)
-        painter.save()
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(colour))
-        painter.drawPolygon([centre + QPointF(x, y) for x, y in corners])
-        painter.restore()
 
     @property
     def _button_px(self) -> int:

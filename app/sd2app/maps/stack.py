@@ -12,11 +12,11 @@ from PySide6.QtWidgets import QFrame, QMenu, QScrollArea, QScrollBar, QWidget
 from sd2app.maps.arrangement import BELOW_PX, HEADER_PX, LEAST_PX, Arrangement, heights_px
 from sd2app.maps.difference import DifferenceModel
 from sd2app.maps.difference_view import DifferenceView
-from sd2app.maps.heatmap import HANDLE_PX, HeatmapView
+from sd2app.maps.heatmap import HeatmapView
 from sd2app.maps.overview import Overview
 from sd2app.session.session import Session
 from sd2app.widgets.canvas import Overlay
-from sd2app.widgets.time_axis import MARGIN_PX
+from sd2app.widgets.time_axis import HANDLE_PX, MARGIN_PX
 
 _BORDER_PX = BELOW_PX + 2  # two pixels of the map, to be hit
 _MOVED_PX = 4

@@ -6,9 +6,11 @@ from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
-from PySide6.QtWidgets import QWidget
+from PySide6.QtCore import QPointF
+from PySide6.QtWidgets import QMenu, QWidget
 
 from sd2app.feature import Action, Feature, Shell
+from sd2app.imu.model import ImuModel
 from sd2app.maps.model import SynthesisModel
 from sd2app.scene.bar import SceneBar
 from sd2app.scene.camera import Preset
@@ -50,11 +52,12 @@ class SceneFeature(Feature):
         shell: Shell,
         synthesis: SynthesisModel,
         placements: PlacementsModel,
+        inertial: ImuModel,
         offer_frame: MenuPart,
     ) -> None:
         self._session, self._shell = session, shell
         self._offer_frame = offer_frame
-        self._synthesis, self._placements = synthesis, placements
+        self._synthesis, self._placements, self._inertial = synthesis, placements, inertial
         self.view: SceneView | None = None
         self.changing = (session.display.mesh_changed,)
 
@@ -98,14 +101,23 @@ class SceneFeature(Feature):
         """The 3D view under its bar."""
         from sd2app.scene.view import SceneView
 
-        self.view = view = SceneView(self._session, self._synthesis, self._placements)
+        self.view = view = SceneView(
+            self._session, self._synthesis, self._placements, self._inertial
+        )
         export = self._shell.action("export_strip")
         view.menu_parts = (
             view.offer_value,
+            self._offer_inertial,
             self._offer_frame,
             lambda menu, _: menu.addAction(export),
         )
         return pane(SceneBar(self._session.display, self._shell.action), (self.view, 1))
+
+    def _offer_inertial(self, menu: QMenu, place: QPointF) -> None:
+        """Offer to place an inertial sensor at a place of the body, or to remove the one there."""
+        assert self.view is not None
+        if not self.view.inertial_hand.offer(menu, place.x(), place.y()):
+            menu.addAction(self._shell.action("place_inertial"))
 
     def close(self) -> None:
         """Release VTK."""

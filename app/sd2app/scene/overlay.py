@@ -66,6 +66,7 @@ class Overlay(Canvas):
         self._scene = scene
         self._navigator = navigator
         self.message = ""
+        self.hint = ""  # on what a click does now
         self.marker_words: list[str] = []
         self._legend = QRectF()
         self._state: tuple[object, ...] | None = None
@@ -87,6 +88,7 @@ class Overlay(Canvas):
         scene, navigator, colouring = self._scene, self._navigator, self._scene.colouring
         state = (
             self.message,
+            self.hint,
             self.font(),
             scene.pose,
             scene.sensor,
@@ -133,6 +135,8 @@ class Overlay(Canvas):
             self._paint_beside(painter, f"x {x:+.2f}   y {y:+.2f}   z {z:+.2f} m", position_m)
         elif self._navigator.hovers_sensor:
             self._paint_hint(painter, HINT)
+        elif self.hint:
+            self._paint_hint(painter, self.hint)
         elif marker is not None:
             place_m = tuple(self._scene.markers.positions_m[marker])
             self._paint_beside(painter, self.marker_words[marker], place_m)

@@ -22,6 +22,8 @@ from sd2core.sensor import VirtualSensor
 
 _MARKER_M = 0.10
 _MARKER_LEAST_PX = 7.0
+_INERTIAL_M = 0.028
+_INERTIAL_LEAST_PX = 5.5
 _MARKER_STEP = 1.15
 """Relative change of size from which markers are rebuilt."""
 
@@ -346,3 +348,27 @@ class Markers(Shape):
             points, triangles = shapes.pyramids(self.positions_m, self._directions, self._length_m)
             self.set_shape(points, triangles=triangles)
             self.set_colours(self._theme)
+
+
+class InertialMarkers(Shape):
+    """Inertial sensors on the body: an octahedron each, half of it in the skin."""
+
+    def __init__(self, renderer: vtkRenderer) -> None:
+        super().__init__(renderer, lit=True)
+        self.points_m: NDArray[np.floating] = np.zeros((0, 3))
+        self.look.SetInterpolationToFlat()
+        self.look.SetAmbient(0.6)
+        self.look.SetDiffuse(0.4)
+        self.look.EdgeVisibilityOn()
+        # Told from the body, whatever its colours mean, in both themes.
+        self.set_colour("#101216")
+        self.look.SetEdgeColor(*fractions("#f2f4f7"))
+
+    def set_points(self, points_m: NDArray[np.floating], metres_per_px: float) -> None:
+        """Show sensors at N points, (N, 3), as large as can be seen."""
+        self.points_m = points_m
+        self.show(len(points_m) > 0)
+        if len(points_m):
+            radius_m = max(_INERTIAL_M, _INERTIAL_LEAST_PX * metres_per_px)
+            points, triangles = shapes.octahedra(points_m, radius_m)
+            self.set_shape(points, triangles=triangles)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +14,14 @@ from sd2app.scene import shapes
 from sd2app.scene.body import Extent
 from sd2app.scene.camera import EyePose, Margins, Preset, triple
 from sd2app.scene.colours import Colouring, SceneColours, fractions, mesh_colours, range_limits
-from sd2app.scene.parts import Body, GroundGrid, Markers, SensorGlyph, Shape
+from sd2app.scene.parts import (
+    Body,
+    GroundGrid,
+    InertialMarkers,
+    Markers,
+    SensorGlyph,
+    Shape,
+)
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.sensor import VirtualSensor
 
@@ -56,6 +64,8 @@ class Scene:
         self.camera_glyph = Shape(renderer, points, segments=segments, line_px=1.3)
         self.sensor_glyph = SensorGlyph(renderer)
         self.markers = Markers(renderer, self.colours)
+        self.inertial = InertialMarkers(renderer)
+        self._inertial_rows = np.zeros(0, np.intp)
         self._set_extent(_NOTHING)
         self.set_colours(self.colours)
 
@@ -65,6 +75,11 @@ class Scene:
     def knows_hidden(self) -> bool:
         """True once the visibility of the vertices is known."""
         return self.colouring.visible is not None
+
+    @property
+    def mesh_shown(self) -> bool:
+        """True while a body is drawn."""
+        return self.has_mesh and bool(self.body.actor.GetVisibility())
 
     def set_mesh(self, mesh: MeshSequence, frame: int = 0) -> None:
         """Take over another clip and show one frame of it."""
@@ -126,6 +141,10 @@ class Scene:
         self.markers.set_sensors(sensors, range_m, beyond)
         self._framed = None
         self._lay_ground()
+
+    def set_inertial(self, vertices: Iterable[int]) -> None:
+        """Show inertial sensors on vertices of the mesh."""
+        self._inertial_rows = np.array(list(vertices), np.intp)
 
     def set_hot(self, hot: bool) -> None:
         """Show that the sensor is under the pointer or dragged."""
@@ -225,6 +244,9 @@ class Scene:
             self.body.look.SetPointSize(self._dot_px() * pixel_scale)
         pixel = self.pose.metres_per_pixel(self.extent.centre_m)
         self.markers.set_pixel(pixel if np.isfinite(pixel) else 0.0)
+        rows = self._inertial_rows if self.mesh_shown else self._inertial_rows[:0]
+        rows = rows[rows < len(self.body.points)]  # the mesh may be another already
+        self.inertial.set_points(self.body.points[rows], pixel if np.isfinite(pixel) else 0.0)
         self.sensor_glyph.sphere.SetScale(self.sensor_radius_m)
         self.sensor_glyph.show(self.sensor_shown)
         self.camera_glyph.show(self.camera_shown)

@@ -102,6 +102,21 @@ def pyramids(
     return points.reshape(-1, 3).astype(np.float32), triangles
 
 
+def octahedra(
+    positions: NDArray[np.floating], radius: float
+) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    """Points (6 N, 3) and triangles (8 N, 3) of octahedra around N positions."""
+    one = radius * np.concatenate([np.eye(3), -np.eye(3)])
+    points = positions[:, None] + one
+    sides = np.array(
+        [(0, 1, 2), (1, 3, 2), (3, 4, 2), (4, 0, 2), (1, 0, 5), (3, 1, 5), (4, 3, 5), (0, 4, 5)],
+        np.int32,
+    )
+    first = len(one) * np.arange(len(positions), dtype=np.int32)
+    triangles = (first[:, None, None] + sides).reshape(-1, 3)
+    return points.reshape(-1, 3).astype(np.float32), triangles
+
+
 def rotation_to(directions: ArrayLike) -> NDArray[np.float64]:
     """Rotations (..., 3, 3) that turn +z into ``directions``, (..., 3), and keep the horizon."""
     forward = np.asarray(directions, np.float64)

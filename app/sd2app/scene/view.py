@@ -16,6 +16,7 @@ from PySide6.QtWidgets import QLabel, QMenu, QWidget
 from sd2app.scene.backend import Backend, NoOpenGL, chosen_backend
 from sd2app.scene.camera import Preset
 from sd2app.scene.colours import SceneColours
+from sd2app.scene.inertial import PLACING_HINT, InertialHand
 from sd2app.scene.navigation import Navigator
 from sd2app.scene.overlay import Overlay
 from sd2app.scene.scene import Scene
@@ -23,6 +24,7 @@ from sd2app.widgets.picture import MenuPart, picture_menu
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
+    from sd2app.imu.model import ImuModel
     from sd2app.maps.model import SynthesisModel
     from sd2app.sensor.placements import PlacementsModel
     from sd2app.session.session import Session
@@ -50,10 +52,15 @@ class SceneView(QWidget):
     """
 
     def __init__(
-        self, session: Session, synthesis: SynthesisModel, placements: PlacementsModel
+        self,
+        session: Session,
+        synthesis: SynthesisModel,
+        placements: PlacementsModel,
+        inertial: ImuModel,
     ) -> None:
         super().__init__()
         self._session, self._synthesis, self._placements = session, synthesis, placements
+        self._inertial = inertial
         self._backend: Backend | None = None
         self.menu_parts: Sequence[MenuPart] = ()
         self.setMinimumSize(200, 150)
@@ -66,6 +73,7 @@ class SceneView(QWidget):
         self.scene = Scene(self._backend.renderer)
         self.navigator = Navigator(self.scene, session.edits, placements.use, self.request_render)
         self.overlay = Overlay(self.scene, self.navigator, session.display, self)
+        self.inertial_hand = InertialHand(self.scene, session, inertial)
         self._pressed_px = (0.0, 0.0)
         self.setAccessibleName("Scene")
         self._frame: int | None = None
@@ -80,6 +88,8 @@ class SceneView(QWidget):
             (session.display.theme_changed, self._follow_theme),
             (synthesis.frame_changed, self._follow_scattering),
             (placements.changed, self._follow_placements),
+            (inertial.changed, self._follow_inertial),
+            (session.placing.changed, self._follow_placing),
         )
         for signal, slot in self._followed:
             signal.connect(slot)
@@ -87,6 +97,8 @@ class SceneView(QWidget):
         self._follow_colour()
         self._take_over()
         self._follow_placements()
+        self._follow_inertial()
+        self._follow_placing()
         self._lay_out()
         self._backend.start(self._prepare)
 
@@ -150,10 +162,14 @@ class SceneView(QWidget):
         if kind == QEvent.Type.MouseMove:
             self.navigator.move(*place, event.modifiers())
             at_body = not event.buttons() and not self._at_something(place)
-            self.overlay.show_reading(place, self.reading_at(*place) if at_body else "")
+            self.overlay.show_reading(place, self._words_at(place) if at_body else "")
         elif kind == QEvent.Type.MouseButtonRelease:
             self.navigator.release(*place, event.button())
-            if event.button() == Qt.MouseButton.RightButton and self._clicked_at(place):
+            if not self._clicked_at(place):
+                return
+            if event.button() == Qt.MouseButton.LeftButton:
+                self.inertial_hand.click(*place)
+            elif event.button() == Qt.MouseButton.RightButton:
                 menu = picture_menu(self, self.menu_parts, QPointF(*place))
                 menu.popup(event.globalPosition().toPoint())
         elif kind == QEvent.Type.MouseButtonDblClick and not self._at_something(place):
@@ -166,6 +182,11 @@ class SceneView(QWidget):
     def _clicked_at(self, place: tuple[float, float]) -> bool:
         """True if the button was released where it was pressed, without a drag."""
         return math.dist(place, self._pressed_px) < _CLICK_PX
+
+    def _words_at(self, place: tuple[float, float]) -> str:
+        """What is under the pointer, or what a click would place there, in words."""
+        words = self.inertial_hand.words_at(*place)
+        return words if words or self.inertial_hand.placing else self.reading_at(*place)
 
     def reading_at(self, x_px: float, y_px: float) -> str:
         """Range, radial velocity and visibility of the vertex in front at a pixel, in words."""
@@ -251,6 +272,16 @@ class SceneView(QWidget):
         self.navigator.look_again()
         self.request_render()
 
+    def _follow_inertial(self) -> None:
+        self.scene.set_inertial(self._inertial.vertices.values())
+        self.request_render()
+
+    def _follow_placing(self) -> None:
+        self.overlay.hint = PLACING_HINT if self.inertial_hand.placing else ""
+        self.overlay.show_reading((0.0, 0.0), "")
+        self._choose_cursor()
+        self.overlay.update()
+
     # Drawing
 
     def _prepare(self, size_px: tuple[float, float], pixel_scale: float) -> None:
@@ -307,6 +338,8 @@ class SceneView(QWidget):
             shape = Qt.CursorShape.OpenHandCursor
         elif self.navigator.marker is not None:
             shape = Qt.CursorShape.PointingHandCursor
+        elif self.inertial_hand.placing:
+            shape = Qt.CursorShape.CrossCursor
         else:
             shape = Qt.CursorShape.ArrowCursor
         if self._backend.widget.cursor().shape() != shape:

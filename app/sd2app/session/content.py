@@ -17,6 +17,7 @@ from sd2core.maps import DopplerMap
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Progress
 from sd2core.recording.recording import Recording, open_recording
+from sd2core.recording.relinking import role_words
 from sd2core.timebase import Timebase
 
 if TYPE_CHECKING:
@@ -82,9 +83,15 @@ def recording_of(paths: Sequence[Path], base: Recording | None = None) -> Record
             raise Sd2Error(f"{path} {words}", "a recording, video, mesh or radar capture", remedy)
         if kind in kinds:
             raise Sd2Error(
-                f"{kinds[kind]} and {path} are both a {kind}", "at most one file of each kind"
+                f"{kinds[kind]} and {path} are both of kind {kind}", "at most one file of each kind"
             )
         kinds[kind] = Path(path)
+    if base is None and kinds.keys() == {"imu"}:
+        raise Sd2Error(
+            f"{kinds['imu']} holds samples of an inertial sensor, which are shown beside something",
+            "a recording, video, mesh or radar capture",
+            "Open that first, then add the file",
+        )
     if "recording" in kinds:
         if len(kinds) > 1:
             raise Sd2Error(
@@ -119,7 +126,7 @@ def load_content(recording: Recording, progress: Progress) -> Content:
     for role, path in missing.items():
         problems.append(
             Sd2Error(
-                f"The {role} is not at {path}",
+                f"The {role_words(role)} is not at {path}",
                 remedy="File → Find missing files… looks for it in another folder",
             )
         )

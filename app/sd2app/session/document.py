@@ -275,6 +275,11 @@ class DocumentModel(QObject):
 
 def _keep_edits(before: Recording, after: Recording) -> None:
     """Apply edits made while files were read to what was read."""
-    kept = "labels", "sensor", "placements", "radar_offset_s", "denoiser", "bundled_denoiser"
+    kept = [
+        "labels", "sensor", "placements", "radar_offset_s", "denoiser", "bundled_denoiser",
+        "imu_places",
+    ]  # fmt: skip
+    if after.imu in (None, before.imu):  # not one of the files that were read
+        kept += ["imu", "imu_offset_s"]
     for name in kept:
         setattr(after, name, getattr(before, name))

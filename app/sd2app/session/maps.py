@@ -254,8 +254,10 @@ class PointerModel(QObject):
         self.velocity_mps: float | None = None
         self.reading: Reading | None = None
 
-    def point_at(self, time_s: float, velocity_mps: float, reading: Reading | None) -> None:
-        """Set the track, time and velocity under the pointer."""
+    def point_at(
+        self, time_s: float, velocity_mps: float | None = None, reading: Reading | None = None
+    ) -> None:
+        """Set time and velocity under the pointer, and what is read there of a map."""
         self.time_s, self.velocity_mps, self.reading = time_s, velocity_mps, reading
         self.changed.emit()
 

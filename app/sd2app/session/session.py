@@ -10,6 +10,7 @@ from sd2app.session.content import reference_of
 from sd2app.session.display import DisplayModel
 from sd2app.session.document import DocumentModel
 from sd2app.session.maps import MapModel, PointerModel
+from sd2app.session.placing import PlacingModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.sensor import SensorModel
 from sd2app.session.tasks import TaskList
@@ -54,6 +55,7 @@ class Session:
     span: TimeWindow
     pointer: PointerModel
     maps: Maps
+    placing: PlacingModel
     edits: Edits
 
     def has_content(self) -> bool:
@@ -115,5 +117,6 @@ def build_session(parent: QObject, settings: Settings) -> Session:
             MapModel("Denoised before", parent),
             MapModel("Real", parent),
         ),
+        placing=PlacingModel(parent),
         edits=Edits(document, sensor),
     )

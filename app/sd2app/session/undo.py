@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
 
 from PySide6.QtGui import QUndoCommand
 
@@ -17,6 +18,13 @@ from sd2core.sensor import Vector, VirtualSensor, aimed_at
 if TYPE_CHECKING:
     from sd2core.radar_config import Clutter
     from sd2core.recording.recording import Recording
+
+Offset = Literal["radar_offset_s", "imu_offset_s"]
+"""Time on the recording's clock at which something measured begins."""
+_ALIGNED: Mapping[str, str] = {
+    "radar_offset_s": "Align radar",
+    "imu_offset_s": "Align inertial sensor",
+}
 
 
 class Assign(QUndoCommand):
@@ -113,24 +121,51 @@ class Edits:
             self.place_sensor(rest.pop("sensor"), "Restore sensor")
         self._change("Restore settings", rest)
 
-    # --- alignment of the real capture ----------------------------------------------------
+    # --- inertial sensors -----------------------------------------------------------------
+
+    def place_inertial(self, place: str) -> None:
+        """Put a virtual inertial sensor at a place: a name, or the number of a vertex."""
+        places = self._inertial_places
+        if place not in places:
+            self._change("Place inertial sensor", {"imu_places": (*places, place)})
+
+    def remove_inertial(self, place: str) -> None:
+        """Take the virtual inertial sensor of a place away."""
+        left = tuple(one for one in self._inertial_places if one != place)
+        self._change("Remove inertial sensor", {"imu_places": left})
+
+    def add_inertial_file(self, path: Path, offset_s: float) -> None:
+        """Show a real inertial sensor's samples, the first at a time of the recording's clock."""
+        self._change("Add inertial sensor's file", {"imu": path, "imu_offset_s": offset_s})
+
+    def remove_inertial_file(self) -> None:
+        """Show no real inertial sensor's samples."""
+        self._change("Remove inertial sensor's file", {"imu": None, "imu_offset_s": 0.0})
+
+    @property
+    def _inertial_places(self) -> tuple[str, ...]:
+        recording = self._document.recording
+        return () if recording is None else recording.imu_places
+
+    # --- alignment of what was measured ---------------------------------------------------
 
     def set_radar_offset(self, offset_s: float) -> None:
         """Align the capture."""
-        self._change("Align radar", {"radar_offset_s": offset_s})
+        self._change(_ALIGNED["radar_offset_s"], {"radar_offset_s": offset_s})
 
-    def begin_offset_drag(self) -> None:
-        """Begin a drag of the measured map."""
+    def begin_offset_drag(self, name: Offset = "radar_offset_s") -> None:
+        """Begin to drag what was measured in time."""
         if self._document.recording is not None:
-            self._before = self._document.recording.radar_offset_s
+            self._before = self._fields([name])
 
     def drag_offset(self, seconds: float) -> None:
-        """Shift the measured map by ``seconds`` since the drag began."""
-        self._document.assign({"radar_offset_s": round(self._before + seconds, 3)})
+        """Shift it by ``seconds`` since the drag began."""
+        shifted = {name: round(before + seconds, 3) for name, before in self._before.items()}
+        self._document.assign(shifted)
 
     def end_offset_drag(self) -> None:
         """End the drag; it becomes one step in the history."""
-        self._push_change("Align radar", {"radar_offset_s": self._before})
+        self._push_change(_ALIGNED[next(iter(self._before))], self._before)
 
     # --- processing of the capture --------------------------------------------------------
 

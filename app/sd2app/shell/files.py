@@ -20,16 +20,29 @@ from sd2app.widgets.dialogs import Answer, ask_folder, ask_new, confirmed
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import plain_path
 from sd2core.files.resources import resource_path
+from sd2core.io.imu_columns import holds_inertial_signals
 from sd2core.recording.recording import GoneError, SavedElsewhereError
+from sd2core.recording.relinking import Role, role_words
 
-_PARTS = ("video", "mesh", "radar")
+_PARTS: tuple[Role, ...] = ("video", "mesh", "radar", "imu")
 
 
 class FilesFeature(Feature):
-    """The recording as files; a folder in which a ``fit`` was stopped is taken up."""
+    """The recording as files; a folder in which a ``fit`` was stopped is taken up.
 
-    def __init__(self, session: Session, shell: Shell, fit: FitModel, labels: LabelEdits) -> None:
+    ``add_inertial`` adds an inertial sensor's samples, for which nothing else is read again.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        shell: Shell,
+        fit: FitModel,
+        labels: LabelEdits,
+        add_inertial: Callable[[Path], object],
+    ) -> None:
         self._session, self._shell, self._fit, self._labels = session, shell, fit, labels
+        self._add_inertial = add_inertial
         self._document = session.document
         self._document.opened.connect(self._remember)
         self._document.saved.connect(self._remember)
@@ -50,8 +63,9 @@ class FilesFeature(Feature):
             ),
             Action(
                 "add", "File", "Add to this recording…", (),
-                "Add a video, a mesh or a radar capture to what is open", self._ask_add,
-                has_content,
+                "Add a video, a mesh, a radar capture or an inertial sensor's samples to what is"
+                " open",
+                self._ask_add, has_content,
             ),
             Action(
                 "relink", "File", "Find missing files…", (),
@@ -113,10 +127,19 @@ class FilesFeature(Feature):
 
     def _ask_open(self) -> None:
         if paths := self._ask("Open"):
-            self._replace(paths)
+            if self._document.recording is not None and _is_inertial(paths):
+                self._add(paths)  # nothing to look at by itself
+            else:
+                self._replace(paths)
 
     def _ask_add(self) -> None:
         if paths := self._ask("Add to this recording"):
+            self._add(paths)
+
+    def _add(self, paths: Sequence[Path]) -> None:
+        if _is_inertial(paths):
+            self._add_inertial(paths[0])
+        else:
             self._document.add(paths)
 
     def _ask(self, title: str) -> list[Path]:
@@ -139,8 +162,10 @@ class FilesFeature(Feature):
         before = document.recording
         changed = [one for one in _PARTS if getattr(added, one) != getattr(before, one)]
         replaced = [one for one in changed if getattr(before, one) is not None]
-        words = f"Replace the {' and the '.join(replaced)} of" if replaced else "Add to"
-        return (Drop(f"{words} “{title}”", lambda: document.add(paths)), open_them)
+        named = " and the ".join(map(role_words, replaced))
+        words = f"Replace the {named} of" if replaced else "Add to"
+        add_them = Drop(f"{words} “{title}”", lambda: self._add(paths))
+        return (add_them,) if _is_inertial(paths) else (add_them, open_them)
 
     def _relink(self) -> None:
         """Choose the one folder below which missing files are."""
@@ -151,11 +176,14 @@ class FilesFeature(Feature):
         if relinked is None:
             return
         for role in relinked.missing:
-            self._shell.warn(f"No file below {folder} has the name of the missing {role}.")
+            self._shell.warn(
+                f"No file below {folder} has the name of the missing {role_words(role)}."
+            )
         for role, paths in relinked.ambiguous.items():
             names = ", ".join(str(path) for path in paths)
             self._shell.warn(
-                f"Several files could be the missing {role}: {names}. Nothing was changed."
+                f"Several files could be the missing {role_words(role)}: {names}. Nothing was"
+                " changed."
             )
 
     def save(self) -> bool:
@@ -233,3 +261,8 @@ class FilesFeature(Feature):
     def may_close(self) -> bool:
         """Ask what becomes of unsaved edits."""
         return self.may_discard()
+
+
+def _is_inertial(paths: Sequence[Path]) -> bool:
+    """True for one file of an inertial sensor's samples."""
+    return len(paths) == 1 and paths[0].is_file() and holds_inertial_signals(paths[0])

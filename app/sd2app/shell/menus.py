@@ -20,10 +20,13 @@ _FILLED, _SUBMENU = "@", ">"
 LAYOUT: Mapping[str, tuple[str, ...]] = {
     "File": (
         "new_from_video", "open", "@recent", "add", "compare", "relink", "-", "save",
-        "save_as", "export_map", "export_denoised", "export_maps", "export_strip",
-        "export_dataset", "-", "batch", "-", "recover_labels", "-", "quit",
+        "save_as", "export_map", "export_denoised", "export_maps", "export_inertial",
+        "export_strip", "export_dataset", "-", "batch", "-", "recover_labels", "-", "quit",
     ),
-    "Edit": ("undo", "redo", "-", "sensor_to_camera", "aim_sensor", "placements", "-", "align"),
+    "Edit": (
+        "undo", "redo", "-", "sensor_to_camera", "aim_sensor", "placements", "-",
+        "place_inertial", "-", "align",
+    ),
     "View": (
         "colour_velocity", "colour_range", "colour_visibility", "colour_plain", "dots", "overlay",
         "overlay_dots", "draw_placements", "-", "view_three_quarter", "view_camera", "view_sensor",

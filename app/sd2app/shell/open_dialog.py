@@ -10,10 +10,11 @@ from sd2app.fit.request import REQUEST_NAME
 from sd2core.errors import Sd2Error
 from sd2core.io.kinds import MESH_SUFFIXES, RADAR_SUFFIXES, VIDEO_SUFFIXES, kind_of
 
-_SUFFIXES = sorted(VIDEO_SUFFIXES | MESH_SUFFIXES | RADAR_SUFFIXES | {".npz", ".zip"})
+_OTHERS = {".npz", ".zip", ".csv", ".sto"}
+_SUFFIXES = sorted(VIDEO_SUFFIXES | MESH_SUFFIXES | RADAR_SUFFIXES | _OTHERS)
 _FILES = (
-    f"Recordings, videos, meshes, radar ({' '.join(f'*{one}' for one in _SUFFIXES)}"
-    " recording.json);;All files (*)"
+    "Recordings, videos, meshes, radar, inertial sensors"
+    f" ({' '.join(f'*{one}' for one in _SUFFIXES)} recording.json);;All files (*)"
 )
 _CLOSED = ("recording.json", REQUEST_NAME, "zarr.json", "radar.npy")
 """Files of folders into which nobody has to look."""

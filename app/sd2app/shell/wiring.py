@@ -20,6 +20,7 @@ from sd2app.denoise.validity import MapValidity
 from sd2app.feature import Feature, Shell
 from sd2app.figures.feature import FiguresFeature
 from sd2app.fit.feature import FitFeature
+from sd2app.imu.feature import ImuFeature
 from sd2app.labels.feature import LabelsFeature
 from sd2app.maps.feature import MapsFeature
 from sd2app.maps.stack import MapStack
@@ -115,15 +116,23 @@ class Features:
         )
         self.playback = PlaybackFeature(session)
         self.program = ProgramFeature(session, shell, labels)
-        self.files = FilesFeature(session, shell, self.fit.model, labels.edits)
+        self.imu = ImuFeature(session, shell, parent)
+        self.files = FilesFeature(
+            session, shell, self.fit.model, labels.edits, self.imu.model.add_file
+        )
         self.scene = SceneFeature(
-            session, shell, maps.synthesis, self.sensor.placements, labels.offer_frame
+            session,
+            shell,
+            maps.synthesis,
+            self.sensor.placements,
+            self.imu.model,
+            labels.offer_frame,
         )
         self._in_order: tuple[Feature, ...] = (
             self.mesh_comparison, self.sensor, self.suggestions, self.agreement,
             self.dataset_export, self.fit, self.batch, self.training, self.classify,
             self.denoise, self.maps, self.accuracy, self.video, self.labels, self.figures,
-            self.playback, self.program, self.files, self.scene,
+            self.playback, self.program, self.imu, self.files, self.scene,
         )  # fmt: skip
         session.document.opened.connect(lambda: _take_over(session, self))
 
@@ -165,11 +174,12 @@ def side_pages(features: Features, views: Mapping[str, QWidget]) -> dict[str, QW
 def track_stack(
     session: Session, features: Features, views: Mapping[str, QWidget]
 ) -> tuple[QWidget, MapStack]:
-    """Everything over the shared time axis: maps, labels, ruler, overview; and the maps of it."""
+    """Everything over the shared time axis: maps, inertial sensor, labels, ruler; and the maps."""
     labels = features.labels
     maps = features.maps.stack((labels.over_maps,), (labels.over_all,))
     features.denoise.put_buttons(maps)
-    labels.let_drag_on(maps.views)
+    inertial = features.imu.track((labels.over_maps,))
+    labels.let_drag_on((*maps.views, inertial))
     below = [views[name] for name in ("classes", "suggestions", "labels", "other labels")]
     ruler = TimeRuler(session)
-    return pane((maps, 1), *below, ruler, maps.overview), maps
+    return pane((maps, 1), inertial, *below, ruler, maps.overview), maps

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Literal, Protocol
 
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPen, QWheelEvent
@@ -15,6 +15,8 @@ from sd2app.palette import Palette
 GUTTER_PX = 56
 """Space left of every track for the velocity axis, so that all tracks line up."""
 MARGIN_PX = 8
+HANDLE_PX = 22
+"""Left end of the title row of a map or track, which folds it."""
 _FARTHEST_PX = 1e6
 
 
@@ -85,6 +87,24 @@ def paint_cursor(painter: QPainter, plot: QRectF, x_px: float) -> None:
     for pen in (QPen(QColor(0, 0, 0, 140), 3), QPen(QColor(255, 255, 255), 1)):
         painter.setPen(pen)
         painter.drawLine(top, bottom)
+
+
+def paint_handle(
+    painter: QPainter, header_px: float, to: Literal["down", "right", "left"], colour: str
+) -> None:
+    """Paint the triangle that folds: down while open, to the right while folded."""
+    corners = {
+        "down": ((-4, -2.5), (4, -2.5), (0, 3)),
+        "right": ((-2.5, -4), (-2.5, 4), (3, 0)),
+        "left": ((2.5, -4), (2.5, 4), (-3, 0)),
+    }[to]
+    centre = QPointF(HANDLE_PX / 2 + 2, header_px / 2)
+    painter.save()
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(QColor(colour))
+    painter.drawPolygon([centre + QPointF(x, y) for x, y in corners])
+    painter.restore()
 
 
 def paint_title(painter: QPainter, box: QRectF, text: str, colour: str) -> int:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from sd2core.cli.info.description import (
     Description,
+    describe_imu,
     describe_map,
     describe_mesh,
     describe_parts,
@@ -23,7 +24,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     parser = add_command(
         commands,
         "info",
-        "what is in a recording, video, mesh, radar capture, Doppler map, pairs, data set or model",
+        "what is in a recording, video, mesh, radar or IMU file, map, pairs, data set or model",
         handler=_info,
         examples="  sd2 info walk.sd2\n  sd2 info walk.npz --json\n  sd2 info walk.zarr --verify",
     )
@@ -74,6 +75,8 @@ def describe(path: Path, options: argparse.Namespace) -> Description:
             return describe_video(path, video)
     if kind == "radar":
         return describe_radar(path)
+    if kind == "imu":
+        return describe_imu(path)
     if kind == "pairs":
         from sd2core.cli.info.learning_data import describe_pairs
         from sd2core.pairs.store import read_pairs

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from sd2core.imu.signals import InertialSignals
     from sd2core.io.radar import RadarCapture, RecordedMap
     from sd2core.io.video import VideoReader
     from sd2core.maps import DopplerMap
@@ -52,6 +53,8 @@ def show(description: Description, *, as_json: bool) -> None:
 
 def describe_recording(recording: Recording, parts: list[Description]) -> Description:
     """Describe a recording and its parts; missing files are named."""
+    from sd2core.recording.relinking import role_words
+
     missing = recording.missing()
     x, y, z = recording.sensor.position_m
     data = {
@@ -60,6 +63,8 @@ def describe_recording(recording: Recording, parts: list[Description]) -> Descri
         "title": recording.title,
         "simulated": recording.simulated,
         "radar_offset_s": recording.radar_offset_s,
+        "imu_offset_s": recording.imu_offset_s,
+        "imu_places": list(recording.imu_places),
         "camera": None if recording.camera is None else recording.camera.model_dump(mode="json"),
         "sensor_position_m": [x, y, z],
         "denoiser": None if recording.denoiser is None else str(recording.denoiser),
@@ -77,10 +82,12 @@ def describe_recording(recording: Recording, parts: list[Description]) -> Descri
         "camera": _camera(recording),
         "sensor": f"at x {x:g}, y {y:g}, z {z:g} m",
         "radar offset": f"{recording.radar_offset_s:g} s" if recording.radar else "",
+        "inertial sensors": ", ".join(recording.imu_places),
+        "inertial offset": f"{recording.imu_offset_s:g} s" if recording.imu else "",
         "denoiser": _denoiser(recording),
         "spans": _labels(recording),
     }
-    notes = tuple(f"the {role} is not at {path}" for role, path in missing.items())
+    notes = tuple(f"the {role_words(role)} is not at {path}" for role, path in missing.items())
     if missing:
         notes += (f"find it with: sd2 relink {recording.folder} FOLDER",)
     return Description(f"Recording {recording.folder}", data, facts, notes + recording.notes, parts)
@@ -99,6 +106,8 @@ def describe_parts(recording: Recording) -> list[Description]:
         parts.append(describe_mesh(recording.mesh, mesh))
     if recording.radar is not None and "radar" not in missing:
         parts.append(describe_radar(recording.radar))
+    if recording.imu is not None and "imu" not in missing:
+        parts.append(describe_imu(recording.imu))
     return parts
 
 
@@ -176,6 +185,52 @@ def describe_recorded_map(path: Path, recorded: RecordedMap) -> Description:
     labelled = ", ".join(f"{span.start_s:.3f} to {span.end_s:.3f} s" for span in spans)
     facts = inside.facts | {"gesture": recorded.gesture, "labelled": labelled or "nowhere"}
     return Description(f"Radar map {path}", data, facts, recorded.notes)
+
+
+def describe_imu(path: Path) -> Description:
+    """Open samples of an inertial sensor and describe them."""
+    from sd2core.imu.files import read_signals
+
+    signals = read_signals(path)
+    told = signals_data(signals)
+    data = {
+        "kind": "imu",
+        "path": str(path),
+        **told,
+        "rate_hz": signals.rate_hz,
+        "start_s": float(signals.times_s[0]),
+        "end_s": float(signals.times_s[-1]),
+        "meta": signals.meta,
+    }
+    unknown = told["samples"] - told["known_samples"]
+    facts = {
+        "samples": f"{told['samples']:,} at {signals.rate_hz:.4g} Hz,"
+        f" from {signals.times_s[0]:.3f} to {signals.times_s[-1]:.3f} s"
+        + (f"; {unknown:,} are empty" if unknown else ""),
+        "acceleration": f"up to {told['largest_acceleration_mps2']:.1f} m/s²",
+        "turn rate": f"up to {told['largest_turn_rate_radps']:.2f} rad/s",
+        "at": str(signals.meta.get("at", "")),
+        "axes": str(signals.meta.get("axes", "")),
+    }
+    simulated = " (simulated)" if signals.meta.get("simulated") is True else ""
+    return Description(f"Inertial sensor {path}{simulated}", data, facts)
+
+
+def signals_data(signals: InertialSignals) -> dict[str, Any]:
+    """Number of samples and largest values, for programs."""
+    import numpy as np
+
+    known = signals.known
+    acceleration, turn_rate = (
+        float(np.linalg.norm(values[known], axis=1).max(initial=0.0))
+        for values in (signals.acceleration_mps2, signals.turn_rate_radps)
+    )
+    return {
+        "samples": len(known),
+        "known_samples": int(known.sum()),
+        "largest_acceleration_mps2": acceleration,
+        "largest_turn_rate_radps": turn_rate,
+    }
 
 
 def _denoiser(recording: Recording) -> str:

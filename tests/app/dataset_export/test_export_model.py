@@ -12,13 +12,23 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import QObject
 from swinging_recordings import recording
+from turning_bodies import turning_body
 
-from sd2app.dataset_export.model import ExportModel
+from sd2app.dataset_export.model import ExportChoice, ExportModel
 from sd2app.dataset_export.run import Exported, ExportRun
-from sd2app.dataset_export.text import bytes_words, label_words, size_words, split_words
+from sd2app.dataset_export.text import (
+    bytes_words,
+    inertial_words,
+    label_words,
+    size_words,
+    split_words,
+)
 from sd2app.session.tasks import TaskList
 from sd2core.errors import Sd2Error
+from sd2core.imu.mounting import PLACES
+from sd2core.io.mesh import save_mesh
 from sd2core.placements.placements import PlacementGrid
+from sd2core.recording.recording import Recording
 from sd2core.runs.command_folder import commands_in
 
 FAKE = Path(__file__).resolve().parents[2] / "fake_export.py"
@@ -251,6 +261,39 @@ def test_lines_that_say_nothing_are_left_alone(qtbot, tmp_path) -> None:
         assert not run.on_events([told])
     assert run.history.written is None
     run.close()
+
+
+def test_inertial_sensors_of_the_recordings_are_offered(made, tmp_path: Path, qtbot) -> None:
+    (tmp_path / "people").mkdir()
+    save_mesh(turning_body(60), tmp_path / "body.npz")
+    for name, places in (("anna", ("right-wrist", "17", "head")), ("ben", ("chest",))):
+        one = Recording.create(tmp_path / "people" / f"{name}.sd2", mesh=tmp_path / "body.npz")
+        one.imu_places = places
+        one.save()
+    model = made()
+    model.begin(tmp_path / "people")
+    assert model.imu_places == ("head", "chest", "right-wrist")  # vertices have no names
+    assert inertial_words(model.imu_places) == "at head, chest, right wrist"
+    model.choose(length=20, overlap=0)
+    counted(model, qtbot)
+    without = model.forecast.total_bytes
+    model.choose(imu=model.imu_places)
+    counted(model, qtbot)
+    # Six numbers of four bytes for each sensor and frame.
+    assert model.forecast.total_bytes - without == model.forecast.segments * 20 * 3 * 6 * 4
+    out = tmp_path / "set.zarr"
+    model.start(out)
+    qtbot.waitUntil(lambda: not model.under_way, timeout=20_000)
+    words = json.loads(out.with_name("set.zarr.asked").read_text())
+    assert words[words.index("--imu") + 1] == "head,chest,right-wrist"
+    model.begin(tmp_path / "people" / "ben.sd2")
+    assert model.choice.imu == ("chest",)
+    assert ExportChoice.from_json(model.choice.to_json()) == model.choice
+
+
+def test_sensors_in_words() -> None:
+    assert inertial_words(()) == "none placed"
+    assert inertial_words(PLACES[:6]).endswith(" and 2 more")
 
 
 def test_bytes_in_words() -> None:

@@ -76,6 +76,32 @@ def test_import_refers_to_the_files(sd2: Sd2, plate: Path, tmp_path: Path) -> No
     assert data["missing"] == {}
 
 
+def test_samples_of_an_inertial_sensor(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
+    rows = "".join(f"{10 * row};0;0;1;90;0;0\n" for row in range(50)) + "500;;;;0;0;0\n"
+    wrist = tmp_path / "wrist.csv"
+    wrist.write_text(f"time (ms);ax_g;ay_g;az_g;gx_dps;gy_dps;gz_dps\n{rows}")
+    outcome = sd2("info", wrist)
+    assert outcome.code == 0, outcome.err
+    assert "51 at 100 Hz, from 0.000 to 0.500 s; 1 are empty" in outcome.out
+    data = json.loads(sd2("info", wrist, "--json").out)
+    assert (data["kind"], data["samples"], data["known_samples"]) == ("imu", 51, 50)
+    assert data["largest_acceleration_mps2"] == pytest.approx(9.80665)
+    assert data["largest_turn_rate_radps"] == pytest.approx(np.pi / 2)
+
+    files = ("--mesh", plate, "--imu", wrist, "--imu-offset-s", "0.25")
+    outcome = sd2("import", tmp_path / "a", *files)
+    assert outcome.code == 0, outcome.err
+    recording = open_recording(tmp_path / "a.sd2")
+    assert (recording.imu, recording.imu_offset_s) == (wrist, 0.25)
+    assert json.loads(sd2("info", tmp_path / "a.sd2", "--json").out)["imu"]["samples"] == 51
+    assert sd2("import", tmp_path / "b", "--imu", wrist).code == 1  # nothing to look at
+
+    wrist.write_text("t,ax,ay,az,gx,gy,gz\n0,1,1,1,1,1,1\n")
+    outcome = sd2("info", wrist)
+    assert outcome.code == 1
+    assert "no unit" in outcome.err
+
+
 def test_import_copies_on_request(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
     data = json.loads(
         sd2("import", tmp_path / "a.sd2", "--mesh", plate, "--copy", "--title", "T", "--json").out

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from sd2core.errors import Sd2Error
 from sd2core.imu.files import SUFFIXES, read_signals, write_signals
 from sd2core.imu.signals import InertialSignals
-from sd2core.imu.tables import STANDARD_GRAVITY_MPS2
+from sd2core.io.imu_columns import STANDARD_GRAVITY_MPS2
 
 HEADING = "time_s,acc_x_mps2,acc_y_mps2,acc_z_mps2,gyr_x_radps,gyr_y_radps,gyr_z_radps"
 ROWS = "0.00,1,2,3,4,5,6\n0.01,1,2,3,4,5,6\n0.02,1,2,3,4,5,6\n"

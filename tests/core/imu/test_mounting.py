@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from sd2core.body.model import Body, Resolution
 from sd2core.errors import Sd2Error
-from sd2core.imu.mounting import PLACES, checked_places, mounted
+from sd2core.imu.mounting import PLACES, checked_places, mounted, place_near
 from sd2core.imu.virtual import imu_at_frames, virtual_imu
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.timebase import Timebase
@@ -228,3 +228,32 @@ def test_a_rate_below_the_motion_and_a_clip_too_short_are_refused() -> None:
     assert signals.rate_hz == pytest.approx(200.0)
     assert len(signals.times_s) == int(29 / 30 * 200) + 1
     assert signals.known.all()
+
+
+@pytest.mark.parametrize("resolution", ["low", "medium", "high"])
+def test_the_place_near_a_vertex_is_the_one_that_sits_there(resolution: Resolution) -> None:
+    body = Body.load(resolution)
+    mesh = body_of(body, at_rest(body))
+    for place in PLACES:
+        assert place_near(mesh, mounted(mesh, place).vertex) == place
+
+
+def test_the_place_near_a_vertex_is_on_the_same_limb(body: Body) -> None:
+    """Wherever one bone carries the skin for the most part, also where another place is nearer."""
+    mesh = body_of(body, at_rest(body))
+    index = body.skeleton.index
+    leading = body.bones[np.arange(len(body.bones)), body.weights.argmax(axis=1)]
+    for bone, part in (
+        ("head", "head"),
+        ("finger2-3.L", "left-hand"),
+        ("toe1-2.R", "right-foot"),
+        ("lowerleg02.L", "left-shank"),
+        ("upperleg01.R", "right-thigh"),
+    ):
+        vertices = np.flatnonzero((leading == index[bone]) & (body.weights.max(axis=1) > 0.6))
+        assert vertices.size, bone
+        assert {place_near(mesh, int(vertex)) for vertex in vertices} == {part}
+
+
+def test_on_any_other_surface_the_place_is_the_vertex() -> None:
+    assert place_near(sphere(np.zeros((6, 3))), 17) == "17"

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from sd2core.errors import Sd2Error
+from sd2core.imu.files import write_signals
+from sd2core.imu.signals import InertialSignals
 from sd2core.io.kinds import kind_of
 from sd2core.io.mesh import load_mesh
 from sd2core.maps import DopplerMap
@@ -27,6 +29,44 @@ def test_files_are_told_apart(tmp_path):
     values = np.ones((4, 2), np.float32)
     DopplerMap(values, VelocityAxis(4), Timebase([0, 1]), "real").save(tmp_path / "map.npz")
     assert kind_of(tmp_path / "map.npz") == "map"
+
+
+@pytest.mark.parametrize(
+    "heading",
+    [
+        "time_s,acc_x_mps2,acc_y_mps2,acc_z_mps2,gyr_x_radps,gyr_y_radps,gyr_z_radps",
+        "\ufeffTimestamp (ms);Accelerometer X [g];Accelerometer Y [g];Accelerometer Z [g];"
+        "Gyroscope X [deg/s];Gyroscope Y [deg/s];Gyroscope Z [deg/s];Label",
+        "# at: left-wrist\n\n# rate_hz: 100\nax\tay\taz\tgx\tgy\tgz",
+    ],
+)
+def test_a_table_of_an_inertial_sensor_is_known_by_its_heading(tmp_path, heading):
+    (tmp_path / "wrist.csv").write_text(heading + "\n", encoding="utf-8")
+    assert kind_of(tmp_path / "wrist.csv") == "imu"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "start_s,end_s,label\n0,1,x\n",
+        "t,ax,ay,az\n",
+        "# only remarks\n",
+        "\0\xff",
+        "a" + " " * 9999 + "b",
+    ],
+)
+def test_other_tables_are_none(tmp_path, text):
+    (tmp_path / "labels.csv").write_bytes(text.encode("latin-1"))
+    with pytest.raises(Sd2Error, match="no kind that is known"):
+        kind_of(tmp_path / "labels.csv")
+
+
+@pytest.mark.parametrize("ending", [".csv", ".sto", ".npz"])
+def test_what_sd2_imu_writes_is_known(tmp_path, ending):
+    signals = InertialSignals(np.arange(3) / 100, np.ones((3, 3)), np.ones((3, 3)))
+    write_signals(tmp_path / f"wrist{ending}", signals)
+    assert kind_of(tmp_path / f"wrist{ending}") == "imu"
 
 
 def test_folders_are_told_apart(tmp_path):

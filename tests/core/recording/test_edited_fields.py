@@ -30,6 +30,9 @@ recordings = st.builds(
     placements=st.none()
     | st.builds(PlacementGrid, st.lists(st.floats(0.1, 9), min_size=1, max_size=3).map(tuple)),
     radar_offset_s=st.floats(-9, 9),
+    imu=st.none() | st.just(Path("wrist.csv").absolute()),
+    imu_offset_s=st.floats(-9, 9),
+    imu_places=st.lists(st.sampled_from(["left-wrist", "head", "4711"]), unique=True).map(tuple),
 )
 
 
@@ -44,6 +47,19 @@ def test_what_was_encoded_is_decoded(recording: Recording) -> None:
 def test_what_differs_is_named() -> None:
     one, other = Recording(Path("a.sd2")), Recording(Path("a.sd2"), radar_offset_s=0.5)
     assert differing(edited_fields(one), edited_fields(other)) == ["offset of the radar"]
+
+
+def test_entries_of_earlier_versions_are_read(tmp_path: Path) -> None:
+    placed = Recording(tmp_path / "a.sd2", radar_offset_s=0.5, imu_places=("head",))
+    entry = {
+        name: value for name, value in edited_fields(placed).items() if not name.startswith("imu")
+    }
+    assert decoded_fields(entry).keys() == {"sensor", "placements", "radar_offset_s"}
+    assert not differing(entry, edited_fields(placed))
+    other = Recording(tmp_path / "a.sd2", imu_places=("chest",))
+    assert differing(edited_fields(placed), edited_fields(other)) == [
+        "offset of the radar", "set of inertial sensors"
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize("entry", [{}, {"sensor": {"position_m": "there"}}, {"sensor": {}}])

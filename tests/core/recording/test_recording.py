@@ -532,6 +532,41 @@ def test_planned_placements_are_kept(files: Path) -> None:
         assert open_recording(made.folder).placements == planned
 
 
+def test_inertial_sensors_are_kept_and_their_file_is_found_again(
+    files: Path, tmp_path: Path
+) -> None:
+    (files / "wrist.csv").touch()
+    recording = Recording.create(tmp_path / "walk.sd2", video=files / "walk.mkv")
+    assert (recording.imu, recording.imu_offset_s, recording.imu_places) == (None, 0.0, ())
+    recording.imu, recording.imu_offset_s = files / "wrist.csv", -0.25
+    recording.imu_places = ("left-wrist", "4711")
+    recording.save()
+    again = open_recording(recording.folder)
+    assert (again.imu, again.imu_offset_s) == (files / "wrist.csv", -0.25)
+    assert again.imu_places == ("left-wrist", "4711")
+
+    document = json.loads((recording.folder / "recording.json").read_text())
+    for name in ("imu", "imu_offset_s", "imu_places"):  # as earlier versions wrote it
+        del document[name]
+    (recording.folder / "recording.json").write_text(json.dumps(document))
+    assert open_recording(recording.folder).imu_places == ()
+
+    again.imu = tmp_path / "gone" / "wrist.csv"
+    assert again.missing() == {"imu": tmp_path / "gone" / "wrist.csv"}
+    with pytest.raises(Sd2Error, match=r"inertial sensor's file .* does not exist"):
+        again.save_as(tmp_path / "other.sd2")
+
+
+@pytest.mark.parametrize("place", ["", "Left wrist", "-1", "left_wrist", "1" * 10, 17])
+def test_an_impossible_place_of_an_inertial_sensor_is_refused(files: Path, place: object) -> None:
+    recording = Recording.create(files / "walk.sd2", video=files / "walk.mkv")
+    path = recording.folder / "recording.json"
+    document = json.loads(path.read_text())
+    path.write_text(json.dumps(document | {"imu_places": [place]}))
+    with pytest.raises(Sd2Error, match="imu_places"):
+        open_recording(recording.folder)
+
+
 def test_damaged_placements_are_named(files: Path) -> None:
     made = make(files)
     damaged = {**content(made), "placements": {"kind": "grid", "ranges_m": [0.0]}}

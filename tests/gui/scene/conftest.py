@@ -8,9 +8,10 @@ from typing import Any
 
 import pytest
 from PySide6.QtGui import QGuiApplication
-from scene_stage import Document, Drag, Placements, Stage, Synthesis, two_plates
+from scene_stage import Document, Drag, Inertial, Placements, Stage, Synthesis, two_plates
 
 from sd2app.session.display import DisplayModel
+from sd2app.session.placing import PlacingModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.sensor import SensorModel
 
@@ -28,6 +29,7 @@ def make_stage(qtbot: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable
         monkeypatch.setenv("SD2_SCENE", backend)
         document, synthesis, placements = Document(), Synthesis(), Placements()
         playback, sensor, display = PlaybackModel(), SensorModel(), DisplayModel()
+        inertial, placing = Inertial(), PlacingModel(document)
         log: list[str] = []
 
         session = SimpleNamespace(
@@ -35,14 +37,15 @@ def make_stage(qtbot: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable
             playback=playback,
             sensor=sensor,
             display=display,
+            placing=placing,
             edits=Drag(sensor, log),
         )
-        view = SceneView(session, synthesis, placements)
+        view = SceneView(session, synthesis, placements, inertial)
         qtbot.addWidget(view)
         view.resize(*SIZE)
         view.show()
         QGuiApplication.processEvents()
-        models = (document, playback, sensor, display, synthesis, placements)
+        models = (document, playback, sensor, display, synthesis, placements, inertial, placing)
         made.append(Stage(view, *models, log))
         return made[-1]
 

@@ -12,6 +12,7 @@ from PySide6.QtGui import QColor
 
 from sd2app.sensor.placements import Planned
 from sd2app.session.display import DisplayModel
+from sd2app.session.placing import PlacingModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.sensor import SensorModel
 from sd2core.mesh.sequence import MeshSequence
@@ -65,6 +66,24 @@ class Placements(QObject):
         self.picked.append(number)
 
 
+class Inertial(QObject):
+    """Inertial sensors by their places, and which vertices were clicked."""
+
+    changed = Signal()
+    current = None
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.vertices: dict[str, int] = {}
+        self.clicked: list[int] = []
+
+    def place_at(self, vertex: int) -> str:
+        return str(vertex)
+
+    def place(self, vertex: int) -> None:
+        self.clicked.append(vertex)
+
+
 class Drag:
     """Edits of the sensor by a drag, which are written down."""
 
@@ -93,6 +112,8 @@ class Stage:
     display: DisplayModel
     synthesis: Synthesis
     placements: Placements
+    inertial: Inertial
+    placing: PlacingModel
     log: list[str]
 
     def open(self, mesh: MeshSequence | None) -> None:

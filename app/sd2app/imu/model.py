@@ -1,0 +1,306 @@
+"""Inertial sensors of the open recording: what they would feel, and what a real one measured."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+from PySide6.QtCore import QObject, Signal
+
+from sd2app.background.latest import Emit, LatestRunner
+from sd2app.session.session import Session
+from sd2app.session.tasks import ListedRunner
+from sd2core.errors import Sd2Error
+from sd2core.imu.files import read_signals, write_signals
+from sd2core.imu.mounting import mounted, place_near
+from sd2core.imu.signals import InertialSignals
+from sd2core.imu.virtual import virtual_imu
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.recording.recording import Recording
+
+_FOLDED = "inertial/folded"
+_STOPPED = "stopped: choose the sensor again in the context menu"
+
+
+def place_words(place: str) -> str:
+    """Place in words: ``left wrist``, ``vertex 4711``."""
+    return f"vertex {place}" if place.isdecimal() else place.replace("-", " ")
+
+
+@dataclass(frozen=True)
+class _Seats:
+    """Vertices on which sensors sit, by their places."""
+
+    vertices: Mapping[str, int]
+
+
+class _Wish(NamedTuple):
+    mesh: MeshSequence | None
+    places: tuple[str, ...]
+    current: str | None
+
+
+class _Added(NamedTuple):
+    recording: Recording
+    path: Path
+    signals: InertialSignals
+
+
+class ImuModel(QObject):
+    """Sensors of the recording, of which one is shown; its signals are computed in the background.
+
+    A recording has any number of virtual sensors, and one file of a real one.
+    """
+
+    changed = Signal()  # sensors, signals, or what is known of them
+    noted = Signal(str)
+    failed = Signal(str)
+
+    def __init__(self, session: Session, parent: QObject) -> None:
+        super().__init__(parent)
+        self._session, self._document = session, session.document
+        self.signals: InertialSignals | None = None  # of the current sensor, simulated
+        self.measured: InertialSignals | None = None  # of the real one, on its own clock
+        self.problem = ""  # why the current sensor has no signals
+        self.vertices: Mapping[str, int] = {}  # that sensors sit on, by their places
+        self.folded = session.settings.flag(_FOLDED, False)
+        self._chosen: str | None = None
+        self._wish = _Wish(None, (), None)
+        self._known: dict[str, InertialSignals] = {}
+        self._read: tuple[Path, InertialSignals | None] | None = None  # None: being read, or not
+        self._runner = ListedRunner(
+            "inertial sensor", session.jobs, self, self._receive, self._refuse
+        )
+        self._runner.partial.connect(self._take_seats)
+        self._runner.cancelled.connect(lambda: self._say_problem(_STOPPED))
+        self._reader = LatestRunner("inertial file", self, self._take_file, self._refuse_file)
+        self._adder = LatestRunner("added inertial file", self, self._add, self._fail)
+        self._writer = ListedRunner(
+            "inertial samples", session.jobs, self, self._say_written, self._fail
+        )
+        self._document.opened.connect(session.placing.end)
+        self._document.opened.connect(self._follow)
+        self._document.changed.connect(self._follow)
+
+    # --- what there is --------------------------------------------------------------------
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """Places of the virtual sensors."""
+        recording = self._document.recording
+        return () if recording is None else recording.imu_places
+
+    @property
+    def current(self) -> str | None:
+        """Place of the virtual sensor that is shown; None without any."""
+        if self._chosen in self.places:
+            return self._chosen
+        return next(iter(self.places), None)
+
+    @property
+    def file(self) -> Path | None:
+        """File of the real sensor."""
+        recording = self._document.recording
+        return None if recording is None else recording.imu
+
+    @property
+    def offset_s(self) -> float:
+        """Time on the recording's clock of the first sample of the real sensor."""
+        recording = self._document.recording
+        return 0.0 if recording is None else recording.imu_offset_s
+
+    @property
+    def shift_s(self) -> float:
+        """What is added to the real sensor's times to have them on the recording's clock."""
+        return 0.0 if self.measured is None else self.offset_s - float(self.measured.times_s[0])
+
+    @property
+    def visible(self) -> bool:
+        """True if there is a sensor to be shown."""
+        return bool(self.places) or self.measured is not None
+
+    @property
+    def busy(self) -> bool:
+        """True while signals are computed or read."""
+        return self._runner.busy or self._reader.busy or self._adder.busy
+
+    @property
+    def why_not(self) -> str:
+        """Reason why no sensor can be placed; empty if one can."""
+        mesh = self._document.mesh
+        if mesh is None:
+            return "There is no body to fix a sensor to: add its mesh first (File → Add…)"
+        return "" if mesh.faces is not None else "A point cloud has no surface to fix a sensor to"
+
+    @property
+    def file_name(self) -> str:
+        """Proposed name of a file of the shown signals."""
+        place = "" if self.current is None else place_words(self.current).replace(" ", "-")
+        return self._document.file_name(f"-{place}.csv")
+
+    # --- requests -------------------------------------------------------------------------
+
+    def place_at(self, vertex: int) -> str:
+        """Place to which a click on a vertex leads."""
+        mesh = self._document.mesh
+        return str(vertex) if mesh is None else place_near(mesh, vertex)
+
+    def place(self, vertex: int) -> None:
+        """Put a sensor where a vertex was clicked, and show it."""
+        self._session.placing.end()
+        if not self.why_not:
+            self._chosen = self.place_at(vertex)
+            self._session.edits.place_inertial(self._chosen)
+            self._follow()
+
+    def remove(self, place: str) -> None:
+        """Take a virtual sensor away."""
+        self._session.edits.remove_inertial(place)
+
+    def show(self, place: str) -> None:
+        """Show another sensor of the recording."""
+        self._chosen = place
+        if self.signals is None:
+            self._wish = self._wish._replace(current=None)  # once more where it was stopped
+        self._follow()
+
+    def set_folded(self, folded: bool) -> None:
+        """Show the title of the track alone, or all of it."""
+        if folded != self.folded:
+            self.folded = folded
+            self._session.settings.set_value(_FOLDED, folded)
+            self.changed.emit()
+
+    def add_file(self, path: Path) -> None:
+        """Read a real sensor's samples, and add them to the recording."""
+        recording = self._document.recording
+        if recording is not None:
+            self._adder.submit(lambda emit: _Added(recording, path, read_signals(path)))
+
+    def remove_file(self) -> None:
+        """Show no real sensor."""
+        self._session.edits.remove_inertial_file()
+
+    def save(self, path: Path) -> None:
+        """Write the signals that are shown, in the background."""
+        signals = self.signals
+        if signals is None:
+            return
+
+        def write(emit: Emit) -> Path:
+            write_signals(path, signals)
+            return path
+
+        self._writer.submit(write, f"Writing {path.name}")
+
+    def close(self) -> None:
+        """Stop all work."""
+        for runner in (self._runner, self._reader, self._adder, self._writer):
+            runner.close()
+
+    # --- following ------------------------------------------------------------------------
+
+    def _follow(self) -> None:
+        self._follow_file()
+        wish = _Wish(self._document.mesh, self.places, self.current)
+        if wish == self._wish:
+            return
+        if wish.mesh is not self._wish.mesh:
+            self._known.clear()
+            self.vertices = {}
+        self._wish, self.problem = wish, ""
+        self.signals = None if wish.current is None else self._known.get(wish.current)
+        mesh, known = wish.mesh, self.signals
+        if mesh is None or wish.current is None:
+            self._runner.cancel()
+            self.problem = "" if wish.current is None else self.why_not
+        else:
+            title = f"Moving the sensor at {place_words(wish.current)}" if known is None else ""
+            self._runner.submit(lambda emit: _feel(mesh, wish, known, emit), title)
+        self.changed.emit()
+
+    def _take_seats(self, result: object) -> None:
+        if isinstance(result, _Seats):
+            self.vertices = result.vertices
+            self.changed.emit()
+
+    def _receive(self, signals: InertialSignals) -> None:
+        if self._wish.current is not None:
+            self._known[self._wish.current] = self.signals = signals
+            self.changed.emit()
+
+    def _refuse(self, error: Exception) -> None:
+        self._say_problem(str(error))
+
+    def _say_problem(self, problem: str) -> None:
+        self.problem = problem
+        self.changed.emit()
+
+    # --- the real sensor ------------------------------------------------------------------
+
+    def _follow_file(self) -> None:
+        path = self.file
+        if path == (None if self._read is None else self._read[0]):
+            if self.measured is not None:
+                self.changed.emit()  # its offset
+            return
+        self.measured = None
+        if path is None:
+            self._read = None
+            self._reader.cancel()
+        else:
+            self._read = (path, None)
+            # One that is missing was named when the recording was opened.
+            if path.exists():
+                self._reader.submit(lambda emit: (path, read_signals(path)))
+        self.changed.emit()
+
+    def _take_file(self, read: tuple[Path, InertialSignals]) -> None:
+        self._read = read
+        self.measured = read[1]
+        self.changed.emit()
+
+    def _refuse_file(self, error: Exception) -> None:
+        self._fail(error)
+        self.changed.emit()
+
+    def _add(self, added: _Added) -> None:
+        if added.recording is not self._document.recording:
+            return
+        self._reader.cancel()
+        self._take_file((added.path, added.signals))
+        first_s, last_s = map(float, added.signals.times_s[[0, -1]])
+        clock = self._session.playback.timebase
+        if last_s >= clock.start_s and first_s < clock.end_s:
+            self._session.edits.add_inertial_file(added.path, first_s)
+            return
+        self._session.edits.add_inertial_file(added.path, clock.start_s)
+        self.noted.emit(
+            f"{added.path.name} has a clock of its own: its first sample is put at the start of the"
+            " recording. Drag the title of its track to align it."
+        )
+
+    def _say_written(self, path: Path) -> None:
+        self.noted.emit(f"The samples are in {path}.")
+
+    def _fail(self, error: Exception) -> None:
+        self.failed.emit(str(error))
+
+
+def _feel(
+    mesh: MeshSequence, wish: _Wish, known: InertialSignals | None, emit: Emit
+) -> InertialSignals:
+    """Compute in the background: where sensors sit first, then what the current one feels."""
+    vertices = {}
+    for place in wish.places:
+        try:
+            vertices[place] = mounted(mesh, place).vertex
+        except Sd2Error:
+            continue  # said once it is the current one
+    emit(_Seats(vertices))
+    if known is not None:
+        return known
+    assert wish.current is not None
+    return virtual_imu(mesh, wish.current, progress=lambda done, total: emit((done, total)))

@@ -1,0 +1,318 @@
+"""Track of an inertial sensor below the maps: acceleration over turn rate on the same clock."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPen, QPolygonF, QResizeEvent, QWheelEvent
+
+from sd2app.imu.curves import curve_lines, extent, scale_marks
+from sd2app.imu.model import ImuModel, place_words
+from sd2app.imu.text import AXES, reading_lines, status_parts
+from sd2app.maps.arrangement import BELOW_PX, HEADER_PX
+from sd2app.session.session import Session
+from sd2app.widgets.canvas import AT_LEFT, AT_RIGHT, Overlay, TimePlot, clipped
+from sd2app.widgets.time_axis import (
+    HANDLE_PX,
+    MARGIN_PX,
+    paint_cursor,
+    paint_handle,
+    paint_readout,
+    paint_title,
+    signed_text,
+    turn_wheel,
+)
+from sd2core.imu.signals import InertialSignals
+
+_LANE_PX = 40
+_GAP_PX = 5
+_LEGEND_PX = (16, 5, 12)
+"""Length of a line in the legend, room to its name, room to the next."""
+
+
+class Lane(NamedTuple):
+    """Quantity with a plot of its own."""
+
+    name: str  # of the array in the signals
+    unit: str
+
+
+LANES = (Lane("acceleration_mps2", "m/s²"), Lane("turn_rate_radps", "rad/s"))
+
+
+class InertialTrack(TimePlot):
+    """Shows the current sensor, and the real one dashed.
+
+    Click or drag seeks, the wheel zooms, Shift and the wheel pan; a drag of the title moves the
+    real sensor in time.
+    """
+
+    TOP_PX, BOTTOM_PX = HEADER_PX, BELOW_PX
+
+    def __init__(self, session: Session, model: ImuModel, overlays: Sequence[Overlay]) -> None:
+        super().__init__(session.span)
+        self._session, self._model, self._overlays = session, model, tuple(overlays)
+        self._span, self._playback, self._pointer = session.span, session.playback, session.pointer
+        self._display = session.display
+        self._followed: list[InertialSignals] = []
+        self._extents: dict[str, tuple[float, float]] = {}  # of the lanes, by what they show
+        self._grab: tuple[str, float] | None = None  # what is dragged, and from which pixel
+        self.setMouseTracking(True)
+        self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
+        for signal in (self._span.changed, self._display.theme_changed):
+            signal.connect(self.redraw)
+        for overlay in self._overlays:
+            for signal in overlay.changed:
+                signal.connect(self.redraw)
+        self.follow(self._playback.frame_changed, self._pointer.changed)
+        model.changed.connect(self._follow)
+        self._follow()
+
+    def _follow(self) -> None:
+        model, signals = self._model, [one for one, *_ in self._curves()]
+        if signals != self._followed or not self._extents:
+            self._followed = signals
+            self._extents = {lane.name: extent(signals, lane.name) for lane in LANES}
+        self.setVisible(model.visible)
+        height_px = HEADER_PX if model.folded else self._open_px
+        self.setFixedHeight(height_px)
+        self.setAccessibleName(f"{self.title}: {' · '.join(status_parts(model))}")
+        self.redraw()
+
+    @property
+    def _open_px(self) -> int:
+        return HEADER_PX + len(LANES) * _LANE_PX + (len(LANES) - 1) * _GAP_PX + BELOW_PX
+
+    @property
+    def title(self) -> str:
+        """Title of the track."""
+        place = self._model.current
+        return "Inertial sensor" + ("" if place is None else f" at {place_words(place)}")
+
+    def lane_rect(self, number: int) -> QRectF:
+        """Rectangle of a lane's plot, in pixels."""
+        plot = self.plot_rect()
+        height = (plot.height() - (len(LANES) - 1) * _GAP_PX) / len(LANES)
+        top = plot.top() + number * (height + _GAP_PX)
+        return QRectF(plot.left(), top, plot.width(), height)
+
+    @property
+    def axis_colours(self) -> tuple[QColor, ...]:
+        """Colours of the axes x, y and z."""
+        palette = self._display.palette
+        return tuple(QColor(one) for one in (palette.axis_x, palette.axis_y, palette.axis_z))
+
+    def _curves(self) -> Iterator[tuple[InertialSignals, float, bool]]:
+        """Signals with what their times are shifted by, and if they were measured."""
+        model = self._model
+        if model.signals is not None:
+            yield model.signals, 0.0, False
+        if model.measured is not None:
+            yield model.measured, model.shift_s, True
+
+    # --- painting -------------------------------------------------------------------------
+
+    def paint(self, painter: QPainter) -> None:
+        """Header, lanes and labels; over what is kept of them, the cursors."""
+        self.paint_kept(painter, self._paint_track)
+        if self._model.folded:
+            return
+        plot, scale = self.plot_rect(), self.scale
+        with clipped(painter, plot):
+            if self._pointer.time_s is not None:
+                painter.setPen(QPen(QColor(self._display.palette.muted), 1, Qt.PenStyle.DotLine))
+                x = scale.x_of(self._pointer.time_s)
+                painter.drawLine(QPointF(x, plot.top()), QPointF(x, plot.bottom()))
+            paint_cursor(painter, plot, scale.x_of(self._playback.time_s))
+        if self.underMouse() and self._pointer.time_s is not None:
+            time_s = self._pointer.time_s
+            if lines := reading_lines(self._model, time_s):
+                place = QPointF(scale.x_of(time_s), plot.top())
+                paint_readout(painter, plot, place, lines, self._display.palette)
+
+    def _paint_track(self, painter: QPainter) -> None:
+        colours = self._display.palette
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.fillRect(self.rect(), QColor(colours.panel))
+        self._paint_header(painter)
+        if self._model.folded:
+            return
+        shown = list(self._curves())
+        for number, lane in enumerate(LANES):
+            self._paint_lane(painter, self.lane_rect(number), lane, shown)
+        for overlay in self._overlays:
+            overlay.paint(painter, self.plot_rect(), self.scale)
+
+    def _paint_header(self, painter: QPainter) -> None:
+        colours = self._display.palette
+        paint_handle(painter, HEADER_PX, "right" if self._model.folded else "down", colours.muted)
+        box = QRectF(HANDLE_PX, 0, self.width() - HANDLE_PX - MARGIN_PX, HEADER_PX)
+        left = HANDLE_PX + paint_title(painter, box, self.title, colours.text) + 12
+        room = self.width() - 2 * MARGIN_PX - left - self._paint_legend(painter, box, left)
+        painter.setPen(QColor(colours.muted))
+        metrics, parts = painter.fontMetrics(), status_parts(self._model)
+        words = [" · ".join(parts[:count]) for count in range(len(parts), 1, -1)]
+        status = next(
+            (one for one in words if metrics.horizontalAdvance(one) <= room),
+            metrics.elidedText("".join(parts[:1]), Qt.TextElideMode.ElideRight, int(max(room, 40))),
+        )
+        painter.drawText(QRectF(left, 0, self.width(), HEADER_PX), AT_LEFT, status)
+
+    def _paint_legend(self, painter: QPainter, box: QRectF, left: float) -> float:
+        """Paint the axes' lines at the right end of the header; returns its width and a gap."""
+        if self._model.folded:
+            return 0.0
+        line_px, to_name_px, apart_px = _LEGEND_PX
+        metrics, solid = painter.fontMetrics(), Qt.PenStyle.SolidLine
+        entries = [
+            (name, colour, solid) for name, colour in zip(AXES, self.axis_colours, strict=True)
+        ]
+        if self._model.measured is not None and self._model.signals is not None:
+            muted = QColor(self._display.palette.muted)
+            entries.append(("measured", muted, Qt.PenStyle.DashLine))
+        widths = [line_px + to_name_px + metrics.horizontalAdvance(name) for name, *_ in entries]
+        width = float(sum(widths) + apart_px * (len(widths) - 1))
+        if self.width() - 2 * MARGIN_PX - left - width < 60:
+            return 0.0
+        x, middle = box.right() - width, box.center().y()
+        for (name, colour, style), entry_px in zip(entries, widths, strict=True):
+            painter.setPen(_pen(colour, style))
+            painter.drawLine(QPointF(x, middle), QPointF(x + line_px, middle))
+            painter.setPen(QColor(self._display.palette.muted))
+            painter.drawText(
+                QRectF(x + line_px + to_name_px, 0, entry_px, HEADER_PX), AT_LEFT, name
+            )
+            x += entry_px + apart_px
+        return width + apart_px
+
+    def _paint_lane(
+        self,
+        painter: QPainter,
+        plot: QRectF,
+        lane: Lane,
+        shown: list[tuple[InertialSignals, float, bool]],
+    ) -> None:
+        colours = self._display.palette
+        painter.fillRect(plot, QColor(colours.well))
+        low, high = self._extents[lane.name]
+        marks = scale_marks(low, high) if shown else ()
+
+        def y_of(value: float) -> float:
+            return plot.bottom() - plot.height() * (value - low) / (high - low)
+
+        painter.setPen(QPen(QColor(colours.border), 1))
+        painter.drawLine(QPointF(plot.left(), y_of(0.0)), QPointF(plot.right(), y_of(0.0)))
+        with clipped(painter, plot):
+            for signals, shift_s, measured in reversed(shown):
+                style = Qt.PenStyle.DashLine if measured else Qt.PenStyle.SolidLine
+                curves = curve_lines(
+                    signals.times_s,
+                    getattr(signals, lane.name),
+                    self._span.start_s - shift_s,
+                    self._span.end_s - shift_s,
+                    plot.width(),
+                )
+                for colour, lines in zip(self.axis_colours, curves, strict=True):
+                    painter.setPen(_pen(colour, style))
+                    for x_px, heights in lines:
+                        y_px = plot.bottom() - plot.height() * (heights - low) / (high - low)
+                        points = zip((plot.left() + x_px).tolist(), y_px.tolist(), strict=True)
+                        painter.drawPolyline(QPolygonF([QPointF(x, y) for x, y in points]))
+        self._paint_scale(painter, plot, lane.unit, [(one, y_of(one)) for one in marks])
+
+    def _paint_scale(
+        self, painter: QPainter, plot: QRectF, unit: str, marks: list[tuple[float, float]]
+    ) -> None:
+        """Write some values with their heights in pixels left of a lane, and the unit between."""
+        painter.setPen(QPen(QColor(self._display.palette.muted), 1))
+        line_px = float(painter.fontMetrics().height())
+        half_px = line_px / 2 - 3  # letters are lower than their line
+        for _, y in marks:
+            painter.drawLine(QPointF(plot.left() - 4, y), QPointF(plot.left(), y))
+        middles = [min(max(y, plot.top() + half_px), plot.bottom() - half_px) for _, y in marks]
+        texts = [signed_text(value) for value, _ in marks] + [unit]
+        middles.append(sum(middles) / len(middles) if len(marks) > 1 else plot.center().y())
+        for text, middle in zip(texts, middles, strict=True):
+            box = QRectF(0, middle - line_px / 2, plot.left() - 8, line_px)
+            painter.drawText(box, AT_RIGHT, text)
+
+    # --- mouse ----------------------------------------------------------------------------
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """Start to drag the cursor, the time axis or the alignment; or fold."""
+        place = event.position()
+        if event.button() == Qt.MouseButton.MiddleButton:
+            self._grab = ("pan", place.x())
+        elif event.button() == Qt.MouseButton.LeftButton:
+            if place.y() >= HEADER_PX:
+                self._grab = ("seek", place.x())
+                self._playback.seek(self.scale.time_of(place.x()))
+            elif place.x() < HANDLE_PX:
+                self._model.set_folded(not self._model.folded)
+            elif self._model.measured is not None:
+                self._grab = ("offset", place.x())
+                self._session.edits.begin_offset_drag("imu_offset_s")
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        """Drag what is held, and read what is under the pointer."""
+        place = event.position()
+        self._read(place)
+        if self._grab is None:
+            self.setCursor(self._cursor_at(place))
+            return
+        what, start_x = self._grab
+        if what == "seek":
+            self._playback.seek(self.scale.time_of(place.x()))
+        elif what == "pan":
+            self._span.pan((start_x - place.x()) * self.scale.seconds_per_px)
+            self._grab = ("pan", place.x())
+        else:
+            self._session.edits.drag_offset((place.x() - start_x) * self.scale.seconds_per_px)
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        """End the drag."""
+        if self._grab is not None and self._grab[0] == "offset":
+            self._session.edits.end_offset_drag()
+        self._grab = None
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        """Show the whole recording; a double click on the title folds or unfolds."""
+        if event.position().y() >= HEADER_PX:
+            self._span.fit()
+        else:
+            self.mousePressEvent(event)
+
+    def leaveEvent(self, event: object) -> None:
+        """Clear the reading under the pointer."""
+        self._pointer.leave()
+        self.update()
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        """Zoom about the pointer, or pan with Shift or a sideways wheel."""
+        turn_wheel(event, self._span, self.scale)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Draw again for the new width."""
+        self.redraw()
+
+    def _read(self, place: QPointF) -> None:
+        if self._model.folded or not self.plot_rect().contains(place):
+            self._pointer.leave()
+        else:
+            self._pointer.point_at(self.scale.time_of(place.x()))
+
+    def _cursor_at(self, place: QPointF) -> Qt.CursorShape:
+        if place.y() >= HEADER_PX:
+            return Qt.CursorShape.CrossCursor
+        if place.x() < HANDLE_PX:
+            return Qt.CursorShape.PointingHandCursor
+        if self._model.measured is not None:
+            return Qt.CursorShape.SizeHorCursor
+        return Qt.CursorShape.ArrowCursor
+
+
+def _pen(colour: QColor, style: Qt.PenStyle) -> QPen:
+    """Pen of a line: thinner where it is dashed."""
+    return QPen(colour, 1.5 if style == Qt.PenStyle.SolidLine else 1.0, style)

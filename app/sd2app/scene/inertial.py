@@ -1,0 +1,115 @@
+"""Inertial sensors on the body in the scene: put there by a click, named, taken away; no VTK."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtWidgets import QMenu
+
+from sd2app.imu.model import ImuModel, place_words
+from sd2app.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from sd2app.session.session import Session
+
+PLACING_HINT = "A click on the body places an inertial sensor  ·  Esc cancels"
+_REACH_PX = 9.0
+_THIN_M = 0.05
+"""Depth behind the surface at which a marker counts as hidden."""
+_NEAREST_M = 0.01
+"""Depth from which something is in front of the eye."""
+
+
+class InertialHand:
+    """What the pointer does to the inertial sensors; places are pixels of the view."""
+
+    def __init__(self, scene: Scene, session: Session, model: ImuModel) -> None:
+        self._scene, self._session, self._model = scene, session, model
+
+    @property
+    def placing(self) -> bool:
+        """True while a click on the body places a sensor."""
+        return self._session.placing.active
+
+    def vertex_at(self, x_px: float, y_px: float) -> int | None:
+        """Vertex of the surface under the pointer; None beside it."""
+        mesh, scene = self._session.document.mesh, self._scene
+        if mesh is None or mesh.faces is None or not scene.mesh_shown:
+            return None
+        return vertex_under(scene.pose.project(scene.body.points), mesh.faces, x_px, y_px)
+
+    def sensor_at(self, x_px: float, y_px: float) -> str | None:
+        """Place of the sensor whose marker is under the pointer, the nearest to it."""
+        points, places = self._scene.inertial.points_m, list(self._model.vertices)
+        if not self._scene.mesh_shown or not len(points) or len(points) != len(places):
+            return None
+        x, y, depth = self._scene.pose.project(points).T
+        away = np.where(depth > _NEAREST_M, np.hypot(x - x_px, y - y_px), np.inf)
+        nearest = int(away.argmin())
+        if away[nearest] > _REACH_PX:
+            return None
+        front = self.vertex_at(x_px, y_px)
+        if front is not None:  # it may be on the far side
+            front_m = self._scene.pose.project(self._scene.body.points[front])[0, 2]
+            if depth[nearest] > front_m + _THIN_M:
+                return None
+        return places[nearest]
+
+    def words_at(self, x_px: float, y_px: float) -> str:
+        """Sensor under the pointer, or the one that a click would place, in words."""
+        place = None
+        if self.placing:
+            vertex = self.vertex_at(x_px, y_px)
+            place = None if vertex is None else self._model.place_at(vertex)
+        else:
+            place = self.sensor_at(x_px, y_px)
+        return "" if place is None else f"inertial sensor at {place_words(place)}"
+
+    def click(self, x_px: float, y_px: float) -> None:
+        """Place a sensor if one is to be placed, and the body is there."""
+        vertex = self.vertex_at(x_px, y_px) if self.placing else None
+        if vertex is not None:
+            self._model.place(vertex)
+
+    def offer(self, menu: QMenu, x_px: float, y_px: float) -> bool:
+        """Offer in a context menu what can be done at a place; False where nothing can."""
+        model, sensor = self._model, self.sensor_at(x_px, y_px)
+        if sensor is not None:
+            if sensor != model.current:
+                menu.addAction(f"S&how sensor at {place_words(sensor)}", lambda: model.show(sensor))
+            menu.addAction(
+                f"&Remove inertial sensor at {place_words(sensor)}", lambda: model.remove(sensor)
+            )
+            return True
+        vertex = self.vertex_at(x_px, y_px)
+        if vertex is None:
+            return False
+        words = place_words(model.place_at(vertex))
+        menu.addAction(f"Place &inertial sensor at {words}", lambda: model.place(vertex))
+        return True
+
+
+def vertex_under(
+    pixels: NDArray[np.floating], faces: NDArray[np.int32], x_px: float, y_px: float
+) -> int | None:
+    """Corner of the foremost triangle at a pixel, the nearest to it; None where there is none.
+
+    ``pixels``, shape (V, 3), are those of the vertices, and how far they are in front of the eye.
+    """
+    corners = (pixels[:, :2] - (x_px, y_px))[faces]  # (F, 3, 2)
+    following = np.roll(corners, -1, axis=1)
+    # Twice the areas of the triangles of two corners and the pixel: of one sign inside.
+    areas = corners[..., 0] * following[..., 1] - corners[..., 1] * following[..., 0]  # (F, 3)
+    inside = (areas >= 0).all(axis=1) | (areas <= 0).all(axis=1)
+    depths = pixels[:, 2][faces]
+    rows = np.flatnonzero(inside & (depths > _NEAREST_M).all(axis=1) & areas.any(axis=1))
+    if not rows.size:
+        return None
+    # Each area belongs to the corner across; the inverse of the depth is linear in the picture.
+    weights = np.roll(areas[rows], 2, axis=1)
+    weights = weights / weights.sum(axis=1, keepdims=True)
+    foremost = rows[(weights / depths[rows]).sum(axis=1).argmax()]
+    nearest = np.hypot(*corners[foremost].T).argmin()
+    return int(faces[foremost, nearest])
