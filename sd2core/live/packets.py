@@ -1,0 +1,203 @@
+"""Frames of samples from the UDP packets of a DCA1000 capture card, whatever arrives.
+
+A packet is a sequence number from 1 on (uint32), the number of bytes that were sent before (48
+bits), both little-endian, and up to 1,456 bytes of samples: Texas Instruments, *DCA1000EVM Data
+Capture Card User's Guide* (SPRUIJ4), section on the format of raw data packets. Samples are put
+where the byte count says, so that order does not matter; the sequence number tells duplicates and
+a restart of the card.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from typing import NamedTuple
+
+HEADER_BYTES = 10
+PAYLOAD_BYTES = 1456
+"""Largest number of bytes of samples in a packet."""
+WINDOW_PACKETS = 64
+"""A packet that is this much later than others is given up, and its frame handed out without it."""
+
+_HEADER = struct.Struct("<IIH")
+_FAR_PACKETS = 4096
+"""A sequence number this much smaller than the newest is that of a card that began again."""
+_SEQUENCES = 2**32
+_COUNTS = 2**48
+
+
+class RawFrame(NamedTuple):
+    """Bytes of one frame."""
+
+    index: int  # since the card began
+    data: bytearray  # zero where nothing was received
+    missing_bytes: int
+    lost: int  # frames before this one of which nothing was handed out
+    received_s: float  # of the packet that was received last
+    stream: int  # counts how often the card began again
+
+
+@dataclass
+class PacketCounts:
+    """Number of packets by what became of them."""
+
+    received: int = 0
+    invalid: int = 0  # no packet of this kind
+    duplicate: int = 0
+    late: int = 0  # their frame was handed out before
+    lost: int = 0  # never received, or not yet
+    restarts: int = 0
+
+
+class _Open:
+    """Frame that is not complete yet."""
+
+    def __init__(self, frame_bytes: int) -> None:
+        self.data = bytearray(frame_bytes)
+        self.missing = frame_bytes
+        self.received_s = 0.0
+
+
+class FrameAssembler:
+    """Assemble frames of a fixed size from packets in any order.
+
+    Frames come in order. One that lacks packets comes with zeros in their place, once
+    ``window_packets`` later ones are there; of one that lacks all nothing comes. Listening may
+    begin at any packet: the first frame is then the first whole one.
+
+    Examples
+    --------
+    >>> from sd2core.live.packets import FrameAssembler, packet
+    >>> frames = FrameAssembler(frame_bytes=4)
+    >>> frames.take(packet(2, 2, b"cd"), 0.1)
+    []
+    >>> [(one.index, bytes(one.data)) for one in frames.take(packet(1, 0, b"ab"), 0.2)]
+    [(0, b'abcd')]
+    """
+
+    def __init__(self, frame_bytes: int, window_packets: int = WINDOW_PACKETS) -> None:
+        self.counts = PacketCounts()
+        self._frame_bytes = frame_bytes
+        self._window = window_packets
+        self._open: dict[int, _Open] = {}
+        self._lost_frames = 0
+        self._next: int | None = None  # frame to hand out; None before the first packet
+        self._seen: set[int] = set()
+        # Of the packet sent last, by its sequence number: the number, its byte count, its end.
+        self._newest = self._count = self._end = 0
+
+    def take(self, datagram: bytes | memoryview, received_s: float) -> list[RawFrame]:
+        """Take a packet; returns the frames that are ready by it."""
+        size = len(datagram) - HEADER_BYTES
+        if not 0 < size <= PAYLOAD_BYTES:
+            self.counts.invalid += 1
+            return []
+        number, low, high = _HEADER.unpack_from(datagram)
+        count = low | high << 32
+        ready: list[RawFrame] = []
+        if self._next is None:
+            self._begin(number, count)
+        step = _signed(number - self._newest, _SEQUENCES)
+        place = self._count + _signed(count - self._count, _COUNTS)
+        if self._is_restart(step, place, first=number == 1 and count == 0):
+            ready += self.finish()
+            self.counts.restarts += 1
+            self._open.clear()
+            self._begin(number, count)
+            step, place = 1, count
+        number = self._newest + step
+        if number in self._seen:
+            self.counts.duplicate += 1
+            return ready
+        self._seen.add(number)
+        self.counts.received += 1
+        if step > 0:
+            self.counts.lost += step - 1
+            self._newest, self._count, self._end = number, place, place + size
+            if len(self._seen) > 2 * _FAR_PACKETS:
+                self._seen = {one for one in self._seen if one > number - _FAR_PACKETS}
+        else:
+            self.counts.lost = max(self.counts.lost - 1, 0)
+        self._place(memoryview(datagram)[HEADER_BYTES:], place, received_s)
+        window = self._window * PAYLOAD_BYTES
+        return ready + self._ready((self._end - window) // self._frame_bytes)
+
+    def finish(self) -> list[RawFrame]:
+        """Hand out what waits for packets that do not come; a frame without its end stays."""
+        complete = [index for index, one in self._open.items() if one.missing <= 0]
+        return self._ready(max(complete, default=-1) + 1)
+
+    @property
+    def unfinished_bytes(self) -> int:
+        """Number of received bytes that are in no frame yet."""
+        return sum(self._frame_bytes - one.missing for one in self._open.values())
+
+    def _begin(self, number: int, count: int) -> None:
+        self._newest, self._count, self._end = number - 1, count, count
+        self._seen.clear()
+        # Near the beginning the first packets may still be on their way.
+        early = count <= self._window * PAYLOAD_BYTES
+        self._next = 0 if early else -(-count // self._frame_bytes)
+
+    def _is_restart(self, step: int, place: int, *, first: bool) -> bool:
+        """True if a packet cannot be of the same stream as the newest one."""
+        if step > 0:
+            return place < self._end or (step == 1 and place != self._end)
+        return step <= -_FAR_PACKETS or place > self._count or (first and step < -self._window)
+
+    def _place(self, samples: memoryview, place: int, received_s: float) -> None:
+        """Copy samples into the frames that they belong to."""
+        assert self._next is not None
+        late = False
+        while len(samples):
+            index, at = divmod(place, self._frame_bytes)
+            piece = samples[: self._frame_bytes - at]
+            samples, place = samples[len(piece) :], place + len(piece)
+            if index < self._next:
+                late = True
+                continue
+            frame = self._open.get(index)
+            if frame is None:
+                frame = self._open[index] = _Open(self._frame_bytes)
+            frame.data[at : at + len(piece)] = piece
+            frame.missing -= len(piece)
+            frame.received_s = received_s
+        self.counts.late += late
+
+    def _ready(self, before: int) -> list[RawFrame]:
+        """Frames in order: complete ones, and those of numbers below ``before`` as they are."""
+        ready = []
+        while self._next is not None:
+            frame = self._open.get(self._next)
+            if frame is None and self._next < before:
+                following = min(before, min(self._open, default=before))
+                self._lost_frames += following - self._next
+                self._next = following
+            elif frame is not None and (frame.missing <= 0 or self._next < before):
+                ready.append(
+                    RawFrame(
+                        self._next,
+                        frame.data,
+                        max(frame.missing, 0),
+                        self._lost_frames,
+                        frame.received_s,
+                        self.counts.restarts,
+                    )
+                )
+                del self._open[self._next]
+                self._lost_frames = 0
+                self._next += 1
+            else:
+                break
+        return ready
+
+
+def packet(number: int, count: int, samples: bytes) -> bytes:
+    """Packet of a sequence number, a byte count and samples, as the card sends it."""
+    count %= _COUNTS
+    return _HEADER.pack(number % _SEQUENCES, count & 0xFFFFFFFF, count >> 32) + samples
+
+
+def _signed(difference: int, modulus: int) -> int:
+    """Difference of two counters that wrap around, the one of the smallest size."""
+    return (difference + modulus // 2) % modulus - modulus // 2
