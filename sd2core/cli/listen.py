@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import math
 import shutil
 import sys
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from sd2core.cli.options import add_command, add_json, positive_float
 from sd2core.cli.output import counted, print_event, print_facts
@@ -140,7 +139,7 @@ def _follow(listening: Listening, status: _Status, seconds: float | None) -> Non
     """Show columns until the source ends, the time is over, or q is pressed."""
     from sd2core.cli.keys import pressed_keys
 
-    end_s = time.monotonic() + seconds if seconds is not None else np.inf
+    end_s = time.monotonic() + seconds if seconds is not None else math.inf
     with pressed_keys() as key:
         while not listening.is_over and time.monotonic() < end_s and key() not in ("q", "Q"):
             status.show(listening.next_column(_WAIT_S))
@@ -191,8 +190,11 @@ class _Status:
 
     def end(self, folder: Path) -> None:
         """Say what there is."""
-        counts, latencies_s = self._listening.counts, self._listening.latencies_s
-        median_s, most_s = np.quantile(latencies_s, (0.5, 0.95)) if latencies_s.size else (0.0, 0.0)
+        counts, latencies_s = self._listening.counts, sorted(self._listening.latencies_s)
+        median_s = most_s = None
+        if latencies_s:
+            median_s = latencies_s[len(latencies_s) // 2]
+            most_s = latencies_s[math.ceil(0.95 * len(latencies_s)) - 1]
         if self._is_line:
             print()
         for doubt in self._source.doubts():
@@ -201,8 +203,8 @@ class _Status:
             print_event(
                 "end",
                 out=str(folder) if counts.recorded else None,
-                latency_median_s=float(median_s) if latencies_s.size else None,
-                latency_95_s=float(most_s) if latencies_s.size else None,
+                latency_median_s=median_s,
+                latency_95_s=most_s,
                 **vars(counts),
             )
             return
@@ -213,10 +215,9 @@ class _Status:
         facts = {
             "recorded": counted(counts.recorded, "frame"),
             "missing": ", ".join(missing) or "nothing",
-            "latency": f"{1e3 * median_s:.1f} ms, 95 % within {1e3 * most_s:.1f} ms"
-            if latencies_s.size
-            else "",
         }
+        if median_s is not None and most_s is not None:
+            facts["latency"] = f"{1e3 * median_s:.1f} ms, 95 % within {1e3 * most_s:.1f} ms"
         print_facts(str(folder), facts)
 
     def _missing(self) -> list[str]:
@@ -245,10 +246,10 @@ class _Status:
         self._loudest = max(self._loudest, float(column.values.max()))
         if not self._loudest > 0:
             return _BARS[0] * len(column.values)
-        with np.errstate(divide="ignore"):
-            below_db = -10.0 * np.log10(column.values / np.float32(self._loudest))
-        steps = np.clip(len(_BARS) - 1 - below_db // _BAR_DB, 0, len(_BARS) - 1)
-        return "".join(_BARS[int(step)] for step in steps)
+        top = len(_BARS) - 1
+        lowest = 10.0 ** (-0.1 * _BAR_DB * top)
+        shares = (max(float(value) / self._loudest, lowest) for value in column.values)
+        return "".join(_BARS[round(top + 10.0 * math.log10(one) / _BAR_DB)] for one in shares)
 
     def _print_json(self) -> None:
         column = self._column

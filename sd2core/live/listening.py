@@ -148,9 +148,9 @@ class Listening:
         return time.monotonic() - self._last_received_s
 
     @property
-    def latencies_s(self) -> NDArray[np.float64]:
-        """Times from a frame's last packet to its column, of the last 10,000 frames."""
-        return np.array(self._latencies_s)
+    def latencies_s(self) -> list[float]:
+        """Times from a frame's last packet to its column, of the last 10,000 columns."""
+        return list(self._latencies_s)
 
     def start(self) -> None:
         """Begin to listen."""

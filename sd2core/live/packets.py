@@ -29,7 +29,7 @@ _COUNTS = 2**48
 class RawFrame(NamedTuple):
     """Bytes of one frame."""
 
-    index: int  # since the card began
+    number: int  # counted from when the card began
     data: bytearray  # zero where nothing was received
     missing_bytes: int
     lost: int  # frames before this one of which nothing was handed out
@@ -71,7 +71,7 @@ class FrameAssembler:
     >>> frames = FrameAssembler(frame_bytes=4)
     >>> frames.take(packet(2, 2, b"cd"), 0.1)
     []
-    >>> [(one.index, bytes(one.data)) for one in frames.take(packet(1, 0, b"ab"), 0.2)]
+    >>> [(one.number, bytes(one.data)) for one in frames.take(packet(1, 0, b"ab"), 0.2)]
     [(0, b'abcd')]
     """
 
@@ -85,6 +85,8 @@ class FrameAssembler:
         self._seen: set[int] = set()
         # Of the packet sent last, by its sequence number: the number, its byte count, its end.
         self._newest = self._count = self._end = 0
+        self._first = 0  # smallest sequence number
+        self._largest = 0  # samples of a packet, in bytes
 
     def take(self, datagram: bytes | memoryview, received_s: float) -> list[RawFrame]:
         """Take a packet; returns the frames that are ready by it."""
@@ -92,39 +94,40 @@ class FrameAssembler:
         if not 0 < size <= PAYLOAD_BYTES:
             self.counts.invalid += 1
             return []
-        number, low, high = _HEADER.unpack_from(datagram)
+        sequence, low, high = _HEADER.unpack_from(datagram)
         count = low | high << 32
         ready: list[RawFrame] = []
         if self._next is None:
-            self._begin(number, count)
-        step = _signed(number - self._newest, _SEQUENCES)
+            self._begin(sequence, count, size)
+        step = _signed(sequence - self._newest, _SEQUENCES)
         place = self._count + _signed(count - self._count, _COUNTS)
-        if self._is_restart(step, place, first=number == 1 and count == 0):
+        if self._is_restart(step, place, first=sequence == 1 and count == 0):
             ready += self.finish()
             self.counts.restarts += 1
             self._open.clear()
-            self._begin(number, count)
+            self._begin(sequence, count, size)
             step, place = 1, count
-        number = self._newest + step
-        if number in self._seen:
+        sequence = self._newest + step
+        if sequence in self._seen:
             self.counts.duplicate += 1
             return ready
-        self._seen.add(number)
+        self._seen.add(sequence)
         self.counts.received += 1
+        # Of those between the first and the newest, this one is not lost.
+        self.counts.lost += max(step, self._first - sequence, 0) - 1
+        self._first = min(self._first, sequence)
         if step > 0:
-            self.counts.lost += step - 1
-            self._newest, self._count, self._end = number, place, place + size
+            self._newest, self._count, self._end = sequence, place, place + size
+            self._largest = max(self._largest, size)
             if len(self._seen) > 2 * _FAR_PACKETS:
-                self._seen = {one for one in self._seen if one > number - _FAR_PACKETS}
-        else:
-            self.counts.lost = max(self.counts.lost - 1, 0)
+                self._seen = {one for one in self._seen if one > sequence - _FAR_PACKETS}
         self._place(memoryview(datagram)[HEADER_BYTES:], place, received_s)
-        window = self._window * PAYLOAD_BYTES
+        window = self._window * self._largest
         return ready + self._ready((self._end - window) // self._frame_bytes)
 
     def finish(self) -> list[RawFrame]:
         """Hand out what waits for packets that do not come; a frame without its end stays."""
-        complete = [index for index, one in self._open.items() if one.missing <= 0]
+        complete = [number for number, one in self._open.items() if one.missing <= 0]
         return self._ready(max(complete, default=-1) + 1)
 
     @property
@@ -132,11 +135,15 @@ class FrameAssembler:
         """Number of received bytes that are in no frame yet."""
         return sum(self._frame_bytes - one.missing for one in self._open.values())
 
-    def _begin(self, number: int, count: int) -> None:
-        self._newest, self._count, self._end = number - 1, count, count
+    def _begin(self, sequence: int, count: int, size: int) -> None:
+        self._newest, self._count, self._end = sequence - 1, count, count
+        self._first = sequence
+        # The last packet of all is a short one; those before it were full.
+        before = count // max(sequence - 1, 1)
+        self._largest = max(size, min(before, PAYLOAD_BYTES))
         self._seen.clear()
         # Near the beginning the first packets may still be on their way.
-        early = count <= self._window * PAYLOAD_BYTES
+        early = count <= self._window * self._largest
         self._next = 0 if early else -(-count // self._frame_bytes)
 
     def _is_restart(self, step: int, place: int, *, first: bool) -> bool:
@@ -150,15 +157,15 @@ class FrameAssembler:
         assert self._next is not None
         late = False
         while len(samples):
-            index, at = divmod(place, self._frame_bytes)
+            number, at = divmod(place, self._frame_bytes)
             piece = samples[: self._frame_bytes - at]
             samples, place = samples[len(piece) :], place + len(piece)
-            if index < self._next:
+            if number < self._next:
                 late = True
                 continue
-            frame = self._open.get(index)
+            frame = self._open.get(number)
             if frame is None:
-                frame = self._open[index] = _Open(self._frame_bytes)
+                frame = self._open[number] = _Open(self._frame_bytes)
             frame.data[at : at + len(piece)] = piece
             frame.missing -= len(piece)
             frame.received_s = received_s
@@ -192,10 +199,10 @@ class FrameAssembler:
         return ready
 
 
-def packet(number: int, count: int, samples: bytes) -> bytes:
+def packet(sequence: int, count: int, samples: bytes) -> bytes:
     """Packet of a sequence number, a byte count and samples, as the card sends it."""
     count %= _COUNTS
-    return _HEADER.pack(number % _SEQUENCES, count & 0xFFFFFFFF, count >> 32) + samples
+    return _HEADER.pack(sequence % _SEQUENCES, count & 0xFFFFFFFF, count >> 32) + samples
 
 
 def _signed(difference: int, modulus: int) -> int:

@@ -259,7 +259,7 @@ class Dca1000Source:
         elif raw.stream != self._anchor.stream:
             self._anchor_s = max(raw.received_s - self._first_s, self._last_s + period_s)
             self._anchor = raw
-        self._last_s = self._anchor_s + (raw.index - self._anchor.index) * period_s
+        self._last_s = self._anchor_s + (raw.number - self._anchor.number) * period_s
         self._judge_rate(raw)
         return Frame(raw.data, self._last_s, raw.received_s, raw.missing_bytes, raw.lost)
 
@@ -268,14 +268,14 @@ class Dca1000Source:
         if self._is_judged:
             return
         if self._sent is None or self._sent[0] != raw.stream:
-            self._sent = (raw.stream, raw.received_s, raw.index)
+            self._sent = (raw.stream, raw.received_s, raw.number)
             return
         passed_s = raw.received_s - self._sent[1]
         if passed_s < _JUDGED_S:
             return
         self._is_judged = True
         period_s = self._setup.config.frame_repetition_s
-        share = (raw.index - self._sent[2]) * period_s / passed_s
+        share = (raw.number - self._sent[2]) * period_s / passed_s
         if abs(share - 1.0) > _RATE_TOLERANCE:
             size = self._decoder.frame_bytes
             self._rate_doubt = (

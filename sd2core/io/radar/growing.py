@@ -223,5 +223,6 @@ def _notes(head: GrowingHead, entries: NDArray[Any]) -> list[str]:
             f"{damaged:,} frames hold zeros for {missing:,} bytes of packets that were lost."
         )
     if sessions > 1:
-        notes.append(f"Listening was stopped and continued {sessions - 1} times.")
+        often = "once" if sessions == 2 else f"{sessions - 1} times"
+        notes.append(f"Listening was stopped and continued {often}.")
     return notes
