@@ -21,7 +21,7 @@ WINDOW_PACKETS = 64
 
 _HEADER = struct.Struct("<IIH")
 _FAR_PACKETS = 4096
-"""A sequence number this much smaller than the newest is that of a card that began again."""
+"""A sequence number this far from the newest is of another stream, until the next one follows it."""
 _SEQUENCES = 2**32
 _COUNTS = 2**48
 
@@ -42,11 +42,29 @@ class PacketCounts:
     """Number of packets by what became of them."""
 
     received: int = 0
-    invalid: int = 0  # no packet of this kind
+    invalid: int = 0  # no packet of this kind, or of no stream
     duplicate: int = 0
     late: int = 0  # their frame was handed out before
     lost: int = 0  # never received, or not yet
     restarts: int = 0
+
+
+class _Packet(NamedTuple):
+    sequence: int
+    count: int  # of the bytes sent before
+    samples: memoryview
+
+    @property
+    def is_first(self) -> bool:
+        """True for the first packet after a card began."""
+        return self.sequence == 1 and self.count == 0
+
+    def is_followed_by(self, other: _Packet) -> bool:
+        """True if the other one is the next of the same stream."""
+        return (
+            other.sequence == (self.sequence + 1) % _SEQUENCES
+            and other.count == (self.count + len(self.samples)) % _COUNTS
+        )
 
 
 class _Open:
@@ -83,6 +101,7 @@ class FrameAssembler:
         self._lost_frames = 0
         self._next: int | None = None  # frame to hand out; None before the first packet
         self._seen: set[int] = set()
+        self._alone: _Packet | None = None  # that fits nothing so far
         # Of the packet sent last, by its sequence number: the number, its byte count, its end.
         self._newest = self._count = self._end = 0
         self._first = 0  # smallest sequence number
@@ -90,40 +109,16 @@ class FrameAssembler:
 
     def take(self, datagram: bytes | memoryview, received_s: float) -> list[RawFrame]:
         """Take a packet; returns the frames that are ready by it."""
-        size = len(datagram) - HEADER_BYTES
-        if not 0 < size <= PAYLOAD_BYTES:
+        if not 0 < len(datagram) - HEADER_BYTES <= PAYLOAD_BYTES:
             self.counts.invalid += 1
             return []
         sequence, low, high = _HEADER.unpack_from(datagram)
-        count = low | high << 32
-        ready: list[RawFrame] = []
+        given = _Packet(sequence, low | high << 32, memoryview(datagram)[HEADER_BYTES:])
         if self._next is None:
-            self._begin(sequence, count, size)
-        step = _signed(sequence - self._newest, _SEQUENCES)
-        place = self._count + _signed(count - self._count, _COUNTS)
-        if self._is_restart(step, place, first=sequence == 1 and count == 0):
-            ready += self.finish()
-            self.counts.restarts += 1
-            self._open.clear()
-            self._begin(sequence, count, size)
-            step, place = 1, count
-        sequence = self._newest + step
-        if sequence in self._seen:
-            self.counts.duplicate += 1
-            return ready
-        self._seen.add(sequence)
-        self.counts.received += 1
-        # Of those between the first and the newest, this one is not lost.
-        self.counts.lost += max(step, self._first - sequence, 0) - 1
-        self._first = min(self._first, sequence)
-        if step > 0:
-            self._newest, self._count, self._end = sequence, place, place + size
-            self._largest = max(self._largest, size)
-            if len(self._seen) > 2 * _FAR_PACKETS:
-                self._seen = {one for one in self._seen if one > sequence - _FAR_PACKETS}
-        self._place(memoryview(datagram)[HEADER_BYTES:], place, received_s)
-        window = self._window * self._largest
-        return ready + self._ready((self._end - window) // self._frame_bytes)
+            self._begin(given)
+        elif not self._continues(given):
+            return self._take_elsewhere(given, received_s)
+        return self._accept(given, received_s)
 
     def finish(self) -> list[RawFrame]:
         """Hand out what waits for packets that do not come; a frame without its end stays."""
@@ -135,22 +130,78 @@ class FrameAssembler:
         """Number of received bytes that are in no frame yet."""
         return sum(self._frame_bytes - one.missing for one in self._open.values())
 
-    def _begin(self, sequence: int, count: int, size: int) -> None:
-        self._newest, self._count, self._end = sequence - 1, count, count
-        self._first = sequence
+    def _begin(self, first: _Packet) -> None:
+        """Begin a stream with a packet."""
+        self._newest, self._count, self._end = first.sequence - 1, first.count, first.count
+        self._first = first.sequence
         # The last packet of all is a short one; those before it were full.
-        before = count // max(sequence - 1, 1)
-        self._largest = max(size, min(before, PAYLOAD_BYTES))
+        before = first.count // max(first.sequence - 1, 1)
+        self._largest = max(len(first.samples), min(before, PAYLOAD_BYTES))
         self._seen.clear()
+        self._open.clear()
         # Near the beginning the first packets may still be on their way.
-        early = count <= self._window * self._largest
-        self._next = 0 if early else -(-count // self._frame_bytes)
+        early = first.count <= self._window * self._largest
+        self._next = 0 if early else -(-first.count // self._frame_bytes)
 
-    def _is_restart(self, step: int, place: int, *, first: bool) -> bool:
-        """True if a packet cannot be of the same stream as the newest one."""
+    def _from_newest(self, given: _Packet) -> tuple[int, int]:
+        """Packets from the newest one to this, and its byte count, beyond all wraps."""
+        step = _signed(given.sequence - self._newest, _SEQUENCES)
+        return step, self._count + _signed(given.count - self._count, _COUNTS)
+
+    def _continues(self, given: _Packet) -> bool:
+        """True if a packet fits the stream of the newest one, near it."""
+        step, place = self._from_newest(given)
         if step > 0:
-            return place < self._end or (step == 1 and place != self._end)
-        return step <= -_FAR_PACKETS or place > self._count or (first and step < -self._window)
+            follows = place == self._end if step == 1 else place >= self._end
+            return follows and step <= _FAR_PACKETS
+        return -_FAR_PACKETS < step and place <= self._count and not (
+            given.is_first and step < -self._window
+        )
+
+    def _take_elsewhere(self, given: _Packet, received_s: float) -> list[RawFrame]:
+        """Take a packet of a card that began again, or of a stream that went on unheard.
+
+        Unless it is the first packet of all, the one after it is waited for: a stray one is none.
+        """
+        before, self._alone = self._alone, None
+        together = [given]
+        if not given.is_first:
+            if before is None or not before.is_followed_by(given):
+                self.counts.invalid += before is not None
+                self._alone = given._replace(samples=memoryview(bytes(given.samples)))
+                return []
+            together = [before, given]
+        ready = []
+        step, place = self._from_newest(together[0])
+        if given.is_first or step <= 0 or place < self._end:
+            ready = self.finish()
+            self.counts.restarts += 1
+            self._begin(together[0])
+        for one in together:
+            ready += self._accept(one, received_s)
+        return ready
+
+    def _accept(self, given: _Packet, received_s: float) -> list[RawFrame]:
+        """Put the samples of a packet of this stream in their place."""
+        step, place = self._from_newest(given)
+        sequence = self._newest + step
+        if sequence in self._seen:
+            self.counts.duplicate += 1
+            return []
+        self._seen.add(sequence)
+        self.counts.received += 1
+        # Of those between the first and the newest, this one is not lost.
+        self.counts.lost += max(step, self._first - sequence, 0) - 1
+        self._first = min(self._first, sequence)
+        if step > 0:
+            size = len(given.samples)
+            self._newest, self._count, self._end = sequence, place, place + size
+            self._largest = max(self._largest, size)
+            if len(self._seen) > 2 * _FAR_PACKETS:
+                self._seen = {one for one in self._seen if one > sequence - _FAR_PACKETS}
+        self._place(given.samples, place, received_s)
+        window = self._window * self._largest
+        return self._ready((self._end - window) // self._frame_bytes)
 
     def _place(self, samples: memoryview, place: int, received_s: float) -> None:
         """Copy samples into the frames that they belong to."""

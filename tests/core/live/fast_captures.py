@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -39,15 +38,3 @@ def assert_same_samples(one: RadarCapture, other: RadarCapture) -> None:
     np.testing.assert_array_equal(
         one.read(0, one.frame_count), other.read(0, other.frame_count)
     )
-
-
-def part(capture: RadarCapture, start: int, stop: int) -> np.ndarray:
-    """Frames of a capture."""
-    return capture.read(start, stop)
-
-
-def recorded(folder: Path) -> RadarCapture:
-    """Capture of a recording."""
-    from sd2core.recording.recording import open_recording
-
-    return open_recording(folder).load_capture()
