@@ -21,7 +21,7 @@ WINDOW_PACKETS = 64
 
 _HEADER = struct.Struct("<IIH")
 _FAR_PACKETS = 4096
-"""A sequence number this far from the newest is of another stream, until the next one follows it."""
+"""A packet this far from the newest is believed once the one after it is there as well."""
 _SEQUENCES = 2**32
 _COUNTS = 2**48
 
@@ -51,19 +51,19 @@ class PacketCounts:
 
 class _Packet(NamedTuple):
     sequence: int
-    count: int  # of the bytes sent before
+    sent_before: int  # in bytes
     samples: memoryview
 
     @property
     def is_first(self) -> bool:
         """True for the first packet after a card began."""
-        return self.sequence == 1 and self.count == 0
+        return self.sequence == 1 and self.sent_before == 0
 
     def is_followed_by(self, other: _Packet) -> bool:
         """True if the other one is the next of the same stream."""
         return (
             other.sequence == (self.sequence + 1) % _SEQUENCES
-            and other.count == (self.count + len(self.samples)) % _COUNTS
+            and other.sent_before == (self.sent_before + len(self.samples)) % _COUNTS
         )
 
 
@@ -132,21 +132,25 @@ class FrameAssembler:
 
     def _begin(self, first: _Packet) -> None:
         """Begin a stream with a packet."""
-        self._newest, self._count, self._end = first.sequence - 1, first.count, first.count
+        self._newest, self._count, self._end = (
+            first.sequence - 1,
+            first.sent_before,
+            first.sent_before,
+        )
         self._first = first.sequence
         # The last packet of all is a short one; those before it were full.
-        before = first.count // max(first.sequence - 1, 1)
+        before = first.sent_before // max(first.sequence - 1, 1)
         self._largest = max(len(first.samples), min(before, PAYLOAD_BYTES))
         self._seen.clear()
         self._open.clear()
         # Near the beginning the first packets may still be on their way.
-        early = first.count <= self._window * self._largest
-        self._next = 0 if early else -(-first.count // self._frame_bytes)
+        early = first.sent_before <= self._window * self._largest
+        self._next = 0 if early else -(-first.sent_before // self._frame_bytes)
 
     def _from_newest(self, given: _Packet) -> tuple[int, int]:
         """Packets from the newest one to this, and its byte count, beyond all wraps."""
         step = _signed(given.sequence - self._newest, _SEQUENCES)
-        return step, self._count + _signed(given.count - self._count, _COUNTS)
+        return step, self._count + _signed(given.sent_before - self._count, _COUNTS)
 
     def _continues(self, given: _Packet) -> bool:
         """True if a packet fits the stream of the newest one, near it."""
@@ -154,8 +158,10 @@ class FrameAssembler:
         if step > 0:
             follows = place == self._end if step == 1 else place >= self._end
             return follows and step <= _FAR_PACKETS
-        return -_FAR_PACKETS < step and place <= self._count and not (
-            given.is_first and step < -self._window
+        return (
+            step > -_FAR_PACKETS
+            and place <= self._count
+            and not (given.is_first and step < -self._window)
         )
 
     def _take_elsewhere(self, given: _Packet, received_s: float) -> list[RawFrame]:

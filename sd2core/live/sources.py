@@ -167,6 +167,7 @@ class Dca1000Source:
         self._is_judged = False
         self._socket = _listening_socket(address, port)
         self.address, self.port = self._socket.getsockname()[:2]
+        self._waiting_bytes = self._socket.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF)
 
     @property
     def about(self) -> str:
@@ -286,12 +287,11 @@ class Dca1000Source:
             )
 
     def _small_buffer(self) -> str:
-        given = self._socket.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF)
-        if given >= _SOCKET_BYTES:
+        if self._waiting_bytes >= _SOCKET_BYTES:
             return ""
         return (
-            f" The system keeps only {given / 1e3:,.0f} kB of packets waiting; on Linux, `sysctl"
-            f" -w net.core.rmem_max={_SOCKET_BYTES}` allows more."
+            f" The system keeps only {self._waiting_bytes / 1e3:,.0f} kB of packets waiting; on"
+            f" Linux, `sysctl -w net.core.rmem_max={_SOCKET_BYTES}` allows more."
         )
 
 

@@ -35,6 +35,4 @@ def assert_same_samples(one: RadarCapture, other: RadarCapture) -> None:
     assert one.frame_count == other.frame_count
     assert one.config == other.config
     assert one.samples.dtype == other.samples.dtype
-    np.testing.assert_array_equal(
-        one.read(0, one.frame_count), other.read(0, other.frame_count)
-    )
+    np.testing.assert_array_equal(one.read(0, one.frame_count), other.read(0, other.frame_count))

@@ -154,7 +154,7 @@ def test_what_does_not_belong_is_refused(tmp_path: Path) -> None:
     recording = GrowingRecording(folder)
     with pytest.raises(Sd2Error, match="of another radar or configuration"):
         recording.check(other)
-    with pytest.raises(Sd2Error, match="word of .* is uint16"):
+    with pytest.raises(Sd2Error, match=r"word of .* is uint16"):
         recording.check(HEAD.model_copy(update={"word": "int16"}))
     with pytest.raises(Sd2Error, match="Another process listens into"):
         GrowingRecording(folder)
