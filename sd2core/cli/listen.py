@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import re
 import shutil
 import sys
 import time
@@ -174,12 +175,13 @@ class _Status:
             self._column = column
             if self._first_s is None:
                 self._first_s = column.time_s
-        silence = self._source.silence()
-        if silence and self._listening.silent_s > _SILENT_S:
-            self._warn(silence)
+        if self._listening.silent_s > _SILENT_S and (silence := self._source.silence()):
+            self._warn_once(silence)
         if time.monotonic() - self._shown_s < (_UPDATE_S if self._is_line else _LINE_S):
             return
         self._shown_s = time.monotonic()
+        for doubt in self._source.doubts(at_end=False):
+            self._warn_once(doubt)
         if self._as_json:
             self._print_json()
         elif self._is_line:
@@ -197,8 +199,8 @@ class _Status:
             most_s = latencies_s[math.ceil(0.95 * len(latencies_s)) - 1]
         if self._is_line:
             print()
-        for doubt in self._source.doubts():
-            self._warn(doubt)
+        for doubt in self._source.doubts(at_end=True):
+            _warn(doubt)
         if self._as_json:
             print_event(
                 "end",
@@ -263,8 +265,15 @@ class _Status:
             }
         print_event("frames", **vars(self._listening.counts), **told)
 
-    def _warn(self, sentence: str) -> None:
-        """Print a sentence to standard error, once."""
-        if sentence not in self._said:
-            self._said.add(sentence)
-            print(f"{chr(10) if self._is_line else ''}sd2: {sentence}", file=sys.stderr, flush=True)
+    def _warn_once(self, sentence: str) -> None:
+        """Print a sentence to standard error, unless it was, with other numbers."""
+        words = re.sub(r"[\d.,]+", "", sentence)
+        if words not in self._said:
+            self._said.add(words)
+            if self._is_line:
+                print()
+            _warn(sentence)
+
+
+def _warn(sentence: str) -> None:
+    print(f"sd2: {sentence}", file=sys.stderr, flush=True)

@@ -50,7 +50,7 @@ class Label(NamedTuple):
 class Column(NamedTuple):
     """Column of the live map."""
 
-    time_s: float
+    time_s: float  # since the first frame of the source
     values: NDArray[np.float32]  # (bins,)
     label: Label | None
 

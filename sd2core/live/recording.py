@@ -165,8 +165,9 @@ class GrowingRecording:
             self.frames = frame_count(self.radar, self._head)
             sizes = (self.frames * self._head.frame_bytes, self.frames * ENTRY.itemsize)
             for name, size in zip((SAMPLES_NAME, INDEX_NAME), sizes, strict=True):
-                with (self.radar / name).open("r+b") as stream:
-                    stream.truncate(size)
+                if (self.radar / name).stat().st_size > size:
+                    with (self.radar / name).open("r+b") as stream:
+                        stream.truncate(size)
             if self.frames:
                 last = read_entries(self.radar, self.frames)[-1]
                 self._last_s, self._session = float(last["time_s"]), int(last["session"]) + 1

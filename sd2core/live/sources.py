@@ -65,8 +65,8 @@ class Source(Protocol):
     def words(self, frame: Frame) -> NDArray[Any]:
         """Words of a frame to be stored, see :meth:`GrowingHead.as_stored`."""
 
-    def doubts(self) -> list[str]:
-        """What looks wrong by now, in sentences."""
+    def doubts(self, *, at_end: bool) -> list[str]:
+        """What looks wrong, in sentences; while listening, packets may still be on their way."""
 
     def silence(self) -> str:
         """What to check when nothing comes; empty where that is no fault."""
@@ -124,7 +124,7 @@ class ReplaySource:
         """Words of a frame, as the capture holds them."""
         return self._head.as_stored(frame.content)
 
-    def doubts(self) -> list[str]:
+    def doubts(self, *, at_end: bool) -> list[str]:
         """Nothing: the capture says what it is."""
         return []
 
@@ -217,18 +217,18 @@ class Dca1000Source:
         """Words of a frame, in the order of captures."""
         return self._stored_as.as_stored(self._decoder.samples(frame.content))
 
-    def doubts(self) -> list[str]:
+    def doubts(self, *, at_end: bool) -> list[str]:
         """What looks wrong with packets and rate."""
         counts, doubts = self.assembler.counts, []
         if counts.invalid:
             doubts.append(
-                f"{counts.invalid:,} packets are none of a DCA1000 (10 bytes and up to 1,456 of"
-                " samples)."
+                "Packets left out that are none of a DCA1000, or do not fit the others:"
+                f" {counts.invalid:,}."
             )
         if self.foreign_packets:
-            doubts.append(f"{self.foreign_packets:,} packets of another sender were left out.")
-        if counts.lost:
-            doubts.append(f"{counts.lost:,} packets were lost.{self._small_buffer()}")
+            doubts.append(f"Packets left out of another sender: {self.foreign_packets:,}.")
+        if at_end and counts.lost:
+            doubts.append(f"Packets lost: {counts.lost:,}.{self._small_buffer()}")
         if self._rate_doubt is not None:
             doubts.append(self._rate_doubt)
         return doubts
@@ -301,7 +301,7 @@ def _listening_socket(address: str, port: int) -> socket.socket:
     try:
         found.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _SOCKET_BYTES)
         found.bind((address, port))
-    except (OSError, OverflowError) as error:
+    except (OSError, OverflowError, TypeError, ValueError) as error:  # the last two for odd names
         found.close()
         place = f"{address}:{port}"
         number = error.errno if isinstance(error, OSError) else None

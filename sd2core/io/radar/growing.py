@@ -214,13 +214,13 @@ def _notes(head: GrowingHead, entries: NDArray[Any]) -> list[str]:
     damaged = int(np.count_nonzero(entries["missing_bytes"]))
     sessions = len(np.unique(entries["session"]))
     if dropped:
-        notes.append(f"{dropped:,} frames were dropped, as this computer was too slow.")
+        notes.append(f"Frames dropped, as this computer was too slow: {dropped:,}.")
     if lost:
-        notes.append(f"{lost:,} frames were sent and never received; their times are a gap.")
+        notes.append(f"Frames sent and never received, a gap in time: {lost:,}.")
     if damaged:
         missing = int(entries["missing_bytes"].sum(dtype=np.int64))
         notes.append(
-            f"{damaged:,} frames hold zeros for {missing:,} bytes of packets that were lost."
+            f"Frames with zeros in place of lost packets: {damaged:,}, {missing:,} bytes in all."
         )
     if sessions > 1:
         often = "once" if sessions == 2 else f"{sessions - 1} times"

@@ -93,7 +93,7 @@ def test_a_dca1000_is_listened_to(sd2: Sd2, tmp_path: Path) -> None:
                         break
                 time.sleep(0.01)
             time.sleep(0.1)
-            for one in packets:
+            for one in (*packets, b"none of a card"[:9]):
                 sender.sendto(one, ("127.0.0.1", port))
                 time.sleep(0.002)
 
@@ -114,6 +114,7 @@ def test_a_dca1000_is_listened_to(sd2: Sd2, tmp_path: Path) -> None:
     assert outcome.code == 0
     assert f"from a DCA1000 to 127.0.0.1:{port}" in outcome.out
     assert "recorded  10 frames" in outcome.out
+    assert "none of a DCA1000, or do not fit the others: 1." in outcome.err
     assert_same_samples(open_recording(tmp_path / "walk.sd2").load_capture(), load_capture(path))
 
 

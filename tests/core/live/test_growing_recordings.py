@@ -143,9 +143,9 @@ def test_losses_are_told_and_kept(tmp_path: Path) -> None:
     recording.close(dropped=5)
     _filled(recording.folder, 1)
     notes = " ".join(load_capture(recording.radar).notes)
-    assert "9 frames were dropped" in notes
-    assert "2 frames were sent and never received" in notes
-    assert "1 frames hold zeros for 24 bytes" in notes
+    assert "too slow: 9." in notes
+    assert "never received, a gap in time: 2." in notes
+    assert "zeros in place of lost packets: 1, 24 bytes in all" in notes
 
 
 def test_what_does_not_belong_is_refused(tmp_path: Path) -> None:

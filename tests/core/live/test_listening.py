@@ -161,7 +161,7 @@ def test_lost_packets_leave_zeros_and_gaps(tmp_path: Path) -> None:
             columns.append(column)
         listening.stop()
         assert source.assembler.counts.lost == len(gone)
-        assert any(f"{len(gone)} packets were lost" in one for one in source.doubts())
+        assert any(f"Packets lost: {len(gone)}." in one for one in source.doubts(at_end=True))
     capture = open_recording(recording.folder).load_capture()
     there = [k for k in range(20) if k not in (5, 6)]
     np.testing.assert_allclose(capture.timebase.times_s, ti.frame_s * np.array(there), atol=1e-9)
@@ -174,8 +174,8 @@ def test_lost_packets_leave_zeros_and_gaps(tmp_path: Path) -> None:
     # Frames 4 and 7 share packets with what is gone.
     assert (listening.counts.lost, listening.counts.damaged) == (2, 3)
     notes = " ".join(capture.notes)
-    assert "2 frames were sent and never received" in notes
-    assert "3 frames hold zeros" in notes
+    assert "never received, a gap in time: 2." in notes
+    assert "zeros in place of lost packets: 3, " in notes
 
 
 def test_a_slow_disk_drops_frames_and_says_so(
@@ -200,7 +200,7 @@ def test_a_slow_disk_drops_frames_and_says_so(
     assert counts.recorded + counts.dropped == 60
     assert not counts.whole
     found = open_recording(recording.folder).load_capture()
-    assert f"{counts.dropped} frames were dropped" in " ".join(found.notes)
+    assert f"too slow: {counts.dropped}." in " ".join(found.notes)
     # What is there is what was received at that time, and the map shows just that.
     places = np.searchsorted(capture.timebase.times_s, found.timebase.times_s - 1e-9)
     np.testing.assert_array_equal(found.read(0, found.frame_count), capture.read(0, 60)[places])
@@ -333,7 +333,7 @@ def test_another_sender_is_left_out(tmp_path: Path) -> None:
             listening.stop()
         assert listening.counts.whole
         assert listening.counts.recorded == TI.frames
-        assert "1 packets of another sender were left out." in source.doubts()
+        assert "Packets left out of another sender: 1." in source.doubts(at_end=True)
 
 
 def test_another_configuration_than_the_radars_is_noticed(
@@ -351,7 +351,7 @@ def test_another_configuration_than_the_radars_is_noticed(
             send(sent, source.port, lambda: _received(source))
             time.sleep(3 * TI.frame_s)
         listening.stop()
-        (doubt,) = (one for one in source.doubts() if "MB/s" in one)
+        (doubt,) = (one for one in source.doubts(at_end=True) if "MB/s" in one)
         assert "walk.cfg says" in doubt
         assert "probably runs with another configuration" in doubt
 
@@ -365,6 +365,8 @@ def test_what_cannot_be_listened_on_is_refused(tmp_path: Path) -> None:
             Dca1000Source(setup, "192.0.2.1")  # reserved for documentation
         with pytest.raises(Sd2Error, match="cannot be listened on"):
             Dca1000Source(setup, port=70000)
+        with pytest.raises(Sd2Error, match="cannot be listened on"):
+            Dca1000Source(setup, "ä" * 100)
         odd = setup.with_name("odd.cfg")
         odd.write_text(setup.read_text().replace(" 32 4000", " 33 4000").replace("15 3 0", "1 3 0"))
         with pytest.raises(Sd2Error, match="do not fill 2 lanes"):
