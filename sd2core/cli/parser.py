@@ -18,6 +18,7 @@ from sd2core.cli import (
     info,
     labels,
     ladder,
+    listen,
     pairs,
     placements,
     preparing,
@@ -45,6 +46,7 @@ examples:
   sd2 align walk.sd2 --save                   the radar's clock, from what both saw
   sd2 synth walk.npz --out map.npz --sensor 0,0,1
   sd2 radar capture/ --out real.npz
+  sd2 listen --dca1000 --setup profile.cfg --out walk.sd2    a radar, while it runs
   sd2 imu walk.zarr --at left-wrist --out wrist.csv    what an inertial sensor would feel
   sd2 denoise map.npz --out denoised.npz      what a radar would show
   sd2 labels suggest walk.sd2                 where something moves
@@ -75,6 +77,7 @@ def build_parser() -> tuple[argparse.ArgumentParser, argparse._SubParsersAction]
         fit,
         synth,
         radar,
+        listen,
         imu,
         denoise,
         classify,

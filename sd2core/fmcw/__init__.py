@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from sd2core.fmcw.chain import ProcessingOptions
 from sd2core.fmcw.link import LinkBudget
+from sd2core.fmcw.live import LiveMap
 from sd2core.fmcw.options import Mirror, Reflector, SignalOptions, WaveOptions
 from sd2core.fmcw.processing import RangeDoppler, doppler_map, limits, range_doppler
 from sd2core.fmcw.reference import Converged, converged_frame, doppler_marginal
@@ -14,6 +15,7 @@ from sd2core.fmcw.spectra import frame_spectra, signal_spectra, velocity_respons
 __all__ = [
     "Converged",
     "LinkBudget",
+    "LiveMap",
     "Mirror",
     "ProcessingOptions",
     "RangeDoppler",

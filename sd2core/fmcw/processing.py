@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
-from sd2core.fmcw.chain import Chain, ProcessingOptions, Window
+from sd2core.fmcw.chain import Chain, FrameChain, ProcessingOptions, Window
 from sd2core.io.radar.capture import RadarCapture
 from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import gaps_in_words, runs
@@ -106,13 +106,13 @@ def doppler_map(
     config = capture.config
     axis = _axis(config, axis, bins, v_max_mps)
     chain = Chain(capture, options)
-    weights = _weights(config, axis, chain)  # (bins, doppler)
+    weights = weights_of(axis, chain)  # (bins, doppler)
     values = np.empty((axis.bins, capture.frame_count), dtype=np.float32)
     inside = everything = 0.0
     progress(0, capture.frame_count)
     for start, stop in chain.blocks():
         power = chain.doppler_power(start, stop)  # (n, doppler)
-        values[:, start:stop] = weights @ power.T
+        values[:, start:stop] = binned(weights, power)
         inside += float(values[:, start:stop].sum(dtype=np.float64))
         everything += float(power.sum(dtype=np.float64)) / config.channels
         progress(stop, capture.frame_count)
@@ -166,7 +166,7 @@ def range_doppler(
         )
     axis = _axis(capture.config, axis, None, None)
     chain = Chain(capture, ProcessingOptions(clutter, clutter_window_s, range_m, window))
-    weights = _weights(capture.config, axis, chain)
+    weights = weights_of(axis, chain)
     power = chain.cell_power(frame)  # (doppler, gates)
     return RangeDoppler((weights @ power).T, chain.range_m, axis, capture.timebase.time_of(frame))
 
@@ -184,9 +184,20 @@ def limits(config: RadarConfig) -> dict[str, float]:
     return found
 
 
-def _weights(config: RadarConfig, axis: VelocityAxis, chain: Chain) -> NDArray[np.float32]:
+def weights_of(axis: VelocityAxis, chain: FrameChain) -> NDArray[np.float32]:
     """Weights of the rebinning of power that is summed over channels, (bins, doppler)."""
+    config = chain.config
     return (rebinning(config, axis, chain.doppler_bins) / config.channels).astype(np.float32)
+
+
+def binned(weights: NDArray[np.float32], power: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Columns of a map, (bins, n), of the power of frames, (n, doppler).
+
+    A column does not depend on how many are computed together, as it would by a matrix product of
+    BLAS.
+    """
+    columns: NDArray[np.float32] = np.einsum("bd,nd->bn", weights, power)
+    return columns
 
 
 def rebinning(config: RadarConfig, axis: VelocityAxis, doppler_bins: int) -> NDArray[np.float64]:

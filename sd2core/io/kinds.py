@@ -88,6 +88,8 @@ def _kind_of_folder(folder: Path) -> Kind:
         return "dataset"
     if (folder / "zarr.json").exists() or folder.suffix == ".zarr":
         return "mesh"
+    if (folder / "live.json").exists():
+        return "radar"
     if (folder / "radar.npy").exists() or any(folder.glob("*/radar.npy")):
         return "radar"
     suffixes = {entry.suffix.lower() for entry in folder.iterdir()}

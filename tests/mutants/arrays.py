@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import pickle
+import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -25,9 +27,12 @@ from sd2core.imu.signals import InertialSignals
 from sd2core.io.mesh import load_mesh, save_mesh
 from sd2core.io.radar import load_capture, load_recorded_map
 from sd2core.io.radar.described import RadarDescription, write_description
+from sd2core.io.radar.growing import GrowingHead
+from sd2core.live.recording import GrowingRecording
 from sd2core.maps import DopplerMap
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.pairs.store import read_pairs
+from sd2core.radar_config import PAPER_RADAR
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 from tests.core.classify.classifiers import classifier
@@ -109,6 +114,18 @@ def _write_sigmf(path: Path) -> None:
     write_description(_RADAR.model_copy(update=stream | times), path / "radar.sigmf-meta")
 
 
+def _write_live(path: Path) -> None:
+    radar = replace(PAPER_RADAR, samples_per_chirp=8, chirps_per_frame=4)
+    head = GrowingHead(radar=radar, word="int16", notes=("Times.",), start_unix_s=1.7e9)
+    recording = GrowingRecording(path.with_suffix(".sd2"))
+    for number in range(60):
+        words = np.full(head.frame_shape, number, head.word_type)
+        recording.append(words, head, time_s=number / 30, lost=number % 2)
+    recording.close()
+    recording.radar.rename(path)
+    shutil.rmtree(recording.folder)
+
+
 def _write_surface(path: Path) -> None:
     mesh = _mesh(1)
     trimesh.Trimesh(mesh.vertices[0], mesh.faces, process=False).export(path)
@@ -173,6 +190,7 @@ TARGETS = [
     Target("radar.h5", write_kkt, load_recorded_map),
     Target("a121.h5", write_a121, _read_capture),
     Target("dca1000", _write_dca1000, _read_capture),
+    Target("live", _write_live, _read_capture),
     Target("own", _write_own, _read_capture),
     Target("hdf5", _write_own_hdf5, lambda path: _read_capture(path / "radar.h5")),
     Target("sdk", lambda path: write_ti(path, TiRecording(lanes=4)), _read_capture),

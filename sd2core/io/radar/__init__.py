@@ -21,6 +21,7 @@ from sd2core.io.radar.described import (
     load_described,
     write_described,
 )
+from sd2core.io.radar.growing import is_growing, load_growing
 from sd2core.io.radar.infineon import (
     INFINEON_FILES,
     check_replaceable,
@@ -54,7 +55,8 @@ __all__ = [
 SUPPORTED = (
     "an Infineon recording: the folder with radar.npy, config.json and radar_timestamp.csv"
     " (or the folder above it, or its radar.npy); an A121's .h5; a DCA1000's .bin with the .cfg or"
-    " .json of the radar; or .npy, .h5 or SigMF samples with a description (docs/radar-files.md)"
+    " .json of the radar; what `sd2 listen` wrote; or .npy, .h5 or SigMF samples with a description"
+    " (docs/radar-files.md)"
 )
 
 
@@ -82,6 +84,8 @@ def load_capture(path: Path | str) -> RadarCapture:
     path = Path(path).expanduser()
     if not path.exists():
         raise Sd2Error(f"{path} does not exist", SUPPORTED, "Check the path")
+    if is_growing(path):
+        return load_growing(path)
     for one in (path, path / DATA_NAME):
         if is_described(one):
             return load_described(one)

@@ -54,12 +54,18 @@ def by_transmitter(samples: Samples, transmitters: int) -> LazySamples:
     """
     frames, receivers, chirps, length = samples.shape
     each = chirps // transmitters
+    shape = (frames, transmitters * receivers, each, length)
+    return LazySamples(
+        shape, samples.dtype, lambda some: sorted_by_transmitter(samples[some], transmitters)
+    )
 
-    def read(some: slice) -> NDArray[Any]:
-        turns = np.asarray(samples[some]).reshape(-1, receivers, each, transmitters, length)
-        return turns.transpose(0, 3, 1, 2, 4).reshape(-1, transmitters * receivers, each, length)
 
-    return LazySamples((frames, transmitters * receivers, each, length), samples.dtype, read)
+def sorted_by_transmitter(samples: NDArray[Any], transmitters: int) -> NDArray[Any]:
+    """Frames with the channels of each transmitter, as :func:`by_transmitter` reads them."""
+    _, receivers, chirps, length = samples.shape
+    each = chirps // transmitters
+    turns = np.asarray(samples).reshape(-1, receivers, each, transmitters, length)
+    return turns.transpose(0, 3, 1, 2, 4).reshape(-1, transmitters * receivers, each, length)
 
 
 @dataclass(frozen=True, eq=False)

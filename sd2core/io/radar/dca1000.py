@@ -24,7 +24,12 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.files.limits import check_regular
-from sd2core.io.radar.capture import LazySamples, RadarCapture, by_transmitter
+from sd2core.io.radar.capture import (
+    LazySamples,
+    RadarCapture,
+    by_transmitter,
+    sorted_by_transmitter,
+)
 from sd2core.io.radar.ti_setup import TiSetup, is_studio_json, read_setup
 from sd2core.timebase import Timebase
 
@@ -50,23 +55,15 @@ def load_dca1000(path: Path) -> RadarCapture:
     sizes = [one.stat().st_size for one in parts]
     frames = _frame_count(parts, sizes, setup, setup_path, notes)
     words = _Words(parts, sizes)
-    offset = _is_offset(words, setup, notes)
+    judged = words.read(0, min(_frame_words(setup), _JUDGED_WORDS))
+    offset = _is_offset(judged, notes)
     chirps = config.transmitters * config.chirps_per_frame
     length = _frame_words(setup)
     shape = (frames, config.receivers, chirps, config.samples_per_chirp)
 
     def read(some: slice) -> NDArray[Any]:
         start, stop, _ = some.indices(frames)
-        raw = words.read(start * length, stop * length)
-        if offset:
-            raw = raw ^ np.int16(-0x8000)
-        flat = _unpacked(raw, setup)
-        if setup.lanes == 2:
-            signal = flat.reshape(-1, chirps, shape[1], shape[3]).transpose(0, 2, 1, 3)
-        else:
-            signal = flat.reshape(-1, chirps, shape[3], shape[1]).transpose(0, 3, 1, 2)
-        signal /= np.float32(32768.0)
-        return signal[..., ::-1] if setup.falling else signal
+        return _in_order(words.read(start * length, stop * length), setup, offset)
 
     sampled = np.dtype(np.float32 if config.sampling == "real" else np.complex64)
     notes.append(
@@ -81,6 +78,29 @@ def load_dca1000(path: Path) -> RadarCapture:
         notes=tuple(notes),
         meta={"format": "TI DCA1000", "configuration": setup_path.name, "lanes": setup.lanes},
     )
+
+
+class FrameDecoder:
+    """Samples of single frames by a configuration, as they come from the card.
+
+    ``frame_bytes`` is the size of a frame; ``notes`` say what was assumed of the words, which is
+    judged by the first frame as in a file. Raises Sd2Error where the samples do not fill the lanes.
+    """
+
+    def __init__(self, setup: TiSetup, name: str) -> None:
+        _check_lanes(setup, name)
+        self.setup = setup
+        self.frame_bytes = _frame_words(setup) * _WORD.itemsize
+        self.notes: list[str] = []
+        self._offset: bool | None = None
+
+    def samples(self, frame: bytes | bytearray) -> NDArray[Any]:
+        """Samples of a frame, float32 or complex64 (channels, chirps, samples)."""
+        words = np.frombuffer(frame, _WORD).astype(np.int16, copy=False)
+        if self._offset is None:
+            self._offset = _is_offset(words[:_JUDGED_WORDS], self.notes)
+        signal = _in_order(words, self.setup, self._offset)
+        return sorted_by_transmitter(signal, self.setup.config.transmitters)[0]
 
 
 def parts_of(path: Path) -> list[Path]:
@@ -182,13 +202,7 @@ def _frame_count(
         f" as {setup_path.name} says"
     )
     remedy = "Use the configuration that it was recorded with, and all parts of the recording"
-    if config.sampling != "real" and config.receivers * config.samples_per_chirp % setup.lanes:
-        raise Sd2Error(
-            f"{setup_path}: {config.samples_per_chirp} complex samples of {config.receivers}"
-            f" receivers do not fill {setup.lanes} lanes of LVDS",
-            f"a multiple of {setup.lanes} per chirp",
-            remedy,
-        )
+    _check_lanes(setup, str(setup_path))
     if any(size % _WORD.itemsize for size in sizes):
         raise Sd2Error(f"{parts[0]} has {total:,} bytes", f"whole words and {told}", remedy)
     if not 0 < frames < _MOST_FRAMES or (left and setup.frames):
@@ -206,9 +220,20 @@ def _frame_count(
     return frames
 
 
-def _is_offset(words: _Words, setup: TiSetup, notes: list[str]) -> bool:
-    """True if words are unsigned counts around mid-scale, by their histogram."""
-    some = words.read(0, min(_frame_words(setup), _JUDGED_WORDS))
+def _check_lanes(setup: TiSetup, name: str) -> None:
+    """Raise Sd2Error if complex samples of a chirp do not fill the lanes."""
+    config = setup.config
+    if config.sampling != "real" and config.receivers * config.samples_per_chirp % setup.lanes:
+        raise Sd2Error(
+            f"{name}: {config.samples_per_chirp} complex samples of {config.receivers}"
+            f" receivers do not fill {setup.lanes} lanes of LVDS",
+            f"a multiple of {setup.lanes} per chirp",
+            "Use the configuration that it was recorded with",
+        )
+
+
+def _is_offset(some: NDArray[np.int16], notes: list[str]) -> bool:
+    """True if words of the first frame are unsigned counts around mid-scale, by their histogram."""
     signed = float(some.std(dtype=np.float64))
     unsigned = float((some ^ np.int16(-0x8000)).std(dtype=np.float64))
     if unsigned < 0.25 * signed:
@@ -223,6 +248,22 @@ def _is_offset(words: _Words, setup: TiSetup, notes: list[str]) -> bool:
             " negative: they look like unsigned counts, which this card does not write."
         )
     return False
+
+
+def _in_order(words: NDArray[np.int16], setup: TiSetup, offset: bool) -> NDArray[Any]:
+    """Samples of whole frames relative to full scale, (n, receivers, chirps of all, samples)."""
+    config = setup.config
+    chirps = config.transmitters * config.chirps_per_frame
+    if offset:
+        words = words ^ np.int16(-0x8000)
+    flat = _unpacked(words, setup)
+    receivers, length = config.receivers, config.samples_per_chirp
+    if setup.lanes == 2:
+        signal = flat.reshape(-1, chirps, receivers, length).transpose(0, 2, 1, 3)
+    else:
+        signal = flat.reshape(-1, chirps, length, receivers).transpose(0, 3, 1, 2)
+    signal /= np.float32(32768.0)
+    return signal[..., ::-1] if setup.falling else signal
 
 
 def _unpacked(words: NDArray[np.int16], setup: TiSetup) -> NDArray[Any]:

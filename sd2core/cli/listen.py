@@ -1,0 +1,279 @@
+"""``sd2 listen``: a radar while it runs, into a recording that grows."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import re
+import shutil
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from sd2core.cli.options import add_command, add_json, positive_float
+from sd2core.cli.output import counted, print_event, print_facts
+from sd2core.errors import Sd2Error
+
+if TYPE_CHECKING:
+    from sd2core.live.listening import Column, Listening
+    from sd2core.live.sources import Source
+
+_SILENT_S = 5.0
+_LINE_S, _UPDATE_S = 2.0, 0.1
+"""Between lines, and between updates of one on a terminal."""
+_WAIT_S = 0.05
+_BARS = "▁▂▃▄▅▆▇█"
+_BAR_DB = 5.0
+"""Power of one step of a bar."""
+
+
+def add_commands(commands: argparse._SubParsersAction) -> None:
+    """Add ``listen``."""
+    parser = add_command(
+        commands,
+        "listen",
+        "record a radar while it runs, and follow its Doppler map",
+        handler=_listen,
+        description=(
+            "Frames go into a recording that can be opened at any moment. The status line shows\n"
+            "the newest column of the Doppler map (receding to approaching), its level, the\n"
+            "classifier's answer, and how many frames were dropped or damaged. Ctrl-C or q stops;\n"
+            "the same command with the same --out goes on. docs/radar-files.md says how to set up\n"
+            "a DCA1000."
+        ),
+        examples=(
+            "  sd2 listen --dca1000 192.168.33.30 --setup profile.cfg --out walk.sd2\n"
+            "  sd2 listen --dca1000 --setup profile.cfg --out walk.sd2    (sent by this computer)\n"
+            "  sd2 listen --replay capture/ --out again.sd2 --seconds 10\n"
+            "  sd2 listen --replay walk.sd2 --out again.sd2 --classifier gestures.safetensors"
+        ),
+    )
+    source = parser.add_mutually_exclusive_group(required=True)
+    source.add_argument(
+        "--dca1000",
+        nargs="?",
+        const="",
+        metavar="ADDRESS[:PORT]",
+        help="listen to a DCA1000 on this address of this computer (default: 127.0.0.1, which"
+        " only programs on this computer reach; port 4098)",
+    )
+    source.add_argument(
+        "--replay",
+        type=Path,
+        metavar="CAPTURE",
+        help="a capture, or the one of a recording, at its own rate",
+    )
+    parser.add_argument(
+        "--setup",
+        type=Path,
+        metavar="FILE",
+        help="the .cfg or .json that the radar runs with (with --dca1000)",
+    )
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="NAME.sd2", help="the recording to write"
+    )
+    parser.add_argument(
+        "--classifier", type=Path, metavar="FILE", help="a classifier of `sd2 classify train`"
+    )
+    parser.add_argument(
+        "--seconds", type=positive_float, metavar="S", help="stop after so long (default: never)"
+    )
+    add_json(parser)
+
+
+def _listen(options: argparse.Namespace) -> None:
+    from sd2core.live.listening import Listening
+    from sd2core.live.recording import GrowingRecording
+
+    classifier = None
+    if options.classifier is not None:
+        from sd2core.classify.files import load_classifier
+
+        classifier = load_classifier(options.classifier)
+    source = _source(options)
+    try:
+        recording = GrowingRecording(options.out)
+        try:
+            listening = Listening(source, recording, classifier=classifier)
+        except BaseException:
+            recording.close()
+            raise
+    except BaseException:
+        source.close()
+        raise
+    status = _Status(listening, source, as_json=options.json)
+    status.begin(recording.folder, recording.is_continued)
+    listening.start()
+    try:
+        _follow(listening, status, options.seconds)
+    except KeyboardInterrupt:
+        pass
+    finally:
+        listening.stop()
+    status.end(recording.folder)
+
+
+def _source(options: argparse.Namespace) -> Source:
+    """Source that the options name; Sd2Error where it is not to be had."""
+    from sd2core.live.sources import DATA_PORT, LOOPBACK, Dca1000Source, ReplaySource
+    from sd2core.recording.recording import is_recording, open_recording
+
+    if options.replay is not None:
+        if options.setup is not None:
+            raise Sd2Error("--setup is given with --replay", "--setup with --dca1000 only")
+        if is_recording(options.replay):
+            return ReplaySource(open_recording(options.replay).load_capture())
+        return ReplaySource(options.replay)
+    if options.setup is None:
+        raise Sd2Error(
+            "--dca1000 is given without --setup",
+            "the .cfg or .json that the radar runs with: samples alone do not say their shape",
+        )
+    address, _, port = options.dca1000.partition(":")
+    if port and not (port.isascii() and port.isdigit()):
+        raise Sd2Error(f"The port is {port!r}", "a number, as in 192.168.33.30:4098")
+    return Dca1000Source(options.setup, address or LOOPBACK, int(port) if port else DATA_PORT)
+
+
+def _follow(listening: Listening, status: _Status, seconds: float | None) -> None:
+    """Show columns until the source ends, the time is over, or q is pressed."""
+    from sd2core.cli.keys import pressed_keys
+
+    end_s = time.monotonic() + seconds if seconds is not None else math.inf
+    with pressed_keys() as key:
+        while not listening.is_over and time.monotonic() < end_s and key() not in ("q", "Q"):
+            status.show(listening.next_column(_WAIT_S))
+
+
+class _Status:
+    """What is printed while listening."""
+
+    def __init__(self, listening: Listening, source: Source, *, as_json: bool) -> None:
+        self._listening, self._source, self._as_json = listening, source, as_json
+        self._is_line = not as_json and sys.stdout.isatty()
+        self._column: Column | None = None
+        self._first_s: float | None = None
+        self._loudest = 0.0
+        self._shown_s = time.monotonic()
+        self._said: set[str] = set()
+
+    def begin(self, folder: Path, continued: bool) -> None:
+        """Say what is listened to."""
+        if self._as_json:
+            print_event(
+                "listening", source=self._source.about, out=str(folder), continued=continued
+            )
+            return
+        goes_on = " (continued)" if continued else ""
+        stop = "Ctrl-C or q stops." if self._is_line else "Ctrl-C stops."
+        print(f"{self._source.about}\n  into {folder}{goes_on}. {stop}", flush=True)
+
+    def show(self, column: Column | None) -> None:
+        """Show the newest column, no oftener than is of use, and what looks wrong."""
+        if column is not None:
+            self._column = column
+            if self._first_s is None:
+                self._first_s = column.time_s
+        if self._listening.silent_s > _SILENT_S and (silence := self._source.silence()):
+            self._warn_once(silence)
+        if time.monotonic() - self._shown_s < (_UPDATE_S if self._is_line else _LINE_S):
+            return
+        self._shown_s = time.monotonic()
+        for doubt in self._source.doubts(at_end=False):
+            self._warn_once(doubt)
+        if self._as_json:
+            self._print_json()
+        elif self._is_line:
+            width = shutil.get_terminal_size().columns - 1
+            print(f"\r{self._line()[:width]:<{width}}", end="", flush=True)
+        else:
+            print(self._line(), flush=True)
+
+    def end(self, folder: Path) -> None:
+        """Say what there is."""
+        counts, latencies_s = self._listening.counts, sorted(self._listening.latencies_s)
+        median_s = most_s = None
+        if latencies_s:
+            median_s = latencies_s[len(latencies_s) // 2]
+            most_s = latencies_s[math.ceil(0.95 * len(latencies_s)) - 1]
+        if self._is_line:
+            print()
+        for doubt in self._source.doubts(at_end=True):
+            _warn(doubt)
+        if self._as_json:
+            print_event(
+                "end",
+                out=str(folder) if counts.recorded else None,
+                latency_median_s=median_s,
+                latency_95_s=most_s,
+                **vars(counts),
+            )
+            return
+        if not counts.recorded:
+            print("No frame came, and nothing was written.")
+            return
+        missing = [text for text in self._missing() if text]
+        facts = {
+            "recorded": counted(counts.recorded, "frame"),
+            "missing": ", ".join(missing) or "nothing",
+        }
+        if median_s is not None and most_s is not None:
+            facts["latency"] = f"{1e3 * median_s:.1f} ms, 95 % within {1e3 * most_s:.1f} ms"
+        print_facts(str(folder), facts)
+
+    def _missing(self) -> list[str]:
+        counts = self._listening.counts
+        told = (
+            (counts.dropped, "dropped"),
+            (counts.lost, "lost"),
+            (counts.damaged, "damaged"),
+            (counts.not_shown, "not shown"),
+        )
+        return [f"{number:,} {what}" if number else "" for number, what in told]
+
+    def _line(self) -> str:
+        counts, column = self._listening.counts, self._column
+        parts = [counted(counts.recorded, "frame"), f"{counts.dropped:,} dropped"]
+        parts += [text for text in self._missing()[1:] if text]
+        if column is not None and self._first_s is not None:
+            parts.insert(0, f"{column.time_s - self._first_s:7.1f} s")
+            parts += [f"level {column.level_db:6.1f} dB", self._bars(column)]
+            if column.label is not None:
+                parts.append(f"{column.label.name} {100 * column.label.probability:.0f} %")
+        return "  ".join(parts)
+
+    def _bars(self, column: Column) -> str:
+        """Powers as bars, receding to approaching, in steps of 5 dB below the loudest so far."""
+        self._loudest = max(self._loudest, float(column.values.max()))
+        if not self._loudest > 0:
+            return _BARS[0] * len(column.values)
+        top = len(_BARS) - 1
+        lowest = 10.0 ** (-0.1 * _BAR_DB * top)
+        shares = (max(float(value) / self._loudest, lowest) for value in column.values)
+        return "".join(_BARS[round(top + 10.0 * math.log10(one) / _BAR_DB)] for one in shares)
+
+    def _print_json(self) -> None:
+        column = self._column
+        told = {}
+        if column is not None:
+            told = {
+                "time_s": column.time_s,
+                "level_db": column.level_db,
+                "label": None if column.label is None else column.label.name,
+                "probability": None if column.label is None else column.label.probability,
+            }
+        print_event("frames", **vars(self._listening.counts), **told)
+
+    def _warn_once(self, sentence: str) -> None:
+        """Print a sentence to standard error, unless it was, with other numbers."""
+        words = re.sub(r"[\d.,]+", "", sentence)
+        if words not in self._said:
+            self._said.add(words)
+            if self._is_line:
+                print()
+            _warn(sentence)
+
+
+def _warn(sentence: str) -> None:
+    print(f"sd2: {sentence}", file=sys.stderr, flush=True)

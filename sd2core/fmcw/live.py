@@ -1,0 +1,69 @@
+"""Doppler map of live frames, column by column."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.errors import Sd2Error
+from sd2core.fmcw.chain import Chain, ProcessingOptions
+from sd2core.fmcw.processing import binned, weights_of
+from sd2core.io.radar.capture import LazySamples, RadarCapture
+from sd2core.sensor import VelocityAxis
+from sd2core.timebase import Timebase
+
+
+class LiveMap:
+    """Columns of the Doppler map of frames as they come.
+
+    They are those that :func:`~sd2core.fmcw.doppler_map` computes of all frames together, bit for
+    bit. The clutter filter ``moving`` looks ahead and is refused (Sd2Error).
+
+    Parameters
+    ----------
+    like : RadarCapture
+        Capture of the same radar, of any number of frames, with samples of the same type.
+    axis : VelocityAxis
+    options : ProcessingOptions
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import sd2core as sd2
+    >>> from sd2core.files.resources import resource_path
+    >>> from sd2core.fmcw import LiveMap, ProcessingOptions
+    >>> capture = sd2.load_capture(resource_path("swipes.sd2") / "radar")
+    >>> live = LiveMap(capture, sd2.VelocityAxis(32, 2.0), ProcessingOptions("mean"))
+    >>> whole = sd2.doppler_map(capture, bins=32, v_max_mps=2.0, clutter="mean")
+    >>> bool((live.column(capture.samples[7:8]) == whole.values[:, 7]).all())
+    True
+    """
+
+    def __init__(self, like: RadarCapture, axis: VelocityAxis, options: ProcessingOptions) -> None:
+        if options.clutter == "moving":
+            raise Sd2Error(
+                "The clutter filter is 'moving', which averages over later frames",
+                "a filter that a frame is enough for: none, mean or regression",
+            )
+        self.axis = axis
+        shape = (1, *like.samples.shape[1:])
+        self._frame = np.zeros(shape, like.samples.dtype)
+        newest = LazySamples(shape, like.samples.dtype, lambda _: self._frame)
+        self._chain = Chain(replace(like, samples=newest, timebase=Timebase([0.0])), options)
+        self._weights = weights_of(axis, self._chain)
+
+    @property
+    def clipped_share(self) -> float:
+        """Share of the samples so far that sit at the converter's ends."""
+        return self._chain.clipped_share
+
+    def column(self, frame: NDArray[Any]) -> NDArray[np.float32]:
+        """Column (bins,) of the next frame (1, channels, chirps, samples).
+
+        Raises Sd2Error if a sample is none, as :meth:`RadarCapture.read` does.
+        """
+        self._frame = frame
+        return binned(self._weights, self._chain.doppler_power(0, 1))[:, 0]

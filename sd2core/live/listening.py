@@ -1,0 +1,272 @@
+"""Frames of a radar into a recording and a Doppler map, while they come.
+
+The source hands frames over in a thread of its own and never waits: a second thread stores them,
+and the caller's makes the map. Where storing cannot follow and the buffer is full, frames are
+dropped and counted; where the caller cannot, their columns are left out of the live map only.
+"""
+
+from __future__ import annotations
+
+import queue
+import threading
+import time
+from collections import deque
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.denoise.resample_to_model import SAME_RATE
+from sd2core.errors import Sd2Error
+from sd2core.fmcw.chain import ProcessingOptions
+from sd2core.fmcw.live import LiveMap
+from sd2core.io.radar.capture import RadarCapture
+from sd2core.live.recording import GrowingRecording, wall_clock_s
+from sd2core.live.sources import Frame, Source
+from sd2core.radar_config import CLUTTER, RadarConfig
+from sd2core.sensor import VelocityAxis
+from sd2core.timebase import Timebase
+
+if TYPE_CHECKING:
+    from sd2core.classify.live import TrainedClassifier
+
+_BUFFER_BYTES = 64 << 20
+"""Frames that may wait for the disk."""
+_LEAST_FRAMES = 8
+_SHOWN_FRAMES = 32
+"""Frames that may wait for the map."""
+_KEPT_LATENCIES = 10_000
+_GAP_FRAMES = 1.5
+
+
+class Label(NamedTuple):
+    """Answer of a classifier."""
+
+    name: str
+    probability: float
+
+
+class Column(NamedTuple):
+    """Column of the live map."""
+
+    time_s: float  # since the first frame of the source
+    values: NDArray[np.float32]  # (bins,)
+    label: Label | None
+
+    @property
+    def level_db(self) -> float:
+        """Power of the column relative to 1, minus infinity where there is none."""
+        power = float(self.values.sum(dtype=np.float64))
+        return 10.0 * float(np.log10(power)) if power > 0 else -np.inf
+
+
+@dataclass
+class Counts:
+    """Numbers of frames by what became of them."""
+
+    recorded: int = 0
+    dropped: int = 0  # received, not stored: the disk was too slow
+    lost: int = 0  # sent, not received
+    damaged: int = 0  # stored, with zeros in place of lost packets
+    not_shown: int = 0  # stored, not in the live map: the caller was too slow
+
+    @property
+    def whole(self) -> bool:
+        """True if nothing is missing in the recording."""
+        return not (self.dropped or self.lost or self.damaged)
+
+
+class Listening:
+    """A source being recorded, with its live map.
+
+    Parameters
+    ----------
+    source : Source
+    recording : GrowingRecording
+        Is closed at the end.
+    axis : VelocityAxis
+        Of the map; that of the classifier where there is one.
+    classifier : TrainedClassifier, optional
+        Asked about every column. Its card must be of the radar's frame rate.
+
+    Raises
+    ------
+    Sd2Error
+        When the source does not fit the recording or the classifier.
+    """
+
+    def __init__(
+        self,
+        source: Source,
+        recording: GrowingRecording,
+        *,
+        axis: VelocityAxis | None = None,
+        classifier: TrainedClassifier | None = None,
+    ) -> None:
+        head = source.head(0.0)
+        recording.check(head)
+        self.counts = Counts()
+        self._source, self._recording = source, recording
+        self._labeller = None if classifier is None else _Labeller(classifier, head.radar)
+        axis = axis or (VelocityAxis() if classifier is None else classifier.card.axis)
+        shape = (1, *head.frame_shape[:3])
+        like = RadarCapture(
+            np.zeros(shape, head.sample_type),
+            head.radar,
+            Timebase([0.0]),
+            full_scale_known=head.full_scale_known,
+        )
+        self._head = head
+        self._map = LiveMap(like, axis, ProcessingOptions(CLUTTER))
+        size = max(_BUFFER_BYTES // head.frame_bytes, _LEAST_FRAMES)
+        self._to_store: queue.Queue[tuple[Frame, int]] = queue.Queue(size)
+        self._to_show: queue.Queue[tuple[NDArray[Any], Frame]] = queue.Queue(_SHOWN_FRAMES)
+        self._dropped = 0  # since the last frame that was taken
+        self._stop = threading.Event()
+        self._error: BaseException | None = None
+        self._latencies_s: deque[float] = deque(maxlen=_KEPT_LATENCIES)
+        self._last_received_s = time.monotonic()
+        self._threads = [
+            threading.Thread(target=self._receive, name="sd2-receive", daemon=True),
+            threading.Thread(target=self._store, name="sd2-store", daemon=True),
+        ]
+
+    @property
+    def axis(self) -> VelocityAxis:
+        """Velocity axis of the live map."""
+        return self._map.axis
+
+    @property
+    def is_over(self) -> bool:
+        """True once there are no more columns to come."""
+        return not any(one.is_alive() for one in self._threads) and self._to_show.empty()
+
+    @property
+    def silent_s(self) -> float:
+        """Time since the last frame, or the start."""
+        return time.monotonic() - self._last_received_s
+
+    @property
+    def latencies_s(self) -> list[float]:
+        """Times from a frame's last packet to its column, of the last 10,000 columns."""
+        return list(self._latencies_s)
+
+    def start(self) -> None:
+        """Begin to listen."""
+        self._last_received_s = time.monotonic()
+        for thread in self._threads:
+            thread.start()
+
+    def next_column(self, timeout_s: float) -> Column | None:
+        """Column of the next frame; None where none comes within the time.
+
+        Raises what stopped the listening, such as OSError of a full disk.
+        """
+        try:
+            words, frame = self._to_show.get(timeout=timeout_s)
+        except queue.Empty:
+            if self._error is not None:
+                raise self._error from None
+            return None
+        values = self._map.column(self._head.as_samples(words))
+        label = None if self._labeller is None else self._labeller.label(frame.time_s, values)
+        self._latencies_s.append(time.monotonic() - frame.received_s)
+        return Column(frame.time_s, values, label)
+
+    def stop(self) -> None:
+        """Stop, store what was received, and close source and recording.
+
+        Raises what kept a frame from being stored.
+        """
+        self._stop.set()
+        for thread in self._threads:
+            if thread.is_alive():
+                thread.join()
+        self._source.close()
+        self._recording.close(self._dropped)
+        if self._error is not None:
+            raise self._error
+
+    def _receive(self) -> None:
+        try:
+            self._source.run(self._take, self._stop)
+        except BaseException as error:  # raised again where it is seen
+            self._error = self._error or error
+
+    def _take(self, frame: Frame) -> None:
+        """Put a frame into the buffer, or count it as dropped."""
+        self._last_received_s = frame.received_s
+        self.counts.lost += frame.lost
+        try:
+            self._to_store.put_nowait((frame, self._dropped))
+            self._dropped = 0
+        except queue.Full:
+            self._dropped += 1
+            self.counts.dropped += 1
+
+    def _store(self) -> None:
+        receiving = self._threads[0]
+        try:
+            while True:
+                try:
+                    frame, dropped = self._to_store.get(timeout=0.05)
+                except queue.Empty:
+                    if not receiving.is_alive() and self._to_store.empty():
+                        return
+                    continue
+                self._store_one(frame, dropped)
+        except BaseException as error:  # raised again where it is seen
+            self._error = self._error or error
+            self._stop.set()
+
+    def _store_one(self, frame: Frame, dropped: int) -> None:
+        words = self._source.words(frame)
+        try:
+            self._to_show.put_nowait((words, frame))
+        except queue.Full:
+            self.counts.not_shown += 1
+        # Time 0 by the wall clock; of the radar's clock there is no more.
+        start_unix_s = wall_clock_s(frame.received_s) - frame.time_s
+        self._recording.append(
+            words,
+            self._source.head(start_unix_s),
+            time_s=frame.time_s,
+            dropped=dropped,
+            lost=frame.lost,
+            missing_bytes=frame.missing_bytes,
+        )
+        self.counts.recorded += 1
+        self.counts.damaged += frame.missing_bytes > 0
+
+
+class _Labeller:
+    """Classifier that is asked about columns; after a gap it begins again."""
+
+    def __init__(self, classifier: TrainedClassifier, radar: RadarConfig) -> None:
+        self._classifier = classifier
+        self._frame_s = radar.frame_repetition_s
+        rate_hz, known_hz = 1.0 / self._frame_s, classifier.card.frame_rate_hz
+        if abs(rate_hz / known_hz - 1.0) > SAME_RATE:
+            raise Sd2Error(
+                f"The radar gives {rate_hz:.4g} frames/s",
+                f"{known_hz:.4g} frames/s, for the classifier"
+                f" {classifier.card.title or classifier.card.name}",
+                "Set the radar to that rate, or label the recording afterwards with"
+                " `sd2 classify apply`",
+            )
+        self._session = classifier.live()
+        self._before_s: float | None = None
+        self._last: Label | None = None
+
+    def label(self, time_s: float, values: NDArray[np.float32]) -> Label | None:
+        """Newest answer after a column; that is to a frame the card's delay before."""
+        if self._before_s is not None and time_s - self._before_s > _GAP_FRAMES * self._frame_s:
+            self._session = self._classifier.live()
+            self._last = None
+        self._before_s = time_s
+        answers = self._session.advance(values[None])
+        if len(answers):
+            best = int(answers[-1].argmax())
+            self._last = Label(self._classifier.classes[best], float(answers[-1][best]))
+        return self._last

@@ -1,0 +1,219 @@
+"""Recording that grows frame by frame, and is whole at any moment."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.errors import Sd2Error
+from sd2core.files.atomic import atomic_write_text, full_disk_named
+from sd2core.files.lock import FileLock
+from sd2core.files.paths import plain_path
+from sd2core.files.recording_json import FILE_NAME
+from sd2core.io.radar.growing import (
+    ENTRY,
+    HEAD_NAME,
+    INDEX_NAME,
+    SAMPLES_NAME,
+    GrowingHead,
+    frame_count,
+    is_growing,
+    read_entries,
+    read_head,
+)
+from sd2core.recording.recording import SUFFIX, Recording, open_recording
+
+RADAR_FOLDER = "radar"
+_LOCK_NAME = "listening.lock"
+_MOST_COUNT = 2**32 - 1
+
+
+class GrowingRecording:
+    """A recording that frames of a radar are appended to.
+
+    Nothing is written before the first frame. A recording that is there is continued if it was
+    written by listening to the same radar; its times go on by the wall clock, so that the pause is
+    a gap.
+
+    Parameters
+    ----------
+    folder : path
+        ``NAME.sd2``; the suffix is appended where it is not there.
+
+    Raises
+    ------
+    Sd2Error
+        When something else is there, or another process listens into it.
+    """
+
+    def __init__(self, folder: Path | str) -> None:
+        folder = plain_path(Path(folder))
+        self.folder = folder if folder.suffix == SUFFIX else folder.with_name(folder.name + SUFFIX)
+        self.radar = self.folder / RADAR_FOLDER
+        self.frames = 0
+        self._head: GrowingHead | None = None
+        self._streams: tuple[IO[bytes], IO[bytes]] | None = None
+        self._session = 0
+        self._begin_s: float | None = None  # of this session; None before its first frame
+        self._last_s = -np.inf
+        if not self.folder.parent.is_dir():
+            raise Sd2Error(f"The folder {self.folder.parent} does not exist", "an existing folder")
+        self._check_is_ours()
+        self._lock: FileLock | None = None
+        if is_growing(self.radar):
+            self._continue()
+
+    @property
+    def is_continued(self) -> bool:
+        """True if it was begun before."""
+        return self._session > 0
+
+    def check(self, head: GrowingHead) -> None:
+        """Raise Sd2Error if frames of this head do not fit those that are there."""
+        if self._head is None:
+            return
+        for name in ("radar", "word", "full_scale_known", "simulated", "replayed"):
+            there, given = getattr(self._head, name), getattr(head, name)
+            if there != given:
+                found = f"{name} of {self.folder} is {there}"
+                if name == "radar":
+                    found = f"{self.folder} is of another radar or configuration: {there}"
+                raise Sd2Error(found, f"to continue it, {given}", "Give another folder as --out")
+
+    def append(
+        self,
+        words: NDArray[Any],
+        head: GrowingHead,
+        *,
+        time_s: float,
+        dropped: int = 0,
+        lost: int = 0,
+        missing_bytes: int = 0,
+    ) -> None:
+        """Append a frame; OSError, after which all before it is there, if it cannot be written.
+
+        Parameters
+        ----------
+        words : array
+            As :meth:`GrowingHead.as_stored` gives them.
+        head : GrowingHead
+            What the frame is of; ``start_unix_s`` is the wall-clock time of this session's time 0.
+        time_s : float
+            Since the first frame of this session.
+        dropped, lost, missing_bytes : int
+            See :data:`~sd2core.io.radar.growing.ENTRY`.
+        """
+        if self._streams is None:
+            self._start(head)
+        assert self._streams is not None
+        assert self._head is not None
+        if self._begin_s is None:
+            self._begin_s = 0.0
+            if self.is_continued:
+                pause_s = head.start_unix_s - self._head.start_unix_s
+                self._begin_s = max(pause_s, self._last_s + head.radar.frame_repetition_s)
+        at_s = self._begin_s + time_s
+        if self.frames and not at_s > self._last_s:
+            raise Sd2Error(
+                f"A frame at {at_s:.6f} s follows one at {self._last_s:.6f} s",
+                "times that increase",
+            )
+        counts = (min(one, _MOST_COUNT) for one in (dropped, lost, missing_bytes, self._session))
+        entry = np.array([(at_s, *counts)], ENTRY)
+        with full_disk_named(self.radar / SAMPLES_NAME):
+            _write(self._streams[0], np.ascontiguousarray(words).view(np.uint8).data.cast("B"))
+            _write(self._streams[1], entry.tobytes())
+        self.frames += 1
+        self._last_s = at_s
+        if self.frames == 1:
+            self._make_recording()
+
+    def close(self, dropped: int = 0) -> None:
+        """End this session; ``dropped`` frames came after its last one."""
+        if self._streams is not None:
+            for stream in self._streams:
+                stream.close()
+            self._streams = None
+            if dropped and self._head is not None:
+                total = self._head.dropped_at_ends + dropped
+                self._write_head(self._head.model_copy(update={"dropped_at_ends": total}))
+        if self._lock is not None:
+            self._lock.release(delete=True)
+            self._lock = None
+
+    def _check_is_ours(self) -> None:
+        if (self.folder / FILE_NAME).exists():
+            if open_recording(self.folder).radar == self.radar and is_growing(self.radar):
+                return
+        elif not self.radar.exists() or is_growing(self.radar):
+            return
+        raise Sd2Error(
+            f"{self.folder} exists, and was not written by `sd2 listen`",
+            "a new folder, or a recording of `sd2 listen` to continue",
+            "Give another folder as --out",
+        )
+
+    def _continue(self) -> None:
+        """Take up what a session before has left, without a frame that it left torn."""
+        self._take_lock()
+        try:
+            self._head = read_head(self.radar)
+            self.frames = frame_count(self.radar, self._head)
+            sizes = (self.frames * self._head.frame_bytes, self.frames * ENTRY.itemsize)
+            for name, size in zip((SAMPLES_NAME, INDEX_NAME), sizes, strict=True):
+                if (self.radar / name).stat().st_size > size:
+                    with (self.radar / name).open("r+b") as stream:
+                        stream.truncate(size)
+            if self.frames:
+                last = read_entries(self.radar, self.frames)[-1]
+                self._last_s, self._session = float(last["time_s"]), int(last["session"]) + 1
+                if not (self.folder / FILE_NAME).exists():
+                    self._make_recording()
+        except BaseException:
+            self.close()
+            raise
+
+    def _start(self, head: GrowingHead) -> None:
+        """Open the files for the first frame of a session."""
+        self.check(head)
+        self.radar.mkdir(parents=True, exist_ok=True)
+        if self._lock is None:
+            self._take_lock()
+        if self._head is None or not self.frames:
+            self._write_head(head)
+        samples = (self.radar / SAMPLES_NAME).open("ab", buffering=0)
+        self._streams = (samples, (self.radar / INDEX_NAME).open("ab", buffering=0))
+
+    def _write_head(self, head: GrowingHead) -> None:
+        atomic_write_text(self.radar / HEAD_NAME, head.model_dump_json(indent=2) + "\n")
+        self._head = head
+
+    def _make_recording(self) -> None:
+        assert self._head is not None
+        Recording.create(self.folder, radar=self.radar, simulated=self._head.simulated)
+
+    def _take_lock(self) -> None:
+        lock = FileLock(self.radar / _LOCK_NAME)
+        if not lock.take():
+            raise Sd2Error(
+                f"Another process listens into {self.folder}",
+                "one that listens into a recording",
+                "Stop that one, or give another folder as --out",
+            )
+        self._lock = lock
+
+
+def wall_clock_s(monotonic_s: float) -> float:
+    """Wall-clock time (unix) of a time of the monotonic clock."""
+    return time.time() - (time.monotonic() - monotonic_s)
+
+
+def _write(stream: IO[bytes], content: bytes | memoryview) -> None:
+    """Write all of it: the system may take less at a time."""
+    left = memoryview(content)
+    while len(left):
+        left = left[stream.write(left) :]
