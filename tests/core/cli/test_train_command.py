@@ -131,7 +131,7 @@ class TestTrain:
             (("PAIRS", "--model", "s5", "--out", "run"), "model.name is 's5'. Expected: one of s4"),
             (("PAIRS", "--set", "width=4", "--out", "run"), "no option 'width'"),
             (("PAIRS", "--nice", "30", "--out", "run"), "machine.nice is 30. Expected: a whole"),
-            (("PAIRS", "--out", "no/run"), "The folder"),
+            (("PAIRS", "--out", "a.toml/run"), "a.toml is a file"),
             (("a.toml", "b.toml", "--out", "run"), "one file with settings"),
             (("--resume", "run", "PAIRS"), "--resume is given with"),
             (("--resume", "run", "--epochs", "3"), "--resume is given with --epochs"),
@@ -148,6 +148,7 @@ class TestTrain:
         said: str,
     ) -> None:
         monkeypatch.chdir(tmp_path)
+        (tmp_path / "a.toml").touch()
         outcome = sd2("train", *(pairs if word == "PAIRS" else word for word in words))
         assert (outcome.code, outcome.out) == (1, "")
         assert said in outcome.err
