@@ -31,6 +31,7 @@ class Palette:
     axis_x: str
     axis_y: str
     axis_z: str
+    inertial: str
 
 
 LIGHT = Palette(
@@ -53,6 +54,7 @@ LIGHT = Palette(
     axis_x="#b83a00",
     axis_y="#00786b",
     axis_z="#4b3bc8",
+    inertial="#ffd21f",
 )
 DARK = Palette(
     window="#17191d",
@@ -74,6 +76,7 @@ DARK = Palette(
     axis_x="#ff8a4c",
     axis_y="#46e0b0",
     axis_z="#9a9cff",
+    inertial="#ffd21f",
 )
 
 

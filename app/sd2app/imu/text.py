@@ -27,7 +27,7 @@ def status_parts(model: ImuModel) -> list[str]:
 
 
 def reading_lines(model: ImuModel, time_s: float) -> tuple[str, ...]:
-    """Values at a time, a line for each sensor, after the time; nothing where there are none."""
+    """Time, then acceleration and turn rate of each sensor; nothing where there are none."""
     lines = []
     if model.signals is not None:
         lines += _values_at("simulated", model.signals, time_s)
@@ -46,7 +46,7 @@ def _values_at(name: str, signals: InertialSignals, time_s: float) -> list[str]:
     acceleration, turn_rate = signals.acceleration_mps2[nearest], signals.turn_rate_radps[nearest]
     if not np.isfinite([acceleration, turn_rate]).all():
         return [f"{name}: not known"]
-    return [f"{name}: {_axes(acceleration, 1)} m/s²  ·  {_axes(turn_rate, 2)} rad/s"]
+    return [f"{name}: {_axes(acceleration, 1)} m/s²", f"{_axes(turn_rate, 2)} rad/s"]
 
 
 def _axes(values: NDArray[np.float64], decimals: int) -> str:

@@ -42,6 +42,7 @@ class SceneColours:
     text: str
     muted: str
     warning: str
+    inertial: str
 
     @classmethod
     def of(cls, palette: Palette, dark: bool) -> SceneColours:
@@ -60,6 +61,7 @@ class SceneColours:
             text=palette.text,
             muted=palette.muted,
             warning=palette.warning,
+            inertial=palette.inertial,
         )
 
 

@@ -360,9 +360,7 @@ class InertialMarkers(Shape):
         self.look.SetAmbient(0.6)
         self.look.SetDiffuse(0.4)
         self.look.EdgeVisibilityOn()
-        # Told from the body, whatever its colours mean, in both themes.
-        self.set_colour("#101216")
-        self.look.SetEdgeColor(*fractions("#f2f4f7"))
+        self.look.SetEdgeColor(0.0, 0.0, 0.0)
 
     def set_points(self, points_m: NDArray[np.floating], metres_per_px: float) -> None:
         """Show sensors at N points, (N, 3), as large as can be seen."""
@@ -372,3 +370,7 @@ class InertialMarkers(Shape):
             radius_m = max(_INERTIAL_M, _INERTIAL_LEAST_PX * metres_per_px)
             points, triangles = shapes.octahedra(points_m, radius_m)
             self.set_shape(points, triangles=triangles)
+
+    def set_colours(self, colours: SceneColours) -> None:
+        """Colours of the theme."""
+        self.set_colour(colours.inertial)

@@ -160,6 +160,7 @@ class Scene:
         self.camera_glyph.set_colour(colours.camera)
         self.sensor_glyph.set_colours(colours, self._hot)
         self.markers.set_colours(colours)
+        self.inertial.set_colours(colours)
         self.body.shadow.GetProperty().SetColor(*fractions(colours.shadow))
         self._stale_colours = True
 

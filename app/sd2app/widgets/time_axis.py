@@ -129,6 +129,7 @@ def paint_readout(
     width = max(metrics.horizontalAdvance(line) for line in lines) + 12
     height = metrics.height() * len(lines) + 6
     left = place.x() + 12 if place.x() + 12 + width < plot.right() else place.x() - 12 - width
+    left = max(left, 1.0)
     top = place.y() - height - 8 if place.y() - height - 8 > plot.top() else place.y() + 8
     # Where the plot is lower than the box, the box lies over what is around it.
     top = max(min(top, painter.device().height() - height - 1.0), 1.0)

@@ -16,8 +16,10 @@ from turning_bodies import turning_body
 from sd2app.imu import model as module
 from sd2app.imu.model import ImuModel, place_words
 from sd2app.imu.text import reading_lines, status_parts
+from sd2app.session.content import recording_of
 from sd2app.session.session import build_session
 from sd2app.settings import Settings
+from sd2core.errors import Sd2Error
 from sd2core.imu.files import read_signals, write_signals
 from sd2core.imu.mounting import mounted
 from sd2core.imu.signals import InertialSignals
@@ -268,6 +270,30 @@ def test_a_real_file_on_a_clock_of_its_own_begins_with_the_recording(
     assert f"x {first:+.1f}".replace("-", "−") in reading_lines(model, 0.0)[1]
 
 
+def test_files_that_are_added_leave_the_sensors_alone(
+    desk: Desk, walk: Path, tmp_path: Path
+) -> None:
+    model = desk.open(walk).model
+    model.place(desk.seat("head"))
+    desk.add(written(tmp_path / "wrist.csv", 0.25))
+    save_mesh(turning_body(FRAMES + 10), tmp_path / "longer.npz")
+    with desk.qtbot.waitSignal(desk.session.document.opened, timeout=20_000):
+        desk.session.document.add([tmp_path / "longer.npz"])
+    desk.settle()
+    assert (desk.recording.imu, desk.recording.imu_offset_s) == (tmp_path / "wrist.csv", 0.25)
+    assert desk.recording.imu_places == ("head",)
+    assert model.signals is not None
+    assert model.signals.times_s[-1] == pytest.approx((FRAMES + 9) / 30)
+    with desk.qtbot.waitSignal(desk.session.document.opened, timeout=20_000):
+        desk.session.document.add([written(tmp_path / "other.csv", 0.5), tmp_path / "longer.npz"])
+    assert (desk.recording.imu, desk.recording.imu_offset_s) == (tmp_path / "other.csv", 0.25)
+
+
+def test_samples_alone_are_no_recording(tmp_path: Path) -> None:
+    with pytest.raises(Sd2Error, match="are shown beside something"):
+        recording_of([written(tmp_path / "wrist.csv", 0.0)])
+
+
 def test_a_damaged_file_is_named_and_not_added(desk: Desk, walk: Path, tmp_path: Path) -> None:
     (tmp_path / "wrist.csv").write_text("t,ax,ay,az,gx,gy,gz\n0,1,1,1,1,1,1\n")
     desk.open(walk).add(tmp_path / "wrist.csv")
@@ -307,7 +333,8 @@ def test_values_are_those_of_the_nearest_sample() -> None:
     model: Any = SimpleNamespace(signals=signals, measured=None)
     assert reading_lines(model, 0.006) == (
         "00:00.006",
-        "simulated: x −3.0  y −2.0  z −1.0 m/s²  ·  x +3.00  y +4.00  z +5.00 rad/s",
+        "simulated: x −3.0  y −2.0  z −1.0 m/s²",
+        "x +3.00  y +4.00  z +5.00 rad/s",
     )
     assert "x −6.0" in reading_lines(model, -0.04)[1]
     assert reading_lines(model, 0.07) == ()

@@ -58,6 +58,14 @@ def linked(recording: Recording) -> None:
     recording.video = recording.folder.parent / "walk.mkv"
 
 
+def carried(recording: Recording) -> None:
+    recording.imu_places = ("left-wrist",)
+
+
+def measured(recording: Recording) -> None:
+    recording.imu = recording.folder.parent / "wrist.csv"
+
+
 @pytest.mark.parametrize(
     ("change", "says"),
     [
@@ -66,6 +74,8 @@ def linked(recording: Recording) -> None:
         (planned, "another plan of placements"),
         (aligned, "another offset of the radar"),
         (linked, "another video"),
+        (carried, "another set of inertial sensors"),
+        (measured, "another file of the inertial sensor"),
     ],
 )
 def test_what_another_saved_is_never_overwritten_without_a_word(

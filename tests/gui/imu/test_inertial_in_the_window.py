@@ -18,6 +18,7 @@ from sd2app.dataset_export.dialog import ExportDialog
 from sd2app.imu.track import LANES, InertialTrack
 from sd2app.maps.arrangement import HEADER_PX
 from sd2app.scene.inertial import PLACING_HINT
+from sd2app.shell import files
 from sd2core.imu.files import read_signals, write_signals
 from sd2core.imu.signals import InertialSignals
 from sd2core.recording.recording import open_recording
@@ -255,6 +256,20 @@ def test_a_real_sensors_file_is_dropped_aligned_and_removed(
     pick(menu_at(track, TITLE), "Remove wrist.csv")
     assert models.document.recording.imu is None
     assert not track.isVisible()
+
+
+@pytest.mark.parametrize("name", ["open", "add"])
+def test_a_real_sensors_file_is_opened_beside_what_is_open(
+    window, name: str, qtbot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    models, path = models_of(window), wrist(tmp_path / "wrist.csv")
+    before = models.document.recording
+    monkeypatch.setattr(files, "ask_to_open", lambda *_: [path])
+    window.action(name).trigger()
+    qtbot.waitUntil(lambda: models.imu.measured is not None, timeout=20_000)
+    assert models.document.recording is before
+    assert before.imu == path
+    assert models.document.undo_stack.undoText() == "Add inertial sensor's file"
 
 
 def test_a_table_of_labels_is_still_one_of_labels(window, tmp_path: Path) -> None:
