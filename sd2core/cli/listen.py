@@ -164,10 +164,11 @@ class _Status:
             print_event(
                 "listening", source=self._source.about, out=str(folder), continued=continued
             )
-            return
-        goes_on = " (continued)" if continued else ""
-        stop = "Ctrl-C or q stops." if self._is_line else "Ctrl-C stops."
-        print(f"{self._source.about}\n  into {folder}{goes_on}. {stop}", flush=True)
+        else:
+            goes_on = " (continued)" if continued else ""
+            stop = "Ctrl-C or q stops." if self._is_line else "Ctrl-C stops."
+            print(f"{self._source.about}\n  into {folder}{goes_on}. {stop}", flush=True)
+        self._warn_of_doubts()
 
     def show(self, column: Column | None) -> None:
         """Show the newest column, no oftener than is of use, and what looks wrong."""
@@ -180,8 +181,7 @@ class _Status:
         if time.monotonic() - self._shown_s < (_UPDATE_S if self._is_line else _LINE_S):
             return
         self._shown_s = time.monotonic()
-        for doubt in self._source.doubts(at_end=False):
-            self._warn_once(doubt)
+        self._warn_of_doubts()
         if self._as_json:
             self._print_json()
         elif self._is_line:
@@ -264,6 +264,10 @@ class _Status:
                 "probability": None if column.label is None else column.label.probability,
             }
         print_event("frames", **vars(self._listening.counts), **told)
+
+    def _warn_of_doubts(self) -> None:
+        for doubt in self._source.doubts(at_end=False):
+            self._warn_once(doubt)
 
     def _warn_once(self, sentence: str) -> None:
         """Print a sentence to standard error, unless it was, with other numbers."""
