@@ -233,8 +233,8 @@ class Dca1000Source:
         if self.waiting_bytes < _SOCKET_BYTES and (counts.lost or not at_end):
             doubts.append(
                 f"The system keeps only {self.waiting_bytes / 1e3:,.0f} kB of packets that wait,"
-                f" and may lose some; on Linux, `sysctl -w net.core.rmem_max={_SOCKET_BYTES}` allows"
-                " more."
+                " and may lose some; on Linux,"
+                f" `sysctl -w net.core.rmem_max={_SOCKET_BYTES}` allows more."
             )
         if self._rate_doubt is not None:
             doubts.append(self._rate_doubt)
