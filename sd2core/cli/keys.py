@@ -26,7 +26,7 @@ else:
     @contextmanager
     def pressed_keys() -> Iterator[Callable[[], str]]:
         """Function that returns the key that was pressed, or an empty text, at once."""
-        if sys.stdin is None or not sys.stdin.isatty():
+        if sys.stdin is None or not sys.stdin.isatty() or _in_background(sys.stdin.fileno()):
             yield str
             return
         terminal = sys.stdin.fileno()
@@ -41,3 +41,10 @@ else:
             yield key
         finally:
             termios.tcsetattr(terminal, termios.TCSADRAIN, before)
+
+    def _in_background(terminal: int) -> bool:
+        """True if the shell runs this process in the background: setting the terminal stops it."""
+        try:
+            return os.tcgetpgrp(terminal) != os.getpgrp()
+        except OSError:  # not the terminal that controls this process
+            return False

@@ -164,10 +164,11 @@ class _Status:
             print_event(
                 "listening", source=self._source.about, out=str(folder), continued=continued
             )
-            return
-        goes_on = " (continued)" if continued else ""
-        stop = "Ctrl-C or q stops." if self._is_line else "Ctrl-C stops."
-        print(f"{self._source.about}\n  into {folder}{goes_on}. {stop}", flush=True)
+        else:
+            goes_on = " (continued)" if continued else ""
+            stop = "Ctrl-C or q stops." if self._is_line else "Ctrl-C stops."
+            print(f"{self._source.about}\n  into {folder}{goes_on}. {stop}", flush=True)
+        self._warn_of_doubts()
 
     def show(self, column: Column | None) -> None:
         """Show the newest column, no oftener than is of use, and what looks wrong."""
@@ -180,8 +181,7 @@ class _Status:
         if time.monotonic() - self._shown_s < (_UPDATE_S if self._is_line else _LINE_S):
             return
         self._shown_s = time.monotonic()
-        for doubt in self._source.doubts(at_end=False):
-            self._warn_once(doubt)
+        self._warn_of_doubts()
         if self._as_json:
             self._print_json()
         elif self._is_line:
@@ -213,29 +213,30 @@ class _Status:
         if not counts.recorded:
             print("No frame came, and nothing was written.")
             return
-        missing = [text for text in self._missing() if text]
         facts = {
             "recorded": counted(counts.recorded, "frame"),
-            "missing": ", ".join(missing) or "nothing",
+            "missing": ", ".join(self._missing()) or "nothing",
+            "not shown": counted(counts.not_shown, "frame") if counts.not_shown else "",
         }
         if median_s is not None and most_s is not None:
             facts["latency"] = f"{1e3 * median_s:.1f} ms, 95 % within {1e3 * most_s:.1f} ms"
         print_facts(str(folder), facts)
 
     def _missing(self) -> list[str]:
+        """Numbers of frames that the recording lacks, or that lack something."""
         counts = self._listening.counts
         told = (
             (counts.dropped, "dropped"),
             (counts.lost, "lost"),
             (counts.damaged, "damaged"),
-            (counts.not_shown, "not shown"),
         )
-        return [f"{number:,} {what}" if number else "" for number, what in told]
+        return [f"{number:,} {what}" for number, what in told if number]
 
     def _line(self) -> str:
         counts, column = self._listening.counts, self._column
-        parts = [counted(counts.recorded, "frame"), f"{counts.dropped:,} dropped"]
-        parts += [text for text in self._missing()[1:] if text]
+        parts = [counted(counts.recorded, "frame"), ", ".join(self._missing()) or "0 dropped"]
+        if counts.not_shown:
+            parts.append(f"{counts.not_shown:,} not shown")
         if column is not None and self._first_s is not None:
             parts.insert(0, f"{column.time_s - self._first_s:7.1f} s")
             parts += [f"level {column.level_db:6.1f} dB", self._bars(column)]
@@ -264,6 +265,10 @@ class _Status:
                 "probability": None if column.label is None else column.label.probability,
             }
         print_event("frames", **vars(self._listening.counts), **told)
+
+    def _warn_of_doubts(self) -> None:
+        for doubt in self._source.doubts(at_end=False):
+            self._warn_once(doubt)
 
     def _warn_once(self, sentence: str) -> None:
         """Print a sentence to standard error, unless it was, with other numbers."""

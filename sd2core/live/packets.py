@@ -44,7 +44,7 @@ class PacketCounts:
     received: int = 0
     invalid: int = 0  # no packet of this kind, or of no stream
     duplicate: int = 0
-    late: int = 0  # their frame was handed out before
+    late: int = 0  # their frame was handed out before, or began before listening
     lost: int = 0  # never received, or not yet
     restarts: int = 0
 
@@ -125,19 +125,10 @@ class FrameAssembler:
         complete = [number for number, one in self._open.items() if one.missing <= 0]
         return self._ready(max(complete, default=-1) + 1)
 
-    @property
-    def unfinished_bytes(self) -> int:
-        """Number of received bytes that are in no frame yet."""
-        return sum(self._frame_bytes - one.missing for one in self._open.values())
-
     def _begin(self, first: _Packet) -> None:
         """Begin a stream with a packet."""
-        self._newest, self._count, self._end = (
-            first.sequence - 1,
-            first.sent_before,
-            first.sent_before,
-        )
-        self._first = first.sequence
+        self._first, self._newest = first.sequence, first.sequence - 1
+        self._count = self._end = first.sent_before
         # The last packet of all is a short one; those before it were full.
         before = first.sent_before // max(first.sequence - 1, 1)
         self._largest = max(len(first.samples), min(before, PAYLOAD_BYTES))

@@ -167,7 +167,8 @@ class Dca1000Source:
         self._is_judged = False
         self._socket = _listening_socket(address, port)
         self.address, self.port = self._socket.getsockname()[:2]
-        self._waiting_bytes = self._socket.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF)
+        # What the system keeps of packets that wait, with its own overhead.
+        self.waiting_bytes = self._socket.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF)
 
     @property
     def about(self) -> str:
@@ -228,7 +229,13 @@ class Dca1000Source:
         if self.foreign_packets:
             doubts.append(f"Packets left out of another sender: {self.foreign_packets:,}.")
         if at_end and counts.lost:
-            doubts.append(f"Packets lost: {counts.lost:,}.{self._small_buffer()}")
+            doubts.append(f"Packets lost: {counts.lost:,}.")
+        if self.waiting_bytes < _SOCKET_BYTES and (counts.lost or not at_end):
+            doubts.append(
+                f"The system keeps only {self.waiting_bytes / 1e3:,.0f} kB of packets that wait,"
+                " and may lose some; on Linux,"
+                f" `sysctl -w net.core.rmem_max={_SOCKET_BYTES}` allows more."
+            )
         if self._rate_doubt is not None:
             doubts.append(self._rate_doubt)
         return doubts
@@ -285,14 +292,6 @@ class Dca1000Source:
                 f" {size:,} bytes every {1e3 * period_s:g} ms): the radar probably runs with"
                 " another configuration, and samples are out of place."
             )
-
-    def _small_buffer(self) -> str:
-        if self._waiting_bytes >= _SOCKET_BYTES:
-            return ""
-        return (
-            f" The system keeps only {self._waiting_bytes / 1e3:,.0f} kB of packets waiting; on"
-            f" Linux, `sysctl -w net.core.rmem_max={_SOCKET_BYTES}` allows more."
-        )
 
 
 def _listening_socket(address: str, port: int) -> socket.socket:

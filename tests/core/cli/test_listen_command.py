@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import queue
 import signal
 import socket
 import subprocess
@@ -11,6 +12,7 @@ import sys
 import threading
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,6 +22,7 @@ from sd2core.classify.files import save_classifier
 from sd2core.cli import listen
 from sd2core.files.resources import resource_path
 from sd2core.io.radar import load_capture
+from sd2core.live.sources import Dca1000Source
 from sd2core.recording.recording import Recording, open_recording
 from tests.core.classify.classifiers import classifier
 from tests.core.io.radar.dca1000_files import TiRecording, words_of, write_ti
@@ -72,50 +75,39 @@ def test_a_classifier_is_asked(sd2: Sd2, tmp_path: Path, monkeypatch: pytest.Mon
     assert "level" in outcome.out
 
 
-def _free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as found:
-        found.bind(("127.0.0.1", 0))
-        return int(found.getsockname()[1])
-
-
-def test_a_dca1000_is_listened_to(sd2: Sd2, tmp_path: Path) -> None:
-    path, port = write_ti(tmp_path / "ti", TI), _free_port()
+def test_a_dca1000_is_listened_to(
+    sd2: Sd2, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write_ti(tmp_path / "ti", TI)
     packets = packets_of(words_of(TI, TI.beat()).tobytes())
+    ports: queue.Queue[int] = queue.Queue()
+    run = Dca1000Source.run
+
+    def told(source: Dca1000Source, *arguments: Any) -> None:
+        ports.put(source.port)
+        run(source, *arguments)
+
+    monkeypatch.setattr(Dca1000Source, "run", told)
 
     def send() -> None:
-        """Send once somebody listens; before, the port is free."""
+        port = ports.get()
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
-            for _ in range(500):
-                with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-                    try:
-                        probe.bind(("127.0.0.1", port))
-                    except OSError:
-                        break
-                time.sleep(0.01)
-            time.sleep(0.1)
             for one in (*packets, b"none of a card"[:9]):
                 sender.sendto(one, ("127.0.0.1", port))
                 time.sleep(0.002)
+        ports.put(port)
 
-    thread = threading.Thread(target=send)
+    thread = threading.Thread(target=send, daemon=True)
     thread.start()
-    outcome = sd2(
-        "listen",
-        "--dca1000",
-        f"127.0.0.1:{port}",
-        "--setup",
-        path.with_suffix(".cfg"),
-        "--out",
-        tmp_path / "walk.sd2",
-        "--seconds",
-        1.5,
-    )
+    setup = path.with_suffix(".cfg")
+    out = tmp_path / "walk.sd2"
+    outcome = sd2("listen", "--dca1000", ":0", "--setup", setup, "--out", out, "--seconds", 1.2)
     thread.join()
     assert outcome.code == 0
-    assert f"from a DCA1000 to 127.0.0.1:{port}" in outcome.out
+    assert f"from a DCA1000 to 127.0.0.1:{ports.get()}" in outcome.out
     assert "recorded  10 frames" in outcome.out
     assert "none of a DCA1000, or do not fit the others: 1." in outcome.err
-    assert_same_samples(open_recording(tmp_path / "walk.sd2").load_capture(), load_capture(path))
+    assert_same_samples(open_recording(out).load_capture(), load_capture(path))
 
 
 def test_silence_is_explained_and_leaves_nothing(
@@ -123,8 +115,7 @@ def test_silence_is_explained_and_leaves_nothing(
 ) -> None:
     monkeypatch.setattr(listen, "_SILENT_S", 0.1)
     setup = write_ti(tmp_path / "ti", TI).with_suffix(".cfg")
-    place = f":{_free_port()}"
-    command = ("listen", "--dca1000", place, "--setup", setup, "--out", tmp_path / "walk.sd2")
+    command = ("listen", "--dca1000", ":0", "--setup", setup, "--out", tmp_path / "walk.sd2")
     outcome = sd2(*command, "--seconds", 0.4)
     assert outcome.code == 0
     assert outcome.err.count("Nothing comes to 127.0.0.1") == 1
