@@ -211,3 +211,15 @@ def test_control_characters_are_replaced_and_counted(folder: Path, name: str) ->
 def test_where_there_are_escapes_control_characters_stay(folder: Path, name: str) -> None:
     labels = Labels(spans=(Span(1, "Gestures", 1, 2, "a", "bell\0\x07\r\n", "A"),))
     assert there_and_back(folder, name, labels)[0] == labels
+
+
+def test_spans_of_one_time_are_said_to_be_renumbered_by_their_tracks(folder: Path) -> None:
+    """A TextGrid holds a part for each track: its order is that of the tracks."""
+    tracks = (LabelTrack("Gestures"), LabelTrack("left-to-right"))
+    spans = tuple(
+        Span(number, track, 2.0, 3.0, "wave", origin="import")
+        for number, track in enumerate(("left-to-right", "Gestures"), start=1)
+    )
+    back, losses = there_and_back(folder, "textgrid", Labels(tracks, spans))
+    assert [span.track for span in back.spans] == ["Gestures", "left-to-right"]
+    assert [loss.what for loss in losses] == ["ids"]
