@@ -72,7 +72,7 @@ def _libraries() -> Finding:
             "System libraries",
             "problem",
             f"{', '.join(missing)} missing",
-            "On Debian or Ubuntu: " + install_line(missing.values()),
+            install_line(missing.values()),
         )
     return Finding("System libraries", "ok", "all there")
 
@@ -115,7 +115,7 @@ def _window() -> list[Finding]:
             "Fonts",
             "problem",
             "none: texts would be boxes",
-            "On Debian or Ubuntu: " + install_line(["fonts-dejavu-core"]),
+            install_line(["fonts-dejavu-core"]),
         ),
     ]
 
@@ -191,7 +191,7 @@ def report(as_json: bool) -> int:
     else:
         width = max(len(one.about) for one in found)
         for one in found:
-            mark = {"ok": "ok", "note": "note", "problem": "PROBLEM"}[one.state]
+            mark = "PROBLEM" if one.state == "problem" else one.state
             print(f"{mark:<8} {one.about:<{width}}  {one.found}")
             if one.remedy:
                 print(f"{'':<8} {'':<{width}}  → {one.remedy}")

@@ -48,14 +48,17 @@ def explain_missing(missing: Mapping[str, str]) -> Sd2Error:
     """Error that says how to install what is missing."""
     return Sd2Error(
         f"System libraries are missing that the window draws with: {', '.join(missing)}",
-        remedy="On Debian or Ubuntu: " + install_line(missing.values()),
+        remedy=install_line(missing.values()),
     )
 
 
 def install_line(packages: Iterable[str]) -> str:
-    """Command that installs packages on Debian and Ubuntu."""
+    """Words on how to install packages on Debian and Ubuntu."""
     names = " ".join(dict.fromkeys(packages))
-    return f"sudo apt-get update && sudo apt-get install --no-install-recommends {names}"
+    return (
+        "On Debian or Ubuntu: sudo apt-get update && sudo apt-get install"
+        f" --no-install-recommends {names}"
+    )
 
 
 def loads(library: str) -> bool:
