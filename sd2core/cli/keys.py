@@ -25,22 +25,35 @@ else:
 
     @contextmanager
     def pressed_keys() -> Iterator[Callable[[], str]]:
-        """Function that returns the key that was pressed, or an empty text, at once."""
-        if sys.stdin is None or not sys.stdin.isatty() or _in_background(sys.stdin.fileno()):
+        """Function that returns the key that was pressed, or an empty text, at once.
+
+        Another program presses keys by a pipe.
+        """
+        terminal = _standard_input()
+        if terminal is None or (os.isatty(terminal) and _in_background(terminal)):
             yield str
             return
-        terminal = sys.stdin.fileno()
-        before = termios.tcgetattr(terminal)
 
         def key() -> str:
             ready = select.select([terminal], [], [], 0)[0]
             return os.read(terminal, 1).decode(errors="replace") if ready else ""
 
+        if not os.isatty(terminal):
+            yield key
+            return
+        before = termios.tcgetattr(terminal)
         tty.setcbreak(terminal)  # no Enter is needed; Ctrl-C interrupts as ever
         try:
             yield key
         finally:
             termios.tcsetattr(terminal, termios.TCSADRAIN, before)
+
+    def _standard_input() -> int | None:
+        """File descriptor of standard input, None where it is closed or no file."""
+        try:
+            return None if sys.stdin is None else sys.stdin.fileno()
+        except (OSError, ValueError):
+            return None
 
     def _in_background(terminal: int) -> bool:
         """True if the shell runs this process in the background: setting the terminal stops it."""

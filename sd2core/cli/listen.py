@@ -6,14 +6,16 @@ import argparse
 import math
 import re
 import shutil
+import signal
 import sys
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.options import add_command, add_json, positive_float
 from sd2core.cli.output import counted, print_event, print_facts
 from sd2core.errors import Sd2Error
+from sd2core.runs.control import signals_kept
 
 if TYPE_CHECKING:
     from sd2core.live.listening import Column, Listening
@@ -80,6 +82,11 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         "--seconds", type=positive_float, metavar="S", help="stop after so long (default: never)"
     )
     add_json(parser)
+    parser.add_argument(
+        "--columns",
+        action="store_true",
+        help="with --json, every column of the Doppler map as it comes, receding to approaching",
+    )
 
 
 def _listen(options: argparse.Namespace) -> None:
@@ -102,15 +109,18 @@ def _listen(options: argparse.Namespace) -> None:
     except BaseException:
         source.close()
         raise
-    status = _Status(listening, source, as_json=options.json)
+    status = _Status(listening, source, as_json=options.json, columns=options.columns)
     status.begin(recording.folder, recording.is_continued)
     listening.start()
-    try:
-        _follow(listening, status, options.seconds)
-    except KeyboardInterrupt:
-        pass
-    finally:
-        listening.stop()
+    with signals_kept():
+        # To be told to end is to be told to stop: what waits to be stored is stored.
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        try:
+            _follow(listening, status, options.seconds)
+        except KeyboardInterrupt:
+            pass
+        finally:
+            listening.stop()
     status.end(recording.folder)
 
 
@@ -149,8 +159,11 @@ def _follow(listening: Listening, status: _Status, seconds: float | None) -> Non
 class _Status:
     """What is printed while listening."""
 
-    def __init__(self, listening: Listening, source: Source, *, as_json: bool) -> None:
+    def __init__(
+        self, listening: Listening, source: Source, *, as_json: bool, columns: bool
+    ) -> None:
         self._listening, self._source, self._as_json = listening, source, as_json
+        self._tells_columns = as_json and columns
         self._is_line = not as_json and sys.stdout.isatty()
         self._column: Column | None = None
         self._first_s: float | None = None
@@ -162,7 +175,12 @@ class _Status:
         """Say what is listened to."""
         if self._as_json:
             print_event(
-                "listening", source=self._source.about, out=str(folder), continued=continued
+                "listening",
+                source=self._source.about,
+                out=str(folder),
+                continued=continued,
+                bins=self._listening.axis.bins,
+                v_max_mps=self._listening.axis.v_max_mps,
             )
         else:
             goes_on = " (continued)" if continued else ""
@@ -176,6 +194,14 @@ class _Status:
             self._column = column
             if self._first_s is None:
                 self._first_s = column.time_s
+            if self._tells_columns:
+                values = [float(f"{value:.9g}") for value in column.values]
+                print_event(
+                    "column",
+                    received_unix_s=column.received_unix_s,
+                    **self._newest(),
+                    values=values,
+                )
         if self._listening.silent_s > _SILENT_S and (silence := self._source.silence()):
             self._warn_once(silence)
         if time.monotonic() - self._shown_s < (_UPDATE_S if self._is_line else _LINE_S):
@@ -183,7 +209,7 @@ class _Status:
         self._shown_s = time.monotonic()
         self._warn_of_doubts()
         if self._as_json:
-            self._print_json()
+            print_event("frames", **self._newest())
         elif self._is_line:
             width = shutil.get_terminal_size().columns - 1
             print(f"\r{self._line()[:width]:<{width}}", end="", flush=True)
@@ -200,7 +226,7 @@ class _Status:
         if self._is_line:
             print()
         for doubt in self._source.doubts(at_end=True):
-            _warn(doubt)
+            self._warn(doubt)
         if self._as_json:
             print_event(
                 "end",
@@ -215,26 +241,16 @@ class _Status:
             return
         facts = {
             "recorded": counted(counts.recorded, "frame"),
-            "missing": ", ".join(self._missing()) or "nothing",
+            "missing": counts.missing or "nothing",
             "not shown": counted(counts.not_shown, "frame") if counts.not_shown else "",
         }
         if median_s is not None and most_s is not None:
             facts["latency"] = f"{1e3 * median_s:.1f} ms, 95 % within {1e3 * most_s:.1f} ms"
         print_facts(str(folder), facts)
 
-    def _missing(self) -> list[str]:
-        """Numbers of frames that the recording lacks, or that lack something."""
-        counts = self._listening.counts
-        told = (
-            (counts.dropped, "dropped"),
-            (counts.lost, "lost"),
-            (counts.damaged, "damaged"),
-        )
-        return [f"{number:,} {what}" for number, what in told if number]
-
     def _line(self) -> str:
         counts, column = self._listening.counts, self._column
-        parts = [counted(counts.recorded, "frame"), ", ".join(self._missing()) or "0 dropped"]
+        parts = [counted(counts.recorded, "frame"), counts.missing or "0 dropped"]
         if counts.not_shown:
             parts.append(f"{counts.not_shown:,} not shown")
         if column is not None and self._first_s is not None:
@@ -254,17 +270,15 @@ class _Status:
         shares = (max(float(value) / self._loudest, lowest) for value in column.values)
         return "".join(_BARS[round(top + 10.0 * math.log10(one) / _BAR_DB)] for one in shares)
 
-    def _print_json(self) -> None:
-        column = self._column
-        told = {}
-        if column is not None:
-            told = {
-                "time_s": column.time_s,
-                "level_db": column.level_db,
-                "label": None if column.label is None else column.label.name,
-                "probability": None if column.label is None else column.label.probability,
-            }
-        print_event("frames", **vars(self._listening.counts), **told)
+    def _newest(self) -> dict[str, Any]:
+        """Numbers of frames, and the newest column in words."""
+        told: dict[str, Any] = dict(vars(self._listening.counts))
+        if (column := self._column) is not None:
+            told["time_s"], told["level_db"] = column.time_s, column.level_db
+            if column.label is not None:
+                told["label"] = column.label.name
+                told["probability"] = column.label.probability
+        return told
 
     def _warn_of_doubts(self) -> None:
         for doubt in self._source.doubts(at_end=False):
@@ -277,8 +291,10 @@ class _Status:
             self._said.add(words)
             if self._is_line:
                 print()
-            _warn(sentence)
+            self._warn(sentence)
 
-
-def _warn(sentence: str) -> None:
-    print(f"sd2: {sentence}", file=sys.stderr, flush=True)
+    def _warn(self, sentence: str) -> None:
+        if self._as_json:
+            print_event("doubt", text=sentence)
+        else:
+            print(f"sd2: {sentence}", file=sys.stderr, flush=True)

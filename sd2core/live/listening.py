@@ -11,7 +11,6 @@ import queue
 import threading
 import time
 from collections import deque
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -22,6 +21,7 @@ from sd2core.errors import Sd2Error
 from sd2core.fmcw.chain import ProcessingOptions
 from sd2core.fmcw.live import LiveMap
 from sd2core.io.radar.capture import RadarCapture
+from sd2core.live.counts import Counts
 from sd2core.live.recording import GrowingRecording, wall_clock_s
 from sd2core.live.sources import Frame, Source
 from sd2core.radar_config import CLUTTER, RadarConfig
@@ -50,7 +50,8 @@ class Label(NamedTuple):
 class Column(NamedTuple):
     """Column of the live map."""
 
-    time_s: float  # since the first frame of the source
+    time_s: float  # in the recording
+    received_unix_s: float  # wall-clock time at which the frame was complete
     values: NDArray[np.float32]  # (bins,)
     label: Label | None
 
@@ -59,22 +60,6 @@ class Column(NamedTuple):
         """Power of the column relative to 1, minus infinity where there is none."""
         power = float(self.values.sum(dtype=np.float64))
         return 10.0 * float(np.log10(power)) if power > 0 else -np.inf
-
-
-@dataclass
-class Counts:
-    """Numbers of frames by what became of them."""
-
-    recorded: int = 0
-    dropped: int = 0  # received, not stored: the disk was too slow
-    lost: int = 0  # sent, not received
-    damaged: int = 0  # stored, with zeros in place of lost packets
-    not_shown: int = 0  # stored, not in the live map: the caller was too slow
-
-    @property
-    def whole(self) -> bool:
-        """True if nothing is missing in the recording."""
-        return not (self.dropped or self.lost or self.damaged)
 
 
 class Listening:
@@ -121,7 +106,7 @@ class Listening:
         self._map = LiveMap(like, axis, ProcessingOptions(CLUTTER))
         size = max(_BUFFER_BYTES // head.frame_bytes, _LEAST_FRAMES)
         self._to_store: queue.Queue[tuple[Frame, int]] = queue.Queue(size)
-        self._to_show: queue.Queue[tuple[NDArray[Any], Frame]] = queue.Queue(_SHOWN_FRAMES)
+        self._to_show: queue.Queue[tuple[float, NDArray[Any], Frame]] = queue.Queue(_SHOWN_FRAMES)
         self._dropped = 0  # since the last frame that was taken
         self._stop = threading.Event()
         self._error: BaseException | None = None
@@ -164,15 +149,15 @@ class Listening:
         Raises what stopped the listening, such as OSError of a full disk.
         """
         try:
-            words, frame = self._to_show.get(timeout=timeout_s)
+            time_s, words, frame = self._to_show.get(timeout=timeout_s)
         except queue.Empty:
             if self._error is not None:
                 raise self._error from None
             return None
         values = self._map.column(self._head.as_samples(words))
-        label = None if self._labeller is None else self._labeller.label(frame.time_s, values)
+        label = None if self._labeller is None else self._labeller.label(time_s, values)
         self._latencies_s.append(time.monotonic() - frame.received_s)
-        return Column(frame.time_s, values, label)
+        return Column(time_s, wall_clock_s(frame.received_s), values, label)
 
     def stop(self) -> None:
         """Stop, store what was received, and close source and recording.
@@ -222,15 +207,17 @@ class Listening:
 
     def _store_one(self, frame: Frame, dropped: int) -> None:
         words = self._source.words(frame)
+        # Time 0 by the wall clock; of the radar's clock there is no more.
+        head = self._source.head(wall_clock_s(frame.received_s) - frame.time_s)
+        # Shown before it is stored: a slow disk does not hold the map up.
+        time_s = self._recording.time_of(frame.time_s, head)
         try:
-            self._to_show.put_nowait((words, frame))
+            self._to_show.put_nowait((time_s, words, frame))
         except queue.Full:
             self.counts.not_shown += 1
-        # Time 0 by the wall clock; of the radar's clock there is no more.
-        start_unix_s = wall_clock_s(frame.received_s) - frame.time_s
         self._recording.append(
             words,
-            self._source.head(start_unix_s),
+            head,
             time_s=frame.time_s,
             dropped=dropped,
             lost=frame.lost,

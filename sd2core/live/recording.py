@@ -84,6 +84,21 @@ class GrowingRecording:
                     found = f"{self.folder} is of another radar or configuration: {there}"
                 raise Sd2Error(found, f"to continue it, {given}", "Give another folder as --out")
 
+    def time_of(self, time_s: float, head: GrowingHead) -> float:
+        """Time in the recording of a frame of this session, see :meth:`append`.
+
+        The first call opens the files, and raises what keeps them from being written.
+        """
+        if self._streams is None:
+            self._start(head)
+        assert self._head is not None
+        if self._begin_s is None:
+            self._begin_s = 0.0
+            if self.is_continued:
+                pause_s = head.start_unix_s - self._head.start_unix_s
+                self._begin_s = max(pause_s, self._last_s + head.radar.frame_repetition_s)
+        return self._begin_s + time_s
+
     def append(
         self,
         words: NDArray[Any],
@@ -107,16 +122,8 @@ class GrowingRecording:
         dropped, lost, missing_bytes : int
             See :data:`~sd2core.io.radar.growing.ENTRY`.
         """
-        if self._streams is None:
-            self._start(head)
+        at_s = self.time_of(time_s, head)
         assert self._streams is not None
-        assert self._head is not None
-        if self._begin_s is None:
-            self._begin_s = 0.0
-            if self.is_continued:
-                pause_s = head.start_unix_s - self._head.start_unix_s
-                self._begin_s = max(pause_s, self._last_s + head.radar.frame_repetition_s)
-        at_s = self._begin_s + time_s
         if self.frames and not at_s > self._last_s:
             raise Sd2Error(
                 f"A frame at {at_s:.6f} s follows one at {self._last_s:.6f} s",

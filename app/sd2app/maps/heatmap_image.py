@@ -59,6 +59,12 @@ class Columns:
         )
         first = frames[:-1]
         filled = (first >= 0) & (first < len(timebase))
+        left_s = start_s - track.offset_s + (stop_s - start_s) * np.arange(columns) / columns
+        # Of a column that a gap ends in, the frames after it are shown.
+        later = frames[1:] > first + 1
+        filled[filled] = later[filled] | (
+            left_s[filled] - timebase.times_s[first[filled]] < track.longest_s
+        )
         if not filled.any():
             return cls(filled, 0, 0, np.zeros(0, np.int64))
         begin, end = int(first[filled][0]), int(frames[1:][filled][-1])

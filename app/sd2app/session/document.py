@@ -5,13 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QUndoStack
 
 from sd2app.background.latest import Emit
-from sd2app.session.content import PARTS, UNTITLED, Content, load_content, recording_of
+from sd2app.session.content import (
+    PARTS,
+    UNTITLED,
+    Content,
+    common_clock,
+    load_content,
+    recording_of,
+)
 from sd2app.session.tasks import Job, ListedRunner, TaskList
 from sd2core.body.camera import PinholeCamera
 from sd2core.labels.spans import Labels
@@ -21,6 +28,7 @@ from sd2core.radar_config import CLUTTER, Clutter
 from sd2core.recording.recording import Recording
 from sd2core.recording.relinking import Relinked
 from sd2core.sensor import VelocityAxis
+from sd2core.timebase import Timebase
 
 if TYPE_CHECKING:
     from sd2core.io.radar import RadarCapture
@@ -32,6 +40,7 @@ class DocumentModel(QObject):
 
     opened = Signal()  # another recording, or none
     changed = Signal()  # something in it, or its place on disk
+    grown = Signal()  # frames were added at its end
     saved = Signal()  # on disk with all edits, maybe in another place than before
     noted = Signal(str)
     failed = Signal(str)
@@ -42,6 +51,7 @@ class DocumentModel(QObject):
         self.content: Content | None = None  # all parts; None while nothing is open
         self.clutter: Clutter = CLUTTER  # method that removes static echoes from the capture
         self.goes_on = False  # the recording is the one that was open before, with other files
+        self.growing = False  # a radar is listened to, and adds frames
         self._base: Recording | None = None
         self._runner = ListedRunner("open", jobs, self, self._receive)
         self._maps = ListedRunner("radar", jobs, self, self._receive_map)
@@ -135,6 +145,11 @@ class DocumentModel(QObject):
         return self._runner.job
 
     @property
+    def maps_capture(self) -> bool:
+        """True while the Doppler map of the capture is being made."""
+        return self._maps.job is not None
+
+    @property
     def part_read(self) -> str:
         """Part that is being read, in words; empty before the first."""
         job = self.reading
@@ -150,6 +165,49 @@ class DocumentModel(QObject):
         """Add files to the recording that is open, or open them."""
         recording = self.recording
         self._start(replace(recording) if recording is not None else None, list(paths))
+
+    def follow(self, content: Content) -> None:
+        """Show a recording that a radar's frames are added to, from now on by :meth:`grow`.
+
+        Where it is the one that is open, its edits and their history stay.
+        """
+        self._runner.cancel()
+        self._maps.cancel()
+        before, self.content = self.content, content
+        self.growing = True
+        if before is not None and before.recording.folder == content.recording.folder:
+            self.content = replace(before, capture=content.capture)
+            assert content.radar_map is not None
+            self.grow(content.radar_map)
+            return
+        if before is not None:
+            before.close()
+        self.goes_on = False
+        self._tell_opened(unsaved=False)
+
+    def grow(self, radar_map: DopplerMap) -> None:
+        """Show a longer map of the radar: it was listened to until its end."""
+        self._take_growth(radar_map.timebase, radar_map=radar_map)
+
+    def end_growth(self) -> None:
+        """Take over the whole capture; Sd2Error if it cannot be read."""
+        if self.content is None or not self.growing:
+            return
+        self.growing = False
+        capture = self.content.recording.load_capture()
+        self._take_growth(capture.timebase, capture=capture)
+        self.changed.emit()
+        if capture.notes:
+            self.noted.emit(" ".join(capture.notes))
+        self._process_capture()
+
+    def _take_growth(self, radar: Timebase, **parts: Any) -> None:
+        content = self.content
+        assert content is not None
+        clocks = [part.timebase for part in (content.video, content.mesh) if part is not None]
+        clocks.append(radar.shifted(content.recording.radar_offset_s))
+        self.content = replace(content, timebase=common_clock(clocks), **parts)
+        self.grown.emit()
 
     def close(self) -> None:
         """Stop all work and let go of the files."""
@@ -177,16 +235,20 @@ class DocumentModel(QObject):
         unsaved = self.goes_on and self.modified
         if before is not None and self.goes_on:
             _keep_edits(before.recording, content.recording)
-        self.undo_stack.clear()
-        if unsaved:
-            self.undo_stack.resetClean()
-        self.opened.emit()
-        self.changed.emit()
+        self.growing = False
+        self._tell_opened(unsaved)
         for problem in content.problems:
             self.failed.emit(problem)
         if content.notes:
             self.noted.emit(" ".join(content.notes))
         self._process_capture()
+
+    def _tell_opened(self, unsaved: bool) -> None:
+        self.undo_stack.clear()
+        if unsaved:
+            self.undo_stack.resetClean()
+        self.opened.emit()
+        self.changed.emit()
 
     # --- changing -------------------------------------------------------------------------
 
@@ -210,7 +272,7 @@ class DocumentModel(QObject):
     def _process_capture(self) -> None:
         """Make the Doppler map of the capture in the background."""
         capture, clutter = self.capture, self.clutter
-        if capture is None:
+        if capture is None or self.growing:
             self._maps.cancel()
             return
 

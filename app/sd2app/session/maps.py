@@ -19,6 +19,8 @@ UNCERTAIN_SHARE = 0.5
 _FAINT_SHARE = 0.05
 """Share of the highest level below which nothing shows on a linear scale."""
 
+_LONGEST_FRAMES = 5
+
 _SHOWS_SHARE = 0.1
 """Deviation, as share of the highest level, that matters where nothing shows."""
 
@@ -170,10 +172,21 @@ class MapModel(QObject):
         self.changed.emit()
 
     def frame_at(self, time_s: float) -> int | None:
-        """Frame of the map at a time of the recording, or None outside."""
-        if self.map is None or not self.map.timebase.covers(time_s - self.offset_s):
+        """Frame of the map at a time of the recording, or None outside and in gaps."""
+        time_s -= self.offset_s
+        if self.map is None or not self.map.timebase.covers(time_s):
             return None
-        return self.map.timebase.frame_at(time_s - self.offset_s)
+        frame = self.map.timebase.frame_at(time_s)
+        return frame if time_s - self.map.times_s[frame] < self.longest_s else None
+
+    @property
+    def longest_s(self) -> float:
+        """Time for which a frame is shown at most: a radar that was stopped for longer saw nothing.
+
+        Cameras that drop some frames show one for as long.
+        """
+        assert self.map is not None
+        return _LONGEST_FRAMES * self.map.timebase.frame_duration_s
 
     def levels_db(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
         """Values in dB above the reference; minus infinity for zero."""

@@ -51,6 +51,13 @@ class PlaybackModel(QObject):
         self.timebase = timebase
         self._move_to(timebase.start_s, force=True)
 
+    def extend(self, timebase: Timebase) -> None:
+        """Clock the same recording with more frames; on its last one, go on to the newest."""
+        at_end = self.frame >= len(self.timebase) - 1
+        self.timebase = timebase
+        if not self.playing:
+            self._move_to(timebase.time_of(len(timebase) - 1 if at_end else self.frame))
+
     def play(self) -> None:
         """Run from here, or from the start when at the end."""
         if self.playing or len(self.timebase) < 2:

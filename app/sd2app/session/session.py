@@ -14,7 +14,7 @@ from sd2app.session.placing import PlacingModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.sensor import SensorModel
 from sd2app.session.tasks import TaskList
-from sd2app.session.time_window import TimeWindow
+from sd2app.session.time_window import GROWING_S, TimeWindow
 from sd2app.session.undo import Edits
 from sd2app.session.video import VideoModel
 from sd2app.settings import Settings
@@ -72,8 +72,19 @@ class Session:
         assert content is not None
         self.playback.set_timebase(content.timebase)
         self.span.set_extent(content.timebase.start_s, content.timebase.end_s)
+        if self.document.growing:
+            self.span.extend(content.timebase.end_s, GROWING_S)
         self.video.set_reader(content.video)
         self.sensor.set_sensor(content.recording.sensor)
+
+    def extend(self) -> None:
+        """Follow a recording that has grown, or ends its growth."""
+        content = self.document.content
+        assert content is not None
+        self.playback.extend(content.timebase)
+        room_s = GROWING_S if self.document.growing else 0.0
+        self.span.extend(content.timebase.end_s, room_s)
+        self.follow_capture()
 
     def follow_capture(self, new: bool = False) -> None:
         """Show the radar's map as the document has it; of a new document at its own 0 dB."""
@@ -101,7 +112,7 @@ def build_session(parent: QObject, settings: Settings) -> Session:
     playback.frame_changed.connect(
         lambda _: playback.playing and span.reveal(playback.time_s)  # turn the page
     )
-    return Session(
+    session = Session(
         settings=settings,
         jobs=jobs,
         document=document,
@@ -120,3 +131,5 @@ def build_session(parent: QObject, settings: Settings) -> Session:
         placing=PlacingModel(parent),
         edits=Edits(document, sensor),
     )
+    document.grown.connect(session.extend)
+    return session

@@ -5,6 +5,8 @@ from __future__ import annotations
 from PySide6.QtCore import QObject, Signal
 
 _SHORTEST_S = 0.2
+GROWING_S = 10.0
+"""What is shown of a recording that grows, unless the user shows more or less."""
 
 
 class TimeWindow(QObject):
@@ -43,15 +45,33 @@ class TimeWindow(QObject):
         self._span = self._extent
         self.changed.emit()
 
+    def extend(self, end_s: float, room_s: float = 0.0) -> None:
+        """Take over another end of what there is; a window that reached to it goes along.
+
+        All of a short recording stays in view; ``room_s`` is the least length of the extent.
+        """
+        first, last = self._extent
+        shows_all, at_end = self._span == self._extent, self.end_s >= last
+        self._extent = (first, max(end_s, first + max(_SHORTEST_S, room_s)))
+        duration = self.duration_s
+        if shows_all and duration < GROWING_S:
+            duration = min(self._extent[1] - first, max(GROWING_S, duration))
+        start = self._extent[1] - duration if at_end else self.start_s
+        self._span = self._held(start, start + duration)
+        self.changed.emit()
+
     def set_span(self, start_s: float, end_s: float) -> None:
         """Show a stretch, held inside the extent and not shorter than 0.2 s."""
-        first, last = self._extent
-        duration = min(max(end_s - start_s, _SHORTEST_S), last - first)
-        start = min(max(start_s, first), last - duration)
-        span = (start, start + duration)
+        span = self._held(start_s, end_s)
         if span != self._span:
             self._span = span
             self.changed.emit()
+
+    def _held(self, start_s: float, end_s: float) -> tuple[float, float]:
+        first, last = self._extent
+        duration = min(max(end_s - start_s, _SHORTEST_S), last - first)
+        start = min(max(start_s, first), last - duration)
+        return start, start + duration
 
     def zoom(self, factor: float, anchor_s: float) -> None:
         """Scale the window by ``factor`` (< 1 shows less), keeping ``anchor_s`` in place."""

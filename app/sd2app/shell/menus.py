@@ -19,7 +19,7 @@ _FILLED, _SUBMENU = "@", ">"
 
 LAYOUT: Mapping[str, tuple[str, ...]] = {
     "File": (
-        "new_from_video", "open", "@recent", "add", "compare", "relink", "-", "save",
+        "new_from_video", "listen", "open", "@recent", "add", "compare", "relink", "-", "save",
         "save_as", "export_map", "export_denoised", "export_maps", "export_inertial",
         "export_strip", "export_dataset", "-", "batch", "-", "recover_labels", "-", "quit",
     ),

@@ -16,8 +16,9 @@ if TYPE_CHECKING:
 class Parts:
     """Parts that may be replaced, e.g. by faster ones in a test.
 
-    Accuracy functions, denoisers and classifiers are the library's, the commands that fit, train
-    and work in batches ``sd2`` itself, and the recovery folder of labels is the user's by default.
+    Accuracy functions, denoisers and classifiers are the library's, the commands that fit, train,
+    work in batches and listen ``sd2`` itself, and the recovery folder of labels is the user's by
+    default.
     """
 
     accuracy: AccuracyLibrary | None = None
@@ -27,3 +28,4 @@ class Parts:
     recovery: Path | None = None
     batch_command: Sequence[str] | None = None
     classifiers: ClassifierLibrary | None = None
+    listen_command: Sequence[str] | None = None

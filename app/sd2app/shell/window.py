@@ -151,7 +151,7 @@ class MainWindow(QMainWindow):
             {name: fill for feature in self.features for name, fill in feature.menus().items()}
         )
         self._fill_panels()
-        bars = self.features.fit.bars()
+        bars = [bar for feature in self.features for bar in feature.bars()]
         for bar in bars:
             self._column.insertWidget(0, bar)
         said = (notice for feature in self.features for notice in feature.notices())

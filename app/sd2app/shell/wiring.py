@@ -22,6 +22,7 @@ from sd2app.figures.feature import FiguresFeature
 from sd2app.fit.feature import FitFeature
 from sd2app.imu.feature import ImuFeature
 from sd2app.labels.feature import LabelsFeature
+from sd2app.live.feature import LiveFeature
 from sd2app.maps.feature import MapsFeature
 from sd2app.maps.stack import MapStack
 from sd2app.mesh_comparison.feature import MeshComparisonFeature
@@ -114,6 +115,7 @@ class Features:
             lambda: labels.model.labels,
             lambda: track_words(denoise.model.card),
         )
+        self.live = LiveFeature(session, shell, parts.listen_command, parent)
         self.playback = PlaybackFeature(session)
         self.program = ProgramFeature(session, shell, labels)
         self.imu = ImuFeature(session, shell, parent)
@@ -132,7 +134,7 @@ class Features:
             self.mesh_comparison, self.sensor, self.suggestions, self.agreement,
             self.dataset_export, self.fit, self.batch, self.training, self.classify,
             self.denoise, self.maps, self.accuracy, self.video, self.labels, self.figures,
-            self.playback, self.program, self.imu, self.files, self.scene,
+            self.live, self.playback, self.program, self.imu, self.files, self.scene,
         )  # fmt: skip
         session.document.opened.connect(lambda: _take_over(session, self))
 

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -92,3 +94,17 @@ def test_columns_without_a_person_are_stretches_on_the_recordings_clock():
     assert track.read(1.25, 1.0).note == "no person"
     assert track.read(1.45, 1.0).note == ""
     assert track_of(np.ones((2, 6))).gaps_s == ()
+
+
+def test_nothing_is_shown_while_a_radar_was_stopped():
+    times_s = np.concatenate([np.arange(10) / 10, 4.0 + np.arange(10) / 10])
+    track = track_of(np.ones((2, 20)))
+    track.set_map(replace(track.map, timebase=Timebase(times_s)))
+    _, filled = shade_columns(track, HeatmapLevels(), 0.0, 6.0, 120)  # 0.05 s each
+    expected = [*range(28), *range(80, 100)]
+    assert np.flatnonzero(filled).tolist() == expected
+    _, filled = shade_columns(track, HeatmapLevels(), 0.0, 6.0, 3)
+    assert filled.tolist() == [True, False, True]
+    assert track.read(1.3, 0.5) is not None  # a few frames may be missing
+    assert track.read(2.0, 0.5) is None
+    assert track.read(4.0, 0.5).frame == 10

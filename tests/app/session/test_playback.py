@@ -88,3 +88,31 @@ def test_one_frame_does_not_play(playback):
     playback.set_timebase(Timebase([0.0]))
     playback.play()
     assert not playback.playing
+
+
+@given(
+    frames=st.integers(1, 20),
+    more=st.lists(st.integers(1, 5), min_size=1, max_size=10),
+    at=st.integers(0, 19),
+)
+def test_the_newest_frame_of_a_growing_recording_stays_on_screen(frames, more, at):
+    playback = PlaybackModel()
+    playback.set_timebase(Timebase.regular(frames, 30.0))
+    playback.seek_frame(at)
+    at_end = playback.frame == frames - 1
+    for count in more:
+        before = playback.time_s
+        frames += count
+        playback.extend(Timebase.regular(frames, 30.0))
+        assert playback.frame == (frames - 1 if at_end else at)
+        assert playback.time_s == playback.timebase.time_of(playback.frame)
+        assert at_end or playback.time_s == before
+
+
+def test_playing_goes_on_into_what_was_added(playback, qtbot):
+    playback.set_timebase(Timebase.regular(3, 30.0))
+    playback.play()
+    playback.extend(Timebase.regular(12, 30.0))
+    assert playback.playing
+    qtbot.waitUntil(lambda: not playback.playing, timeout=20_000)
+    assert playback.frame == 11

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sd2app.session.time_window import TimeWindow
+from sd2app.session.time_window import GROWING_S, TimeWindow
 
 moves = st.one_of(
     st.tuples(st.just("zoom"), st.floats(0.01, 100), st.floats(-20, 50)),
@@ -35,3 +35,33 @@ def test_zooming_keeps_the_anchor_in_place():
     assert span.duration_s == pytest.approx(15.0)
     span.fit()
     assert (span.start_s, span.end_s) == (0.0, 30.0)
+
+
+@given(st.lists(st.floats(0.001, 7.0), min_size=1, max_size=40), st.sampled_from([0.0, GROWING_S]))
+def test_a_window_at_the_end_of_a_growing_recording_stays_there(steps, room_s):
+    span = TimeWindow()
+    span.set_extent(0.0, 0.03)
+    end_s = 0.03
+    for step_s in steps:
+        end_s += step_s
+        span.extend(end_s, room_s)
+        assert span.extent_s == (0.0, max(end_s, room_s, 0.2))
+        assert span.end_s == pytest.approx(span.extent_s[1])
+        assert span.duration_s == pytest.approx(min(span.extent_s[1], GROWING_S))
+    span.extend(end_s)  # it has ended, and there is no more room beyond it
+    assert span.extent_s == (0.0, max(end_s, 0.2))
+    assert span.end_s == pytest.approx(max(end_s, 0.2))
+
+
+def test_a_window_elsewhere_stays_where_the_user_put_it():
+    span = TimeWindow()
+    span.set_extent(0.0, 30.0)
+    span.set_span(4.0, 9.0)
+    span.extend(31.0, GROWING_S)
+    assert (span.start_s, span.end_s) == (4.0, 9.0)
+    span.set_span(29.0, 31.0)  # at the end, as long as the user wants it
+    span.extend(32.5, GROWING_S)
+    assert (span.start_s, span.end_s) == (30.5, 32.5)
+    span.fit()
+    span.extend(33.5, GROWING_S)
+    assert (span.start_s, span.end_s) == (1.0, 33.5)

@@ -1,0 +1,1 @@
+"""Listening to a radar: a recording that grows on screen."""

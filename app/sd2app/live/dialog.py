@@ -1,0 +1,95 @@
+"""Dialog Listen: a radar or a capture, and the recording that grows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtWidgets import QDialog, QLabel, QLineEdit, QToolButton, QWidget
+
+from sd2app.live.setup import ListenSetup
+from sd2app.widgets.dialogs import accepting, ask_file, ask_new
+from sd2app.widgets.inputs import Choice
+from sd2app.widgets.layouts import STRETCH, column_of, form_of, row_of
+from sd2app.widgets.panel import ElidedLabel, outlined, say, sentence
+from sd2core.io.kinds import RADAR_SUFFIXES
+
+_SETUPS = "Configuration of the radar (*.cfg *.json);;All files (*)"
+_CAPTURES = (
+    f"Radar captures and recordings ({' '.join(f'*{one}' for one in sorted(RADAR_SUFFIXES))}"
+    " radar.npy recording.json live.json);;All files (*)"
+)
+_WAYS = {"dca1000": "a TI radar with a DCA1000", "replay": "a capture, replayed at its own rate"}
+_NONE = "none chosen"
+
+
+class ListenDialog(QDialog):
+    """A view of :class:`ListenSetup`."""
+
+    def __init__(self, setup: ListenSetup, parent: QWidget) -> None:
+        super().__init__(parent)
+        self._setup = setup
+        self.setWindowTitle("Listen to a radar")
+        self._way = Choice(
+            "Where frames come from", self, _WAYS, lambda way: setup.choose("way", way)
+        )
+        self._file = ElidedLabel(self)
+        self._folder = ElidedLabel(self)
+        self._address = QLineEdit(setup.address, self)
+        self._address.setAccessibleName("Address of this computer")
+        self._address.setPlaceholderText("127.0.0.1:4098, which only this computer reaches")
+        self._address.textEdited.connect(lambda text: setup.choose("address", text))
+        self._hint = sentence(
+            "A DCA1000 sends to 192.168.33.30, unless it is told otherwise: the network card it is"
+            " plugged into must have that address, and it is what you give here."
+        )
+        self._message = sentence("")
+        self._file_name, self._address_name = QLabel(self), QLabel("Address", self)
+        buttons, self._begin = accepting(self, "Listen")
+        form = form_of(
+            ("From", self._way),
+            (self._file_name, row_of((self._file, 1), self._button(self._ask_file), spacing_px=8)),
+            (self._address_name, self._address),
+            ("", self._hint),
+            ("Into", row_of((self._folder, 1), self._button(self._ask_folder), spacing_px=8)),
+            gaps_px=(16, 12),
+        )
+        self.setLayout(
+            column_of(form, STRETCH, self._message, buttons, spacing_px=16, margins_px=16)
+        )
+        setup.changed.connect(self._refresh)
+        self._refresh()
+        self.resize(620, 320)
+
+    def _button(self, run: Callable[[], None]) -> QToolButton:
+        return outlined("Choose…", "Choose another", run, self)
+
+    def _refresh(self) -> None:
+        setup = self._setup
+        is_radar = setup.way == "dca1000"
+        self._way.show_value(setup.way)
+        self._file_name.setText("Configuration" if is_radar else "Capture")
+        chosen = setup.setup if is_radar else setup.replay
+        self._file.setText(str(chosen) if chosen is not None else _NONE)
+        for widget in (self._address_name, self._address, self._hint):
+            widget.setVisible(is_radar)
+        self._folder.setText(str(setup.folder))
+        words, role = setup.problem, "muted"
+        if not words and setup.continues:
+            words = f"{setup.folder.name} exists: frames are added to it, if it is of this radar."
+        say(self._message, words, role)
+        self._begin.setEnabled(not setup.problem)
+        self._begin.setText("Continue" if setup.continues else "Listen")
+
+    def _ask_file(self) -> None:
+        setup = self._setup
+        if setup.way == "dca1000":
+            start = str(setup.setup or "")
+            if path := ask_file(self, "Configuration that the radar runs with", _SETUPS, start):
+                setup.choose("setup", path)
+        elif path := ask_file(self, "Capture", _CAPTURES, str(setup.replay or "")):
+            setup.choose("replay", path)
+
+    def _ask_folder(self) -> None:
+        start = str(self._setup.folder)
+        if folder := ask_new(self, "Record into", start, "Recording (*.sd2)"):
+            self._setup.choose_folder(folder)

@@ -1,0 +1,310 @@
+"""Listening to a radar in a process beside the window, and its recording on screen."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import sys
+import time
+from collections import deque
+from collections.abc import Sequence
+from typing import Any, Literal
+
+import numpy as np
+from PySide6.QtCore import QObject, QProcess, QProcessEnvironment, QTimer, Signal
+
+from sd2app.live.growing_map import GrowingMap
+from sd2app.live.request import ListenRequest
+from sd2app.session.content import Content
+from sd2app.session.session import Session
+from sd2core.errors import Sd2Error
+from sd2core.live.counts import Counts
+from sd2core.processes import ONE_THREAD
+from sd2core.radar_config import CLUTTER
+from sd2core.recording.recording import FILE_NAME, open_recording
+
+COMMAND = (sys.executable, "-m", "sd2core.cli")
+State = Literal["idle", "opening", "starting", "listening", "stopping", "stopped", "failed"]
+
+_TELL_MS = 100
+"""Numbers that change faster cannot be read."""
+_LATENCIES = 100
+_STOP_MS = 10_000
+"""By then, all that waited to be stored is stored, or never will be."""
+
+
+class LiveModel(QObject):
+    """``sd2 listen`` in a process of its own, so that no frame is lost while the window is busy.
+
+    Its columns are added to the map on screen as they come. Where the user opens another recording
+    meanwhile, listening goes on, and :meth:`show` comes back to it.
+    """
+
+    changed = Signal()  # state, counts, level, latency; at most ten times a second
+    state_changed = Signal()
+    warned = Signal(str)
+
+    def __init__(self, session: Session, parent: QObject, command: Sequence[str] = COMMAND) -> None:
+        super().__init__(parent)
+        self._session, self._document, self._command = session, session.document, list(command)
+        self.state: State = "idle"
+        self.request: ListenRequest | None = None
+        self.about = ""  # radar and place that frames come from
+        self.counts = Counts()
+        self.level_db: float | None = None  # of the newest column
+        self.text = ""  # why it failed
+        self._map: GrowingMap | None = None
+        self._new: list[tuple[float, list[float]]] = []  # columns not on the map yet
+        self._received_unix_s = 0.0
+        self._latencies_s: deque[float] = deque(maxlen=_LATENCIES)
+        self._reference = 0.0  # that was set here: the strongest bin so far is 0 dB
+        self._process: QProcess | None = None
+        self._said = ""  # on standard error
+        self._teller = QTimer(self, singleShot=True, interval=_TELL_MS)
+        self._teller.timeout.connect(self.changed)
+        self._painted = QTimer(self, singleShot=True, interval=0)
+        self._painted.timeout.connect(self._note_latency)
+        self._document.changed.connect(self._begin_when_open)
+        self._document.failed.connect(self._fail_to_open)
+
+    # --- what is known --------------------------------------------------------------------
+
+    @property
+    def busy(self) -> bool:
+        """True while it listens, is about to, or stores what it has received."""
+        return self.state in ("opening", "starting", "listening", "stopping")
+
+    @property
+    def on_screen(self) -> bool:
+        """True while the recording is the one that is open."""
+        recording, request = self._document.recording, self.request
+        return recording is not None and request is not None and recording.folder == request.folder
+
+    @property
+    def can_be_shown(self) -> bool:
+        """True while there is something to show, and something else is open."""
+        return self._map is not None and not self.on_screen
+
+    @property
+    def latency_s(self) -> float | None:
+        """Median time from a frame's reception to the screen, of the last hundred."""
+        return float(np.median(self._latencies_s)) if self._latencies_s else None
+
+    # --- steering -------------------------------------------------------------------------
+
+    def start(self, request: ListenRequest) -> None:
+        """Listen; a recording that is there is opened and continued."""
+        if self.busy:
+            return
+        self.request, self.text, self._map, self.about = request, "", None, ""
+        self.counts, self.level_db = Counts(), None
+        self._latencies_s.clear()
+        if not (request.folder / FILE_NAME).is_file():
+            self._launch()
+            return
+        self._set_state("opening")
+        # Columns are of this filter; the others look ahead, or are the user's choice afterwards.
+        self._document.set_clutter(CLUTTER)
+        if self.on_screen:
+            self._begin_when_open()
+        else:
+            self._document.open([request.folder])
+
+    def go_on(self) -> None:
+        """Listen again to the same, into the same recording."""
+        if self.request is not None:
+            self.start(self.request)
+
+    def stop(self) -> None:
+        """Stop, and keep what was received."""
+        if self.state == "opening":
+            self._set_state("stopped")
+        elif self._process is not None and self.busy:
+            self._set_state("stopping")
+            self._process.write(b"q")
+            self._process.closeWriteChannel()
+
+    def dismiss(self) -> None:
+        """Forget it, once it has ended."""
+        if not self.busy:
+            self._set_state("idle")
+
+    def show(self) -> None:
+        """Show the recording again, in place of what was opened meanwhile."""
+        if self.can_be_shown and self.busy:
+            self._follow()
+        elif self.can_be_shown and self.request is not None:
+            self._document.open([self.request.folder])
+
+    def close(self) -> None:
+        """Stop, and wait until all that was received is stored."""
+        self._teller.stop()
+        process = self._process
+        if process is None:
+            return
+        process.blockSignals(True)
+        process.write(b"q")
+        process.closeWriteChannel()
+        if not process.waitForFinished(_STOP_MS):
+            process.kill()
+            process.waitForFinished(_STOP_MS)
+        self._process = None
+
+    # --- the process ----------------------------------------------------------------------
+
+    def _begin_when_open(self) -> None:
+        """Listen once the recording that is continued is open, with its map."""
+        if self.state != "opening" or not self.on_screen or self._document.maps_capture:
+            return
+        if (there := self._document.radar_map) is not None:
+            self._map = GrowingMap(there)
+            self._launch()
+
+    def _fail_to_open(self, reason: str) -> None:
+        if self.state == "opening":
+            self.text = reason
+            self._set_state("failed")
+
+    def _launch(self) -> None:
+        assert self.request is not None
+        self._said, self._new = "", []
+        process = QProcess(self)
+        environment = QProcessEnvironment.systemEnvironment()
+        for name, value in {**ONE_THREAD, "PYTHONIOENCODING": "utf-8"}.items():
+            environment.insert(name, value)
+        process.setProcessEnvironment(environment)
+        process.readyReadStandardOutput.connect(self._read)
+        process.finished.connect(self._end)
+        process.errorOccurred.connect(self._fail_to_start)
+        self._process = process
+        self._set_state("starting")
+        program, *words = self._command
+        process.start(program, [*words, *self.request.words()])
+
+    def _fail_to_start(self, error: QProcess.ProcessError) -> None:
+        if error == QProcess.ProcessError.FailedToStart and self._process is not None:
+            self._said = f"{self._command[0]} cannot be started: {self._process.errorString()}"
+            self._end(1)
+
+    def _read(self) -> None:
+        process = self._process
+        assert process is not None
+        while process.canReadLine():
+            # A line that another program wrote, or half of one, is left out.
+            with contextlib.suppress(ValueError, KeyError, TypeError):
+                self._take(json.loads(bytes(process.readLine().data())))
+        self._show_new()
+        if not self._teller.isActive():
+            self._teller.start()
+
+    def _take(self, event: dict[str, Any]) -> None:
+        match event["event"]:
+            case "listening":
+                self.about = str(event["source"])
+                if self.state == "starting":
+                    self._set_state("listening")
+            case "doubt":
+                self.warned.emit(str(event["text"]))
+            case "column":
+                self._new.append((float(event["time_s"]), list(event["values"])))
+                self.level_db = event["level_db"]
+                self._received_unix_s = float(event["received_unix_s"])
+                self.counts = Counts.of(event)
+            case "frames" | "end":
+                self.counts = Counts.of(event)
+
+    def _end(self, code: int) -> None:
+        process, self._process = self._process, None
+        assert process is not None
+        self._said += bytes(process.readAllStandardError().data()).decode("utf-8", "replace")
+        process.deleteLater()
+        self._show_new()
+        if self.on_screen:
+            try:
+                self._document.end_growth()
+            except (Sd2Error, OSError) as error:
+                self.warned.emit(str(error))
+        if code == 0:
+            self._set_state("stopped")
+        else:
+            self.text = self._said.strip().removeprefix("sd2: ") or "It ended without saying why."
+            self._set_state("failed")
+
+    # --- on screen ------------------------------------------------------------------------
+
+    def _show_new(self) -> None:
+        """Add the columns that came to the map, and show it."""
+        if not self._new:
+            return
+        if self._map is None:
+            self._map = self._first_map()
+            if self._map is None:
+                return
+            added = True
+            self._add_new()
+            self._follow()
+        else:
+            added = self._add_new()
+            if not self.on_screen:
+                return
+            if not self._document.growing:
+                self._follow()
+            elif added:
+                self._document.grow(self._map.whole())
+        if added:
+            self._keep_reference()
+            self._painted.start()
+
+    def _add_new(self) -> bool:
+        assert self._map is not None
+        bins = self._map.bins
+        columns = [(at_s, np.array(values, np.float32)) for at_s, values in self._new]
+        self._new = []
+        added = [self._map.add(at_s, one) for at_s, one in columns if one.shape == (bins,)]
+        return any(added)
+
+    def _first_map(self) -> GrowingMap | None:
+        """Map of what is stored by now; None before there is something."""
+        assert self.request is not None
+        if not (self.request.folder / FILE_NAME).is_file():
+            return None
+        from sd2core.fmcw.processing import doppler_map
+        from sd2core.sensor import VelocityAxis
+
+        capture = open_recording(self.request.folder).load_capture()
+        return GrowingMap(doppler_map(capture, axis=VelocityAxis(), clutter=CLUTTER))
+
+    def _follow(self) -> None:
+        """Show the recording, which grows."""
+        assert self.request is not None
+        assert self._map is not None
+        recording = open_recording(self.request.folder)
+        radar_map = self._map.whole()
+        timebase = radar_map.timebase.shifted(recording.radar_offset_s)
+        content = Content(
+            recording, timebase, capture=recording.load_capture(), radar_map=radar_map
+        )
+        self._document.follow(content)
+        # On the newest frame, the clock goes on to those that come.
+        self._session.playback.seek_frame(len(self._session.playback.timebase) - 1)
+        self._reference = self._session.maps.real.reference
+
+    def _keep_reference(self) -> None:
+        """Keep 0 dB at the strongest bin so far, unless the user has set it."""
+        real = self._session.maps.real
+        if real.map is None or real.reference != self._reference:
+            return
+        strongest = float(real.map.values[:, -1].max())
+        if strongest > self._reference:
+            real.set_reference(strongest)
+            self._reference = strongest
+
+    def _note_latency(self) -> None:
+        """Note how long the newest frame took: the window has just been painted."""
+        self._latencies_s.append(time.time() - self._received_unix_s)
+
+    def _set_state(self, state: State) -> None:
+        if state != self.state:
+            self.state = state
+            self.state_changed.emit()
+            self.changed.emit()

@@ -1,0 +1,93 @@
+"""Set-up of listening: where frames come from, and where they go."""
+
+from __future__ import annotations
+
+from itertools import count
+from pathlib import Path
+from typing import Literal
+
+from PySide6.QtCore import QObject, Signal
+
+from sd2app.live.request import ListenRequest
+from sd2app.settings import Settings, StoredChoices
+from sd2core.recording.recording import FILE_NAME, SUFFIX
+
+Way = Literal["dca1000", "replay"]
+_DEFAULTS = {"way": "dca1000", "setup": "", "address": "", "replay": "", "beside": ""}
+_ENDINGS = (".cfg", ".json")
+
+
+class ListenSetup(QObject):
+    """Choices, of which all but the recording's name are kept from one time to the next."""
+
+    changed = Signal()
+
+    def __init__(self, settings: Settings, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._choices = StoredChoices(settings, "listen", _DEFAULTS, {"way": ("dca1000", "replay")})
+        beside = Path(self._choices["beside"] or Path.home())
+        self.folder = free_name(beside if beside.is_dir() else Path.home())
+
+    @property
+    def way(self) -> Way:
+        """Kind of source."""
+        way: Way = self._choices["way"]
+        return way
+
+    @property
+    def address(self) -> str:
+        """Address of this computer that a DCA1000 sends to; empty: this computer alone."""
+        return str(self._choices["address"])
+
+    @property
+    def setup(self) -> Path | None:
+        """Configuration that the radar runs with."""
+        return Path(self._choices["setup"]) if self._choices["setup"] else None
+
+    @property
+    def replay(self) -> Path | None:
+        """Capture to be replayed."""
+        return Path(self._choices["replay"]) if self._choices["replay"] else None
+
+    def choose(self, name: str, value: object) -> None:
+        """Choose ``way``, ``address``, ``setup`` or ``replay``."""
+        if self._choices.set(name, str(value).strip()):
+            self.changed.emit()
+
+    def choose_folder(self, folder: Path) -> None:
+        """Choose the recording's folder."""
+        self.folder = folder if folder.suffix == SUFFIX else folder.with_name(folder.name + SUFFIX)
+        self._choices.set("beside", str(self.folder.parent))
+        self.changed.emit()
+
+    @property
+    def continues(self) -> bool:
+        """True if the recording exists: it goes on."""
+        return (self.folder / FILE_NAME).is_file()
+
+    @property
+    def problem(self) -> str:
+        """What is missing, or not there; empty where listening can begin."""
+        if self.way == "replay":
+            if self.replay is None:
+                return "Choose the capture that is replayed."
+            return "" if self.replay.exists() else f"{self.replay} does not exist."
+        if self.setup is None:
+            return "Choose the .cfg or .json that the radar runs with: samples do not say it."
+        if not self.setup.is_file():
+            return f"{self.setup} does not exist."
+        if self.setup.suffix.lower() not in _ENDINGS:
+            return f"{self.setup.name} is no .cfg of the mmWave SDK or .json of mmWave Studio."
+        return ""
+
+    def request(self) -> ListenRequest:
+        """What was chosen."""
+        if self.way == "replay":
+            return ListenRequest(self.folder, replay=self.replay)
+        return ListenRequest(self.folder, setup=self.setup, address=self.address)
+
+
+def free_name(beside: Path) -> Path:
+    """Name of a recording in a folder that is not taken."""
+    names = (beside / f"live-{number}{SUFFIX}" for number in count(1))
+    return next(path for path in names if not path.exists())

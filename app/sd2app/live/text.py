@@ -1,0 +1,56 @@
+"""Sentences about a radar that is listened to."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from sd2core.live.counts import Counts
+
+if TYPE_CHECKING:
+    from sd2app.live.model import LiveModel
+
+
+def title_text(live: LiveModel) -> str:
+    """What is going on, with the recording's name."""
+    assert live.request is not None
+    name = live.request.folder.name
+    match live.state:
+        case "opening":
+            return f"Opening {name}…"
+        case "starting":
+            return f"Beginning to listen, into {name}…"
+        case "listening" if not live.counts.recorded:
+            return "Waiting for the first frame…"
+        case "listening":
+            return f"Listening, into {name}"
+        case "stopping":
+            return f"Storing what was received in {name}…"
+        case "failed":
+            return "Listening has failed"
+        case _:
+            return f"Listening into {name} was stopped"
+
+
+def frames_text(counts: Counts) -> str:
+    """Number of frames, and what they lack, in words."""
+    if not counts.recorded:
+        return ""
+    frames = f"{counts.recorded:,} frame{'' if counts.recorded == 1 else 's'}"
+    lacks = [
+        (counts.dropped, "dropped (this computer was too slow)"),
+        (counts.lost, "lost on the way"),
+        (counts.damaged, "with lost packets"),
+        (counts.not_shown, "stored and not shown yet"),
+    ]
+    told = [f"{number:,} {what}" for number, what in lacks if number]
+    return f"{frames}, {', '.join(told) or 'none missing'}"
+
+
+def level_text(level_db: float | None) -> str:
+    """Power of the newest column of the map."""
+    return "" if level_db is None else f"level {level_db:.1f} dB".replace("-", "−")
+
+
+def latency_text(latency_s: float | None) -> str:
+    """How long a frame takes from its reception to the screen."""
+    return "" if latency_s is None else f"on screen {1e3 * latency_s:.0f} ms after it was received"
