@@ -93,6 +93,8 @@ def _listen(options: argparse.Namespace) -> None:
     from sd2core.live.listening import Listening
     from sd2core.live.recording import GrowingRecording
 
+    if options.columns and not options.json:
+        raise Sd2Error("--columns is given without --json", "both, for a program that reads them")
     classifier = None
     if options.classifier is not None:
         from sd2core.classify.files import load_classifier

@@ -63,6 +63,7 @@ def close_window(window: MainWindow) -> None:
     """Give up a window, whatever was edited in it."""
     if window.ready:
         models_of(window).document.undo_stack.clear()
+        window.features.live.model.close()
     window.close()
     # Styling the next window would style all that are still there, and each part of the next
     # again whenever it is put into another.

@@ -18,6 +18,7 @@ from pathlib import Path
 from PySide6.QtWidgets import QApplication
 
 from sd2app.fit.request import FitRequest
+from sd2app.live.request import ListenRequest
 from sd2app.mesh_comparison.window import ComparisonWindow
 from sd2app.shell.app import wait_until_settled
 from sd2app.shell.window import MainWindow
@@ -149,6 +150,21 @@ def comparison(application: QApplication) -> None:
         window.close()
 
 
+def listening(application: QApplication) -> None:
+    """The sample's radar replayed, with more than ten seconds heard."""
+    with tempfile.TemporaryDirectory() as folder:
+        window = opened(application, [resource_path("swipes.sd2")])
+        live = window.features.live.model
+        request = ListenRequest(Path(folder) / "walk.sd2", replay=resource_path("swipes.sd2"))
+        live.start(request)
+        wait_for(application, lambda: live.counts.recorded >= 330)
+        save(window, "listening.png")
+        live.stop()
+        wait_for(application, lambda: not live.busy)
+        wait_until_settled(application, window, LIMIT_S)
+        window.close()
+
+
 def sizes(application: QApplication) -> None:
     """The window as small, usual and large screens show it, light and dark."""
     window = opened(application, [resource_path("swipes.sd2")])
@@ -195,6 +211,7 @@ def main() -> None:
     take(application, "labels.png", swipes, labels)
     take(application, "placements.png", swipes, placements)
     comparison(application)
+    listening(application)
     learning(application)
     walk = SHARED / "video" / "walk.mkv"
     if walk.exists():

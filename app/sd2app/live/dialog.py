@@ -58,7 +58,7 @@ class ListenDialog(QDialog):
         )
         setup.changed.connect(self._refresh)
         self._refresh()
-        self.resize(620, 320)
+        self.resize(620, 0)
 
     def _button(self, run: Callable[[], None]) -> QToolButton:
         return outlined("Choose…", "Choose another", run, self)

@@ -55,7 +55,7 @@ class LiveModel(QObject):
         self.text = ""  # why it failed
         self._map: GrowingMap | None = None
         self._new: list[tuple[float, list[float]]] = []  # columns not on the map yet
-        self._received_unix_s = 0.0
+        self.received_unix_s = 0.0  # of the newest column
         self._latencies_s: deque[float] = deque(maxlen=_LATENCIES)
         self._reference = 0.0  # that was set here: the strongest bin so far is 0 dB
         self._process: QProcess | None = None
@@ -148,7 +148,7 @@ class LiveModel(QObject):
         if not process.waitForFinished(_STOP_MS):
             process.kill()
             process.waitForFinished(_STOP_MS)
-        self._process = None
+        self._process, self.state = None, "stopped"
 
     # --- the process ----------------------------------------------------------------------
 
@@ -208,7 +208,7 @@ class LiveModel(QObject):
             case "column":
                 self._new.append((float(event["time_s"]), list(event["values"])))
                 self.level_db = event["level_db"]
-                self._received_unix_s = float(event["received_unix_s"])
+                self.received_unix_s = float(event["received_unix_s"])
                 self.counts = Counts.of(event)
             case "frames" | "end":
                 self.counts = Counts.of(event)
@@ -301,7 +301,7 @@ class LiveModel(QObject):
 
     def _note_latency(self) -> None:
         """Note how long the newest frame took: the window has just been painted."""
-        self._latencies_s.append(time.time() - self._received_unix_s)
+        self._latencies_s.append(time.time() - self.received_unix_s)
 
     def _set_state(self, state: State) -> None:
         if state != self.state:

@@ -368,9 +368,7 @@ class MainWindow(QMainWindow):
             event.accept()
             return
         features = self.features
-        if not all(
-            asked.may_close() for asked in (features.files, features.fit, features.training)
-        ):
+        if not all(feature.may_close() for feature in features):
             event.ignore()
             return
         self._settings.set_layout("window", self.saveGeometry())

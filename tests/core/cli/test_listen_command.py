@@ -21,9 +21,12 @@ from cli_outcome import Sd2
 from sd2core.classify.files import save_classifier
 from sd2core.cli import listen
 from sd2core.files.resources import resource_path
+from sd2core.fmcw.processing import doppler_map
 from sd2core.io.radar import load_capture
 from sd2core.live.sources import Dca1000Source
+from sd2core.radar_config import CLUTTER
 from sd2core.recording.recording import Recording, open_recording
+from sd2core.sensor import VelocityAxis
 from tests.core.classify.classifiers import classifier
 from tests.core.io.radar.dca1000_files import TiRecording, words_of, write_ti
 from tests.core.live.fast_captures import assert_same_samples
@@ -201,3 +204,61 @@ def test_q_stops_on_a_terminal(tmp_path: Path) -> None:
     assert "\r " in shown
     assert "▁" in shown or "█" in shown
     assert "recorded" in shown
+
+
+def test_columns_are_those_of_the_map(sd2: Sd2, tmp_path: Path) -> None:
+    path = write_ti(tmp_path / "ti", TI)
+    out = tmp_path / "walk.sd2"
+    told = []
+    for _ in range(2):
+        outcome = sd2("listen", "--replay", path, "--out", out, "--json", "--columns")
+        first, *rest = _events(outcome.out)
+        assert (first["bins"], first["v_max_mps"]) == (32, 2.0)
+        told += [one for one in rest if one["event"] == "column"]
+    capture = open_recording(out).load_capture()
+    expected = doppler_map(capture, axis=VelocityAxis(), clutter=CLUTTER)
+    found = np.array([one["values"] for one in told], np.float32).T
+    np.testing.assert_array_equal(found, expected.values)
+    # Times are those of the recording, also of what was continued.
+    assert [one["time_s"] for one in told] == expected.times_s.tolist()
+    assert [one["recorded"] for one in told][-1] in (9, 10)  # it may be about to be stored
+    assert all(one["received_unix_s"] <= time.time() for one in told)
+    outcome = sd2("listen", "--replay", path, "--out", out, "--columns")
+    assert (outcome.code, "without --json" in outcome.err) == (1, True)
+
+
+def _stopped(process: subprocess.Popen, out: Path) -> None:
+    """A process has stored what it received, and said so."""
+    text, errors = process.communicate(timeout=20)
+    assert (process.returncode, errors) == (0, "")
+    assert f"recorded  {_frames(out)} frames" in text
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGTERM")
+def test_a_request_to_end_stores_what_was_received(tmp_path: Path) -> None:
+    out = tmp_path / "walk.sd2"
+    process = _started(out, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    process.terminate()
+    _stopped(process, out)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no keys by a pipe")
+def test_a_program_presses_q(tmp_path: Path) -> None:
+    out, pipe = tmp_path / "walk.sd2", subprocess.PIPE
+    process = _started(out, stdin=pipe, stdout=pipe, stderr=pipe)
+    assert process.stdin is not None
+    process.stdin.write("q")
+    process.stdin.flush()
+    _stopped(process, out)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no keys by a pipe")
+def test_nobody_to_press_keys_is_no_reason_to_stop(tmp_path: Path) -> None:
+    out, pipe = tmp_path / "walk.sd2", subprocess.PIPE
+    process = _started(out, stdin=subprocess.DEVNULL, stdout=pipe, stderr=pipe)
+    frames = _frames(out)
+    time.sleep(0.3)
+    assert process.poll() is None
+    process.terminate()
+    _stopped(process, out)
+    assert _frames(out) > frames
