@@ -5,8 +5,17 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from sd2core.cli.options import add_command, add_json, add_mesh_reading, finite_float
+from sd2core.cli.options import (
+    add_channel,
+    add_command,
+    add_json,
+    add_mesh_reading,
+    finite_float,
+    flag,
+    given,
+)
 from sd2core.cli.output import print_json, progress_bar
+from sd2core.errors import Sd2Error
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
@@ -25,6 +34,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         examples=(
             "  sd2 import walk.sd2 --video walk.mkv --mesh walk.npz\n"
             "  sd2 import lab.sd2 --radar capture/ --title 'Empty lab'\n"
+            "  sd2 import lab.sd2 --radar capture/ --receiver 2\n"
             "  sd2 import walk.sd2 --video walk.mkv --radar capture/ --radar-offset-s -0.35 --copy"
         ),
     )
@@ -48,6 +58,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         metavar="S",
         help="time in the video, in seconds, of the first radar frame (default: 0)",
     )
+    add_channel(parser)
     parser.add_argument(
         "--imu", type=Path, metavar="FILE", help="samples of an inertial sensor (.csv, .sto, .npz)"
     )
@@ -94,10 +105,16 @@ def _import(options: argparse.Namespace) -> None:
         radar=options.radar,
         mesh_reading=mesh_reading(options),
         radar_offset_s=options.radar_offset_s,
+        radar_receiver=options.receiver,
+        radar_transmitter=options.transmitter,
         imu=options.imu,
         imu_offset_s=options.imu_offset_s,
         title=options.title,
     )
+    chosen = given(options, ("receiver", "transmitter"))
+    if chosen and (recording.radar is None or recording.holds_radar_map):
+        name = flag(next(iter(chosen)))
+        raise Sd2Error(f"{name} is given without raw samples", f"{name} with --radar CAPTURE")
     recording.learn_camera()
     # Opens every file, so that nothing is made of what cannot be read.
     parts = describe_parts(recording)

@@ -132,6 +132,19 @@ def add_mesh_reading(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_channel(parser: argparse._ActionsContainer) -> None:
+    """Add ``--receiver`` and ``--transmitter``."""
+    parser.add_argument(
+        "--receiver",
+        type=positive_int,
+        metavar="N",
+        help="take this receiver, counted from 1 (default: the mean power of all)",
+    )
+    parser.add_argument(
+        "--transmitter", type=positive_int, metavar="N", help="take this transmitter, likewise"
+    )
+
+
 def given(options: argparse.Namespace, names: Iterable[str]) -> dict[str, Any]:
     """Those of the named options that the user gave."""
     values = {name: getattr(options, name) for name in names}

@@ -65,6 +65,35 @@ def test_one_channel_is_chosen(sd2: Sd2, tmp_path: Path) -> None:
     assert "--bins is given without --out" in outcome.err
 
 
+def test_a_recording_keeps_the_channel_that_is_chosen(
+    sd2: Sd2, tmp_path: Path, plate: Path
+) -> None:
+    path, out = write_ti(tmp_path / "ti", TI), tmp_path / "map.npz"
+    folder = tmp_path / "a.sd2"
+    outcome = sd2("import", folder, "--radar", path, "--receiver", 2)
+    assert outcome.code == 0, outcome.err
+    assert "radar channel  receiver 2" in outcome.out
+    told = json.loads(sd2("info", folder, "--json").out)
+    assert (told["radar_receiver"], told["radar_transmitter"]) == (2, None)
+    assert told["radar"]["receivers"] == 1
+    # Options replace the choice, each its own.
+    for options, notes in (
+        ((), {"Receiver 2 only."}),
+        (("--receiver", 1), {"Receiver 1 only."}),
+        (("--transmitter", 2), {"Receiver 2 only.", "Transmitter 2 only."}),
+    ):
+        assert sd2("radar", folder, "--out", out, *options).code == 0
+        only = {note for note in DopplerMap.load(out).meta["notes"] if note.endswith(" only.")}
+        assert only == notes
+        printed = json.loads(sd2("radar", folder, *options, "--json").out)["notes"]
+        assert {note for note in printed if note.endswith(" only.")} == notes
+    for files, receiver in ((("--radar", path), 3), (("--mesh", plate), 1)):
+        outcome = sd2("import", tmp_path / "b.sd2", *files, "--receiver", receiver)
+        assert outcome.code == 1
+        assert "eceiver" in outcome.err
+        assert not (tmp_path / "b.sd2").exists()
+
+
 def test_every_kind_is_described_by_its_own_file(sd2: Sd2, tmp_path: Path) -> None:
     outcome = sd2("radar", write_a121(tmp_path / "a.h5"))
     assert "Acconeer A121, 60.5 GHz" in outcome.out
