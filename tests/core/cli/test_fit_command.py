@@ -270,9 +270,9 @@ class TestOutput:
     @pytest.mark.parametrize(
         "words",
         [
-            ("--person", "1,2,3"),
-            ("--person", "1,2,0,4"),
-            ("--person", "1,2,nan,4"),
+            ("--person-box", "1,2,3"),
+            ("--person-box", "1,2,0,4"),
+            ("--person-box", "1,2,nan,4"),
             ("--person-frame", "-1"),
             ("--resolution", "huge"),
             ("--stature-m", "0"),
