@@ -215,10 +215,6 @@ def _radar(options: argparse.Namespace) -> None:
     from sd2core.io.radar import check_replaceable, named_radar, write_capture, write_described
 
     check_replaceable(options.out)
-    if not options.out.absolute().parent.is_dir():
-        raise Sd2Error(
-            f"The folder {options.out.absolute().parent} does not exist", "an existing folder"
-        )
     config = named_radar(options.radar)
     offsets: tuple[tuple[float, float, float], ...] = ()
     if options.receivers is not None:

@@ -170,7 +170,7 @@ def test_limbs_come_with_the_map(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("command", ["synth", "radar"])
 @pytest.mark.parametrize(
-    ("name", "says"), [("map.txt", "ends in .npz"), ("no/map.npz", "does not exist")]
+    ("name", "says"), [("map.txt", "ends in .npz"), ("plate.npz/map.npz", "plate.npz is a file")]
 )
 def test_an_output_that_cannot_be_written(
     sd2: Sd2, plate: Path, tmp_path: Path, command: str, name: str, says: str

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from sd2app.command_line import full_parser
+from sd2core.cli.output_folders import OUTPUTS
 
 WITHOUT_FACTS = {"labels figure", "strip", "warm-up", "fetch-models", "open", "demo"}
 """Commands that print nothing but what they wrote, or open a window."""
@@ -111,6 +112,12 @@ def test_what_is_written_is_called_out() -> None:
         if not argument.option_strings:
             assert argument.dest != "out", name
             assert "write" not in (argument.help or "").split(), name
+
+
+def test_folders_are_made_for_whatever_is_written() -> None:
+    options = {"--out", *FURTHER_OUTPUTS}
+    found = {one.dest for _, one in OPTIONS_WITH_VALUE if options & {*one.option_strings}}
+    assert found == {*OUTPUTS}
 
 
 def test_an_option_means_the_same_everywhere() -> None:

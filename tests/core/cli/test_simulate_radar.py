@@ -109,7 +109,7 @@ def test_nothing_else_is_overwritten(sd2: Sd2, plate: Path, tmp_path: Path) -> N
     assert "is not a radar recording" in outcome.err
     assert [path.name for path in mine.iterdir()] == ["notes.txt"]
     outcome = sd2("simulate", "radar", plate, "--out", tmp_path / "a" / "b")
-    assert (outcome.code, "does not exist" in outcome.err) == (1, True)
+    assert outcome.code == 0, outcome.err
     outcome = sd2("simulate", "radar", plate, "--out", tmp_path / "c", "--radar", "nowhere.json")
     assert (outcome.code, "no file nowhere.json" in outcome.err) == (1, True)
 
