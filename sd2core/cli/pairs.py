@@ -162,7 +162,7 @@ def _recordings(options: argparse.Namespace) -> None:
         synthesis = replace(synthesis, axis=axis, null_bins=())
     if options.null_bins is not None:
         synthesis = replace(synthesis, null_bins=options.null_bins)
-    with progress_bar("Making pairs") as progress:
+    with progress_bar("Making pairs", "step") as progress:
         made = make_recording_pairs(
             options.recordings,
             options.out,
