@@ -39,6 +39,7 @@ help:
 	@echo "make clean        remove what the above made, .venv included"
 
 setup: system-packages $(COMPILED) landmark-models
+	@scripts/activation.sh $(if $(filter setup,$(MAKECMDGOALS)),always)
 
 .PHONY: system-packages system-packages-for-tests
 system-packages:

@@ -67,7 +67,7 @@ def main() -> int:
     parser.add_argument("--progress-json", action="store_true", required=True)
     parser.add_argument("--stature-m", type=float)
     parser.add_argument("--focal-px", type=float)
-    parser.add_argument("--person")
+    parser.add_argument("--person-box")
     parser.add_argument("--person-frame")
     options = parser.parse_args()
     return run_in_folder(CommandFolder(options.folder), lambda: fit(options))

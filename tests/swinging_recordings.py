@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,9 +20,12 @@ FRAMES = 120
 
 def recording(
     folder: Path, *, offset_s: float = 0.0, radar_frames: int = FRAMES, rate_hz: float = RATE_HZ,
-    simulated: bool = True, radar: bool = True,
+    simulated: bool = True, radar: bool = True, silent_receivers: int = 0,
 ) -> Recording:  # fmt: skip
-    """An octahedron that swings along the line of sight, before a radar that sees noise."""
+    """An octahedron that swings along the line of sight, before a radar that sees noise.
+
+    Its first receiver does; ``silent_receivers`` more receive nothing.
+    """
     folder.mkdir()
     times_s = np.arange(FRAMES) / rate_hz
     corners = 0.3 * np.concatenate([np.eye(3), -np.eye(3)])
@@ -35,8 +39,10 @@ def recording(
             1800, 2200,
             (radar_frames, 1, PAPER_RADAR.chirps_per_frame, PAPER_RADAR.samples_per_chirp),
         )  # fmt: skip
+        nothing = np.full((radar_frames, silent_receivers, *samples.shape[2:]), 2048)
         write_capture(
-            folder / "radar", samples.astype(np.uint16), PAPER_RADAR,
+            folder / "radar", np.concatenate([samples, nothing], axis=1).astype(np.uint16),
+            replace(PAPER_RADAR, receivers=1 + silent_receivers),
             np.arange(radar_frames) / RATE_HZ, simulated=simulated,
         )  # fmt: skip
     return Recording.create(

@@ -135,8 +135,6 @@ def has_display(platform: str, environment: Mapping[str, str]) -> bool:
 def _check_screenshot(path: Path) -> None:
     if path.suffix.lower() != ".png":
         raise Sd2Error(f"The screenshot is to be {path}", "a name that ends in .png")
-    if not path.absolute().parent.is_dir():
-        raise Sd2Error(f"The folder {path.absolute().parent} does not exist", "an existing folder")
 
 
 if __name__ == "__main__":

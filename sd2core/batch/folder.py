@@ -13,6 +13,7 @@ from typing import Any
 from pydantic.dataclasses import dataclass
 
 from sd2core.errors import Sd2Error
+from sd2core.files.paths import make_folder
 from sd2core.runs.folder import RunFolder, State
 from sd2core.runs.progress import Event, last_of, read_events
 
@@ -68,24 +69,20 @@ class BatchFolder(RunFolder):
         return self.path / kind / key[:2] / f"{key}{suffix}"
 
     def prepare(self) -> None:
-        """Make the folder, or take over one of a batch.
+        """Make the folder, with those above it, or take over one of a batch.
 
         Raises Sd2Error if it holds something else, or cannot be made.
         """
         ours = {"lock", self.log.name}
-        if self.path.exists() and not self.exists:
-            if not self.path.is_dir() or {one.name for one in self.path.iterdir()} - ours:
-                raise Sd2Error(
-                    f"{self.path} exists and is not the folder of a batch",
-                    "a new folder, or one that `sd2 batch` made",
-                    "Choose another `out` in the plan",
-                )
-        elif not self.path.absolute().parent.is_dir():
+        if (self.path.exists() and not self.exists) and (
+            not self.path.is_dir() or {one.name for one in self.path.iterdir()} - ours
+        ):
             raise Sd2Error(
-                f"The folder {self.path.absolute().parent} does not exist",
-                "an existing folder in which the batch's is made",
+                f"{self.path} exists and is not the folder of a batch",
+                "a new folder, or one that `sd2 batch` made",
+                "Choose another `out` in the plan",
             )
-        self.path.mkdir(exist_ok=True)
+        make_folder(self.path)
 
     def status(self) -> BatchStatus:
         """Current status, from all lines of progress.

@@ -246,6 +246,7 @@ class _Look:
                 "title": recording.title,
                 "simulated": recording.simulated,
                 "radar_offset_s": recording.radar_offset_s,
+                "radar_channel": [recording.radar_receiver, recording.radar_transmitter],
                 "radar": None if radar is None else self._radar_digest(radar),
             },
         )

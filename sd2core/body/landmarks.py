@@ -102,7 +102,7 @@ def find_landmarks(
         raise Sd2Error(
             f"No person could be followed through {video.path}",
             "a person who is seen in some frames in succession",
-            "Say where the person is: --person X,Y,WIDTH,HEIGHT --person-frame FRAME",
+            "Say where the person is: --person-box X,Y,WIDTH,HEIGHT --person-frame FRAME",
         )
     return TrackInParts(
         store,

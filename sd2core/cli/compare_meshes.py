@@ -7,7 +7,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sd2core.cli.options import add_command, add_json, add_mesh_reading, position
+from sd2core.cli.options import (
+    add_command,
+    add_figure_output,
+    add_json,
+    add_mesh_reading,
+    position,
+)
 from sd2core.cli.output import print_json, print_rows, progress_bar
 from sd2core.errors import Sd2Error
 
@@ -36,15 +42,15 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         ),
         examples=(
             "  sd2 compare-meshes fitted.zarr vibe_output.pkl --image-size 640x480\n"
-            "  sd2 compare-meshes ours.zarr wham.pkl --labels ours,WHAM --figure both.svg"
+            "  sd2 compare-meshes ours.zarr wham.pkl --names ours,WHAM --figure both.svg"
         ),
     )
     parser.add_argument(
         "meshes", type=Path, nargs="+", metavar="MESH", help="two meshes or more, in one frame"
     )
-    parser.add_argument("--labels", metavar="NAMES", help="what to call them, separated by commas")
+    parser.add_argument("--names", metavar="LIST", help="what to call them, separated by commas")
     parser.add_argument(
-        "--reference", metavar="NAME", help="label of the mesh that is right (default: the first)"
+        "--reference", metavar="NAME", help="name of the mesh that is right (default: the first)"
     )
     parser.add_argument(
         "--sensor",
@@ -61,9 +67,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             " and maps are never aligned"
         ),
     )
-    parser.add_argument(
-        "--figure", type=Path, metavar="FILE", help="draw maps and curves (.png, .svg or .pdf)"
-    )
+    add_figure_output(parser, "maps and curves")
     add_mesh_reading(parser)
     add_json(parser)
 
@@ -132,8 +136,8 @@ def _print(comparison: Comparison) -> None:
 
 
 def _labels(options: argparse.Namespace) -> list[str]:
-    if options.labels is not None:
-        labels = [name.strip() for name in options.labels.split(",")]
+    if options.names is not None:
+        labels = [name.strip() for name in options.names.split(",")]
         if len(labels) != len(options.meshes):
             raise Sd2Error(f"{len(labels)} labels for {len(options.meshes)} meshes", "one for each")
     else:

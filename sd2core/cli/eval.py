@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import argparse
-import json
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from sd2core.cli.options import add_command
-from sd2core.cli.output import finite, progress_bar
+from sd2core.cli.options import (
+    add_command,
+    add_figure_output,
+    add_json,
+    add_placements_used,
+)
+from sd2core.cli.output import print_json, progress_bar
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
     from sd2core.denoise.live import TrainedDenoiser
-
-_STANDARD_OUTPUT = Path("-")
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
@@ -37,8 +38,8 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         examples=(
             "  sd2 eval runs/s4 --data campaign.zarr\n"
             "  sd2 eval runs/s4-0 runs/s4-1 runs/s4-2 runs/gru-0 --data campaign.zarr\n"
-            "  sd2 eval denoiser --data mars.zarr --subjects subject4 --json scores.json\n"
-            "  sd2 eval runs/s4 runs/unet --data campaign.zarr --plot scores.png"
+            "  sd2 eval denoiser --data mars.zarr --subjects subject4 --json\n"
+            "  sd2 eval runs/s4 runs/unet --data campaign.zarr --figure scores.png"
         ),
     )
     parser.add_argument(
@@ -51,38 +52,19 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         "--data", type=Path, nargs="+", required=True, metavar="PAIRS", help="stores of pairs"
     )
     add_judging(parser, "those that the first model's run kept for the test, or all", "the errors")
-    parser.add_argument("--markdown", type=Path, metavar="FILE", help="write the tables")
+    parser.add_argument("--markdown", type=Path, metavar="FILE.md", help="write the tables")
 
 
 def add_judging(parser: argparse.ArgumentParser, usual_subjects: str, drawn: str) -> None:
     """Add whom an evaluation judges on which maps, and the files of its result."""
     parser.add_argument(
         "--subjects",
-        metavar="NAMES",
+        metavar="LIST",
         help=f"people to evaluate on, separated by commas, or `all` (default: {usual_subjects})",
     )
-    parser.add_argument(
-        "--all-placements",
-        action="store_true",
-        help="use also the maps from other places of the sensor, not only each movement's own",
-    )
-    parser.add_argument(
-        "--json", type=Path, metavar="FILE", help="write all numbers, or - to print them"
-    )
-    parser.add_argument(
-        "--plot", type=Path, metavar="FILE", help=f"draw {drawn}, as .png, .svg or .pdf"
-    )
-
-
-def check_result_files(options: argparse.Namespace) -> None:
-    """Refuse files of ``--json`` and ``--plot`` that cannot be written."""
-    from sd2core.cli.reading import check_output
-    from sd2core.files.figure_files import SUFFIXES
-
-    if options.plot is not None:
-        check_output(options.plot, *SUFFIXES)
-    if options.json not in (None, _STANDARD_OUTPUT):
-        check_output(options.json, ".json")
+    add_placements_used(parser, "evaluate on maps from", "first")
+    add_figure_output(parser, drawn)
+    add_json(parser)
 
 
 def named_subjects(text: str, everybody: tuple[str, ...]) -> tuple[str, ...]:
@@ -90,25 +72,13 @@ def named_subjects(text: str, everybody: tuple[str, ...]) -> tuple[str, ...]:
     return everybody if text == "all" else tuple(name for name in text.split(",") if name)
 
 
-def print_or_write(options: argparse.Namespace, content: Mapping[str, Any]) -> bool:
-    """Print all numbers or write them, as ``--json`` says; True where they were printed."""
-    from sd2core.files.atomic import atomic_write_text
-
-    text = json.dumps(finite(content), indent=2, ensure_ascii=False)
-    if options.json == _STANDARD_OUTPUT:
-        print(text)
-        return True
-    if options.json is not None:
-        atomic_write_text(options.json, text + "\n")
-    return False
-
-
 def _eval(options: argparse.Namespace) -> None:
     from sd2core.cli.reading import check_output
     from sd2core.files.atomic import atomic_write_text
-    from sd2core.files.figure_files import save_figure
+    from sd2core.files.figure_files import check_figure, save_figure
 
-    check_result_files(options)
+    if options.figure is not None:
+        check_figure(options.figure)
     if options.markdown is not None:
         check_output(options.markdown, ".md")
     from sd2core.train.data import read_mixed
@@ -124,13 +94,15 @@ def _eval(options: argparse.Namespace) -> None:
             [_loaded(model) for model in options.models],
             pairs,
             subjects,
-            first_only=not options.all_placements,
+            first_only=options.placements == "first",
             progress=progress,
         )
-    if not print_or_write(options, evaluation.to_json()):
+    if options.json:
+        print_json(evaluation.to_json())
+    else:
         print(as_text(evaluation))
-    if options.plot is not None:
-        save_figure(draw(evaluation), options.plot)
+    if options.figure is not None:
+        save_figure(draw(evaluation), options.figure)
     if options.markdown is not None:
         atomic_write_text(options.markdown, as_markdown(evaluation))
 

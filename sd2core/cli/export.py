@@ -14,6 +14,7 @@ from sd2core.cli.options import (
     add_command,
     add_json_and_progress,
     add_limbs,
+    add_output,
     add_people_kept_out,
     bin_list,
     name_list,
@@ -67,9 +68,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "inputs", type=Path, nargs="+", metavar="INPUT", help="recordings, pairs, maps, folders"
     )
-    parser.add_argument(
-        "--out", type=Path, required=True, metavar="FILE", help="ends in .zarr, .h5 or .npz"
-    )
+    add_output(parser, "FILE", "the data set to write (.zarr, .h5 or .npz)")
     _add_content(parser)
     _add_making(parser)
     parser.add_argument(
@@ -88,15 +87,19 @@ def _add_content(parser: argparse.ArgumentParser) -> None:
         "--imu",
         type=name_list,
         default=(),
-        metavar="PLACES",
+        metavar="LIST",
         help="also keep what inertial sensors there would feel at every frame, e.g."
         " left-wrist,right-wrist; places as for `sd2 imu`",
     )
     group.add_argument(
-        "--length", type=positive_int, default=72, metavar="N", help="frames (default: 72)"
+        "--segment-frames",
+        type=positive_int,
+        default=72,
+        metavar="N",
+        help="length of a segment (default: 72)",
     )
     group.add_argument(
-        "--overlap",
+        "--overlap-frames",
         type=int,
         default=10,
         metavar="N",
@@ -105,7 +108,7 @@ def _add_content(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--rate",
         type=positive_float,
-        metavar="F",
+        metavar="FPS",
         help="frames per second; other sources are brought to it (default: the first one's)",
     )
     group.add_argument(
@@ -119,7 +122,7 @@ def _add_content(parser: argparse.ArgumentParser) -> None:
         "--min-share",
         type=share,
         default=0.2,
-        metavar="P",
+        metavar="SHARE",
         help="least share of a segment for foreground (default: 20%%)",
     )
     group.add_argument(
@@ -129,7 +132,7 @@ def _add_content(parser: argparse.ArgumentParser) -> None:
     people.add_argument(
         "--subjects",
         type=name_list,
-        metavar="NAMES",
+        metavar="LIST",
         help="subject of each recording and map, separated by commas, in their order (default:"
         " each recording shows another person)",
     )
@@ -150,7 +153,7 @@ def _add_content(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_making(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group("maps of recordings")
+    group = parser.add_argument_group("maps")
     group.add_argument(
         "--placements",
         metavar="FILE|planned",
@@ -160,7 +163,7 @@ def _add_making(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--tolerance",
         type=share,
-        metavar="P",
+        metavar="SHARE",
         help="make synthetic maps as fast as possible within this error, e.g. 2%% (default: exact)",
     )
     group.add_argument(
@@ -234,8 +237,8 @@ def _dataset_options(options: argparse.Namespace) -> DatasetOptions:
 
     return DatasetOptions(
         kinds=tuple(options.kinds.replace(" ", "").split(",")),
-        length=options.length,
-        overlap=options.overlap,
+        length=options.segment_frames,
+        overlap=options.overlap_frames,
         frame_rate_hz=options.rate,
         null_bins=options.null_bins,
         label_rule=options.label_rule,

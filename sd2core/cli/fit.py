@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from sd2core.cli.options import (
     add_command,
     add_json_and_progress,
+    add_output,
     not_negative_float,
     positive_float,
 )
@@ -54,21 +55,19 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             "them. The size of everything follows from the person's height: say it with\n"
             "--stature-m where you know it, every velocity is proportional to it. At first use\n"
             "the landmark models are fetched (36 MB, see `sd2 fetch-models`).\n\n"
-            "It can be stopped at any moment: what is done stays in OUT.partial, and the same\n"
+            "It can be stopped at any moment: what is done stays in FILE.partial, and the same\n"
             "command goes on from there."
         ),
         examples=(
             "  sd2 fit walk.mp4 --out walk.zarr --stature-m 1.78\n"
-            "  sd2 fit two.mp4 --out left.zarr --person 40,60,180,400 --person-frame 12\n"
+            "  sd2 fit two.mp4 --out left.zarr --person-box 40,60,180,400 --person-frame 12\n"
             "  sd2 fit walk.mp4 --out walk.npz --field-of-view 68 --resolution low"
         ),
     )
     parser.add_argument("video", type=Path, metavar="VIDEO", help="any video that FFmpeg reads")
+    add_output(parser, "FILE", "the mesh to write (.zarr or .npz)")
     parser.add_argument(
-        "--out", type=Path, required=True, metavar="MESH", help="the mesh to write (.zarr or .npz)"
-    )
-    parser.add_argument(
-        "--person",
+        "--person-box",
         type=_rectangle,
         metavar="X,Y,W,H",
         help="a rectangle around the person, in pixels (default: who is seen best)",
@@ -88,7 +87,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--focal-px",
         type=positive_float,
-        metavar="F",
+        metavar="PX",
         help="focal length in pixels (default: as the file says, or 56° across the longer side)",
     )
     parser.add_argument(
@@ -152,8 +151,10 @@ def _fit(options: argparse.Namespace) -> None:
 
 
 def _make(options: argparse.Namespace) -> None:
-    if options.person_frame is not None and options.person is None:
-        raise Sd2Error("--person-frame is given without --person", "the rectangle in that frame")
+    if options.person_frame is not None and options.person_box is None:
+        raise Sd2Error(
+            "--person-frame is given without --person-box", "the rectangle in that frame"
+        )
     if options.landmarks is not None:
         from sd2core.cli.reading import check_output
 
@@ -196,8 +197,8 @@ def _choices(options: argparse.Namespace) -> FitChoices:
     from sd2core.body.person_selection import Rectangle
 
     person = None
-    if options.person is not None:
-        x, y, width, height = options.person
+    if options.person_box is not None:
+        x, y, width, height = options.person_box
         person = Rectangle(x, y, width, height, options.person_frame or 0)
     return FitChoices(
         person=person,

@@ -5,8 +5,18 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from sd2core.cli.options import add_command, add_json, add_mesh_reading, finite_float
+from sd2core.cli.options import (
+    add_channel,
+    add_command,
+    add_json,
+    add_mesh_reading,
+    add_output,
+    finite_float,
+    flag,
+    given,
+)
 from sd2core.cli.output import print_json, progress_bar
+from sd2core.errors import Sd2Error
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
@@ -23,12 +33,13 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             "that what cannot be read is said here and not later."
         ),
         examples=(
-            "  sd2 import walk.sd2 --video walk.mkv --mesh walk.npz\n"
-            "  sd2 import lab.sd2 --radar capture/ --title 'Empty lab'\n"
-            "  sd2 import walk.sd2 --video walk.mkv --radar capture/ --radar-offset-s -0.35 --copy"
+            "  sd2 import --video walk.mkv --mesh walk.npz --out walk.sd2\n"
+            "  sd2 import --radar capture/ --title 'Empty lab' --out lab.sd2\n"
+            "  sd2 import --radar capture/ --receiver 2 --out lab.sd2\n"
+            "  sd2 import --video a.mkv --radar capture/ --radar-offset-s -0.35 --copy --out a.sd2"
         ),
     )
-    parser.add_argument("out", type=Path, metavar="OUT", help="the recording to make (NAME.sd2)")
+    add_output(parser, "NAME.sd2", "the recording to make")
     parser.add_argument("--video", type=Path, metavar="FILE", help="video of the person")
     parser.add_argument(
         "--mesh",
@@ -39,7 +50,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     )
     add_mesh_reading(parser)
     parser.add_argument(
-        "--radar", type=Path, metavar="FOLDER", help="radar capture of the same scene"
+        "--radar", type=Path, metavar="CAPTURE", help="radar capture of the same scene"
     )
     parser.add_argument(
         "--radar-offset-s",
@@ -48,6 +59,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         metavar="S",
         help="time in the video, in seconds, of the first radar frame (default: 0)",
     )
+    add_channel(parser)
     parser.add_argument(
         "--imu", type=Path, metavar="FILE", help="samples of an inertial sensor (.csv, .sto, .npz)"
     )
@@ -58,7 +70,9 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         metavar="S",
         help="time in the video, in seconds, of their first sample (default: 0)",
     )
-    parser.add_argument("--title", default="", help="what to call it (default: its name)")
+    parser.add_argument(
+        "--title", default="", metavar="TEXT", help="what to call it (default: its name)"
+    )
     parser.add_argument("--copy", action="store_true", help="copy the files into the recording")
     add_json(parser)
 
@@ -74,8 +88,10 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         ),
         examples="  sd2 relink walk.sd2 /media/disk/experiments",
     )
-    parser.add_argument("recording", type=Path, metavar="RECORDING")
-    parser.add_argument("folder", type=Path, metavar="FOLDER")
+    parser.add_argument("recording", type=Path, metavar="RECORDING", help="a recording (.sd2)")
+    parser.add_argument(
+        "folder", type=Path, metavar="FOLDER", help="where to look, and in all folders below"
+    )
     add_json(parser)
 
 
@@ -94,10 +110,16 @@ def _import(options: argparse.Namespace) -> None:
         radar=options.radar,
         mesh_reading=mesh_reading(options),
         radar_offset_s=options.radar_offset_s,
+        radar_receiver=options.receiver,
+        radar_transmitter=options.transmitter,
         imu=options.imu,
         imu_offset_s=options.imu_offset_s,
         title=options.title,
     )
+    chosen = given(options, ("receiver", "transmitter"))
+    if chosen and (recording.radar is None or recording.holds_radar_map):
+        name = flag(next(iter(chosen)))
+        raise Sd2Error(f"{name} is given without raw samples", f"{name} with --radar CAPTURE")
     recording.learn_camera()
     # Opens every file, so that nothing is made of what cannot be read.
     parts = describe_parts(recording)

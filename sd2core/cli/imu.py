@@ -11,6 +11,7 @@ from sd2core.cli.options import (
     add_command,
     add_json,
     add_mesh_reading,
+    add_output,
     not_negative_float,
     positive_float,
     vector,
@@ -49,16 +50,18 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--at", required=True, metavar="PLACE|VERTEX", help="where on the body, or which vertex"
     )
+    add_output(parser, "FILE", "the samples to write (.csv, .sto or .npz)")
     parser.add_argument(
-        "--out", type=Path, required=True, metavar="FILE", help="ends in .csv, .sto or .npz"
-    )
-    parser.add_argument(
-        "--rate", type=positive_float, default=100.0, metavar="F", help="in Hz (default: 100)"
+        "--rate",
+        type=positive_float,
+        default=100.0,
+        metavar="HZ",
+        help="samples per second (default: 100)",
     )
     parser.add_argument(
         "--cutoff",
         type=positive_float,
-        metavar="F",
+        metavar="HZ",
         help="where the zero-phase low pass leaves half of the amplitude, in Hz (default: 6, or a"
         " fifth of the mesh's frame rate if that is lower)",
     )
@@ -76,7 +79,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 
 def _add_errors(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group("errors of the sensor (default: none)")
+    group = parser.add_argument_group("sensor errors", "none by default")
     for short, long, unit in (
         ("acc", "accelerometer", "m/s²"),
         ("gyr", "gyroscope", "rad/s"),
@@ -92,17 +95,19 @@ def _add_errors(parser: argparse.ArgumentParser) -> None:
             f"--{short}-noise",
             type=not_negative_float,
             default=0.0,
-            metavar="D",
+            metavar="DENSITY",
             help=f"density of its white noise, in {unit}/√Hz",
         )
         group.add_argument(
             f"--{short}-range",
             type=positive_float,
             default=math.inf,
-            metavar="M",
-            help=f"its range: ±M {unit}; what is beyond is clipped",
+            metavar="LARGEST",
+            help=f"its range, plus and minus, in {unit}; what is beyond is clipped",
         )
-    group.add_argument("--seed", type=int, default=0, metavar="N", help="of the noise (default: 0)")
+    group.add_argument(
+        "--seed", type=int, default=0, metavar="N", help="seed of the noise (default: 0)"
+    )
 
 
 def _imu(options: argparse.Namespace) -> None:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sd2core.cli.options import (
     add_command,
+    add_figure_output,
     add_json,
     add_mesh_and_sensor,
     add_mesh_reading,
+    add_method,
     positive_float,
     positive_int,
     share,
@@ -46,18 +47,13 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             "  sd2 ladder walk.npz\n"
             "  sd2 ladder walk.npz --quick --tolerance 1%\n"
             "  sd2 ladder walk.sd2 --sensor 1.5,0,2 --budget-ms 0.1\n"
-            "  sd2 ladder walk.npz --family fmcw\n"
-            "  sd2 ladder walk.npz --plot accuracy.png --json"
+            "  sd2 ladder walk.npz --method fmcw\n"
+            "  sd2 ladder walk.npz --figure accuracy.png --json"
         ),
     )
     add_mesh_and_sensor(parser)
     add_wish(parser, "2%%")
-    parser.add_argument(
-        "--family",
-        choices=("histogram", "fmcw"),
-        default="histogram",
-        help="measure counting, or the FMCW signal (default: histogram)",
-    )
+    add_method(parser, "measure counting, or the FMCW signal")
     parser.add_argument(
         "--weight",
         choices=("count", "area", "projected"),
@@ -76,9 +72,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--fresh", action="store_true", help="measure again what was measured before"
     )
-    parser.add_argument(
-        "--plot", type=Path, metavar="FILE", help="draw error against cost, as .png, .svg or .pdf"
-    )
+    add_figure_output(parser, "error against cost")
     add_mesh_reading(parser)
     add_json(parser)
 
@@ -89,25 +83,25 @@ def _ladder(options: argparse.Namespace) -> int:
     from sd2core.doppler import PRESETS
     from sd2core.files.figure_files import SUFFIXES, save_figure
 
-    if options.plot is not None:
+    if options.figure is not None:
         if options.quick:
-            raise Sd2Error("--plot is given with --quick", "one of the two: nothing is measured")
-        check_output(options.plot, *SUFFIXES)
-    if options.quick and options.family == "fmcw":
-        raise Sd2Error("--quick is given with --family fmcw", "it with --family histogram only")
+            raise Sd2Error("--figure is given with --quick", "one of the two: nothing is measured")
+        check_output(options.figure, *SUFFIXES)
+    if options.quick and options.method == "fmcw":
+        raise Sd2Error("--quick is given with --method fmcw", "it with --method histogram only")
     mesh, sensor = mesh_and_sensor(options)
     synthesis = check_options(mesh, replace(PRESETS["paper"], weight=options.weight))
     choice = None
-    if options.family == "histogram":
+    if options.method == "histogram":
         tolerance = options.tolerance
         if tolerance is None and options.budget_ms is None:
             tolerance = _TOLERANCE
         choice = chosen(mesh, sensor, synthesis, tolerance, options.budget_ms)
     measurement = None if options.quick else _measured(mesh, sensor, synthesis, options)
-    if options.plot is not None and measurement is not None:
+    if options.figure is not None and measurement is not None:
         from sd2core.accuracy.results import plot_cost_and_error
 
-        save_figure(plot_cost_and_error(measurement, choice), options.plot)
+        save_figure(plot_cost_and_error(measurement, choice), options.figure)
     if options.json:
         print_json(
             {
@@ -129,14 +123,14 @@ def add_wish(parser: argparse.ArgumentParser, default: str) -> None:
     wanted.add_argument(
         "--tolerance",
         type=share,
-        metavar="P",
+        metavar="SHARE",
         help=f"the error that is allowed, as 2%% or 0.02: relative L1 of the smoothed map"
         f" (default: {default})",
     )
     wanted.add_argument(
         "--budget-ms",
         type=positive_float,
-        metavar="B",
+        metavar="MS",
         help="instead, the milliseconds per frame that are allowed",
     )
 
@@ -177,7 +171,7 @@ def _measured(
     from sd2core.accuracy.cache import cached_measurement, store_measurement
     from sd2core.accuracy.measuring import REPEATS, measure
 
-    known = cached_measurement(mesh, sensor, synthesis, options.family)
+    known = cached_measurement(mesh, sensor, synthesis, options.method)
     if known is not None and not (known.stale or options.fresh or options.repeats):
         return known
     with progress_bar("Measuring", "plan") as progress:
@@ -185,7 +179,7 @@ def _measured(
             mesh,
             sensor,
             options=synthesis,
-            family=options.family,
+            family=options.method,
             repeats=options.repeats or REPEATS,
             progress=progress,
         )

@@ -12,7 +12,12 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sd2core.cli.options import add_command, add_json, positive_float
+from sd2core.cli.options import (
+    add_command,
+    add_json,
+    add_output,
+    positive_float,
+)
 from sd2core.cli.output import counted, print_event, print_facts
 from sd2core.errors import Sd2Error
 from sd2core.runs.control import signals_kept
@@ -72,9 +77,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         metavar="FILE",
         help="the .cfg or .json that the radar runs with (with --dca1000)",
     )
-    parser.add_argument(
-        "--out", type=Path, required=True, metavar="NAME.sd2", help="the recording to write"
-    )
+    add_output(parser, "NAME.sd2", "the recording to write")
     parser.add_argument(
         "--classifier", type=Path, metavar="FILE", help="a classifier of `sd2 classify train`"
     )

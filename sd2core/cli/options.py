@@ -60,7 +60,7 @@ def add_axis(parser: argparse._ActionsContainer) -> None:
     parser.add_argument(
         "--v-max",
         type=positive_float,
-        metavar="V",
+        metavar="MPS",
         help="end of the velocity axis in m/s (default: 2)",
     )
 
@@ -71,11 +71,23 @@ def add_mesh_and_sensor(parser: argparse.ArgumentParser) -> None:
     add_sensor(parser)
 
 
+def add_output(
+    parser: argparse._ActionsContainer, metavar: str, text: str, *, required: bool = True
+) -> None:
+    """Add ``--out``."""
+    parser.add_argument("--out", type=Path, required=required, metavar=metavar, help=text)
+
+
+def add_figure_output(parser: argparse._ActionsContainer, drawn: str) -> None:
+    """Add ``--figure``."""
+    parser.add_argument(
+        "--figure", type=Path, metavar="FILE", help=f"draw {drawn}, as .png, .svg or .pdf"
+    )
+
+
 def add_map_output(parser: argparse.ArgumentParser, *, required: bool = True) -> None:
     """Add ``--out`` for a Doppler map."""
-    parser.add_argument(
-        "--out", type=Path, required=required, metavar="FILE.npz", help="the map to write"
-    )
+    add_output(parser, "FILE.npz", "the map to write", required=required)
 
 
 def add_sensor(parser: argparse.ArgumentParser) -> None:
@@ -90,45 +102,79 @@ def add_sensor(parser: argparse.ArgumentParser) -> None:
 
 def add_mesh_reading(parser: argparse.ArgumentParser) -> None:
     """Add what a mesh file may not say about itself."""
-    parser.add_argument(
+    group = parser.add_argument_group("mesh file", "what it may not say about itself")
+    group.add_argument(
         "--faces",
         type=Path,
         metavar="FILE",
         help="triangles (.npy or .obj) for a mesh that has none of its own",
     )
-    parser.add_argument(
+    group.add_argument(
         "--fps",
         type=positive_float,
-        metavar="F",
+        metavar="FPS",
         help="frames per second of a mesh that does not say",
     )
-    parser.add_argument(
+    group.add_argument(
         "--scale",
         type=positive_float,
-        metavar="S",
+        metavar="M",
         help="metres per unit of the mesh, e.g. 0.001 for millimetres (default: 1)",
     )
-    parser.add_argument(
+    group.add_argument(
         "--person", metavar="ID", help="which person of a file of several (default: seen longest)"
     )
-    parser.add_argument(
+    group.add_argument(
         "--distance-m",
         type=finite_float,
-        metavar="D",
+        metavar="M",
         help="move a mesh that is centred on the body's root this far forward",
     )
-    parser.add_argument(
+    group.add_argument(
         "--image-size",
         type=image_size,
         metavar="WxH",
         help="size of the video in pixels, to place the output of VIBE (default: that of the"
         " recording's video)",
     )
-    parser.add_argument(
+    group.add_argument(
         "--focal-px",
         type=positive_float,
-        metavar="F",
+        metavar="PX",
         help="focal length of the video in pixels, likewise (default: the diagonal)",
+    )
+
+
+def add_channel(parser: argparse._ActionsContainer) -> None:
+    """Add ``--receiver`` and ``--transmitter``."""
+    parser.add_argument(
+        "--receiver",
+        type=positive_int,
+        metavar="N",
+        help="take this receiver, counted from 1 (default: the mean power of all)",
+    )
+    parser.add_argument(
+        "--transmitter", type=positive_int, metavar="N", help="take this transmitter, likewise"
+    )
+
+
+def add_method(parser: argparse._ActionsContainer, text: str) -> None:
+    """Add ``--method``: counting vertices, or the signal of a radar."""
+    parser.add_argument(
+        "--method",
+        choices=("histogram", "fmcw"),
+        default="histogram",
+        help=f"{text} (default: histogram)",
+    )
+
+
+def add_placements_used(parser: argparse._ActionsContainer, what: str, usual: str) -> None:
+    """Add ``--placements``: which places of the sensor are used of data that has several."""
+    parser.add_argument(
+        "--placements",
+        choices=("all", "first"),
+        default=usual,
+        help=f"{what} all places of the sensor, or the first only (default: {usual})",
     )
 
 
@@ -195,7 +241,7 @@ def add_limbs(parser: argparse._ActionsContainer) -> None:
 def add_people_kept_out(group: argparse._ActionsContainer, validation: str, test: str) -> None:
     """Add ``--validation-subjects`` and ``--test-subjects``; the texts say who else it is."""
     for part, help_text in (("validation", validation), ("test", test)):
-        group.add_argument(f"--{part}-subjects", type=name_list, metavar="NAMES", help=help_text)
+        group.add_argument(f"--{part}-subjects", type=name_list, metavar="LIST", help=help_text)
 
 
 def bin_list(text: str) -> tuple[int, ...]:

@@ -12,6 +12,7 @@ from sd2core.cli.options import (
     add_command,
     add_json,
     add_limbs,
+    add_output,
     bin_list,
     finite_float,
     given,
@@ -29,7 +30,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     parser = add_command(
         commands, "pairs", "make pairs of synthetic and real Doppler to learn from"
     )
-    kinds = parser.add_subparsers(title="recordings", metavar="COMMAND", required=True)
+    kinds = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     _add_mars(kinds)
     _add_recordings(kinds)
 
@@ -49,21 +50,21 @@ def _add_recordings(kinds: argparse._SubParsersAction) -> None:
             "  sd2 pairs recordings a1.sd2 a2.sd2 b1.sd2 --subjects anna,anna,ben --out mine.zarr"
         ),
     )
-    parser.add_argument("recordings", type=Path, nargs="+", metavar="RECORDING", help="NAME.sd2")
+    parser.add_argument(
+        "recordings", type=Path, nargs="+", metavar="RECORDING", help="with a mesh and a radar"
+    )
     _add_pairs(parser, "14,15,16 of 32, else none")
     parser.add_argument(
         "--subjects",
         type=lambda text: tuple(text.split(",")),
-        metavar="NAMES",
+        metavar="LIST",
         help="subject of each recording, separated by commas (default: each shows another person)",
     )
 
 
 def _add_pairs(parser: argparse.ArgumentParser, usual_null_bins: str) -> None:
     """Add the store of pairs, and the axis and nulled bins of its maps."""
-    parser.add_argument(
-        "--out", type=Path, required=True, metavar="PAIRS", help="the store to write (.zarr)"
-    )
+    add_output(parser, "FILE.zarr", "the pairs to write")
     add_axis(parser)
     parser.add_argument(
         "--null-bins",
@@ -112,18 +113,18 @@ def _add_mars(kinds: argparse._SubParsersAction) -> None:
         help="weight of a vertex (default: count)",
     )
     parser.add_argument(
-        "--radar-position",
+        "--sensor",
         type=position,
         metavar="X,Y,Z",
-        help="place of the radar beside the Kinect in metres, right, down and forward (default:"
-        " estimated; 0,0,0 where only --radar-offset is given)",
+        help="where the radar is beside the Kinect, in metres, right, down and forward (default:"
+        " estimated; 0,0,0 where only --radar-offset-s is given)",
     )
     parser.add_argument(
-        "--radar-offset",
+        "--radar-offset-s",
         type=finite_float,
         metavar="S",
         help="what the radar shows at a time is the motion so many seconds later (default:"
-        " estimated; 0 where only --radar-position is given)",
+        " estimated; 0 where only --sensor is given)",
     )
     parser.add_argument(
         "--target",
@@ -143,8 +144,8 @@ def _choices(options: argparse.Namespace) -> MarsChoices:
     changes = given(options, ("null_bins", "visibility", "weight"))
     choices = replace(choices, synthesis=replace(synthesis, axis=axis, **changes))
     place = None
-    if options.radar_position is not None or options.radar_offset is not None:
-        place = RadarPlace(options.radar_position or (0.0, 0.0, 0.0), options.radar_offset or 0.0)
+    if options.sensor is not None or options.radar_offset_s is not None:
+        place = RadarPlace(options.sensor or (0.0, 0.0, 0.0), options.radar_offset_s or 0.0)
     choices = replace(choices, limbs=options.limbs, place=place)
     return replace(choices, target=options.target) if options.target else choices
 
@@ -161,7 +162,7 @@ def _recordings(options: argparse.Namespace) -> None:
         synthesis = replace(synthesis, axis=axis, null_bins=())
     if options.null_bins is not None:
         synthesis = replace(synthesis, null_bins=options.null_bins)
-    with progress_bar("Making pairs") as progress:
+    with progress_bar("Making pairs", "step") as progress:
         made = make_recording_pairs(
             options.recordings,
             options.out,

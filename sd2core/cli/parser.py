@@ -42,7 +42,7 @@ examples:
   sd2 open walk.sd2                           look at a recording, a video or a mesh
   sd2 info walk.npz                           what is in a file
   sd2 fit walk.mp4 --out walk.zarr            a moving mesh from a video of a person
-  sd2 import walk.sd2 --video walk.mkv --mesh walk.npz
+  sd2 import --video walk.mkv --mesh walk.npz --out walk.sd2
   sd2 align walk.sd2 --save                   the radar's clock, from what both saw
   sd2 synth walk.npz --out map.npz --sensor 0,0,1
   sd2 radar capture/ --out real.npz

@@ -7,7 +7,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.ladder import add_wish
-from sd2core.cli.options import add_command, add_json, add_mesh_reading, flag, given, positive_int
+from sd2core.cli.options import (
+    add_command,
+    add_json,
+    add_mesh_reading,
+    add_output,
+    flag,
+    given,
+    positive_int,
+)
 from sd2core.cli.output import counted, duration, print_facts, print_json, print_rows, progress_bar
 from sd2core.errors import Sd2Error
 
@@ -49,7 +57,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             "  sd2 placements walk.sd2 --placements grid.json --json"
         ),
     )
-    parser.add_argument("mesh", type=Path, metavar="RECORDING", help="a recording, or a mesh")
+    parser.add_argument("mesh", type=Path, metavar="MESH", help="a mesh, or a recording")
     parser.add_argument(
         "--ranges", metavar="LIST", help="distances in metres; with --cloud from:to, as 1:4"
     )
@@ -60,10 +68,10 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         "--elevations", metavar="LIST", help="degrees; with --cloud from:to (default: 0)"
     )
     parser.add_argument(
-        "--cloud", type=positive_int, metavar="N", help="N random places instead of a grid"
+        "--cloud", type=positive_int, metavar="N", help="so many random places instead of a grid"
     )
     parser.add_argument(
-        "--seed", type=int, metavar="S", help="seed of the random places (default: 0)"
+        "--seed", type=int, metavar="N", help="seed of the random places (default: 0)"
     )
     parser.add_argument(
         "--placements",
@@ -71,7 +79,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         metavar="FILE",
         help="read the places from a file of --out",
     )
-    parser.add_argument("--out", type=Path, metavar="FILE.json", help="write the plan")
+    add_output(parser, "FILE.json", "the plan to write", required=False)
     add_wish(parser, "2%%")
     add_mesh_reading(parser)
     add_json(parser)

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, get_args
 
 from sd2core.cli.options import (
     add_axis,
+    add_channel,
     add_command,
     add_json,
     add_map_output,
     flag,
     given,
-    positive_int,
     span_m,
 )
 from sd2core.cli.output import progress_bar
@@ -75,15 +75,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         metavar="LO,HI",
         help="count only echoes from this range in metres (default: all)",
     )
-    parser.add_argument(
-        "--receiver",
-        type=positive_int,
-        metavar="N",
-        help="take this receiver, counted from 1 (default: the mean power of all)",
-    )
-    parser.add_argument(
-        "--transmitter", type=positive_int, metavar="N", help="take this transmitter, likewise"
-    )
+    add_channel(parser)
     add_json(parser)
     add_description(parser)
 
@@ -108,16 +100,20 @@ def _show_limits(options: argparse.Namespace) -> None:
     from sd2core.io.radar import holds_map, load_capture
     from sd2core.recording.recording import is_recording, open_recording
 
-    path = options.capture
-    if is_recording(path):
-        recording = open_recording(path)
+    path, channel = options.capture, (options.receiver, options.transmitter)
+    recording = open_recording(path) if is_recording(path) else None
+    if recording is not None:
         path = recording.radar or path
     _refuse(_of_processing(options), "without --out", "together with --out")
     if holds_map(path):
         _refuse(_of_channels(options), f"and {path} holds a finished map", "for raw samples only")
         description = describe_radar(path)
     else:
-        capture = load_capture(path).channel(options.receiver, options.transmitter)
+        capture = (
+            load_capture(path).channel(*channel)
+            if recording is None
+            else recording.load_capture(*channel)
+        )
         description = describe_capture(path, capture)
     show(description, as_json=options.json)
 
@@ -130,19 +126,18 @@ def _write_map(options: argparse.Namespace) -> None:
     from sd2core.recording.recording import is_recording, open_recording
 
     check_map_output(options.out)
-    offset_s = 0.0
+    channel, offset_s = (options.receiver, options.transmitter), 0.0
     if is_recording(options.capture):
         recording = open_recording(options.capture)
         if recording.holds_radar_map:
             _write_recorded(recording.load_radar_map(), recording.radar_offset_s, options)
             return
-        capture, offset_s = recording.load_capture(), recording.radar_offset_s
+        capture, offset_s = recording.load_capture(*channel), recording.radar_offset_s
     elif holds_map(options.capture):
         _write_recorded(load_recorded_map(options.capture), 0.0, options)
         return
     else:
-        capture = load_capture(options.capture)
-    capture = capture.channel(options.receiver, options.transmitter)
+        capture = load_capture(options.capture).channel(*channel)
     with progress_bar("Processing") as progress:
         doppler = doppler_map(
             capture,

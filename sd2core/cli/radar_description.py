@@ -17,6 +17,7 @@ class _Entry(NamedTuple):
 
     parse: Callable[[str], Any]
     meaning: str
+    metavar: str
 
 
 _ENTRIES = {
@@ -24,36 +25,41 @@ _ENTRIES = {
         lambda text: tuple(part.strip() for part in text.split(",")),
         "names of the array's dimensions: frame, transmitter, receiver, chirp, sample, iq; or"
         " stream (default: frame,chirp,sample, with receivers and transmitters after the frames)",
+        "LIST",
     ),
-    "carrier_hz": _Entry(positive_float, "centre frequency of the samples of a chirp"),
+    "carrier_hz": _Entry(positive_float, "centre frequency of the samples of a chirp", "HZ"),
     "bandwidth_hz": _Entry(
-        finite_float, "frequencies that the samples of a chirp cover; 0 for a continuous wave"
+        finite_float, "frequencies that the samples of a chirp cover; 0 for a continuous wave", "HZ"
     ),
-    "slope_hz_per_s": _Entry(finite_float, "slope of a chirp, in place of the bandwidth"),
-    "sample_rate_hz": _Entry(positive_float, "samples per second within a chirp"),
+    "slope_hz_per_s": _Entry(
+        finite_float, "slope of a chirp, in place of the bandwidth", "HZ_PER_S"
+    ),
+    "sample_rate_hz": _Entry(positive_float, "samples per second within a chirp", "HZ"),
     "chirp_repetition_s": _Entry(
-        positive_float, "time between chirps of the same transmitter, in seconds"
+        positive_float, "time between chirps of the same transmitter, in seconds", "S"
     ),
-    "frame_repetition_s": _Entry(positive_float, "time between frames, in seconds"),
+    "frame_repetition_s": _Entry(positive_float, "time between frames, in seconds", "S"),
     "sign": _Entry(
-        int, "1 where the phase grows with the distance, -1 where it falls (default: 1)"
+        int, "1 where the phase grows with the distance, -1 where it falls (default: 1)", "SIGN"
     ),
-    "zero": _Entry(finite_float, "value that is no signal, such as 2048 (default: 0)"),
-    "full_scale": _Entry(positive_float, "value above zero that fills the converter"),
-    "samples_per_chirp": _Entry(positive_int, "of a stream: samples that make a chirp"),
-    "chirps_per_frame": _Entry(positive_int, "of a stream: chirps that make a frame"),
-    "range_start_m": _Entry(finite_float, "distance of the first sample, if samples are distances"),
-    "range_step_m": _Entry(positive_float, "distance between samples, likewise"),
-    "dataset": _Entry(str, "dataset of an HDF5 file of several"),
-    "name": _Entry(str, "name of the radar on screen"),
+    "zero": _Entry(finite_float, "value that is no signal, such as 2048 (default: 0)", "VALUE"),
+    "full_scale": _Entry(positive_float, "value above zero that fills the converter", "VALUE"),
+    "samples_per_chirp": _Entry(positive_int, "of a stream: samples that make a chirp", "N"),
+    "chirps_per_frame": _Entry(positive_int, "of a stream: chirps that make a frame", "N"),
+    "range_start_m": _Entry(
+        finite_float, "distance of the first sample, if samples are distances", "M"
+    ),
+    "range_step_m": _Entry(positive_float, "distance between samples, likewise", "M"),
+    "dataset": _Entry(str, "dataset of an HDF5 file of several", "NAME"),
+    "name": _Entry(str, "name of the radar on screen", "NAME"),
 }
 
 
 def add_description(parser: argparse.ArgumentParser) -> None:
     """Add the entries of a description."""
-    group = parser.add_argument_group("after describe", "all in SI units")
+    group = parser.add_argument_group("description", "after the word describe; all in SI units")
     for name, entry in _ENTRIES.items():
-        group.add_argument(flag(name), type=entry.parse, metavar="V", help=entry.meaning)
+        group.add_argument(flag(name), type=entry.parse, metavar=entry.metavar, help=entry.meaning)
 
 
 def refuse_description(options: argparse.Namespace) -> None:

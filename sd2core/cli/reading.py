@@ -112,11 +112,6 @@ def check_output(path: Path, *suffixes: str) -> None:
         raise Sd2Error(f"The output file is {path}", f"a name that ends in {endings}")
     if path.is_dir():
         raise Sd2Error(f"The output file {path} is a folder", f"a file's name, ending in {endings}")
-    if not path.absolute().parent.is_dir():
-        raise Sd2Error(
-            f"The folder {path.absolute().parent} does not exist",
-            "an existing folder for the output file",
-        )
     try:
         check_writable(path)
     except OSError as error:

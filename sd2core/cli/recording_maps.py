@@ -116,13 +116,7 @@ def _denoised(model: ModelCard, synthetic: DopplerMap) -> DopplerMap:
 
 
 def _radar(recording: Recording, axis: VelocityAxis | None) -> DopplerMap:
-    from sd2core.fmcw import doppler_map
-    from sd2core.radar_config import CLUTTER
+    from sd2core.datasets.recording_sources import radar_map
 
-    if recording.holds_radar_map:
-        doppler = recording.load_radar_map().doppler
-    else:
-        capture = recording.load_capture()
-        with progress_bar("Processing") as progress:
-            doppler = doppler_map(capture, axis=axis, clutter=CLUTTER, progress=progress)
-    return doppler.shifted(recording.radar_offset_s)
+    with progress_bar("Processing") as progress:
+        return radar_map(recording, axis, progress)

@@ -8,6 +8,7 @@ import re
 import sys
 from collections.abc import Sequence
 
+from sd2core.cli.output_folders import output_folders
 from sd2core.errors import Sd2Error
 from sd2core.processes import INTERRUPTED
 
@@ -22,7 +23,8 @@ def run(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> int:
     """
     options = parser.parse_args(attach_negative_values(arguments))
     try:
-        code = options.handler(options)
+        with output_folders(options):
+            code = options.handler(options)
         _flush_output()
         return code or 0
     except Sd2Error as error:

@@ -14,6 +14,7 @@ from sd2core.cli.options import (
     add_limbs,
     add_mesh_and_sensor,
     add_mesh_reading,
+    add_output,
     finite_float,
     position,
     positive_float,
@@ -38,7 +39,8 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         "simulate",
         "make radar samples of any mesh, or pairs of simulated people to train on",
         examples=(
-            "  sd2 simulate radar walk.npz walk-radar\n  sd2 simulate campaign campaign.zarr"
+            "  sd2 simulate radar walk.npz --out walk-radar\n"
+            "  sd2 simulate campaign --out campaign.zarr"
         ),
     )
     kinds = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
@@ -59,18 +61,18 @@ def _add_radar(kinds: argparse._SubParsersAction) -> None:
             "metres."
         ),
         examples=(
-            "  sd2 simulate radar walk.npz walk-radar\n"
+            "  sd2 simulate radar walk.npz --out walk-radar\n"
             "  sd2 radar walk-radar --out map.npz    (its Doppler map)\n"
-            "  sd2 simulate radar walk.npz left --sensor -1,0,0 --snr-db 20 --receivers 3\n"
-            "  sd2 simulate radar walk.npz floor --ground 1.1 --beam-width-deg 60\n"
-            "  sd2 simulate radar walk.npz like-mine --radar capture/config.json"
+            "  sd2 simulate radar walk.npz --out left --sensor -1,0,0 --snr-db 20 --receivers 3\n"
+            "  sd2 simulate radar walk.npz --out floor --ground 1.1 --beam-width-deg 60\n"
+            "  sd2 simulate radar walk.npz --out like-mine --radar capture/config.json"
         ),
     )
     add_mesh_and_sensor(parser)
-    parser.add_argument("out", type=Path, metavar="OUT", help="the capture's folder to write")
+    add_output(parser, "FOLDER", "the capture to write")
     add_radar_choice(parser)
     parser.add_argument(
-        "--model",
+        "--method",
         choices=("nufft", "direct"),
         default="nufft",
         help="sum by a non-uniform FFT, or triangle by triangle, some hundred times slower"
@@ -112,7 +114,7 @@ def _add_radar(kinds: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--beam-width-deg",
         type=positive_float,
-        metavar="B",
+        metavar="DEG",
         help="full width of the beam at half power, along where the sensor looks (default: all"
         " directions alike)",
     )
@@ -134,7 +136,7 @@ def _add_radar(kinds: argparse._SubParsersAction) -> None:
     noise.add_argument(
         "--snr-db",
         type=finite_float,
-        metavar="S",
+        metavar="DB",
         help="add thermal noise this many decibels below the moving mesh's echo (default: none)",
     )
     noise.add_argument(
@@ -213,10 +215,6 @@ def _radar(options: argparse.Namespace) -> None:
     from sd2core.io.radar import check_replaceable, named_radar, write_capture, write_described
 
     check_replaceable(options.out)
-    if not options.out.absolute().parent.is_dir():
-        raise Sd2Error(
-            f"The folder {options.out.absolute().parent} does not exist", "an existing folder"
-        )
     config = named_radar(options.radar)
     offsets: tuple[tuple[float, float, float], ...] = ()
     if options.receivers is not None:
@@ -229,7 +227,7 @@ def _radar(options: argparse.Namespace) -> None:
     elif options.wall is not None:
         mirror = Mirror.wall(*options.wall)
     wave = WaveOptions(
-        model=options.model,
+        model=options.method,
         blocks=options.blocks,
         coherent=not options.incoherent,
         motion=options.motion,
@@ -282,15 +280,15 @@ def _add_campaign(kinds: argparse._SubParsersAction) -> None:
             "the same takes."
         ),
         examples=(
-            "  sd2 simulate campaign campaign.zarr\n"
-            "  sd2 simulate campaign small.zarr --subjects 3 --minutes 5 --seed 1\n"
-            "  sd2 simulate campaign ranges.zarr --placements 3\n"
-            "  sd2 simulate campaign as-in-the-paper.zarr --protocol paper"
+            "  sd2 simulate campaign --out campaign.zarr\n"
+            "  sd2 simulate campaign --people 3 --minutes 5 --seed 1 --out small.zarr\n"
+            "  sd2 simulate campaign --sensors 3 --out ranges.zarr\n"
+            "  sd2 simulate campaign --protocol paper --out as-in-the-paper.zarr"
         ),
     )
-    parser.add_argument("out", type=Path, metavar="OUT", help="folder of the pairs")
+    add_output(parser, "FILE.zarr", "the pairs to write")
     parser.add_argument(
-        "--subjects",
+        "--people",
         type=positive_int,
         default=6,
         metavar="N",
@@ -300,7 +298,7 @@ def _add_campaign(kinds: argparse._SubParsersAction) -> None:
         "--minutes",
         type=positive_float,
         default=90.0,
-        metavar="M",
+        metavar="MIN",
         help="minutes of all people together (default: 90)",
     )
     parser.add_argument(
@@ -315,10 +313,10 @@ def _add_campaign(kinds: argparse._SubParsersAction) -> None:
         help="of the paper's swipes: one kind in a take, or all four (default: to-and-fro)",
     )
     parser.add_argument(
-        "--seed", type=_seed, default=0, metavar="S", help="seed of all random numbers (default: 0)"
+        "--seed", type=_seed, default=0, metavar="N", help="seed of all random numbers (default: 0)"
     )
     parser.add_argument(
-        "--placements",
+        "--sensors",
         type=positive_int,
         default=1,
         metavar="N",
@@ -329,22 +327,22 @@ def _add_campaign(kinds: argparse._SubParsersAction) -> None:
         "--take-seconds",
         type=positive_float,
         default=15.0,
-        metavar="T",
-        help="length of a take (default: 15)",
+        metavar="S",
+        help="length of a take, in seconds (default: 15)",
     )
     parser.add_argument(
-        "--processes",
+        "--workers",
         type=positive_int,
         default=2,
-        metavar="P",
+        metavar="N",
         help="worker processes (default: 2)",
     )
     add_limbs(parser)
     parser.add_argument(
         "--fit-errors",
         type=Path,
-        metavar="FILE",
-        help="errors of fits to imitate (.json; default: those measured of `sd2 fit`)",
+        metavar="FILE.json",
+        help="errors of fits to imitate (default: those measured of `sd2 fit`)",
     )
     parser.add_argument(
         "--fit-error-sizes",
@@ -393,7 +391,7 @@ def _campaign(options: argparse.Namespace) -> None:
     campaign = Campaign(
         options.seed,
         options.take_seconds,
-        options.placements,
+        options.sensors,
         limbs=options.limbs,
         protocol=_protocol(options),
         error_sizes=options.fit_error_sizes,
@@ -402,9 +400,9 @@ def _campaign(options: argparse.Namespace) -> None:
         made = make_campaign(
             options.out,
             campaign,
-            subjects=options.subjects,
+            subjects=options.people,
             minutes=options.minutes,
-            processes=options.processes,
+            processes=options.workers,
             errors=options.fit_errors,
             progress=progress,
         )
@@ -421,7 +419,7 @@ def _campaign(options: argparse.Namespace) -> None:
                 "made": made,
                 "frames": pairs.frames,
                 "minutes": first.frames / first.frame_rate_hz / 60.0,
-                "placements": options.placements,
+                "placements": options.sensors,
                 "labels": list(pairs.labels),
             }
         )
@@ -429,5 +427,5 @@ def _campaign(options: argparse.Namespace) -> None:
     print(
         f"Made {made} takes: {options.out} holds {len(first.takes)} simulated takes of"
         f" {len(pairs.subjects)} people, {first.frames / first.frame_rate_hz / 60.0:.1f} minutes"
-        + (f", each from {options.placements} places" if options.placements > 1 else "")
+        + (f", each from {options.sensors} places" if options.sensors > 1 else "")
     )

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from sd2core.cli.options import (
     add_command,
     add_mesh_reading,
+    add_output,
     add_sensor,
     positive_float,
     positive_int,
@@ -48,9 +49,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         metavar="PATH",
         help="a recording, or a video, a mesh, or both",
     )
-    parser.add_argument(
-        "--out", type=Path, required=True, metavar="FILE", help="FILE.png, FILE.svg or FILE.pdf"
-    )
+    add_output(parser, "FILE", "the figure to write (.png, .svg or .pdf)")
     chosen = parser.add_mutually_exclusive_group()
     chosen.add_argument(
         "--frames",
@@ -80,7 +79,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         "--v-max",
         type=positive_float,
         default=2.0,
-        metavar="V",
+        metavar="MPS",
         help="velocity in m/s at which the colours end (default: 2)",
     )
     parser.add_argument(

@@ -15,12 +15,14 @@ from sd2core.cli.options import (
     add_map_output,
     add_mesh_and_sensor,
     add_mesh_reading,
+    add_method,
     bin_list,
     flag,
     given,
     not_negative_float,
     positive_float,
     positive_int,
+    share,
 )
 from sd2core.cli.output import progress_bar
 from sd2core.cli.simulate import add_radar_choice, simulate_with_bar
@@ -70,7 +72,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             "Counts the mesh's vertices by their velocity towards the sensor, frame by frame.\n"
             "The camera is at 0,0,0 and looks along z; x is to its right and y down, in\n"
             "metres. Positive velocity is approaching. Options that are not given come from\n"
-            "the preset. With --model fmcw the echoes of all triangles are summed to the signal\n"
+            "the preset. With --method fmcw the echoes of all triangles are summed to the signal\n"
             "of a radar, and that is processed like a capture (more: sd2 simulate radar)."
         ),
         examples=(
@@ -80,7 +82,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             "  sd2 synth points.npz --out map.npz --visibility none --null-bins none\n"
             "  sd2 synth walk.npz --out map.npz --preset vid2doppler\n"
             "  sd2 synth walk.npz --out map.npz --tolerance 2%    (as quick as this allows)\n"
-            "  sd2 synth walk.npz --out map.npz --model fmcw\n"
+            "  sd2 synth walk.npz --out map.npz --method fmcw\n"
             "  sd2 synth walk.zarr --out map.npz --uncertainty    (of a mesh from sd2 fit)\n"
             "  sd2 synth walk.zarr --out map.npz --limbs    (each part of the body apart, too)"
         ),
@@ -93,12 +95,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         default="paper",
         help="the paper's chain, or Vid2Doppler's arithmetic to the last digit (default: paper)",
     )
-    parser.add_argument(
-        "--model",
-        choices=("histogram", "fmcw"),
-        default="histogram",
-        help="count vertices, or simulate the radar's signal (default: histogram)",
-    )
+    add_method(parser, "count vertices, or simulate the radar's signal")
     add_radar_choice(parser)
     add_wish(parser, "none: what the options say")
     parser.add_argument(
@@ -122,9 +119,9 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     )
     parser.add_argument(
         "--vertices-kept",
-        type=positive_float,
+        type=share,
         metavar="SHARE",
-        help="simplify the surface to this share of its vertices, 0.25 say (default: 1, all)",
+        help="simplify the surface to this share of its vertices, e.g. 25%% (default: 1, all)",
     )
     parser.add_argument(
         "--weight",
@@ -135,7 +132,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--null-bins",
         type=bin_list,
-        metavar="BINS",
+        metavar="LIST",
         help="bins to empty, as 14,15,16, or none (default: those from -0.25 to 0.125 m/s, which"
         " the paper's radar cannot tell from a static room; on any axis those at 0 m/s)",
     )
@@ -154,7 +151,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--reference-range-m",
         type=positive_float,
-        metavar="R",
+        metavar="M",
         help="range at which a vertex counts as one (paper: 2.2)",
     )
     parser.add_argument(
@@ -178,7 +175,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--velocity-sigma-bins",
         type=not_negative_float,
-        metavar="B",
+        metavar="BINS",
         help="smooth the map along velocity (sigma in bins)",
     )
     parser.add_argument(
@@ -205,10 +202,10 @@ def _synth(options: argparse.Namespace) -> None:
     from sd2core.mesh.decimation import decimate
 
     check_map_output(options.out)
-    if options.model == "fmcw":
+    if options.method == "fmcw":
         _check_fmcw(options)
     elif options.radar != "paper":
-        raise Sd2Error("--radar is given", "it together with --model fmcw only")
+        raise Sd2Error("--radar is given", "it together with --method fmcw only")
     wish = options.tolerance is not None or options.budget_ms is not None
     if wish:
         _check_wish(options)
@@ -221,7 +218,7 @@ def _synth(options: argparse.Namespace) -> None:
             " known",
             "a mesh that was fitted to a video with `sd2 fit`",
         )
-    if options.model == "fmcw":
+    if options.method == "fmcw":
         doppler = _by_fmcw(options, mesh, sensor)
     elif wish:
         doppler = _as_chosen(options, mesh, sensor)
@@ -236,8 +233,8 @@ def _synth(options: argparse.Namespace) -> None:
 
 def _check_wish(options: argparse.Namespace) -> None:
     wish = "--tolerance" if options.tolerance is not None else "--budget-ms"
-    if options.model == "fmcw":
-        raise Sd2Error(f"{wish} is given with --model fmcw", f"{wish} with the histogram only")
+    if options.method == "fmcw":
+        raise Sd2Error(f"{wish} is given with --method fmcw", f"{wish} with the histogram only")
     for name in given(options, _RUNGS):
         raise Sd2Error(
             f"{wish} is given with {flag(name)}",
@@ -280,12 +277,12 @@ def _check_fmcw(options: argparse.Namespace) -> None:
     unfit += ["limbs"] * options.limbs
     if unfit:
         raise Sd2Error(
-            f"{flag(unfit[0])} is given with --model fmcw",
+            f"{flag(unfit[0])} is given with --method fmcw",
             "options of the histogram with the histogram only",
         )
     if options.visibility not in (None, "facing", "exact"):
         raise Sd2Error(
-            f"--visibility {options.visibility} is given with --model fmcw", "facing or exact"
+            f"--visibility {options.visibility} is given with --method fmcw", "facing or exact"
         )
 
 

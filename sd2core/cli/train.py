@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from sd2core.cli.options import (
     add_command,
     add_json,
+    add_output,
     add_people_kept_out,
     flag,
     given,
@@ -94,7 +95,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         metavar="CONFIG.toml|DATA",
         help="a file with settings, or one or several stores of pairs, which are mixed",
     )
-    parser.add_argument("--out", type=Path, metavar="RUN", help="the folder of the run; new")
+    add_output(parser, "RUN", "the folder of the run; new", required=False)
     parser.add_argument(
         "--resume", type=Path, metavar="RUN", help="go on with a run that was stopped or killed"
     )
@@ -108,7 +109,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 
 def _add_learning(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group("what learns, and how")
+    group = parser.add_argument_group("network and training")
     group.add_argument(
         "--model",
         metavar="NAME",
@@ -135,17 +136,22 @@ def _add_learning(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--minutes",
         type=positive_float,
-        metavar="M",
+        metavar="MIN",
         help="train for so long instead; the learning rate follows the clock",
     )
-    group.add_argument("--batch-size", type=positive_int, metavar="N", help="default: 64")
     group.add_argument(
-        "--learning-rate", type=positive_float, metavar="R", help="at its highest (default: 0.003)"
+        "--batch-size", type=positive_int, metavar="N", help="segments of a batch (default: 64)"
+    )
+    group.add_argument(
+        "--learning-rate",
+        type=positive_float,
+        metavar="RATE",
+        help="at its highest (default: 0.003)",
     )
     group.add_argument(
         "--ssm-learning-rate",
         type=positive_float,
-        metavar="R",
+        metavar="RATE",
         help="the same for the parameters of state spaces (default: 0.001)",
     )
     group.add_argument(
@@ -167,11 +173,13 @@ def _add_learning(parser: argparse.ArgumentParser) -> None:
         help="what makes an epoch the best: error of the map, or of the peak velocity"
         " (default: rmse)",
     )
-    group.add_argument("--seed", type=int, metavar="N", help="default: 0")
+    group.add_argument(
+        "--seed", type=int, metavar="N", help="seed of all random numbers (default: 0)"
+    )
 
 
 def _add_data(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group("what it learns from")
+    group = parser.add_argument_group("data")
     add_people_kept_out(
         group,
         "kept out to choose the best epoch by, separated by commas (default: a sixth of all, at"
@@ -180,10 +188,10 @@ def _add_data(parser: argparse.ArgumentParser) -> None:
         "kept out for `sd2 eval`, or none (default: as many)",
     )
     group.add_argument(
-        "--segment-frames", type=positive_int, metavar="N", help="length (default: 72)"
+        "--segment-frames", type=positive_int, metavar="N", help="length of a segment (default: 72)"
     )
     group.add_argument(
-        "--overlap-frames", type=int, metavar="N", help="of neighbours (default: 10)"
+        "--overlap-frames", type=int, metavar="N", help="frames that neighbours share (default: 10)"
     )
     group.add_argument(
         "--segments",
@@ -199,18 +207,22 @@ def _add_data(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--range-factor",
         type=positive_float,
-        metavar="F",
+        metavar="FACTOR",
         help="range synthesis: scale input and target together, as if the person were up to F"
         " times nearer or farther (default: 1, off)",
     )
 
 
 def _add_machine(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group("on what")
+    group = parser.add_argument_group("machine")
     group.add_argument(
-        "--device", choices=("auto", "cpu", "cuda"), help="default: a GPU where there is one"
+        "--device",
+        choices=("auto", "cpu", "cuda"),
+        help="where to compute (default: a GPU where there is one)",
     )
-    group.add_argument("--devices", type=positive_int, metavar="N", help="GPUs (default: 1)")
+    group.add_argument(
+        "--devices", type=positive_int, metavar="N", help="number of GPUs (default: 1)"
+    )
     group.add_argument(
         "--precision",
         choices=("auto", "32", "bf16"),

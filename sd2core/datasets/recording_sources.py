@@ -43,7 +43,7 @@ from sd2core.mesh.sequence import MeshSequence
 from sd2core.mocap.recording_pairs import on_clock
 from sd2core.placements.body_extent import BodyExtent
 from sd2core.placements.placements import Place, Placements
-from sd2core.progress import Progress, part_of
+from sd2core.progress import Progress, part_of, silent
 from sd2core.radar_config import CLUTTER
 from sd2core.recording.recording import Recording, open_recording
 from sd2core.runs.pace import Kind
@@ -141,15 +141,19 @@ def labels_and_classes(labels: Labels) -> tuple[tuple[str, ...], dict[str, str]]
     return names, classes | {BACKGROUND: BACKGROUND}
 
 
-def radar_map(recording: Recording, axis: VelocityAxis) -> DopplerMap:
+def radar_map(
+    recording: Recording, axis: VelocityAxis | None, progress: Progress = silent
+) -> DopplerMap:
     """Return the map of a recording's radar file, on the recording's clock.
 
-    ``axis`` is that of a capture's map; a file that holds a map keeps its own.
+    ``axis`` is that of a capture's map, None the radar's own; a file that holds a map keeps its
+    own.
     """
     if recording.holds_radar_map:
         radar = recording.load_radar_map().doppler
     else:
-        radar = doppler_map(recording.load_capture(), axis=axis, clutter=CLUTTER)
+        capture = recording.load_capture()
+        radar = doppler_map(capture, axis=axis, clutter=CLUTTER, progress=progress)
     return radar.shifted(recording.radar_offset_s)
 
 
@@ -372,10 +376,12 @@ def _fingerprint(recording: Recording, key: SourceKey, making: Making) -> str:
     place = None
     if key.placement:
         place = asdict(places_of(recording, making)[key.placement - 1])
+    channel = [recording.radar_receiver, recording.radar_transmitter]
     content = {
         "sensor": asdict(recording.sensor),
         "place": place,
         "radar_offset_s": recording.radar_offset_s,
+        **({"radar_channel": channel} if any(channel) else {}),
         "mesh_reading": recording.mesh_reading.model_dump(mode="json"),
         "spans": [
             (span.track, span.start_s, span.end_s, span.label)

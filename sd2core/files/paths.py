@@ -5,9 +5,10 @@ from __future__ import annotations
 import glob
 import os
 import shutil
-from itertools import chain, count
+from itertools import chain, count, takewhile
 from pathlib import Path, PurePath, PurePosixPath, PureWindowsPath
 
+from sd2core.errors import Sd2Error
 from sd2core.progress import Progress
 
 
@@ -105,6 +106,27 @@ def free_path(folder: Path, name: str, prefix: str, *, reserved: str) -> Path:
         # A link that leads nowhere does not "exist" but would be replaced.
         if free != reserved and not os.path.lexists(folder / free)
     )
+
+
+def make_folder(path: Path) -> list[Path]:
+    """Make a folder, with those above it that are missing; return those that were made.
+
+    Raises Sd2Error if something above it is no folder, or it cannot be made.
+    """
+    path = path.absolute()
+    missing = list(takewhile(lambda one: not one.exists(), (path, *path.parents)))
+    above = missing[-1].parent if missing else path
+    if not above.is_dir():
+        raise Sd2Error(f"{above} is a file", "a folder", "Choose another place")
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise Sd2Error(
+            f"The folder {path} cannot be made ({error.strerror})",
+            f"a place in {above} for it",
+            "Choose another place",
+        ) from error
+    return missing
 
 
 def remove(path: Path) -> None:

@@ -124,6 +124,8 @@ class Document(BaseModel):
     faces: StoredPath | None = None
     radar: StoredPath | None = None
     radar_offset_s: Time = 0.0
+    radar_receiver: PositiveInt | None = None
+    radar_transmitter: PositiveInt | None = None
     imu: StoredPath | None = None
     imu_offset_s: Time = 0.0
     imu_places: tuple[ImuPlace, ...] = ()

@@ -16,6 +16,8 @@ WORDS = {
     "sensor": "sensor",
     "placements": "plan of placements",
     "radar_offset_s": "offset of the radar",
+    "radar_receiver": "receiver of the radar",
+    "radar_transmitter": "transmitter of the radar",
     "denoiser": "denoiser",
     "bundled_denoiser": "denoiser",
     "title": "title",

@@ -18,9 +18,11 @@ from sd2core.recording.divergence import WORDS
 from sd2core.recording.recording import Recording
 from sd2core.sensor import VirtualSensor
 
-EDITED = ("sensor", "placements", "radar_offset_s", "imu", "imu_offset_s", "imu_places")
-"""Names of the fields. Journals of earlier versions end with the third."""
-_ALWAYS = EDITED[:3]
+_ALWAYS = ("sensor", "placements", "radar_offset_s")
+_INERTIAL = ("imu", "imu_offset_s", "imu_places")
+_CHANNEL = ("radar_receiver", "radar_transmitter")
+EDITED = (*_ALWAYS, *_INERTIAL, *_CHANNEL)
+"""Names of the fields. Journals of earlier versions end with the third or the sixth."""
 
 
 def edited_fields(recording: Recording) -> dict[str, Any]:
@@ -33,6 +35,8 @@ def edited_fields(recording: Recording) -> dict[str, Any]:
         "imu": None if recording.imu is None else str(plain_path(recording.imu)),
         "imu_offset_s": recording.imu_offset_s,
         "imu_places": recording.imu_places,
+        "radar_receiver": recording.radar_receiver,
+        "radar_transmitter": recording.radar_transmitter,
     }
     return dict(json.loads(json.dumps(entry)))
 
@@ -54,12 +58,21 @@ def decoded_fields(entry: Mapping[str, Any]) -> dict[str, Any]:
                 "imu_offset_s": float(entry["imu_offset_s"]),
                 "imu_places": tuple(map(str, entry["imu_places"])),
             }
+        if "radar_receiver" in entry:
+            fields |= {name: _number(entry[name]) for name in _CHANNEL}
         return fields
     except (KeyError, TypeError, ValueError, ValidationError) as error:
         raise Sd2Error(
             f"Sensor, placements and offset that were not saved cannot be read ({error})",
             f"the fields {', '.join(_ALWAYS)}",
         ) from error
+
+
+def _number(entry: Any) -> int | None:
+    """Decode a number from 1 on, or none."""
+    if entry is not None and int(entry) < 1:
+        raise ValueError(f"{entry!r} is no number from 1 on")
+    return None if entry is None else int(entry)
 
 
 def differing(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[str]:

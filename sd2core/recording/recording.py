@@ -103,6 +103,8 @@ class Recording:
     radar_offset_s : float
         Time on the recording's clock at which the first radar frame was taken.
         The clock is the video's, or the mesh's where there is no video.
+    radar_receiver, radar_transmitter : int or None
+        The one of the capture whose signal is used, counted from 1. None: the mean power of all.
     imu : Path or None
         Samples of a real inertial sensor; see :func:`sd2core.imu.files.read_signals`.
     imu_offset_s : float
@@ -150,6 +152,8 @@ class Recording:
     radar: Path | None = None
     mesh_reading: MeshReading = field(default_factory=MeshReading)
     radar_offset_s: float = 0.0
+    radar_receiver: int | None = None
+    radar_transmitter: int | None = None
     imu: Path | None = None
     imu_offset_s: float = 0.0
     imu_places: tuple[str, ...] = ()
@@ -346,6 +350,8 @@ class Recording:
         document.mesh_reading = self.mesh_reading
         document.camera = self.camera
         document.radar_offset_s = _finite(self.radar_offset_s, "radar offset in seconds")
+        document.radar_receiver = self.radar_receiver
+        document.radar_transmitter = self.radar_transmitter
         document.imu_offset_s = _finite(self.imu_offset_s, "inertial sensor's offset in seconds")
         document.imu_places = self.imu_places
         document.bundled_denoiser = self.bundled_denoiser
@@ -462,11 +468,30 @@ class Recording:
                 options["image_size"] = (video.width, video.height)
         return options
 
-    def load_capture(self) -> RadarCapture:
-        """Load the radar capture on its own clock; the recording's is ``radar_offset_s`` later."""
+    def load_capture(
+        self, receiver: int | None = None, transmitter: int | None = None
+    ) -> RadarCapture:
+        """Load the radar capture on its own clock; the recording's is ``radar_offset_s`` later.
+
+        Of several channels it holds those that the recording chooses; a number replaces the choice.
+        Raises Sd2Error where the capture has none of that number.
+        """
+        return self.load_every_channel().channel(
+            self.radar_receiver if receiver is None else receiver,
+            self.radar_transmitter if transmitter is None else transmitter,
+        )
+
+    def load_every_channel(self) -> RadarCapture:
+        """Load the radar capture with all channels, whatever the recording chooses."""
         from sd2core.io.radar import load_capture
 
         return load_capture(self._present("radar"))
+
+    @property
+    def channel_in_words(self) -> str:
+        """Channel of the radar that it chooses, such as ``receiver 2``; empty for all."""
+        chosen = (("receiver", self.radar_receiver), ("transmitter", self.radar_transmitter))
+        return ", ".join(f"{name} {number}" for name, number in chosen if number is not None)
 
     @property
     def holds_radar_map(self) -> bool:
@@ -540,6 +565,8 @@ def open_recording(path: Path) -> Recording:
         bundled_denoiser=document.bundled_denoiser,
         mesh_reading=document.mesh_reading,
         radar_offset_s=document.radar_offset_s,
+        radar_receiver=document.radar_receiver,
+        radar_transmitter=document.radar_transmitter,
         imu_offset_s=document.imu_offset_s,
         imu_places=tuple(dict.fromkeys(document.imu_places)),
         sensor=sensor,

@@ -12,6 +12,7 @@ from typing import Any
 from pydantic.dataclasses import dataclass
 
 from sd2core.errors import Sd2Error
+from sd2core.files.paths import make_folder
 from sd2core.runs.folder import LIVE, RunFolder, State
 from sd2core.runs.progress import Event, last_of, read_events, standing
 
@@ -66,14 +67,7 @@ class TrainingFolder(RunFolder):
                 "Choose another name"
                 + (f", or go on with it: `sd2 train --resume {self.path}`" if self.exists else ""),
             )
-        above = next(one for one in self.path.absolute().parents if one.exists())
-        if not above.is_dir():
-            raise Sd2Error(
-                f"{above} is a file",
-                f"a folder in which {self.path.name} is made",
-                "Choose another place for the run",
-            )
-        self.path.mkdir(parents=True, exist_ok=True)
+        make_folder(self.path)
 
     def create(self, model: str) -> None:
         """Make the folder and the description of the run. Raises Sd2Error as :meth:`make`."""

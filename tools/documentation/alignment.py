@@ -3,7 +3,7 @@
 ::
 
     sd2 pairs mars mars_subject1 mars_subject4 --out mars.zarr
-    sd2 simulate campaign small.zarr --subjects 2 --minutes 3
+    sd2 simulate campaign --people 2 --minutes 3 --out small.zarr
     python -m tools.documentation.alignment mars.zarr small.zarr
 
 Of every take, maps are aligned whose offset is known: with the radar's times moved by it, or with

@@ -16,8 +16,6 @@ from __future__ import annotations
 import argparse
 import json
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 from sd2core.accuracy.cache import this_machine
@@ -28,7 +26,7 @@ from tools.documentation.classifier_protocols import (
     protocols_section,
 )
 from tools.documentation.places import BUILD, DOCS, IMAGES
-from tools.documentation.runs import campaign_of, sd2
+from tools.documentation.runs import campaign_of, printed, sd2
 
 SEED = 2
 SAMPLE = "resources/swipes.sd2"
@@ -113,11 +111,11 @@ def _page(options: argparse.Namespace) -> str:
     """All but the paper's experiment."""
     folder: Path = options.out
     campaign = options.campaign
-    made = f"sd2 simulate campaign gestures.zarr --subjects 6 --minutes {options.minutes:g}"
-    made += f" --placements 3 --seed {SEED}"
+    made = f"sd2 simulate campaign --people 6 --minutes {options.minutes:g} --out gestures.zarr"
+    made += f" --sensors 3 --seed {SEED} --out gestures.zarr"
     if campaign is None:
         campaign = campaign_of(
-            folder, options.minutes, "--placements", 3, "--seed", SEED, "--processes", 2
+            folder, options.minutes, "--sensors", 3, "--seed", SEED, "--workers", 2
         )
     tables = folder / "table"
     chosen = ["--seeds", options.seeds, *(["--shares", options.shares] if options.shares else [])]
@@ -158,7 +156,7 @@ def _options() -> argparse.Namespace:
 
 
 def _head(options: argparse.Namespace, campaign: Path, told: dict, made: str) -> str:
-    facts = json.loads(_output("info", campaign, "--json"))
+    facts = json.loads(printed("info", campaign, "--json"))
     runs = [run for one in told["conditions"] for run in one["runs"]]
     given = [f"--seeds {options.seeds}"] if options.seeds != 5 else []
     given += [f"--minutes {options.minutes:g}"] if options.minutes != 36 else []
@@ -230,9 +228,9 @@ def _large(options: argparse.Namespace, out: Path) -> str:
         campaign = campaign_of(out / "large", minutes, "--seed", 1)
     how = ("--radar-only", "--seeds", options.seeds, "--shares", "30%,100%")
     sd2("classify", "table", campaign, "--out", out / "large-table", *how)
-    facts = json.loads(_output("info", campaign, "--json"))["minutes_of_subject"]
+    facts = json.loads(printed("info", campaign, "--json"))["minutes_of_subject"]
     words = LARGE.format(
-        made=f"sd2 simulate campaign campaign.zarr --subjects 6 --minutes {minutes:g} --seed 1",
+        made=f"sd2 simulate campaign --people 6 --minutes {minutes:g} --seed 1 --out campaign.zarr",
         minutes=sum(facts.values()),
         people=len(facts),
         command=_command(["classify", "table", "campaign.zarr", "--out", "tables", *how], {}),
@@ -248,17 +246,12 @@ def _sample(campaign: Path, out: Path) -> str:
     parts = [SAMPLE_HEAD.format(train=_command(train, shown))]
     for maps in ("radar", "denoised"):
         evaluate = ["classify", "eval", SAMPLE, "--maps", maps, "--model", model]
-        parts.append(f"`{_command(evaluate, shown)}`:\n\n```\n{_output(*evaluate)}```\n\n")
+        parts.append(f"`{_command(evaluate, shown)}`:\n\n```\n{printed(*evaluate)}```\n\n")
     return "".join(parts)
 
 
 def _command(arguments: list[object], shown: dict[str, str]) -> str:
     return " ".join(["sd2", *(shown.get(str(one), str(one)) for one in arguments)])
-
-
-def _output(*arguments: object) -> str:
-    command = [sys.executable, "-m", "sd2core.cli", *map(str, arguments)]
-    return subprocess.run(command, check=True, capture_output=True, text=True).stdout
 
 
 if __name__ == "__main__":

@@ -63,7 +63,8 @@ training [decision 25](decisions/0025-training-runs.md).
 
 ## The simulated campaign
 
-`sd2 simulate campaign OUT --subjects 6 --minutes 90 --seed N --limbs --fit-error-sizes 0,1.5` makes
+`sd2 simulate campaign --people 6 --minutes 90 --seed N --limbs --fit-error-sizes 0,1.5
+--out OUT` makes
 pairs without a radar:
 what a **simulated** 60 GHz radar shows of people's true motion (the target), and the synthetic
 Doppler of bodies that err as fits of videos were measured to err (the input). People of random

@@ -175,7 +175,7 @@ def main() -> None:
         pilot=PILOT_EPOCHS,
         epochs=_epochs(jobs),
         same_step=beside("unet-step", "swin-step"),
-        tables=tables(folder, runs, campaign, "--plot", IMAGES / "denoiser-campaign.png"),
+        tables=tables(folder, runs, campaign, "--figure", IMAGES / "denoiser-campaign.png"),
         variants=VARIANTS.format(
             tables=beside("s4-both", SERIAL),
             serial_minutes=epoch_ends_s(folder / alone[SERIAL].name)[0] / 60.0,

@@ -23,7 +23,7 @@ from sd2core.files.resources import resource_path
 from sd2core.placements.placements import PlacementGrid
 from tools.documentation.windows import LIMIT_S, opened, save, wait_for
 
-_CAMPAIGN = ("--subjects", "4", "--minutes", "4", "--seed", "1")
+_CAMPAIGN = ("--people", "4", "--minutes", "4", "--seed", "1")
 _COMPARE_STEPS = 100
 _LONG_S = 1800.0
 

@@ -42,7 +42,7 @@ from tools.documentation.classifier_protocols import (
 )
 from tools.documentation.paper_bodies import draw_bodies
 from tools.documentation.places import BUILD, DOCS, IMAGES, REPOSITORY
-from tools.documentation.runs import Job, sd2, settings, timed, train
+from tools.documentation.runs import Job, printed, settings, timed, train
 
 PAGE = DOCS / "paper.md"
 LINES = Path(__file__).with_name("paper_lines.md")
@@ -99,7 +99,7 @@ before denoising. Each level is relative to the map's own strongest cell.
 """
 
 DENOISERS = """
-On {machine}. Campaign: `sd2 simulate campaign random.zarr --protocol paper --order random
+On {machine}. Campaign: `sd2 simulate campaign --out random.zarr --protocol paper --order random
 --seed {seed} --minutes {campaign_minutes:g}`: six people, who make all four swipes in random order
 (4.1) in two of three takes, and let their hands hang in the third. Four are learnt from, one
 chooses the best epoch, one is judged. Each model is trained {seeds} times with different seeds,
@@ -258,10 +258,8 @@ def _denoisers(options: argparse.Namespace) -> str:
     }
     runs = {name: [job.seeded(seed) for seed in range(options.seeds)] for name, job in jobs.items()}
     train(folder, [run for those in runs.values() for run in those])
-    told = folder / "table-1.json"
     models = [folder / run.name for those in runs.values() for run in those]
-    sd2("eval", *models, "--data", campaign, "--json", told)
-    evaluation = json.loads(told.read_text("utf-8"))
+    evaluation = json.loads(printed("eval", *models, "--data", campaign, "--json"))
     judged = read_pairs(campaign).of(evaluation["subjects"])
     _compare(judged, {name: folder / those[0].name for name, those in runs.items()})
     bin_mps = judged.axis.bin_width_mps
@@ -304,12 +302,12 @@ def table_1(evaluation: Mapping[str, Any], nothing: VelocityError) -> str:
     ours = {name: groups[name]["peak_mae_mps"]["mean"] for name in (*PRINTED, "none")}
     head = ["", "paper, real radar: MAE", "σ", "S4 to it"]
     rows = [[*head, "ours, simulated radar: MAE", "σ", "S4 to it", "to none"]]
-    for name, printed in PRINTED.items():
+    for name, of_paper in PRINTED.items():
         rows.append(
             [
                 TITLES[name],
-                *(f"{value:.4f}" for value in printed),
-                _change(PRINTED["s4"][0], printed[0]),
+                *(f"{value:.4f}" for value in of_paper),
+                _change(PRINTED["s4"][0], of_paper[0]),
                 *(_spread(groups[name][key]) for key in ("peak_mae_mps", "peak_sd_mps")),
                 _change(ours["s4"], ours[name]),
                 _change(ours[name], ours["none"]),

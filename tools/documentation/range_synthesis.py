@@ -29,7 +29,7 @@ make range-synthesis
 here with `--minutes {minutes:g} --epochs {epochs} --seeds {seeds}`, on {machine}.
 
 A **simulated** campaign of {minutes:g} minutes of six people (`sd2 simulate campaign
---placements {places}`): every take is seen from beside the camera, and from two more sensors at
+--sensors {places}`): every take is seen from beside the camera, and from two more sensors at
 other ranges (1.5 to 4 m), up to 45° aside, 10° below to 25° above. Synthetic Doppler and simulated
 radar are both those of the moved sensor.
 
@@ -66,7 +66,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=2)
     options = parser.parse_args()
     folder: Path = options.folder
-    campaign = campaign_of(folder, options.minutes, "--seed", 3, "--placements", PLACES)
+    campaign = campaign_of(folder, options.minutes, "--seed", 3, "--sensors", PLACES)
     jobs = {
         which: [
             Job(
@@ -92,8 +92,8 @@ def main() -> None:
         places=PLACES,
         first_first=tables(folder, runs["first"], campaign),
         all_first=tables(folder, runs["all"], campaign),
-        first_all=tables(folder, runs["first"], campaign, "--all-placements"),
-        all_all=tables(folder, runs["all"], campaign, "--all-placements"),
+        first_all=tables(folder, runs["first"], campaign, "--placements", "all"),
+        all_all=tables(folder, runs["all"], campaign, "--placements", "all"),
     )
     atomic_write_text(DOCS / "range-synthesis.md", page)
 

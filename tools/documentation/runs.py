@@ -52,11 +52,17 @@ def sd2(*arguments: object) -> None:
         sys.exit(code)
 
 
+def printed(*arguments: object) -> str:
+    """Run a command, and return what it prints."""
+    command = [sys.executable, "-m", "sd2core.cli", *map(str, arguments)]
+    return subprocess.run(command, check=True, capture_output=True, text=True).stdout
+
+
 def campaign_of(folder: Path, minutes: float, *options: object) -> Path:
     """A simulated campaign of six people; what is there of it is not made again."""
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / "campaign.zarr"
-    sd2("simulate", "campaign", path, "--subjects", 6, "--minutes", minutes, *options)
+    sd2("simulate", "campaign", "--out", path, "--people", 6, "--minutes", minutes, *options)
     return path
 
 

@@ -86,7 +86,7 @@ class Step:
 STEPS = (
     Step(
         "Pairs to learn from",
-        "sd2 simulate campaign campaign.zarr --subjects 6 --minutes 12 --placements 2 --seed 2",
+        "sd2 simulate campaign --people 6 --minutes 12 --sensors 2 --seed 2 --out campaign.zarr",
         "*Train* page, where a campaign or recordings of one's own are chosen. (Who has a radar"
         " makes pairs with `sd2 pairs` instead.)",
     ),

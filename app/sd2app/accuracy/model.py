@@ -190,7 +190,7 @@ class AccuracyModel(QObject):
         if result.plan.family != "histogram":
             self.noted.emit(
                 "The window counts vertices; FMCW plans are shown for comparison. "
-                "Run one with: sd2 synth MESH --out map.npz --model fmcw"
+                "Run one with: sd2 synth MESH --out map.npz --method fmcw"
             )
             return
         if not serves_at_rest(result):

@@ -190,7 +190,8 @@ class ExportModel(Runs[ExportRun]):
         choice = self.choice
         words = [
             "export", str(choice.place), "--out", str(out), "--kinds", ",".join(choice.kinds),
-            "--length", str(choice.length), "--overlap", str(choice.overlap), "--progress-json",
+            "--segment-frames", str(choice.length), "--overlap-frames", str(choice.overlap),
+            "--progress-json",
         ]  # fmt: skip
         words += ["--placements", "planned"] if choice.planned else []
         words += ["--imu", ",".join(choice.imu)] if choice.imu else []

@@ -68,7 +68,7 @@ class FitRequest:
             words += ["--focal-px", f"{self.focal_px:.2f}"]
         if self.person is not None:
             p = self.person
-            words += ["--person", f"{p.x},{p.y},{p.width},{p.height}"]
+            words += ["--person-box", f"{p.x},{p.y},{p.width},{p.height}"]
             words += ["--person-frame", str(p.frame)]
         return words
 

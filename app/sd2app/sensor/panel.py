@@ -156,7 +156,19 @@ class SensorPanel(QWidget):
             QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
         )
         offset = pane(row_of((self._offset, 1), find, spacing_px=6, margins_px=0))
-        form = _form_of(("Offset", offset), ("Clutter", self._clutter))
+        self._receiver = Choice("Receiver whose signal is shown", self)
+        self._transmitter = Choice("Transmitter whose signal is shown", self)
+        for choice, choose in (
+            (self._receiver, edits.choose_receiver),
+            (self._transmitter, edits.choose_transmitter),
+        ):
+            choice.currentIndexChanged.connect(lambda place, choose=choose: choose(place or None))
+        self._capture_form = form = _form_of(
+            ("Offset", offset),
+            ("Clutter", self._clutter),
+            ("Receiver", self._receiver),
+            ("Transmitter", self._transmitter),
+        )
         limits = QGridLayout()
         limits.setHorizontalSpacing(12)
         limits.setVerticalSpacing(3)
@@ -242,13 +254,23 @@ class SensorPanel(QWidget):
         self._radar_name.setText(capture.config.name)
         self._offset.show_value(recording.radar_offset_s)
         self._clutter.show_value(document.clutter)
+        config = capture.config
+        self._show_channel(self._receiver, config.receivers, recording.radar_receiver)
+        self._show_channel(self._transmitter, config.transmitters, recording.radar_transmitter)
         for name, (_, text_of) in _LIMITS.items():
-            self._limits[name].setText(text_of(capture.config))
+            self._limits[name].setText(text_of(config))
         blind = len(radar_map.unseen_bins) if radar_map is not None else 0
         self._warning.setVisible(blind > 0)
         self._warning.setText(
             f"The axis goes beyond this radar's v max: it cannot see {blind} of the bins."
         )
+
+    def _show_channel(self, choice: Choice, count: int, chosen: int | None) -> None:
+        """Offer receivers or transmitters, where there are several."""
+        numbers = [str(number) for number in range(1, count + 1)]
+        choice.offer(["all (mean power)", *numbers], chosen or 0)
+        # A number that this capture does not have can be replaced.
+        self._capture_form.setRowVisible(choice, count > 1 or chosen is not None)
 
 
 def _form_of(*rows: tuple[str | QWidget, QWidget]) -> QFormLayout:

@@ -43,6 +43,7 @@ _TOLD: dict[str, tuple[str, str]] = {
 class Content:
     """A recording with its parts opened; what could not be opened is in ``problems``.
 
+    ``capture`` has all channels, of which the recording may choose one, as ``radar_map`` shows.
     ``radar_labels`` are those that a radar file brings with it, on the radar's clock.
     """
 
@@ -109,6 +110,8 @@ def recording_of(paths: Sequence[Path], base: Recording | None = None) -> Record
     recording = base or Recording(UNTITLED, title=Path(paths[0]).stem)
     for kind, path in kinds.items():
         setattr(recording, kind, path)
+    if base is not None and "radar" in kinds:  # which may have other channels
+        recording.radar_receiver = recording.radar_transmitter = None
     return recording
 
 
@@ -153,7 +156,7 @@ def load_content(recording: Recording, progress: Progress) -> Content:
         recorded = attempt(recording.radar, recording.load_radar_map)
         radar_map = None if recorded is None else recorded.doppler
     else:
-        capture, radar_map = attempt(recording.radar, recording.load_capture), None
+        capture, radar_map = attempt(recording.radar, recording.load_every_channel), None
     progress(100 * len(PARTS), 100 * len(PARTS))
     parts = [part for part in (video, mesh, capture, recorded) if part is not None]
     if not parts:

@@ -77,7 +77,7 @@ class DocumentModel(QObject):
 
     @property
     def capture(self) -> RadarCapture | None:
-        """Raw radar capture, on its own clock."""
+        """Raw radar capture with all channels, on its own clock."""
         return self.content.capture if self.content else None
 
     @property
@@ -257,9 +257,12 @@ class DocumentModel(QObject):
         recording = self.recording
         if recording is None or all(getattr(recording, name) == fields[name] for name in fields):
             return
+        channel = _channel(recording)
         for name, value in fields.items():
             setattr(recording, name, value)
         self.changed.emit()
+        if _channel(recording) != channel:
+            self._process_capture()
 
     def set_clutter(self, clutter: Clutter) -> None:
         """Remove static echoes another way."""
@@ -271,16 +274,17 @@ class DocumentModel(QObject):
 
     def _process_capture(self) -> None:
         """Make the Doppler map of the capture in the background."""
-        capture, clutter = self.capture, self.clutter
-        if capture is None or self.growing:
+        capture, clutter, recording = self.capture, self.clutter, self.recording
+        if capture is None or recording is None or self.growing:
             self._maps.cancel()
             return
+        channel = _channel(recording)
 
         def process(emit: Emit) -> DopplerMap:
             from sd2core.fmcw.processing import doppler_map
 
             return doppler_map(
-                capture,
+                capture.channel(*channel),
                 axis=VelocityAxis(),
                 clutter=clutter,
                 progress=lambda done, total: emit((done, total)),
@@ -335,6 +339,10 @@ class DocumentModel(QObject):
         self.changed.emit()
 
 
+def _channel(recording: Recording) -> tuple[int | None, int | None]:
+    return recording.radar_receiver, recording.radar_transmitter
+
+
 def _keep_edits(before: Recording, after: Recording) -> None:
     """Apply edits made while files were read to what was read."""
     kept = [
@@ -343,5 +351,7 @@ def _keep_edits(before: Recording, after: Recording) -> None:
     ]  # fmt: skip
     if after.imu in (None, before.imu):  # not one of the files that were read
         kept += ["imu", "imu_offset_s"]
+    if after.radar == before.radar:
+        kept += ["radar_receiver", "radar_transmitter"]
     for name in kept:
         setattr(after, name, getattr(before, name))

@@ -98,7 +98,10 @@ class Session:
         if radar_map is not None:
             simulated = radar_map.kind == "simulated"
         real.title = "Radar (simulated)" if simulated else "Real"
-        # A map with its clutter removed in another manner is compared at the same 0 dB.
+        if capture is not None and (recording := self.document.recording) is not None:
+            real.title = ", ".join(filter(None, (real.title, recording.channel_in_words)))
+        # A map of another channel, or with its clutter removed in another manner, is compared at
+        # the same 0 dB.
         if radar_map is not None and (new or real.map is None):
             real.set_reference(reference_of(radar_map.values, radar_map.null_bins))
         real.set_map(radar_map)

@@ -12,7 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.classify.data import DATA_HELP, add_sources, clips_of
 from sd2core.cli.classify.train import add_network, network_of
-from sd2core.cli.options import add_command, add_json_and_progress, positive_int, share
+from sd2core.cli.options import (
+    add_command,
+    add_json_and_progress,
+    add_output,
+    positive_int,
+    share,
+)
 from sd2core.cli.output import finite, print_event, print_json, progress_bar
 
 if TYPE_CHECKING:
@@ -46,7 +52,7 @@ def add_table(kinds: argparse._SubParsersAction) -> None:
         ),
     )
     add_sources(parser)
-    parser.add_argument("--out", type=Path, required=True, metavar="OUT", help="folder")
+    add_output(parser, "FOLDER", "the tables, figures and models to write")
     parser.add_argument(
         "--seeds",
         type=positive_int,

@@ -47,7 +47,7 @@ def add_data(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--maps",
         default="radar",
-        metavar="NAMES",
+        metavar="LIST",
         help=f"some of {', '.join(MAP_NAMES)}, separated by commas (default: radar)",
     )
 

@@ -8,7 +8,6 @@ import shlex
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from sd2core.classify.defaults import DELAY_S, MODELS, WIDTH
@@ -22,7 +21,9 @@ from sd2core.cli.classify.data import (
 from sd2core.cli.options import (
     add_command,
     add_json_and_progress,
+    add_output,
     add_people_kept_out,
+    add_placements_used,
     given,
     not_negative_float,
     positive_float,
@@ -56,16 +57,9 @@ def add_train(kinds: argparse._SubParsersAction) -> None:
         ),
     )
     add_data(parser)
-    parser.add_argument(
-        "--out", type=Path, required=True, metavar="FILE", help="file to write (.safetensors)"
-    )
+    add_output(parser, "FILE.safetensors", "the classifier to write")
     add_network(parser)
-    parser.add_argument(
-        "--placements",
-        choices=("all", "first"),
-        default="all",
-        help="range synthesis: train on all places of the sensor, or the first only (default: all)",
-    )
+    add_placements_used(parser, "range synthesis: train on", "all")
     otherwise = "(default: as the data set says, or a sixth of all)"
     add_people_kept_out(
         parser,
@@ -80,9 +74,11 @@ def add_train(kinds: argparse._SubParsersAction) -> None:
         help="end after so many validations without improvement",
     )
     parser.add_argument(
-        "--learning-rate", type=positive_float, metavar="R", help="peak learning rate"
+        "--learning-rate", type=positive_float, metavar="RATE", help="peak learning rate"
     )
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="default: 0")
+    parser.add_argument(
+        "--seed", type=int, default=0, metavar="N", help="seed of all random numbers (default: 0)"
+    )
     add_json_and_progress(parser)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sd2core.cli.classify.data import DATA_HELP, add_data, asked_maps, clips_of
-from sd2core.cli.eval import add_judging, check_result_files, named_subjects, print_or_write
+from sd2core.cli.eval import add_judging, named_subjects
 from sd2core.cli.labels.reading import check_label_output, print_lost
 from sd2core.cli.labels.suggest import (
     add_searched_map,
@@ -55,7 +55,7 @@ def add_eval(kinds: argparse._SubParsersAction) -> None:
         ),
         examples=(
             "  sd2 classify eval campaign.zarr --model gestures.safetensors\n"
-            "  sd2 classify eval own.sd2 --model g.safetensors --subjects all --plot matrix.png"
+            "  sd2 classify eval own.sd2 --model g.safetensors --subjects all --figure matrix.png"
         ),
     )
     add_data(parser)
@@ -66,9 +66,10 @@ def add_eval(kinds: argparse._SubParsersAction) -> None:
 def _eval(options: argparse.Namespace) -> None:
     from sd2core.classify.files import load_classifier
     from sd2core.classify.live import judge
-    from sd2core.files.figure_files import save_figure
+    from sd2core.files.figure_files import check_figure, save_figure
 
-    check_result_files(options)
+    if options.figure is not None:
+        check_figure(options.figure)
     classifier = load_classifier(options.model)
     maps = asked_maps(options)
     known = clips_of(options.data, maps, options.denoiser)
@@ -84,9 +85,11 @@ def _eval(options: argparse.Namespace) -> None:
         **found.to_json(),
         **found.summary(),
     }
-    if not print_or_write(options, told):
+    if options.json:
+        print_json(told)
+    else:
         _say(found, known, subjects, sorted(learnt))
-    if options.plot is not None:
+    if options.figure is not None:
         from sd2core.classify.comparison_report import confusion_figure
         from sd2core.classify.metrics import shares
 
@@ -96,7 +99,7 @@ def _eval(options: argparse.Namespace) -> None:
             ["frames", "gestures"],
             f"{options.model.stem} on {' and '.join(known.kinds)} maps",
         )
-        save_figure(figure, options.plot)
+        save_figure(figure, options.figure)
 
 
 def _judged(known: ClipSet, card: ClassifierCard, options: argparse.Namespace) -> tuple[Clip, ...]:
@@ -112,7 +115,7 @@ def _judged(known: ClipSet, card: ClassifierCard, options: argparse.Namespace) -
             f"There is nothing of {', '.join(missing)}", f"some of {', '.join(known.subjects)}"
         )
     clips = known.of(names)
-    return clips if options.all_placements else tuple(c for c in clips if c.placement == 0)
+    return clips if options.placements == "all" else tuple(c for c in clips if c.placement == 0)
 
 
 def _say(found: Score, known: ClipSet, subjects: list[str], learnt: list[str]) -> None:

@@ -63,6 +63,8 @@ def describe_recording(recording: Recording, parts: list[Description]) -> Descri
         "title": recording.title,
         "simulated": recording.simulated,
         "radar_offset_s": recording.radar_offset_s,
+        "radar_receiver": recording.radar_receiver,
+        "radar_transmitter": recording.radar_transmitter,
         "imu_offset_s": recording.imu_offset_s,
         "imu_places": list(recording.imu_places),
         "camera": None if recording.camera is None else recording.camera.model_dump(mode="json"),
@@ -82,6 +84,7 @@ def describe_recording(recording: Recording, parts: list[Description]) -> Descri
         "camera": _camera(recording),
         "sensor": f"at x {x:g}, y {y:g}, z {z:g} m",
         "radar offset": f"{recording.radar_offset_s:g} s" if recording.radar else "",
+        "radar channel": recording.channel_in_words,
         "inertial sensors": ", ".join(recording.imu_places),
         "inertial offset": f"{recording.imu_offset_s:g} s" if recording.imu else "",
         "denoiser": _denoiser(recording),
@@ -105,7 +108,11 @@ def describe_parts(recording: Recording) -> list[Description]:
             mesh = recording.load_mesh(progress)
         parts.append(describe_mesh(recording.mesh, mesh))
     if recording.radar is not None and "radar" not in missing:
-        parts.append(describe_radar(recording.radar))
+        parts.append(
+            describe_radar(recording.radar)
+            if recording.holds_radar_map
+            else describe_capture(recording.radar, recording.load_capture())
+        )
     if recording.imu is not None and "imu" not in missing:
         parts.append(describe_imu(recording.imu))
     return parts

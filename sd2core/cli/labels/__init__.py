@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import asdict
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.labels.agree import add_agree
@@ -20,7 +19,11 @@ from sd2core.cli.labels.reading import (
 from sd2core.cli.labels.recording import add_cut, add_figure
 from sd2core.cli.labels.recover import add_recover
 from sd2core.cli.labels.suggest import add_suggest
-from sd2core.cli.options import add_command, add_json
+from sd2core.cli.options import (
+    add_command,
+    add_json,
+    add_output,
+)
 from sd2core.cli.output import counted, print_json, print_rows
 
 if TYPE_CHECKING:
@@ -38,7 +41,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         examples=(
             "  sd2 labels show walk.sd2\n"
             "  sd2 labels statistics walk.sd2 --csv\n"
-            "  sd2 labels convert walk.sd2 walk.eaf\n"
+            "  sd2 labels convert walk.sd2 --out walk.eaf\n"
             "  sd2 labels suggest walk.sd2 --out suggested.json\n"
             "  sd2 labels agree anna.json ben.json --video walk.mp4\n"
             "  sd2 labels figure walk.sd2 --out walk.pdf\n"
@@ -67,18 +70,18 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         "write labels as another program reads them",
         handler=_convert,
         description=(
-            "The suffix of OUT says which program: .json for SD² Studio, .csv, .tsv, .eaf,\n"
+            "The suffix of --out says which program: .json for SD² Studio, .csv, .tsv, .eaf,\n"
             ".TextGrid, .boris; a .txt needs --to. Prints what the file could not hold."
         ),
         examples=(
-            "  sd2 labels convert walk.sd2 walk.eaf\n"
-            "  sd2 labels convert labels.json labels.txt --to audacity --rate 30\n"
-            "  sd2 labels convert walk.eaf labels.json"
+            "  sd2 labels convert walk.sd2 --out walk.eaf\n"
+            "  sd2 labels convert labels.json --out labels.txt --to audacity --fps 30\n"
+            "  sd2 labels convert walk.eaf --out labels.json"
         ),
     )
-    add_labels(convert, "IN")
-    convert.add_argument("out", type=Path, metavar="OUT", help="the file to write")
-    convert.add_argument("--to", metavar="NAME", help="the format of OUT, likewise")
+    add_labels(convert)
+    add_output(convert, "FILE", "the file to write")
+    convert.add_argument("--to", metavar="NAME", help="the format of --out, likewise")
     add_replace(convert)
     add_json(convert)
 

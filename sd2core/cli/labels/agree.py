@@ -9,7 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.labels.reading import add_clock, clock_of, labels_at, needed, with_rate
 from sd2core.cli.labels.suggest import spans_data
-from sd2core.cli.options import add_command, add_json, share
+from sd2core.cli.options import (
+    add_command,
+    add_json,
+    share,
+)
 from sd2core.cli.output import counted, print_json, print_rows
 
 if TYPE_CHECKING:
@@ -38,7 +42,7 @@ def add_agree(kinds: argparse._SubParsersAction) -> None:
         "--min-iou",
         type=share,
         default=0.5,
-        metavar="X",
+        metavar="SHARE",
         help="intersection over union that a match must reach (default: 0.5)",
     )
     parser.add_argument("--track", metavar="NAME", help="compare this track only")

@@ -15,7 +15,11 @@ from sd2core.cli.labels.reading import (
     read_named,
     write,
 )
-from sd2core.cli.options import add_command, add_json
+from sd2core.cli.options import (
+    add_command,
+    add_json,
+    add_output,
+)
 from sd2core.cli.output import counted, print_json, print_rows
 from sd2core.errors import Sd2Error
 
@@ -45,13 +49,11 @@ def add_set(kinds: argparse._SubParsersAction) -> None:
         ),
     )
     add_labels(parser)
-    parser.add_argument("--export", type=Path, metavar="SET.json", help="write the set by itself")
+    parser.add_argument("--export", type=Path, metavar="FILE.json", help="write the set by itself")
     parser.add_argument(
-        "--use", metavar="SET.json", help=f"another set; {_USUAL!r} is the program's own"
+        "--use", metavar="FILE.json", help=f"another set; {_USUAL!r} is the program's own"
     )
-    parser.add_argument(
-        "--out", type=Path, metavar="OUT", help="where to write the labels with that other set"
-    )
+    add_output(parser, "FILE", "where to write the labels with that other set", required=False)
     add_replace(parser)
     add_json(parser)
 

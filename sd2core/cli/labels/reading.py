@@ -24,18 +24,18 @@ def add_clock(parser: argparse.ArgumentParser) -> None:
     """Add the options that give the times of frames."""
     group = parser.add_argument_group("frame times", "one of these; a recording brings its own")
     choice = group.add_mutually_exclusive_group()
-    choice.add_argument("--recording", type=Path, metavar="REC.sd2", help="those of a recording")
+    choice.add_argument("--recording", type=Path, metavar="RECORDING", help="those of a recording")
     choice.add_argument("--video", type=Path, metavar="FILE", help="those of a video")
     choice.add_argument("--mesh", type=Path, metavar="FILE", help="those of a mesh")
     choice.add_argument(
-        "--rate", type=positive_float, metavar="F", help="F frames per second from 0 s on"
+        "--fps", type=positive_float, metavar="FPS", help="so many per second from 0 s on"
     )
 
 
-def add_labels(parser: argparse.ArgumentParser, name: str = "FILE") -> None:
+def add_labels(parser: argparse.ArgumentParser) -> None:
     """Add a file with labels, how to read it, and the times of frames; see :func:`read_named`."""
-    parser.add_argument("file", type=Path, metavar=name, help="the file with labels")
-    parser.add_argument("--format", metavar="NAME", help=f"the format of {name}: {_FORMATS}")
+    parser.add_argument("file", type=Path, metavar="FILE", help="the file with labels")
+    parser.add_argument("--format", metavar="NAME", help=f"the format of FILE: {_FORMATS}")
     parser.add_argument(
         "--observation", metavar="NAME", help="which one of a BORIS project with several"
     )
@@ -114,20 +114,20 @@ def clock_of(options: argparse.Namespace, *sources: Path) -> Timebase | None:
 def with_rate(
     options: argparse.Namespace, timebase: Timebase | None, *labels: Labels
 ) -> Timebase | None:
-    """Return the same frame times, or those of ``--rate`` for as long as the labels."""
+    """Return the same frame times, or those of ``--fps`` for as long as the labels."""
     from sd2core.timebase import Timebase
 
-    if options.rate is None:
+    if options.fps is None:
         return timebase
     end_s = max((span.end_s for one in labels for span in one.spans), default=0.0)
-    frames = max(math.ceil(end_s * options.rate - 1e-6), 1)
+    frames = max(math.ceil(end_s * options.fps - 1e-6), 1)
     if frames > _MOST_FRAMES:
         raise Sd2Error(
-            f"The labels end at {end_s:g} s; at {options.rate:g} frames/s these are"
+            f"The labels end at {end_s:g} s; at {options.fps:g} frames/s these are"
             f" {frames:,} frames",
             f"up to {_MOST_FRAMES:,}",
         )
-    return Timebase.regular(frames, options.rate)
+    return Timebase.regular(frames, options.fps)
 
 
 def needed(timebase: Timebase | None, why: str) -> Timebase:
@@ -135,7 +135,7 @@ def needed(timebase: Timebase | None, why: str) -> Timebase:
     if timebase is None:
         raise Sd2Error(
             f"{why} needs the times of frames",
-            "--recording, --video, --mesh or --rate",
+            "--recording, --video, --mesh or --fps",
             "Name the recording that was labelled, or its frame rate",
         )
     return timebase
@@ -156,7 +156,7 @@ def recording_clock(recording: Recording) -> Timebase:
     raise Sd2Error(
         f"{recording.folder} has no video, mesh or radar capture at hand",
         "one of them, for the times of frames",
-        "Give the frame rate with --rate",
+        "Give the frame rate with --fps",
     )
 
 

@@ -8,7 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sd2core.cli.labels.reading import labels_at, recording_clock
-from sd2core.cli.options import add_command, add_json, not_negative_float
+from sd2core.cli.options import (
+    add_command,
+    add_json,
+    add_output,
+    not_negative_float,
+)
 from sd2core.cli.output import counted, print_json, progress_bar
 from sd2core.cli.recording_maps import add_labelled_recording, chosen_maps, maps_of
 from sd2core.errors import Sd2Error
@@ -40,9 +45,7 @@ def add_figure(kinds: argparse._SubParsersAction) -> None:
         ),
     )
     add_labelled_recording(parser)
-    parser.add_argument(
-        "--out", type=Path, required=True, metavar="FILE", help="FILE.png, FILE.svg or FILE.pdf"
-    )
+    add_output(parser, "FILE", "the figure to write (.png, .svg or .pdf)")
     parser.add_argument(
         "--from-s", type=not_negative_float, metavar="S", help="start of the figure, in seconds"
     )
@@ -120,11 +123,9 @@ def add_cut(kinds: argparse._SubParsersAction) -> None:
         ),
     )
     add_labelled_recording(parser)
+    add_output(parser, "FOLDER", "where to write a folder for each span")
     parser.add_argument(
-        "--out", type=Path, required=True, metavar="FOLDER", help="folder, made if missing"
-    )
-    parser.add_argument(
-        "--label", action="append", metavar="NAME", help="only spans with this label; may be given"
+        "--label", action="append", metavar="LABEL", help="only spans with this label; may be given"
         " several times",
     )  # fmt: skip
     parser.add_argument(

@@ -9,7 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.labels.reading import add_replace, check_label_output
-from sd2core.cli.options import add_command, add_json
+from sd2core.cli.options import (
+    add_command,
+    add_json,
+    add_output,
+)
 from sd2core.cli.output import counted, print_json, print_rows
 from sd2core.errors import Sd2Error
 
@@ -34,12 +38,10 @@ def add_recover(kinds: argparse._SubParsersAction) -> None:
         "recording",
         type=Path,
         nargs="?",
-        metavar="REC",
+        metavar="RECORDING",
         help="the labelled recording, or a video that was not saved as one yet",
     )
-    parser.add_argument(
-        "--out", type=Path, metavar="FILE.json", help="write the newest of REC, for `convert`"
-    )
+    add_output(parser, "FILE.json", "write the newest of RECORDING, for `convert`", required=False)
     add_replace(parser)
     add_json(parser)
 
@@ -48,7 +50,7 @@ def _recover(options: argparse.Namespace) -> None:
     from sd2core.labels.recovery import offers_in, recovery_folder
 
     if options.out is not None and options.recording is None:
-        raise Sd2Error("--out was given without REC", "a recording whose labels are written")
+        raise Sd2Error("--out was given without RECORDING", "a recording whose labels are written")
     found = offers_in(recovery_folder(), declined=True)
     offers = found.offers
     if options.recording is not None:

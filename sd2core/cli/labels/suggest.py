@@ -14,7 +14,14 @@ from sd2core.cli.labels.reading import (
     recording_clock,
     write,
 )
-from sd2core.cli.options import add_command, add_json, flag, given, not_negative_float
+from sd2core.cli.options import (
+    add_command,
+    add_json,
+    add_output,
+    flag,
+    given,
+    not_negative_float,
+)
 from sd2core.cli.output import counted, print_json, print_rows
 from sd2core.cli.recording_maps import MapName, maps_of
 from sd2core.errors import Sd2Error
@@ -59,7 +66,9 @@ def add_suggest(kinds: argparse._SubParsersAction) -> None:
     add_searched_map(parser, ("synthetic", "radar"))
     for name, (metavar, text) in _HELP.items():
         parser.add_argument(flag(name), type=not_negative_float, metavar=metavar, help=text)
-    parser.add_argument("--label", default="gesture", help="label of the spans (default: gesture)")
+    parser.add_argument(
+        "--label", default="gesture", metavar="LABEL", help="label of the spans (default: gesture)"
+    )
     add_json(parser)
 
 
@@ -73,7 +82,7 @@ def add_searched_map(parser: argparse.ArgumentParser, kinds: tuple[MapName, ...]
         choices=kinds,
         help="which map of a recording (default: synthetic where there is a mesh)",
     )
-    parser.add_argument("--out", type=Path, metavar="FILE", help="the file of labels to write")
+    add_output(parser, "FILE", "the labels to write", required=False)
     add_replace(parser)
 
 

@@ -139,7 +139,7 @@ def _elsewhere(
             raise Sd2Error(
                 "A process that makes takes has ended by itself",
                 f"memory and time for {processes} processes",
-                "Run the same command again, with fewer --processes; it goes on where it was",
+                "Run the same command again, with fewer --workers; it goes on where it was",
             ) from error
         except BaseException:
             # Whoever stops does not wait for takes that are under way.

@@ -206,7 +206,7 @@ def test_an_fmcw_point_is_for_comparison(desk, qtbot):
     before = desk.trade.in_use
     desk.trade.use(WAVES[0])
     assert desk.trade.in_use == before
-    assert "--model fmcw" in desk.notes[0]
+    assert "--method fmcw" in desk.notes[0]
 
 
 def test_measuring_is_a_job_and_is_remembered(desk, qtbot):

@@ -217,7 +217,7 @@ def test_a_request_as_a_command_line(tmp_path) -> None:
     )
     assert request.arguments() == [
         "fit", "walk.mp4", "--out", str(Path("w.sd2/mesh.zarr")), "--progress-json",
-        "--stature-m", "1.700", "--focal-px", "612.50", "--person", "1,2,30,40",
+        "--stature-m", "1.700", "--focal-px", "612.50", "--person-box", "1,2,30,40",
         "--person-frame", "9",
     ]  # fmt: skip
 
@@ -229,7 +229,7 @@ def test_the_command_knows_every_word_of_it(tmp_path) -> None:
     options = build_parser()[0].parse_args(request.arguments())
     assert (options.video, options.out) == (request.video, request.mesh)
     assert (options.stature_m, options.focal_px) == (1.7, 612.5)
-    assert (options.person, options.person_frame) == ((1, 2, 30, 40), 9)
+    assert (options.person_box, options.person_frame) == ((1, 2, 30, 40), 9)
     assert options.progress_json
 
 

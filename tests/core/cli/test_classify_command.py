@@ -101,7 +101,7 @@ def test_a_classifier_is_trained_described_and_judged(
     assert "background, horizontal, vertical" in described.out
     assert "simulated maps" in described.out
     plot = tmp_path / "matrix.png"
-    judged = sd2("classify", "eval", store, "--model", model, "--json", "-", "--plot", plot)
+    judged = sd2("classify", "eval", store, "--model", model, "--json", "--figure", plot)
     told = json.loads(judged.out)
     assert told["subjects"] == ["s3"]
     assert told["learnt_from"] == []
@@ -174,8 +174,7 @@ def test_gestures_of_a_map_become_labels(
 
 def test_a_classifier_is_judged_on_a_labelled_recording(sd2: Sd2, model: Path) -> None:
     judged = sd2(
-        *("classify", "eval", f"anna={SAMPLE}", "--maps", "synthetic", "--model", model),
-        *("--json", "-"),
+        *("classify", "eval", f"anna={SAMPLE}", "--maps", "synthetic", "--model", model, "--json")
     )
     found = json.loads(judged.out)
     assert found["subjects"] == ["anna"]

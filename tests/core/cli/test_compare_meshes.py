@@ -35,7 +35,7 @@ def test_the_table_and_the_figure(sd2: Sd2, pair: tuple[Path, Path], tmp_path: P
 
 def test_json_with_labels_and_another_reference(sd2: Sd2, pair: tuple[Path, Path]) -> None:
     outcome = sd2(
-        "compare-meshes", *pair, "--labels", "A,B", "--reference", "B", "--json", "--align", "root"
+        "compare-meshes", *pair, "--names", "A,B", "--reference", "B", "--json", "--align", "root"
     )
     found = json.loads(outcome.out)
     assert (found["reference"], found["alignment"], found["frames"]) == ("B", "root", 8)
@@ -62,8 +62,8 @@ def test_a_mesh_that_does_not_say_its_rate(
 @pytest.mark.parametrize(
     ("arguments", "found"),
     [
-        (("--labels", "one"), "1 labels for 2 meshes"),
-        (("--labels", "one,one"), "one, one"),
+        (("--names", "one"), "1 labels for 2 meshes"),
+        (("--names", "one,one"), "one, one"),
         (("--reference", "third"), "'third'"),
         (("--figure", "pair.bmp"), "pair.bmp"),
     ],

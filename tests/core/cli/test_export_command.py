@@ -18,7 +18,7 @@ from sd2core.io.mesh import load_mesh, save_mesh
 from sd2core.placements.placements import PlacementGrid, write_placements
 from sd2core.recording.recording import Recording
 
-SMALL = ("--kinds", "synthetic,simulated", "--length", 30, "--overlap", 5)
+SMALL = ("--kinds", "synthetic,simulated", "--segment-frames", 30, "--overlap-frames", 5)
 
 
 @pytest.fixture
@@ -70,7 +70,17 @@ def test_limb_maps_are_exported_on_request(sd2: Sd2, tmp_path: Path) -> None:
     save_mesh(mesh, tmp_path / "mesh.npz")
     body = Recording.create(tmp_path / "ben.sd2", mesh=tmp_path / "mesh.npz").folder
     out = tmp_path / "set.h5"
-    asked = ("export", octahedron, body, "--out", out, "--kinds", "synthetic", "--length", 20)
+    asked = (
+        "export",
+        octahedron,
+        body,
+        "--out",
+        out,
+        "--kinds",
+        "synthetic",
+        "--segment-frames",
+        20,
+    )
     sizes = []
     for more in ((), ("--limbs",)):
         told = sd2(*asked[:1], *asked[2:], *more, "--dry-run", "--json")
@@ -159,7 +169,7 @@ def test_one_damaged_recording_is_reported_and_the_rest_is_written(
     ("arguments", "message"),
     [
         (("--kinds", "radar"), "some of synthetic, denoised, simulated, real"),
-        (("--overlap", "72"), "an overlap of 0 to 71"),
+        (("--overlap-frames", "72"), "an overlap of 0 to 71"),
         (("--subjects", "a,b"), "2 people are named for 3 recordings"),
         (("--test-subjects", "dora"), "'dora' is to be a test subject"),
         (("--test", "dora"), "'dora' is to be a test subject"),
@@ -180,7 +190,17 @@ def test_inertial_sensors_are_exported_on_request(sd2: Sd2, tmp_path: Path) -> N
     save_mesh(mesh, tmp_path / "mesh.npz")
     body = Recording.create(tmp_path / "ben.sd2", mesh=tmp_path / "mesh.npz").folder
     out = tmp_path / "set.zarr"
-    asked = ("export", body, octahedron, "--out", out, "--kinds", "synthetic", "--length", 20)
+    asked = (
+        "export",
+        body,
+        octahedron,
+        "--out",
+        out,
+        "--kinds",
+        "synthetic",
+        "--segment-frames",
+        20,
+    )
     with_sensors = (*asked, "--imu", "right-wrist,chest")
     told = sd2(*with_sensors, "--dry-run", "--json")
     assert len(json.loads(told.out)["failed"]) == 1
@@ -208,7 +228,9 @@ def test_inertial_sensors_need_a_body(sd2: Sd2, tmp_path: Path) -> None:
     content = json.loads(document.read_text("utf-8"))
     content["mesh"] = None
     document.write_text(json.dumps(content), "utf-8")
-    told = sd2("export", radar, "--out", tmp_path / "a.zarr", "--imu", "head", "--length", 20)
+    told = sd2(
+        "export", radar, "--out", tmp_path / "a.zarr", "--imu", "head", "--segment-frames", 20
+    )
     assert told.code == 1
     assert "has no mesh" in told.err
     told = sd2("export", radar, "--out", tmp_path / "b.zarr", "--imu", "knee")

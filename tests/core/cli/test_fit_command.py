@@ -226,7 +226,7 @@ class TestOutput:
         ("name", "said"),
         [
             ("mesh.obj", "a name that ends in .zarr or .npz"),
-            ("nowhere/mesh.zarr", "nowhere does not exist"),
+            ("notes.npz/mesh.zarr", "notes.npz is a file"),
             ("notes.npz", "notes.npz exists and is no mesh"),
             ("group.zarr", "group.zarr exists and is no mesh"),
             ("taken.npz", "taken.npz.partial exists and is not what a stopped fit has left"),
@@ -270,9 +270,9 @@ class TestOutput:
     @pytest.mark.parametrize(
         "words",
         [
-            ("--person", "1,2,3"),
-            ("--person", "1,2,0,4"),
-            ("--person", "1,2,nan,4"),
+            ("--person-box", "1,2,3"),
+            ("--person-box", "1,2,0,4"),
+            ("--person-box", "1,2,nan,4"),
             ("--person-frame", "-1"),
             ("--resolution", "huge"),
             ("--stature-m", "0"),

@@ -32,12 +32,12 @@ def test_info_is_silent_where_somebody_is_throughout(sd2: Sd2, plate: Path) -> N
     assert json.loads(sd2("info", plate, "--json").out)["frames_without_person"] == 0
 
 
-@pytest.mark.parametrize("model", ["histogram", "fmcw"])
+@pytest.mark.parametrize("method", ["histogram", "fmcw"])
 def test_synth_says_that_those_columns_are_empty(
-    sd2: Sd2, holed: Path, tmp_path: Path, model: str
+    sd2: Sd2, holed: Path, tmp_path: Path, method: str
 ) -> None:
     out = tmp_path / "map.npz"
-    said = sd2("synth", holed, "--out", out, "--model", model)
+    said = sd2("synth", holed, "--out", out, "--method", method)
     assert (said.code, said.err.count("Traceback")) == (0, 0)
     assert "Without a person: 3 of " in said.out
     doppler = DopplerMap.load(out)
@@ -46,7 +46,7 @@ def test_synth_says_that_those_columns_are_empty(
     assert ((doppler.times_s[absent] > 4 / 30) & (doppler.times_s[absent] < 8 / 30)).all()
     power = doppler.values.sum(axis=0)
     # A radar's noise goes on without anybody.
-    assert power[absent].max() <= (0.0 if model == "histogram" else 0.05 * power.max())
+    assert power[absent].max() <= (0.0 if method == "histogram" else 0.05 * power.max())
     assert json.loads(sd2("info", out, "--json").out)["frames_without_person"] == len(absent)
 
 
@@ -98,6 +98,6 @@ def test_what_is_not_known_is_refused(sd2: Sd2, plate: Path, tmp_path: Path) -> 
 
 
 def test_a_radar_signal_has_none(sd2: Sd2, fitted: Path, tmp_path: Path) -> None:
-    said = sd2("synth", fitted, "--out", tmp_path / "m.npz", "--uncertainty", "--model", "fmcw")
+    said = sd2("synth", fitted, "--out", tmp_path / "m.npz", "--uncertainty", "--method", "fmcw")
     assert said.code == 1
-    assert "--uncertainty is given with --model fmcw" in said.err
+    assert "--uncertainty is given with --method fmcw" in said.err

@@ -63,7 +63,15 @@ def test_what_cannot_be_read_is_explained(sd2: Sd2, tmp_path: Path, name: str) -
 
 def test_import_refers_to_the_files(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
     outcome = sd2(
-        "import", tmp_path / "a", "--mesh", plate, "--fps", "15", "--radar-offset-s", "-0.25"
+        "import",
+        "--out",
+        tmp_path / "a",
+        "--mesh",
+        plate,
+        "--fps",
+        "15",
+        "--radar-offset-s",
+        "-0.25",
     )
     assert outcome.code == 0, outcome.err
     recording = open_recording(tmp_path / "a.sd2")
@@ -89,12 +97,12 @@ def test_samples_of_an_inertial_sensor(sd2: Sd2, plate: Path, tmp_path: Path) ->
     assert data["largest_turn_rate_radps"] == pytest.approx(np.pi / 2)
 
     files = ("--mesh", plate, "--imu", wrist, "--imu-offset-s", "0.25")
-    outcome = sd2("import", tmp_path / "a", *files)
+    outcome = sd2("import", "--out", tmp_path / "a", *files)
     assert outcome.code == 0, outcome.err
     recording = open_recording(tmp_path / "a.sd2")
     assert (recording.imu, recording.imu_offset_s) == (wrist, 0.25)
     assert json.loads(sd2("info", tmp_path / "a.sd2", "--json").out)["imu"]["samples"] == 51
-    assert sd2("import", tmp_path / "b", "--imu", wrist).code == 1  # nothing to look at
+    assert sd2("import", "--out", tmp_path / "b", "--imu", wrist).code == 1  # nothing to look at
 
     wrist.write_text("t,ax,ay,az,gx,gy,gz\n0,1,1,1,1,1,1\n")
     outcome = sd2("info", wrist)
@@ -104,7 +112,17 @@ def test_samples_of_an_inertial_sensor(sd2: Sd2, plate: Path, tmp_path: Path) ->
 
 def test_import_copies_on_request(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
     data = json.loads(
-        sd2("import", tmp_path / "a.sd2", "--mesh", plate, "--copy", "--title", "T", "--json").out
+        sd2(
+            "import",
+            "--out",
+            tmp_path / "a.sd2",
+            "--mesh",
+            plate,
+            "--copy",
+            "--title",
+            "T",
+            "--json",
+        ).out
     )
     assert data["title"] == "T"
     assert data["mesh"]["path"] == str(tmp_path / "a.sd2" / "plate.npz")
@@ -120,7 +138,7 @@ def test_import_makes_nothing_of_what_cannot_be_read(
 ) -> None:
     broken = tmp_path / "broken.npz"
     broken.write_text("no")
-    outcome = sd2("import", tmp_path / "a.sd2", option, broken)
+    outcome = sd2("import", "--out", tmp_path / "a.sd2", option, broken)
     assert outcome.code == 1
     assert says in outcome.err
     assert not (tmp_path / "a.sd2").exists()
@@ -128,14 +146,14 @@ def test_import_makes_nothing_of_what_cannot_be_read(
 
 @pytest.mark.parametrize("arguments", [[], ["--mesh", "no.npz"]])
 def test_import_of_nothing(sd2: Sd2, tmp_path: Path, arguments: list[str]) -> None:
-    outcome = sd2("import", tmp_path / "a.sd2", *arguments)
+    outcome = sd2("import", "--out", tmp_path / "a.sd2", *arguments)
     assert outcome.code == 1
     assert not (tmp_path / "a.sd2").exists()
 
 
 def test_missing_files_are_named_and_found_again(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
     recording = tmp_path / "a.sd2"
-    sd2("import", recording, "--mesh", plate)
+    sd2("import", "--out", recording, "--mesh", plate)
     (tmp_path / "disk").mkdir()
     plate.rename(tmp_path / "disk" / "plate.npz")
     outcome = sd2("info", recording)
@@ -149,7 +167,7 @@ def test_missing_files_are_named_and_found_again(sd2: Sd2, plate: Path, tmp_path
 
 def test_relink_says_what_it_could_not_decide(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
     recording = tmp_path / "a.sd2"
-    sd2("import", recording, "--mesh", plate)
+    sd2("import", "--out", recording, "--mesh", plate)
     for name in ("one", "two"):
         (tmp_path / "disk" / name).mkdir(parents=True)
         (tmp_path / "disk" / name / "plate.npz").write_bytes(plate.read_bytes())
@@ -165,6 +183,7 @@ def test_relink_says_what_it_could_not_decide(sd2: Sd2, plate: Path, tmp_path: P
 def test_a_real_recording(sd2: Sd2, shared_data: Path, tmp_path: Path) -> None:
     outcome = sd2(
         "import",
+        "--out",
         tmp_path / "walk.sd2",
         "--video",
         shared_data / "video" / "walk.mkv",

@@ -56,7 +56,7 @@ def cells(line: str) -> list[str]:
 
 
 def test_show_prints_spans_and_how_long_they_are(sd2: Sd2, anna: Path) -> None:
-    lines = sd2("labels", "show", anna, "--rate", 10).out.splitlines()
+    lines = sd2("labels", "show", anna, "--fps", 10).out.splitlines()
     assert cells(lines[1]) == ["1", "1.000", "2.000", "10–19", "(10)", "wave", "Gestures", "n1"]
     assert cells(lines[-2])[:4] == ["swipe", "1", "3.000", "3.000"]
     assert cells(lines[-1])[:4] == ["wave", "2", "1.500", "0.750"]
@@ -65,7 +65,7 @@ def test_show_prints_spans_and_how_long_they_are(sd2: Sd2, anna: Path) -> None:
 
 
 def test_show_prints_json(sd2: Sd2, anna: Path) -> None:
-    data = json.loads(sd2("labels", "show", anna, "--rate", 10, "--json").out)
+    data = json.loads(sd2("labels", "show", anna, "--fps", 10, "--json").out)
     assert data["spans"][2]["frames"] == {"first": 40, "last": 69, "count": 30}
     assert data["spans"][2]["label"] == "swipe"
     assert [*data["labels"]] == ["swipe", "wave"]
@@ -74,10 +74,10 @@ def test_show_prints_json(sd2: Sd2, anna: Path) -> None:
 
 
 def test_statistics_are_printed_three_ways(sd2: Sd2, anna: Path) -> None:
-    lines = sd2("labels", "statistics", anna, "--rate", 10).out.splitlines()
+    lines = sd2("labels", "statistics", anna, "--fps", 10).out.splitlines()
     expected = ["2", "1.500", "0.750", "0.354", "0.750", "0.500", "1.000", "21.4"]
     assert cells(lines[-1]) == ["wave", *expected]
-    table = sd2("labels", "statistics", anna, "--rate", 10, "--csv").out.splitlines()
+    table = sd2("labels", "statistics", anna, "--fps", 10, "--csv").out.splitlines()
     assert table[0].startswith("label,spans,total s,mean s,sd s")
     assert table[-1] == ",".join(["wave", *expected])
     data = json.loads(sd2("labels", "statistics", anna, "--json").out)["labels"]
@@ -131,7 +131,7 @@ def test_a_mesh_gives_the_times_of_frames(sd2: Sd2, anna: Path, plate: Path) -> 
 
 def test_a_recording_shows_its_own_labels_and_frames(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
     folder = tmp_path / "plate.sd2"
-    assert sd2("import", folder, "--mesh", plate).code == 0
+    assert sd2("import", "--out", folder, "--mesh", plate).code == 0
     assert "holds no spans" in sd2("labels", "show", folder).out
     written(folder / files.FILE_NAME, (0.1, 0.3, "wave"))
     data = json.loads(sd2("labels", "show", folder, "--json").out)
@@ -154,42 +154,42 @@ def test_spans_of_an_older_recording_are_shown(sd2: Sd2, plate: Path, tmp_path: 
 
 def test_convert_there_and_back_and_what_is_not_kept(sd2: Sd2, anna: Path, tmp_path: Path) -> None:
     out = tmp_path / "anna.txt"
-    done = sd2("labels", "convert", anna, out, "--to", "audacity", "--rate", 30)
+    done = sd2("labels", "convert", anna, "--out", out, "--to", "audacity", "--fps", 30)
     assert done.code == 0, done.err
     assert "with 3 spans" in done.out
     assert "not kept: Audacity keeps no notes: 3 notes left out" in done.out
     back = tmp_path / "back.json"
-    assert sd2("labels", "convert", out, back).code == 0
+    assert sd2("labels", "convert", out, "--out", back).code == 0
     before, after = files.read_labels(anna).labels, files.read_labels(back).labels
     assert [(s.start_s, s.end_s, s.label) for s in after.spans] == [
         (s.start_s, s.end_s, s.label) for s in before.spans
     ]
     table = tmp_path / "anna.csv"
-    data = json.loads(sd2("labels", "convert", anna, table, "--rate", 30, "--json").out)
+    data = json.loads(sd2("labels", "convert", anna, "--out", table, "--fps", 30, "--json").out)
     assert data["spans"] == len(read_labels(table).spans) == 3
 
 
 def test_convert_needs_frame_times_and_a_new_file(sd2: Sd2, anna: Path, tmp_path: Path) -> None:
     out = tmp_path / "anna.csv"
-    refused = sd2("labels", "convert", anna, out)
+    refused = sd2("labels", "convert", anna, "--out", out)
     assert refused.code == 1
     assert "needs the times of frames" in refused.err
     assert not out.exists()
     out.write_text("precious")
-    refused = sd2("labels", "convert", anna, out, "--rate", 30)
+    refused = sd2("labels", "convert", anna, "--out", out, "--fps", 30)
     assert refused.code == 1
     assert "anna.csv exists" in refused.err
     assert out.read_text() == "precious"
-    assert sd2("labels", "convert", anna, out, "--rate", 30, "--replace").code == 0
+    assert sd2("labels", "convert", anna, "--out", out, "--fps", 30, "--replace").code == 0
     assert len(read_labels(out).spans) == 3
 
 
 def test_only_one_clock_may_be_named(sd2: Sd2, anna: Path, plate: Path) -> None:
-    assert sd2("labels", "show", anna, "--rate", 30, "--mesh", plate).code == 2
+    assert sd2("labels", "show", anna, "--fps", 30, "--mesh", plate).code == 2
 
 
 def test_a_rate_that_cannot_be_is_a_sentence(sd2: Sd2, anna: Path) -> None:
-    refused = sd2("labels", "show", anna, "--rate", 1e12)
+    refused = sd2("labels", "show", anna, "--fps", 1e12)
     assert refused.code == 1
     assert "frames/s these are" in refused.err
 
@@ -217,7 +217,7 @@ def test_suggest_says_how_far_from_a_span_it_was(sd2: Sd2, moving: Path) -> None
 
 def test_suggest_in_a_recording_uses_its_mesh(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
     folder = tmp_path / "plate.sd2"
-    assert sd2("import", folder, "--mesh", plate).code == 0
+    assert sd2("import", "--out", folder, "--mesh", plate).code == 0
     # The plate moves in every frame: nothing is quiet, so nothing stands out.
     assert sd2("labels", "suggest", folder).out.startswith("0 spans")
     refused = sd2("labels", "suggest", folder, "--of", "radar")
@@ -238,7 +238,7 @@ def test_what_cannot_be_suggested_from_is_refused(sd2: Sd2, plate: Path, moving:
 
 
 def test_agree_prints_kappas_matches_and_what_is_left(sd2: Sd2, anna: Path, ben: Path) -> None:
-    done = sd2("labels", "agree", anna, ben, "--rate", 10)
+    done = sd2("labels", "agree", anna, ben, "--fps", 10)
     assert done.code == 0, done.err
     for text in (
         "2 spans matched from an IoU of 0.5 on, 1 of them with the same label",
@@ -251,7 +251,7 @@ def test_agree_prints_kappas_matches_and_what_is_left(sd2: Sd2, anna: Path, ben:
 
 
 def test_agree_prints_json(sd2: Sd2, anna: Path, ben: Path) -> None:
-    data = json.loads(sd2("labels", "agree", anna, ben, "--rate", 10, "--json").out)
+    data = json.loads(sd2("labels", "agree", anna, ben, "--fps", 10, "--json").out)
     assert data["frames"] == 72
     assert data["answers"] == [[], ["push"], ["swipe"], ["wave"]]
     # Of 72 frames A has wave in 15 (B in 9 of them) and swipe in 30, which B calls push;
@@ -261,22 +261,22 @@ def test_agree_prints_json(sd2: Sd2, anna: Path, ben: Path) -> None:
         (1, 1, 0),
         (3, 2, 2),
     ]
-    same = json.loads(sd2("labels", "agree", anna, anna, "--rate", 10, "--json").out)
+    same = json.loads(sd2("labels", "agree", anna, anna, "--fps", 10, "--json").out)
     assert same["overall"]["kappa"] == same["f1"] == same["mean_iou"] == 1.0
 
 
 def test_agree_without_a_number_says_so(sd2: Sd2, tmp_path: Path) -> None:
     nothing = written(tmp_path / "none.json")
-    done = sd2("labels", "agree", nothing, nothing, "--rate", 10)
+    done = sd2("labels", "agree", nothing, nothing, "--fps", 10)
     assert "Kappa is undefined: both give the same single answer in all frames." in done.out
 
 
 def test_agree_refuses_what_it_cannot_do(sd2: Sd2, anna: Path, ben: Path) -> None:
     for arguments, words in (
         ((anna, ben), "Comparing labels needs the times of frames"),
-        ((anna, ben, "--rate", 10, "--track", "Other"), "no track 'Other'"),
-        ((anna, ben, "--rate", 10, "--min-iou", 2), "The least IoU of a match is 2"),
-        ((anna, ben.with_name("missing.json"), "--rate", 10), "missing.json does not exist"),
+        ((anna, ben, "--fps", 10, "--track", "Other"), "no track 'Other'"),
+        ((anna, ben, "--fps", 10, "--min-iou", 2), "The least IoU of a match is 2"),
+        ((anna, ben.with_name("missing.json"), "--fps", 10), "missing.json does not exist"),
     ):
         refused = sd2("labels", "agree", *arguments)
         assert refused.code == 1
@@ -365,7 +365,7 @@ def test_labels_that_were_saved_while_the_command_ran_are_not_replaced(
         return found
 
     monkeypatch.setattr(place, "read_named", slow)
-    told = [anna] if command == "convert" else ["--use", "usual", "--out", anna]
+    told = ["--out", anna] if command == "convert" else ["--use", "usual", "--out", anna]
     outcome = sd2("labels", command, anna, *told, "--replace")
     assert outcome.code == 1
     assert f"{anna} was saved by a window or another program" in outcome.err

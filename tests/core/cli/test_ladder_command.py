@@ -52,7 +52,7 @@ def test_the_table_names_what_it_was_measured_against(sd2: Sd2, plate: Path) -> 
 @pytest.mark.slow
 def test_the_picture(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
     picture = tmp_path / "trade.png"
-    assert sd2("ladder", plate, "--repeats", 1, "--plot", picture).code == 0
+    assert sd2("ladder", plate, "--repeats", 1, "--figure", picture).code == 0
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
@@ -65,9 +65,9 @@ def test_what_cannot_be_held_is_said(sd2: Sd2, plate: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--quick", "--plot", "x.png"), "--plot"),
-        (("--plot", "x.gif"), ".png"),
-        (("--quick", "--family", "fmcw"), "--quick"),
+        (("--quick", "--figure", "x.png"), "--figure"),
+        (("--figure", "x.gif"), ".png"),
+        (("--quick", "--method", "fmcw"), "--quick"),
     ],
 )
 def test_what_does_not_go_together(

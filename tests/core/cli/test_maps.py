@@ -94,10 +94,10 @@ def test_an_approaching_plate(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
     assert "exact: 100.0% visible on average" in outcome.out
 
 
-@pytest.mark.parametrize("model", ["histogram", "fmcw"])
-def test_fewer_vertices_are_said(sd2: Sd2, plate: Path, tmp_path: Path, model: str) -> None:
+@pytest.mark.parametrize("method", ["histogram", "fmcw"])
+def test_fewer_vertices_are_said(sd2: Sd2, plate: Path, tmp_path: Path, method: str) -> None:
     out = tmp_path / "map.npz"
-    outcome = sd2("synth", plate, "--out", out, "--vertices-kept", 0.3, "--model", model)
+    outcome = sd2("synth", plate, "--out", out, "--vertices-kept", 0.3, "--method", method)
     assert outcome.code == 0, outcome.err
     assert re.search(r"decimated to \d\d of 81 vertices", outcome.out)
     doppler = DopplerMap.load(out)
@@ -160,7 +160,7 @@ def test_limbs_come_with_the_map(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
     assert json.loads(sd2("info", out, "--json").out)["limbs"] == list(found.limbs.parts)
     for more, words in (
         ((plate,), "the parts of the body are not known"),
-        ((body, "--model", "fmcw"), "--limbs is given with --model fmcw"),
+        ((body, "--method", "fmcw"), "--limbs is given with --method fmcw"),
     ):
         said = sd2("synth", *more, "--out", tmp_path / "other.npz", "--limbs")
         assert said.code == 1
@@ -170,7 +170,7 @@ def test_limbs_come_with_the_map(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("command", ["synth", "radar"])
 @pytest.mark.parametrize(
-    ("name", "says"), [("map.txt", "ends in .npz"), ("no/map.npz", "does not exist")]
+    ("name", "says"), [("map.txt", "ends in .npz"), ("plate.npz/map.npz", "plate.npz is a file")]
 )
 def test_an_output_that_cannot_be_written(
     sd2: Sd2, plate: Path, tmp_path: Path, command: str, name: str, says: str

@@ -65,6 +65,35 @@ def test_one_channel_is_chosen(sd2: Sd2, tmp_path: Path) -> None:
     assert "--bins is given without --out" in outcome.err
 
 
+def test_a_recording_keeps_the_channel_that_is_chosen(
+    sd2: Sd2, tmp_path: Path, plate: Path
+) -> None:
+    path, out = write_ti(tmp_path / "ti", TI), tmp_path / "map.npz"
+    folder = tmp_path / "a.sd2"
+    outcome = sd2("import", "--out", folder, "--radar", path, "--receiver", 2)
+    assert outcome.code == 0, outcome.err
+    assert "radar channel  receiver 2" in outcome.out
+    told = json.loads(sd2("info", folder, "--json").out)
+    assert (told["radar_receiver"], told["radar_transmitter"]) == (2, None)
+    assert told["radar"]["receivers"] == 1
+    # Options replace the choice, each its own.
+    for options, notes in (
+        ((), {"Receiver 2 only."}),
+        (("--receiver", 1), {"Receiver 1 only."}),
+        (("--transmitter", 2), {"Receiver 2 only.", "Transmitter 2 only."}),
+    ):
+        assert sd2("radar", folder, "--out", out, *options).code == 0
+        only = {note for note in DopplerMap.load(out).meta["notes"] if note.endswith(" only.")}
+        assert only == notes
+        printed = json.loads(sd2("radar", folder, *options, "--json").out)["notes"]
+        assert {note for note in printed if note.endswith(" only.")} == notes
+    for files, receiver in ((("--radar", path), 3), (("--mesh", plate), 1)):
+        outcome = sd2("import", "--out", tmp_path / "b.sd2", *files, "--receiver", receiver)
+        assert outcome.code == 1
+        assert "eceiver" in outcome.err
+        assert not (tmp_path / "b.sd2").exists()
+
+
 def test_every_kind_is_described_by_its_own_file(sd2: Sd2, tmp_path: Path) -> None:
     outcome = sd2("radar", write_a121(tmp_path / "a.h5"))
     assert "Acconeer A121, 60.5 GHz" in outcome.out
@@ -141,7 +170,7 @@ def test_recordings_take_every_kind_and_copy_what_belongs_to_it(
         np.save(path, np.zeros((4, 16, 20), np.float32))
         assert sd2("radar", "describe", path, *DESCRIBED).code == 0
     folder = tmp_path / "made.sd2"
-    outcome = sd2("import", folder, "--radar", path, "--copy")
+    outcome = sd2("import", "--out", folder, "--radar", path, "--copy")
     assert outcome.code == 0, outcome.err
     recording = open_recording(folder)
     assert not recording.holds_radar_map
@@ -166,14 +195,14 @@ def test_a_recording_without_radar_has_no_limits(sd2: Sd2, tmp_path: Path, plate
 @pytest.mark.parametrize("name", ["iwr6843", "wifi-5ghz"])
 def test_a_radar_is_simulated_by_its_name(sd2: Sd2, tmp_path: Path, plate: Path, name: str) -> None:
     folder = tmp_path / "made"
-    outcome = sd2("simulate", "radar", plate, folder, "--radar", name)
+    outcome = sd2("simulate", "radar", plate, "--out", folder, "--radar", name)
     assert outcome.code == 0, outcome.err
     assert "unverified" in outcome.out
     assert sd2("radar", folder, "--out", tmp_path / "map.npz").code == 0
     doppler = DopplerMap.load(tmp_path / "map.npz")
     assert doppler.kind == "simulated"
     direct = tmp_path / "direct.npz"
-    assert sd2("synth", plate, "--model", "fmcw", "--radar", name, "--out", direct).code == 0
+    assert sd2("synth", plate, "--method", "fmcw", "--radar", name, "--out", direct).code == 0
     assert DopplerMap.load(direct).carrier_hz == doppler.carrier_hz
     outcome = sd2("radar", folder, "--out", tmp_path / "map.npz", "--range", "0.5,4")
     if name == "wifi-5ghz":
@@ -185,6 +214,6 @@ def test_a_radar_is_simulated_by_its_name(sd2: Sd2, tmp_path: Path, plate: Path,
 
 
 def test_a_radar_that_is_none_is_named(sd2: Sd2, tmp_path: Path, plate: Path) -> None:
-    outcome = sd2("simulate", "radar", plate, tmp_path / "made", "--radar", "sonar")
+    outcome = sd2("simulate", "radar", plate, "--out", tmp_path / "made", "--radar", "sonar")
     assert outcome.code == 1
     assert "There is no radar 'sonar'" in outcome.err

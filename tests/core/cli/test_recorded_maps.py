@@ -68,7 +68,7 @@ def test_what_only_samples_allow_is_refused(
 def test_a_recording_is_made_of_it(sd2: Sd2, swing: Path, tmp_path: Path, copied: bool) -> None:
     folder = tmp_path / "swing.sd2"
     options = ("--radar-offset-s", 1.5, *(("--copy",) if copied else ()))
-    made = sd2("import", folder, "--radar", swing, *options)
+    made = sd2("import", "--out", folder, "--radar", swing, *options)
     assert made.code == 0, made.err
     if copied:
         swing.unlink()
@@ -82,7 +82,7 @@ def test_a_damaged_file_is_a_sentence(sd2: Sd2, swing: Path, tmp_path: Path) -> 
     swing.write_bytes(swing.read_bytes()[:5000])
     for outcome in (
         sd2("info", swing),
-        sd2("import", tmp_path / "a.sd2", "--radar", swing),
+        sd2("import", "--out", tmp_path / "a.sd2", "--radar", swing),
         sd2("radar", swing, "--out", tmp_path / "map.npz"),
     ):
         assert outcome.code == 1
@@ -94,7 +94,7 @@ def test_its_labels_are_those_of_the_recording(sd2: Sd2, swing: Path, tmp_path: 
     data = json.loads(sd2("labels", "show", swing, "--json").out)
     assert [span["frames"] for span in data["spans"]] == [{"first": 2, "last": 4, "count": 3}]
     folder = tmp_path / "swing.sd2"
-    assert sd2("import", folder, "--radar", swing, "--radar-offset-s", 1.5).code == 0
+    assert sd2("import", "--out", folder, "--radar", swing, "--radar-offset-s", 1.5).code == 0
     moved = json.loads(sd2("labels", "show", folder, "--json").out)["spans"][0]
     assert moved["start_s"] == pytest.approx(1.5 + 2 * FRAME_S)
     assert moved["frames"] == {"first": 2, "last": 4, "count": 3}

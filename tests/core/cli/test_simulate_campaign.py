@@ -13,51 +13,51 @@ from sd2core.pairs.store import read_pairs
 
 def test_a_campaign_is_made_and_told(sd2: Sd2, tmp_path: Path) -> None:
     out = tmp_path / "small.zarr"
-    options = ["--subjects", 1, "--minutes", 0.03, "--take-seconds", 2, "--processes", 1]
-    outcome = sd2("simulate", "campaign", out, *options, "--json")
+    options = ["--people", 1, "--minutes", 0.03, "--take-seconds", 2, "--workers", 1]
+    outcome = sd2("simulate", "campaign", "--out", out, *options, "--json")
     assert outcome.code == 0, outcome.err
     said = json.loads(outcome.out)
     assert (said["takes"], said["made"], said["frames"]) == (1, 1, 60)
     assert said["simulated"] is True
     assert said["labels"] == list(read_pairs(out).labels)
     assert json.loads(sd2("info", out, "--json").out)["protocol"].startswith("varied")
-    again = sd2("simulate", "campaign", out, *options)
+    again = sd2("simulate", "campaign", "--out", out, *options)
     assert again.code == 0
     assert "Made 0 takes" in again.out
     assert "1 simulated takes of 1 people" in again.out
 
 
 @pytest.mark.parametrize(
-    "options", [["--seed", "-1"], ["--minutes", "0"], ["--subjects", "none"], ["--placements", "0"]]
+    "options", [["--seed", "-1"], ["--minutes", "0"], ["--people", "none"], ["--sensors", "0"]]
 )
 def test_numbers_that_make_no_sense_are_usage(sd2: Sd2, tmp_path: Path, options: list[str]) -> None:
-    assert sd2("simulate", "campaign", tmp_path / "x.zarr", *options).code == 2
+    assert sd2("simulate", "campaign", "--out", tmp_path / "x.zarr", *options).code == 2
     assert not (tmp_path / "x.zarr").exists()
 
 
 def test_other_things_are_not_written_over(sd2: Sd2, tmp_path: Path) -> None:
     (tmp_path / "mine.txt").write_text("mine")
-    outcome = sd2("simulate", "campaign", tmp_path, "--minutes", 0.03, "--take-seconds", 2)
+    outcome = sd2("simulate", "campaign", "--out", tmp_path, "--minutes", 0.03, "--take-seconds", 2)
     assert outcome.code == 1
     assert "holds no pairs" in outcome.err
 
 
 def test_info_says_the_protocol_and_no_other_goes_on(sd2: Sd2, tmp_path: Path) -> None:
     out = tmp_path / "one.zarr"
-    short = ["--subjects", 1, "--minutes", 0.03, "--take-seconds", 2, "--processes", 1]
-    made = sd2("simulate", "campaign", out, *short, "--protocol", "paper", "--json")
+    short = ["--people", 1, "--minutes", 0.03, "--take-seconds", 2, "--workers", 1]
+    made = sd2("simulate", "campaign", "--out", out, *short, "--protocol", "paper", "--json")
     assert json.loads(made.out)["protocol"] == "paper"
     words = "paper, swipes to-and-fro"
     assert json.loads(sd2("info", out, "--json").out)["protocol"] == words
     assert words in sd2("info", out).out
     for other in (["--protocol", "paper", "--order", "random"], []):
-        outcome = sd2("simulate", "campaign", out, *short, *other)
+        outcome = sd2("simulate", "campaign", "--out", out, *short, *other)
         assert outcome.code == 1
         assert "same settings" in outcome.err
 
 
 def test_varied_takes_have_no_order(sd2: Sd2, tmp_path: Path) -> None:
-    outcome = sd2("simulate", "campaign", tmp_path / "x.zarr", "--order", "to-and-fro")
+    outcome = sd2("simulate", "campaign", "--out", tmp_path / "x.zarr", "--order", "to-and-fro")
     assert outcome.code == 1
     assert "Add --protocol paper" in outcome.err
     assert not (tmp_path / "x.zarr").exists()

@@ -47,11 +47,11 @@ class TestTrain:
             "epoch",
             "end",
         ]
-        scores, table, picture = (tmp_path / f"e.{kind}" for kind in ("json", "md", "png"))
-        words = ("--data", pairs, "--json", scores, "--markdown", table, "--plot", picture)
-        outcome = sd2("eval", tmp_path / "run0", tmp_path / "run1", *words)
+        table, picture = tmp_path / "e.md", tmp_path / "e.png"
+        asked = ("eval", tmp_path / "run0", tmp_path / "run1", "--data", pairs)
+        outcome = sd2(*asked, "--markdown", table, "--figure", picture)
         assert outcome.code == 0, outcome.err
-        content = json.loads(scores.read_text())
+        content = json.loads(sd2(*asked, "--json").out)
         assert content["subjects"] == ["s3"]
         assert [(one["name"], len(one["models"])) for one in content["groups"]] == [
             ("none", 1),
@@ -225,5 +225,5 @@ class TestEval:
         assert "has no model yet" in outcome.err
         outcome = sd2("eval", "no-such-model", "--data", pairs)
         assert "no model called 'no-such-model'" in outcome.err
-        outcome = sd2("eval", tmp_path / "run", "--data", pairs, "--plot", tmp_path / "e.bmp")
+        outcome = sd2("eval", tmp_path / "run", "--data", pairs, "--figure", tmp_path / "e.bmp")
         assert "ends in .png" in outcome.err

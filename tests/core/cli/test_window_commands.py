@@ -90,7 +90,8 @@ def test_a_display_is_used(
 
 
 @pytest.mark.parametrize(
-    ("name", "says"), [("window.jpg", "ends in .png"), ("no/window.png", "does not exist")]
+    ("name", "says"),
+    [("window.jpg", "ends in .png"), ("plate.npz/window.png", "plate.npz is a file")],
 )
 def test_a_screenshot_that_cannot_be_written(
     sd2: Sd2, window: list, plate: Path, tmp_path: Path, name: str, says: str

@@ -33,6 +33,8 @@ recordings = st.builds(
     imu=st.none() | st.just(Path("wrist.csv").absolute()),
     imu_offset_s=st.floats(-9, 9),
     imu_places=st.lists(st.sampled_from(["left-wrist", "head", "4711"]), unique=True).map(tuple),
+    radar_receiver=st.none() | st.integers(1, 8),
+    radar_transmitter=st.none() | st.integers(1, 8),
 )
 
 
@@ -52,7 +54,9 @@ def test_what_differs_is_named() -> None:
 def test_entries_of_earlier_versions_are_read(tmp_path: Path) -> None:
     placed = Recording(tmp_path / "a.sd2", radar_offset_s=0.5, imu_places=("head",))
     entry = {
-        name: value for name, value in edited_fields(placed).items() if not name.startswith("imu")
+        name: value
+        for name, value in edited_fields(placed).items()
+        if name in ("sensor", "placements", "radar_offset_s")
     }
     assert decoded_fields(entry).keys() == {"sensor", "placements", "radar_offset_s"}
     assert not differing(entry, edited_fields(placed))
@@ -64,5 +68,12 @@ def test_entries_of_earlier_versions_are_read(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("entry", [{}, {"sensor": {"position_m": "there"}}, {"sensor": {}}])
 def test_something_else_is_refused(entry: dict) -> None:
+    with pytest.raises(Sd2Error, match="cannot be read"):
+        decoded_fields(entry)
+
+
+@pytest.mark.parametrize("number", [0, -1, "left"])
+def test_a_receiver_that_cannot_be_is_refused(number: object) -> None:
+    entry = edited_fields(Recording(Path("a.sd2"))) | {"radar_receiver": number}
     with pytest.raises(Sd2Error, match="cannot be read"):
         decoded_fields(entry)

@@ -191,7 +191,7 @@ def test_what_makes_no_campaign_is_refused(wrong: dict[str, float]) -> None:
 def test_workers_end_with_a_parent_that_is_killed(tmp_path: Path) -> None:
     """And what is there is whole."""
     out = tmp_path / "killed.zarr"
-    command = [sys.executable, "-m", "sd2core.cli", "simulate", "campaign", str(out)]
+    command = [sys.executable, "-m", "sd2core.cli", "simulate", "campaign", "--out", str(out)]
     with subprocess.Popen([*command, "--take-seconds", "2"]) as parent:
         _until(lambda: (out / "takes.jsonl").exists(), 120.0)
         workers = _children(parent.pid)

@@ -254,7 +254,7 @@ def test_fmcw_plans_are_shown_and_said_how_to_run(panel, plot, window, qtbot):
     qtbot.waitUntil(lambda: trade.measured.job is None, timeout=5_000)
     qtbot.mouseClick(plot, Qt.MouseButton.LeftButton, pos=at(plot, WAVES[0]))
     assert trade.in_use.plan == EXACT
-    assert "--model fmcw" in window.messages.text
+    assert "--method fmcw" in window.messages.text
 
 
 def test_what_was_measured_elsewhere_is_said_to_be(panel, window, fake, qtbot):

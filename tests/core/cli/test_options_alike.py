@@ -1,0 +1,150 @@
+"""One word for one thing in the options of all commands, and help of one form."""
+
+from __future__ import annotations
+
+import argparse
+from collections import defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+
+from sd2app.command_line import full_parser
+from sd2core.cli.output_folders import OUTPUTS
+
+WITHOUT_FACTS = {"labels figure", "strip", "warm-up", "fetch-models", "open", "demo"}
+"""Commands that print nothing but what they wrote, or open a window."""
+
+FURTHER_OUTPUTS = {
+    "--figure": "FILE",
+    "--markdown": "FILE.md",
+    "--probabilities": "FILE.npz",
+    "--landmarks": "FILE",
+    "--export": "FILE.json",
+    "--screenshot": "FILE.png",
+}
+"""What some commands write beside their result, or without one, and not by default."""
+
+SEVERAL_MEANINGS = {
+    "--imu": {"FILE", "LIST"},  # a real sensor's samples; places of virtual ones
+    "--model": {"FILE", "FILE|NAME", "NAME", None},  # one that was trained; kind of one to train
+    "--placements": {"FILE", "FILE|planned", None},  # a plan; which of those in pairs are used
+    "--radar": {"CAPTURE", "NAME|CONFIG.json"},  # a real one; one to simulate
+    "--rate": {"FPS", "HZ"},  # of maps; of an inertial sensor
+}
+"""Options whose value differs between commands. Of all others a metavar says it for all."""
+
+ENDINGS = {
+    "FILE", "FILE.json", "FILE.npz", "FILE.safetensors", "FILE.zarr", "FOLDER", "NAME.sd2", "RUN",
+}  # fmt: skip
+"""Metavars of ``--out``."""
+
+UNITS = {"_s": "S", "_m": "M", "_hz": "HZ", "_deg": "DEG", "_db": "DB", "_px": "PX", "_ms": "MS"}
+
+GROUPS = {
+    "positional arguments", "options", "data", "description", "frame times", "machine", "maps",
+    "mesh file", "network", "network and training", "people", "segments", "sensor errors",
+}  # fmt: skip
+
+
+def walk(
+    parser: argparse.ArgumentParser, path: tuple[str, ...] = ()
+) -> Iterator[tuple[str, argparse.ArgumentParser]]:
+    """Every command that does something, by its words."""
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for name, inner in action.choices.items():
+                yield from walk(inner, (*path, name))
+            return
+    yield " ".join(path), parser
+
+
+COMMANDS = dict(walk(full_parser()))
+ARGUMENTS = [
+    (f"{name}: {argument.option_strings or argument.dest}", argument)
+    for name, parser in COMMANDS.items()
+    for argument in parser._actions
+    if argument.dest != "help"
+]
+OPTIONS_WITH_VALUE = [
+    (name, argument)
+    for name, argument in ARGUMENTS
+    if argument.option_strings and argument.nargs != 0
+]
+
+
+def test_there_are_commands_to_look_at() -> None:
+    assert {"info", "labels cut", "classify table", "open"} <= COMMANDS.keys()
+    assert len(OPTIONS_WITH_VALUE) > 100
+
+
+def test_help_begins_in_lower_case_and_ends_without_a_full_stop() -> None:
+    for name, argument in ARGUMENTS:
+        text = argument.help or ""
+        assert text, name
+        assert text[0] == text[0].lower(), name
+        assert not text.endswith((".", ";", ",")), name
+        assert not text.startswith("default"), name
+
+
+def test_groups_have_names_from_a_small_set() -> None:
+    for name, parser in COMMANDS.items():
+        titles = [group.title for group in parser._action_groups if group._group_actions]
+        assert set(titles) <= GROUPS, name
+        assert len(titles) == len(set(titles)), name
+
+
+def test_facts_are_printed_as_json_on_request() -> None:
+    for name in COMMANDS.keys() - WITHOUT_FACTS:
+        (json,) = [one for one in COMMANDS[name]._actions if "--json" in one.option_strings]
+        assert json.nargs == 0, name
+
+
+def test_what_is_written_is_called_out() -> None:
+    for name, argument in OPTIONS_WITH_VALUE:
+        option, words = argument.option_strings[0], (argument.help or "").split()
+        if option == "--out":
+            assert argument.type is Path, name
+            assert argument.metavar in ENDINGS, name
+        elif option in FURTHER_OUTPUTS:
+            assert argument.metavar == FURTHER_OUTPUTS[option], name
+        else:
+            assert not {"write", "draw", "keep"} & {words[0]} or argument.type is not Path, name
+    for name, argument in ARGUMENTS:
+        if not argument.option_strings:
+            assert argument.dest != "out", name
+            assert "write" not in (argument.help or "").split(), name
+
+
+def test_folders_are_made_for_whatever_is_written() -> None:
+    options = {"--out", *FURTHER_OUTPUTS}
+    found = {one.dest for _, one in OPTIONS_WITH_VALUE if options & {*one.option_strings}}
+    assert found == {*OUTPUTS}
+
+
+def test_an_option_means_the_same_everywhere() -> None:
+    found: defaultdict[str, set[object]] = defaultdict(set)
+    for _, argument in OPTIONS_WITH_VALUE:
+        for option in argument.option_strings:
+            found[option].add(argument.metavar)
+    del found["--out"]
+    assert {option: names for option, names in found.items() if len(names) > 1} == SEVERAL_MEANINGS
+
+
+def test_a_metavar_stands_for_one_kind_of_value() -> None:
+    kinds: defaultdict[object, set[bool]] = defaultdict(set)
+    for _, argument in OPTIONS_WITH_VALUE:
+        kinds[argument.metavar].add(argument.type is Path)
+    kinds.pop(None)  # choices, which are listed
+    # `labels set --use` takes a file, or the word usual.
+    assert [one for one, paths in kinds.items() if len(paths) > 1] == ["FILE.json"]
+
+
+def test_a_unit_in_the_name_is_that_of_the_value() -> None:
+    for name, argument in OPTIONS_WITH_VALUE:
+        for ending, metavar in UNITS.items():
+            if argument.dest.endswith(ending) and not argument.dest.endswith("_per_s"):
+                assert argument.metavar == metavar, name
+
+
+def test_values_have_a_name_or_are_listed() -> None:
+    for name, argument in OPTIONS_WITH_VALUE:
+        assert argument.choices or isinstance(argument.metavar, str), name
