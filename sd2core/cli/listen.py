@@ -6,8 +6,8 @@ import argparse
 import math
 import re
 import shutil
-import signal
 import sys
+import threading
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,7 +20,7 @@ from sd2core.cli.options import (
 )
 from sd2core.cli.output import counted, print_event, print_facts
 from sd2core.errors import Sd2Error
-from sd2core.runs.control import signals_kept
+from sd2core.runs.control import stop_signals
 
 if TYPE_CHECKING:
     from sd2core.live.listening import Column, Listening
@@ -116,14 +116,11 @@ def _listen(options: argparse.Namespace) -> None:
         raise
     status = _Status(listening, source, as_json=options.json, columns=options.columns)
     status.begin(recording.folder, recording.is_continued)
-    listening.start()
-    with signals_kept():
-        # To be told to end is to be told to stop: what waits to be stored is stored.
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
+    # To be told to end is to be told to stop: what waits to be stored is stored.
+    with stop_signals() as told:
+        listening.start()
         try:
-            _follow(listening, status, options.seconds)
-        except KeyboardInterrupt:
-            pass
+            _follow(listening, status, options.seconds, told)
         finally:
             listening.stop()
     status.end(recording.folder)
@@ -151,13 +148,17 @@ def _source(options: argparse.Namespace) -> Source:
     return Dca1000Source(options.setup, address or LOOPBACK, int(port) if port else DATA_PORT)
 
 
-def _follow(listening: Listening, status: _Status, seconds: float | None) -> None:
-    """Show columns until the source ends, the time is over, or q is pressed."""
+def _follow(
+    listening: Listening, status: _Status, seconds: float | None, told: threading.Event
+) -> None:
+    """Show columns until the source ends, the time is over, q is pressed, or it is told to end."""
     from sd2core.cli.keys import pressed_keys
 
     end_s = time.monotonic() + seconds if seconds is not None else math.inf
     with pressed_keys() as key:
-        while not listening.is_over and time.monotonic() < end_s and key() not in ("q", "Q"):
+        while not (
+            listening.is_over or time.monotonic() >= end_s or told.is_set() or key() in ("q", "Q")
+        ):
             status.show(listening.next_column(_WAIT_S))
 
 

@@ -11,6 +11,7 @@ import queue
 import threading
 import time
 from collections import deque
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -103,7 +104,9 @@ class Listening:
             full_scale_known=head.full_scale_known,
         )
         self._head = head
-        self._map = LiveMap(like, axis, ProcessingOptions(CLUTTER))
+        self._channel = recording.channel
+        self._like = like
+        self._map = LiveMap(like.channel(*self._channel), axis, ProcessingOptions(CLUTTER))
         size = max(_BUFFER_BYTES // head.frame_bytes, _LEAST_FRAMES)
         self._to_store: queue.Queue[tuple[Frame, int]] = queue.Queue(size)
         self._to_show: queue.Queue[tuple[float, NDArray[Any], Frame]] = queue.Queue(_SHOWN_FRAMES)
@@ -154,7 +157,8 @@ class Listening:
             if self._error is not None:
                 raise self._error from None
             return None
-        values = self._map.column(self._head.as_samples(words))
+        frame_alone = replace(self._like, samples=self._head.as_samples(words))
+        values = self._map.column(frame_alone.channel(*self._channel).samples[0:1])
         label = None if self._labeller is None else self._labeller.label(time_s, values)
         self._latencies_s.append(time.monotonic() - frame.received_s)
         return Column(time_s, wall_clock_s(frame.received_s), values, label)

@@ -72,6 +72,14 @@ class GrowingRecording:
         """True if it was begun before."""
         return self._session > 0
 
+    @property
+    def channel(self) -> tuple[int | None, int | None]:
+        """Receiver and transmitter that the recording is shown with; None: all."""
+        if not (self.folder / FILE_NAME).is_file():
+            return None, None
+        recording = open_recording(self.folder)
+        return recording.radar_receiver, recording.radar_transmitter
+
     def check(self, head: GrowingHead) -> None:
         """Raise Sd2Error if frames of this head do not fit those that are there."""
         if self._head is None:

@@ -89,3 +89,18 @@ def signals_kept() -> Iterator[None]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+@contextmanager
+def stop_signals() -> Iterator[threading.Event]:
+    """Event that SIGTERM and SIGINT set in place of what they do otherwise.
+
+    An exception in the midst of anything, as Ctrl-C raises, may be lost in a library, or end the
+    process with the signal although it was caught.
+    """
+    told = threading.Event()
+    with signals_kept():
+        if threading.current_thread() is threading.main_thread():
+            for number in (signal.SIGTERM, signal.SIGINT):
+                signal.signal(number, lambda *_: told.set())
+        yield told

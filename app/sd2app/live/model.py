@@ -282,7 +282,7 @@ class LiveModel(QObject):
         radar_map = self._map.whole()
         timebase = radar_map.timebase.shifted(recording.radar_offset_s)
         content = Content(
-            recording, timebase, capture=recording.load_capture(), radar_map=radar_map
+            recording, timebase, capture=recording.load_every_channel(), radar_map=radar_map
         )
         self._document.follow(content)
         # On the newest frame, the clock goes on to those that come.

@@ -194,7 +194,7 @@ class DocumentModel(QObject):
         if self.content is None or not self.growing:
             return
         self.growing = False
-        capture = self.content.recording.load_capture()
+        capture = self.content.recording.load_every_channel()
         self._take_growth(capture.timebase, capture=capture)
         self.changed.emit()
         if capture.notes:

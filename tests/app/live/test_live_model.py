@@ -32,104 +32,121 @@ LIMIT_MS = 60_000
 def session(qtbot) -> Iterator[Session]:
     parent = QObject()
     made = build_session(parent, Settings.forgetful())
+    made.document.opened.connect(made.take_over)
     yield made
     made.document.close()
 
 
-@pytest.fixture
-def capture(tmp_path: Path) -> Path:
-    """Swipes that last a second."""
-    found = fast_swipes(frames=45, faster=1.5)
-    folder = tmp_path / "swipes"
-    samples = np.asarray(found.samples[:45])
-    write_capture(folder, samples, found.config, found.timebase.times_s, simulated=True)
+def written(folder: Path, times_s: np.ndarray) -> Path:
+    """Swipes of the sample at other times."""
+    found = fast_swipes(frames=len(times_s))
+    samples = np.asarray(found.samples[: len(times_s)])
+    write_capture(folder, samples, found.config, times_s, simulated=True)
     return folder
+
+
+@pytest.fixture
+def endless(tmp_path: Path) -> Path:
+    """Capture whose last frame is minutes after the others: replaying it does not end by itself."""
+    return written(tmp_path / "swipes", np.append(np.arange(12) / 30, 600.0))
 
 
 def heard(session: Session, request: ListenRequest, qtbot, frames: int) -> LiveModel:
     """Model that has shown some frames."""
     model = LiveModel(session, QObject(session.document))
     model.start(request)
-    qtbot.waitUntil(lambda: session.maps.real.map is not None, timeout=LIMIT_MS)
     qtbot.waitUntil(lambda: len(session.playback.timebase) >= frames, timeout=LIMIT_MS)
     return model
 
 
-def whole_map(folder: Path) -> np.ndarray:
+def stopped(model: LiveModel, qtbot) -> None:
+    model.stop()
+    qtbot.waitUntil(lambda: model.state == "stopped", timeout=LIMIT_MS)
+
+
+def assert_shows(session: Session, folder: Path) -> None:
+    """The map on screen is the recording's."""
     capture = open_recording(folder).load_capture()
-    return doppler_map(capture, axis=VelocityAxis(), clutter=CLUTTER).values
+    whole = doppler_map(capture, axis=VelocityAxis(), clutter=CLUTTER)
+    np.testing.assert_array_equal(session.maps.real.map.values, whole.values)
+    np.testing.assert_array_equal(session.playback.timebase.times_s, whole.times_s)
 
 
 def test_the_map_on_screen_is_that_of_the_recording_stopped_and_continued(
-    session, capture, tmp_path, qtbot
+    session, endless, tmp_path, qtbot
 ):
-    request = ListenRequest(tmp_path / "walk.sd2", replay=capture)
-    model = heard(session, request, qtbot, 5)
+    request = ListenRequest(tmp_path / "walk.sd2", replay=endless)
+    model = heard(session, request, qtbot, 12)
     assert session.document.growing
-    assert session.span.extent_s[1] >= 10.0  # room for what comes
-    assert session.playback.frame == len(session.playback.timebase) - 1
+    assert session.span.extent_s == (0.0, 10.0)  # room for what comes
+    assert session.playback.frame == 11
     assert session.maps.real.title == "Radar (simulated)"
-    model.stop()
-    qtbot.waitUntil(lambda: model.state == "stopped", timeout=LIMIT_MS)
+    assert_shows(session, request.folder)
+    stopped(model, qtbot)
     assert not session.document.growing
-    first = session.document.capture.frame_count
-    assert model.counts == Counts(recorded=first)
+    assert model.counts == Counts(recorded=12)
     assert 0 < model.latency_s < 30
     qtbot.waitUntil(lambda: not session.document.maps_capture, timeout=LIMIT_MS)
-    np.testing.assert_array_equal(session.maps.real.map.values, whole_map(request.folder))
-    # The last bit of it by itself: the capture ends, and with it the process.
+    assert_shows(session, request.folder)
     session.playback.seek_frame(0)
     model.go_on()
-    qtbot.waitUntil(lambda: model.state == "listening", timeout=LIMIT_MS)
-    qtbot.waitUntil(lambda: model.state == "stopped", timeout=LIMIT_MS)
-    live = session.maps.real.map
-    assert model.counts == Counts(recorded=45)
-    assert len(session.playback.timebase) == first + 45
-    np.testing.assert_array_equal(live.values, whole_map(request.folder))
+    qtbot.waitUntil(lambda: len(session.playback.timebase) == 24, timeout=LIMIT_MS)
+    assert session.playback.frame == 23
+    assert_shows(session, request.folder)
+    stopped(model, qtbot)
     assert "continued once" in " ".join(session.document.capture.notes)
-    model.close()
 
 
-def test_edits_while_listening_stay_and_can_be_taken_back(session, capture, tmp_path, qtbot):
-    request = ListenRequest(tmp_path / "walk.sd2", replay=capture)
+def test_a_source_that_ends_ends_it(session, tmp_path, qtbot):
+    capture = written(tmp_path / "swipes", np.arange(40) / 60)
+    model = LiveModel(session, QObject(session.document))
+    model.start(ListenRequest(tmp_path / "walk.sd2", replay=capture))
+    qtbot.waitUntil(lambda: model.state == "stopped", timeout=LIMIT_MS)
+    assert model.counts == Counts(recorded=40)
+    qtbot.waitUntil(lambda: not session.document.maps_capture, timeout=LIMIT_MS)
+    assert_shows(session, tmp_path / "walk.sd2")
+
+
+def test_edits_while_listening_stay_and_can_be_taken_back(session, endless, tmp_path, qtbot):
+    request = ListenRequest(tmp_path / "walk.sd2", replay=endless)
     model = heard(session, request, qtbot, 3)
     session.edits.begin_offset_drag()
     session.edits.drag_offset(0.25)
     session.edits.end_offset_drag()
-    model.stop()
-    qtbot.waitUntil(lambda: model.state == "stopped", timeout=LIMIT_MS)
+    stopped(model, qtbot)
     document = session.document
     assert document.modified
     assert document.recording.radar_offset_s == 0.25
     assert session.playback.timebase.start_s == pytest.approx(0.25)
     document.undo_stack.undo()
     assert document.recording.radar_offset_s == 0.0
-    model.close()
 
 
-def test_listening_goes_on_beside_another_recording(session, capture, tmp_path, qtbot):
-    request = ListenRequest(tmp_path / "walk.sd2", replay=capture)
-    model = heard(session, request, qtbot, 2)
+def test_listening_goes_on_beside_another_recording(session, endless, tmp_path, qtbot):
+    request = ListenRequest(tmp_path / "walk.sd2", replay=endless)
+    model = heard(session, request, qtbot, 12)
     with qtbot.waitSignal(session.document.opened, timeout=LIMIT_MS):
-        session.document.open([capture])
-    assert model.can_be_shown
+        session.document.open([endless])
     assert model.busy
-    qtbot.waitUntil(lambda: model.state == "stopped", timeout=LIMIT_MS)
-    assert session.document.paths == (capture,)
+    assert model.can_be_shown
     assert not session.document.growing
+    model.show()
+    assert session.document.growing
+    assert_shows(session, request.folder)
     with qtbot.waitSignal(session.document.opened, timeout=LIMIT_MS):
-        model.show()
-    assert session.document.capture.frame_count == 45
-    model.close()
+        session.document.open([endless])
+    stopped(model, qtbot)
+    assert session.document.paths == (endless,)
+    with qtbot.waitSignal(session.document.opened, timeout=LIMIT_MS):
+        model.show()  # as any other: it has ended
+    assert session.document.capture.frame_count == 12
 
 
-def test_closing_stores_what_was_received(session, capture, tmp_path, qtbot):
-    request = ListenRequest(tmp_path / "walk.sd2", replay=capture)
-    model = heard(session, request, qtbot, 2)
-    shown = len(session.playback.timebase)
+def test_closing_stores_what_was_received(session, endless, tmp_path, qtbot):
+    request = ListenRequest(tmp_path / "walk.sd2", replay=endless)
+    model = heard(session, request, qtbot, 12)
     model.close()
-    found = open_recording(request.folder).load_capture()
-    assert shown <= found.frame_count <= 45
+    assert open_recording(request.folder).load_capture().frame_count == 12
 
 
 # --- a process that says what it is told to ------------------------------------------------

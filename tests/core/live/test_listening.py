@@ -381,3 +381,22 @@ def test_what_cannot_be_listened_on_is_refused(tmp_path: Path) -> None:
         with pytest.raises(Sd2Error, match="do not fill 2 lanes"):
             Dca1000Source(odd, port=0)
         assert "Nothing comes to 127.0.0.1" in source.silence()
+
+
+def test_a_chosen_receiver_stays_chosen_when_listening_goes_on(tmp_path: Path) -> None:
+    path = write_ti(tmp_path / "ti", TiRecording(frames=6, loops=32, receivers=3))
+    recording = GrowingRecording(tmp_path / "walk.sd2")
+    assert recording.channel == (None, None)
+    listening = Listening(ReplaySource(path), recording)
+    listening.start()
+    _columns(listening)
+    chosen = open_recording(recording.folder)
+    chosen.radar_receiver = 2
+    chosen.save(chosen.load_capture().timebase)
+    again = GrowingRecording(recording.folder)
+    listening = Listening(ReplaySource(path), again)
+    listening.start()
+    columns = _columns(listening)
+    only = doppler_map(load_capture(path).channel(2), axis=VelocityAxis(), clutter=CLUTTER)
+    np.testing.assert_array_equal(np.stack([one.values for one in columns], 1), only.values)
+    assert open_recording(again.folder).load_every_channel().config.receivers == 3
