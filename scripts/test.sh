@@ -22,11 +22,12 @@ expression=$1
 without="--ignore=tests/benchmarks"
 
 echo "== Tests without a display"
-QT_QPA_PLATFORM=offscreen $pytest $side_by_side $without -m "($expression) and not gl" < /dev/null
+QT_QPA_PLATFORM=offscreen scripts/timed.sh "tests without a display" \
+    $pytest $side_by_side $without -m "($expression) and not gl" < /dev/null
 offscreen=$?
 
 echo "== Tests on a display"
-scripts/on_display.sh $pytest -m "($expression) and gl" $on_display < /dev/null
+scripts/timed.sh "tests on a display" scripts/on_display.sh $pytest -m "($expression) and gl" $on_display < /dev/null
 display=$?
 if [ $display -eq $NO_TESTS_COLLECTED ]; then display=0; fi
 

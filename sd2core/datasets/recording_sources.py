@@ -250,6 +250,7 @@ class _Opened:
                 f"one of {', '.join(wanted)}",
             )
         times_s = next(iter(maps.values())).times_s
+        channel = self.recording.channel_in_words
         return Source(
             key.subject,
             key.recording,
@@ -264,6 +265,7 @@ class _Opened:
                 "recording": self.recording.title,
                 "simulated": self.recording.simulated,
                 "radar_offset_s": self.recording.radar_offset_s,
+                **({"radar_channel": channel} if channel else {}),
                 **self._plan,
             },
             self._imu,

@@ -67,6 +67,7 @@ def make_recording_pairs(
     for recording in opened:
         _check(recording)
     labels = (_BACKGROUND, *sorted({span.label for one in opened for span in one.labelled.spans}))
+    channels = [one.channel_in_words for one in opened]
     writer: PairWriter | None = None
     first: tuple[Path, float, bool] | None = None
     found: dict[str, tuple[int, int]] = {}
@@ -90,6 +91,7 @@ def make_recording_pairs(
                 provenance={
                     "made_by": f"SD² Studio {__version__}",
                     "recordings": [one.folder.name for one in opened],
+                    **({"radar_channels": channels} if any(channels) else {}),
                     "synthesis": asdict(synthesis),
                     "clutter": CLUTTER,
                 },

@@ -118,7 +118,7 @@ STEPS = (
     Step(
         "Judge it on a person it has not seen",
         "sd2 classify eval campaign.zarr --model gestures.safetensors",
-        "*Train* page, *Classifier*: *Open a result…* shows what `--json` wrote.",
+        "*Train* page, *Classifier*: *Open a result…* shows a file of what `--json` prints.",
     ),
     Step(
         "Find gestures in the sample",

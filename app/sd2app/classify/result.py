@@ -15,7 +15,9 @@ from sd2core.classify.metrics import shares
 from sd2core.errors import Sd2Error
 from sd2core.files.texts import read_json
 
-_EXPECTED = "table.json of `sd2 classify table`, or what `sd2 classify eval --json` writes"
+_EXPECTED = (
+    "table.json of `sd2 classify table`, or a file of what `sd2 classify eval --json` prints"
+)
 _TABLE = "table.json"
 
 

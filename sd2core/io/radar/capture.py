@@ -170,6 +170,7 @@ class RadarCapture:
                 raise Sd2Error(
                     f"{name.capitalize()} {number} of {self.source or 'a capture'} is asked for",
                     f"1 to {there}" if there > 1 else f"1: there is one {name}",
+                    "Choose another one, or all",
                 )
             parts.append(np.arange(there) if number is None else np.array([number - 1]))
         kept = (parts[0][:, None] * config.receivers + parts[1]).ravel()

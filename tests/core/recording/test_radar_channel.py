@@ -66,6 +66,20 @@ def test_every_user_takes_the_channel_that_is_chosen(
     assert not user(one, tmp_path / "second").any()
 
 
+def test_what_is_made_of_it_says_so(tmp_path: Path) -> None:
+    one = silent_second(tmp_path / "anna.sd2")
+    by_pairs(one, tmp_path / "all")
+    one.radar_receiver = 1
+    one.save()
+    by_pairs(one, tmp_path / "one")
+    told = [read_pairs(tmp_path / name / "pairs.zarr").provenance for name in ("all", "one")]
+    assert [one.get("radar_channels") for one in told] == [None, ["receiver 1"]]
+    with pytest.raises(Sd2Error, match=r"pairs\.zarr"):  # pairs of both channels do not mix
+        make_recording_pairs([one.folder], tmp_path / "all" / "pairs.zarr")
+    (source,) = recording_sources([one.folder], ["anna"], Making(kinds=("simulated",)))
+    assert source.load(silent).made_of()["radar_channel"] == "receiver 1"
+
+
 def test_it_is_stored_and_absent_in_older_files(tmp_path: Path) -> None:
     one = silent_second(tmp_path / "anna.sd2")
     one.radar_receiver, one.radar_transmitter = 2, 1

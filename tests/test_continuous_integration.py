@@ -1,0 +1,59 @@
+"""``.ci/run`` says how long each part took, and fails as the part that fails."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture
+def checkout(tmp_path: Path) -> Path:
+    """The scripts with a make and a python that do nothing."""
+    for name in (".ci", "scripts"):
+        shutil.copytree(ROOT / name, tmp_path / name)
+    (tmp_path / "tests").mkdir()
+    for path, text in (
+        ("bin/make", '#!/usr/bin/env bash\n[ "$1" = test ] && exec scripts/test.sh all\n'
+                     '[ "$*" != "$FAILING" ] || exit 3\n'),
+        ("bin/xvfb-run", "#!/usr/bin/env bash\n"),
+        (".venv/bin/python", '#!/usr/bin/env bash\n[ "$FAILING" != offscreen ] || exit 7\n'),
+    ):  # fmt: skip
+        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / path).write_text(text)
+        (tmp_path / path).chmod(0o755)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("failing", "code", "parts"),
+    [
+        ("", 0, ["setup", "tests without a display", "tests on a display", "lint"]),
+        ("system-packages-for-tests setup", 3, ["setup failed (3)"]),
+        (
+            "offscreen",
+            7,
+            ["setup", "tests without a display failed (7)", "tests on a display"],
+        ),
+        ("lint", 3, ["setup", "tests without a display", "tests on a display", "lint failed (3)"]),
+    ],
+)
+def test_the_parts_are_timed_and_a_failure_is_one(
+    checkout: Path, failing: str, code: int, parts: list[str]
+) -> None:
+    environment = os.environ | {
+        "PATH": f"{checkout / 'bin'}{os.pathsep}{os.environ['PATH']}", "FAILING": failing
+    }  # fmt: skip
+    done = subprocess.run(
+        [checkout / ".ci" / "run"], env=environment, capture_output=True, text=True
+    )
+    assert done.returncode == code, done.stderr
+    _, summary = done.stdout.split("== Times\n")
+    found = re.findall(r"^(.*?) +\d+ min \d\d s(?: +(.*))?$", summary, re.MULTILINE)
+    assert [" ".join(filter(None, one)) for one in found] == parts
