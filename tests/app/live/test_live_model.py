@@ -32,7 +32,10 @@ LIMIT_MS = 60_000
 def session(qtbot) -> Iterator[Session]:
     parent = QObject()
     made = build_session(parent, Settings.forgetful())
+    # As the window does it.
     made.document.opened.connect(made.take_over)
+    made.document.opened.connect(lambda: made.follow_capture(new=True))
+    made.document.changed.connect(made.follow_capture)
     yield made
     made.document.close()
 
