@@ -348,8 +348,10 @@ def _towards_camera(mesh: sd2.MeshSequence) -> Array:
 
 
 def _fastest_frame(mesh: sd2.MeshSequence) -> int:
-    """Frame with the largest speed towards the camera."""
-    return int(_towards_camera(mesh)[2:-2].max(axis=1).argmax()) + 2
+    """Frame with the largest speed of any vertex in space."""
+    vertices_m = np.asarray(mesh.vertices[:], float)
+    steps_m = np.linalg.norm(vertices_m[2:] - vertices_m[:-2], axis=2)
+    return int((steps_m.max(axis=1) / (mesh.times_s[2:] - mesh.times_s[:-2])).argmax()) + 1
 
 
 def _swinging_plate(peak_mps: float) -> tuple[sd2.MeshSequence, Array]:
