@@ -42,20 +42,6 @@ def test_commands_are_understood(line: str) -> None:
     assert callable(options.handler)
 
 
-def test_the_python_of_the_readme_runs(
-    shared_data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (block,) = re.findall(
-        r"```python\n(.*?)```", (REPOSITORY / "README.md").read_text("utf-8"), re.DOTALL
-    )
-    (tmp_path / "walk.npz").symlink_to(shared_data / "mesh" / "walk.npz")
-    (tmp_path / "capture").symlink_to(shared_data / "radar" / "infineon_people")
-    monkeypatch.chdir(tmp_path)
-    names: dict = {}
-    exec(block, names)
-    assert names["m"].axis == names["real"].axis
-
-
 @pytest.mark.parametrize(
     "document", DOCUMENTS, ids=lambda path: path.relative_to(REPOSITORY).as_posix()
 )

@@ -53,10 +53,24 @@ def _add_window_commands(commands: argparse._SubParsersAction) -> None:
         "demo",
         "open the bundled sample recording in the window",
         handler=_demo,
-        description="A simulated body makes eight swipes in front of a simulated radar.",
-        examples="  sd2 demo\n  sd2 demo --screenshot window.png    (needs no display)",
+        description=(
+            "A simulated body makes eight swipes in front of a simulated radar. The bundled files\n"
+            "stay as they are; --out writes a copy to edit, export or train with."
+        ),
+        examples=(
+            "  sd2 demo\n"
+            "  sd2 demo --out sample.sd2            (a copy; opens no window)\n"
+            "  sd2 demo --screenshot window.png    (needs no display)"
+        ),
     )
-    for parser in (opening, demo):
+    instead = demo.add_mutually_exclusive_group()
+    instead.add_argument(
+        "--out",
+        type=Path,
+        metavar="NAME.sd2",
+        help="write a copy of the sample with its files, and open no window",
+    )
+    for parser in (opening, instead):
         parser.add_argument(
             "--screenshot",
             type=Path,
@@ -99,7 +113,14 @@ def _open(options: argparse.Namespace) -> int:
 def _demo(options: argparse.Namespace) -> int:
     from sd2core.files.resources import resource_path
 
-    return _show([resource_path("swipes.sd2")], options.screenshot)
+    sample = resource_path("swipes.sd2")
+    if options.out is None:
+        return _show([sample], options.screenshot)
+    from sd2core.recording.recording import open_recording
+
+    copy = open_recording(sample).save_as(options.out, copy=True)
+    print(f"Wrote {copy.folder}")
+    return 0
 
 
 def _show(paths: Sequence[Path], screenshot: Path | None) -> int:

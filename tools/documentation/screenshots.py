@@ -38,6 +38,14 @@ def sample(window: MainWindow) -> None:
     window.session.playback.seek(1.9)
 
 
+def beside(window: MainWindow) -> None:
+    """The sensor 2 m to the side of the body, in the same moment as :func:`sample`."""
+    window.session.playback.seek(1.9)
+    torso_m = window.features.maps.synthesis.torso_m
+    sensor = VirtualSensor(position_m=(2.0, 0.0, 1.6))
+    window.session.edits.place_sensor(aimed_at(sensor, torso_m))
+
+
 def far_in_the_dark(window: MainWindow) -> None:
     """The sensor moved aside to 6 m, range colours, dark theme."""
     window.features.program.set_dark(True)
@@ -205,6 +213,7 @@ def main() -> None:
     strip()
     swipes = [resource_path("swipes.sd2")]
     take(application, "sample.png", swipes, sample)
+    take(application, "beside.png", swipes, beside)
     take(application, "dark.png", swipes, far_in_the_dark)
     take(application, "accuracy.png", swipes, accuracy)
     sizes(application)

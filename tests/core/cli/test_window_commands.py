@@ -11,6 +11,8 @@ import pytest
 from cli_outcome import Sd2
 
 from sd2app.command_line import has_display
+from sd2core.files.resources import is_bundled, resource_path
+from sd2core.recording.recording import open_recording
 
 
 @pytest.fixture
@@ -99,6 +101,25 @@ def test_a_screenshot_that_cannot_be_written(
     outcome = sd2("open", plate, "--screenshot", tmp_path / name)
     assert (outcome.code, window) == (1, [])
     assert says in " ".join(outcome.err.split())
+
+
+def test_a_copy_of_the_sample_is_complete_and_ones_own(
+    sd2: Sd2, window: list, tmp_path: Path
+) -> None:
+    assert sd2("demo", "--out", tmp_path / "mine").code == 0
+    assert not window
+    copy, sample = (
+        open_recording(tmp_path / "mine.sd2"),
+        open_recording(resource_path("swipes.sd2")),
+    )
+    assert (copy.spans, copy.sensor, copy.title) == (sample.spans, sample.sensor, sample.title)
+    for file in (copy.video, copy.mesh, copy.radar):
+        assert file is not None
+        assert file.is_relative_to(tmp_path / "mine.sd2")
+        assert not is_bundled(file)
+    again = sd2("demo", "--out", tmp_path / "mine.sd2")
+    assert again.code == 1
+    assert "is a recording already" in again.err
 
 
 def test_ctrl_c_ends_the_window(
