@@ -74,8 +74,10 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         ),
         examples="  sd2 relink walk.sd2 /media/disk/experiments",
     )
-    parser.add_argument("recording", type=Path, metavar="RECORDING")
-    parser.add_argument("folder", type=Path, metavar="FOLDER")
+    parser.add_argument("recording", type=Path, metavar="RECORDING", help="a recording (NAME.sd2)")
+    parser.add_argument(
+        "folder", type=Path, metavar="FOLDER", help="where its files may be, at any depth"
+    )
     add_json(parser)
 
 
