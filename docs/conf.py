@@ -21,6 +21,9 @@ _KERNEL = REPOSITORY / "build" / "notebook"
 os.environ |= {
     "IPYTHONDIR": str(_KERNEL / "ipython"),
     "JUPYTER_RUNTIME_DIR": str(_KERNEL / "runtime"),
+    # Threads of small products wait for each other, and much so where other work is done.
+    "OMP_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
     "PYDEVD_DISABLE_FILE_VALIDATION": "1",
     "PYTHONPATH": os.pathsep.join([str(REPOSITORY), str(REPOSITORY / "app")]),
 }
@@ -47,7 +50,7 @@ myst_heading_anchors = 4
 
 # The notebook is stored without outputs, and runs whenever its page is built.
 nb_execution_mode = "force"
-nb_execution_raise_on_error = True
+nb_execution_show_tb = True
 nb_execution_timeout = 240
 nb_ipywidgets_js: dict[str, dict[str, str]] = {}  # by default from the web
 
