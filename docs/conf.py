@@ -41,11 +41,10 @@ extensions = [
     "sphinx.ext.napoleon",
     "sphinx_copybutton",
 ]
-exclude_patterns = ["conf.py"]
 
 # Markdown. Links to files outside docs/ become downloads, so that they work without a network;
 # one that leads nowhere is a warning, and warnings are errors.
-myst_enable_extensions = ["attrs_block", "deflist"]
+myst_enable_extensions = ["deflist"]
 myst_heading_anchors = 4
 
 # The notebook is stored without outputs, and runs whenever its page is built.
@@ -84,7 +83,7 @@ html_theme_options = {
     "footer_end": [],
 }
 html_sidebars = {"index": [], "first-five-minutes": []}
-copybutton_prompt_text = r"\$ |>>> |\.\.\. "
+copybutton_prompt_text = r">>> |\.\.\. "
 copybutton_prompt_is_regexp = True
 
 

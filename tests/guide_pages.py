@@ -12,7 +12,7 @@ from pathlib import Path
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 
-_FENCE = re.compile(r"^( *)```(\S*)[^\n]*\n(.*?)^\1```$", re.DOTALL | re.MULTILINE)
+_FENCE = re.compile(r"^( *)```(\S*)[^\n]*\n(.*?)^\1``` *$", re.DOTALL | re.MULTILINE)
 _COMMENT = r"<!-- {}: ((?:(?!-->).)+?) -->"
 _OPERATORS = {"|", "||", "&", "&&", ";", ">", ">>", "<"}
 

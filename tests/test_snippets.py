@@ -20,7 +20,9 @@ from guide_pages import REPOSITORY, Block, Page, pages_to_follow
 from sd2core.numerics.compiled import cache_directory
 
 pytestmark = [
-    pytest.mark.skipif(shutil.which("bash") is None, reason="the blocks are run by bash"),
+    pytest.mark.skipif(
+        os.name == "nt" or shutil.which("bash") is None, reason="the blocks are run by bash"
+    ),
     # Warnings are for the reader of a page to see, as at home.
     pytest.mark.filterwarnings("default"),
 ]
