@@ -74,9 +74,9 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         ),
         examples="  sd2 relink walk.sd2 /media/disk/experiments",
     )
-    parser.add_argument("recording", type=Path, metavar="RECORDING", help="a recording (NAME.sd2)")
+    parser.add_argument("recording", type=Path, metavar="RECORDING", help="a recording (.sd2)")
     parser.add_argument(
-        "folder", type=Path, metavar="FOLDER", help="where its files may be, at any depth"
+        "folder", type=Path, metavar="FOLDER", help="where to look, and in all folders below"
     )
     add_json(parser)
 

@@ -28,7 +28,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         handler=_info,
         examples="  sd2 info walk.sd2\n  sd2 info walk.npz --json\n  sd2 info walk.zarr --verify",
     )
-    parser.add_argument("path", type=Path, metavar="PATH", help="a recording, or any file it reads")
+    parser.add_argument("path", type=Path, metavar="PATH", help="what to describe")
     parser.add_argument(
         "--verify",
         action="store_true",
