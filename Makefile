@@ -12,18 +12,19 @@ COMPILED := .venv/.compiled
 # Among them every module in KERNEL_MODULES of sd2core/numerics/compiled.py.
 KERNELS := $(wildcard sd2core/numerics/*.py sd2core/body/*.py sd2core/scattering/*.py sd2core/doppler/*.py sd2core/fmcw/*.py)
 
-.PHONY: help setup demo test test-slow lint format bench fuzz wheel screenshots accuracy fitting denoiser denoiser-comparison range-synthesis scale classifier real-gestures whole-loop paper soak clean
+.PHONY: help setup demo test test-slow lint docs format bench fuzz wheel screenshots accuracy fitting denoiser denoiser-comparison range-synthesis scale classifier real-gestures whole-loop paper soak clean
 
 help:
 	@echo "make demo         set up, and open the sample recording in the window"
 	@echo "make test         set up, and run the test suite (no display needed)"
 	@echo "make setup        virtual environment in .venv, with pinned dependencies"
 	@echo "make lint         ruff, mypy and the rules between modules"
+	@echo "make docs         the guide, as a site: build/docs/index.html"
 	@echo "make format       let ruff format the code"
 	@echo "make test-slow    the slow tests"
 	@echo "make bench        the benchmarks"
 	@echo "make fuzz         10,000 damaged files of all kinds, each read or refused (half an hour)"
-	@echo "make wheel        dist/*.whl"
+	@echo "make wheel        dist/*.whl, with the guide in it"
 	@echo "make screenshots  the pictures in docs/"
 	@echo "make accuracy     docs/accuracy-and-speed.md, measured (some five minutes)"
 	@echo "make fitting      docs/fitting.md, measured (some ten minutes)"
@@ -77,6 +78,9 @@ lint: $(INSTALLED)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+docs: $(COMPILED)
+	$(BIN)/python -m sphinx -W --keep-going -q -d build/doctrees docs build/docs
+
 format: $(INSTALLED)
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
@@ -87,7 +91,7 @@ bench: system-packages-for-tests setup
 fuzz: $(INSTALLED)
 	$(BIN)/python -m tests.mutants --count 10000
 
-wheel: $(INSTALLED)
+wheel: docs
 	$(BIN)/python -m build --wheel --no-isolation
 
 screenshots: system-packages-for-tests setup
@@ -129,6 +133,6 @@ soak: system-packages-for-tests setup
 		$(if $(TRAINING),--training $(TRAINING))
 
 clean:
-	rm -rf .venv build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .benchmarks \
+	rm -rf .venv build dist docs/commands .mypy_cache .ruff_cache .pytest_cache .hypothesis .benchmarks \
 		.import_linter_cache
 	find sd2core app tests tools -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -45,6 +45,18 @@ def shared_data() -> Path:
 
 
 @pytest.fixture(scope="session")
+def built_guide() -> Path:
+    """Folder of the guide's site; building it takes too long for a test."""
+    folder = REPOSITORY / "build" / "docs"
+    if (folder / "index.html").is_file():
+        return folder
+    reason = f"the guide is not built at {folder} (type `make docs`)"
+    if os.environ.get("SD2_REQUIRE_SHARED") == "1":
+        pytest.fail(reason)
+    pytest.skip(reason)
+
+
+@pytest.fixture(scope="session")
 def compiled_kernels() -> None:
     """Machine code in memory; what is not on disk yet is compiled by one worker alone."""
     folder = cache_directory()

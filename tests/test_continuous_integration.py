@@ -34,14 +34,19 @@ def checkout(tmp_path: Path) -> Path:
 @pytest.mark.parametrize(
     ("failing", "code", "parts"),
     [
-        ("", 0, ["setup", "tests without a display", "tests on a display", "lint"]),
+        ("", 0, ["setup", "guide", "tests without a display", "tests on a display", "lint"]),
         ("system-packages-for-tests setup", 3, ["setup failed (3)"]),
         (
             "offscreen",
             7,
-            ["setup", "tests without a display failed (7)", "tests on a display"],
+            ["setup", "guide", "tests without a display failed (7)", "tests on a display"],
         ),
-        ("lint", 3, ["setup", "tests without a display", "tests on a display", "lint failed (3)"]),
+        ("docs", 3, ["setup", "guide failed (3)"]),
+        (
+            "lint",
+            3,
+            ["setup", "guide", "tests without a display", "tests on a display", "lint failed (3)"],
+        ),
     ],
 )
 def test_the_parts_are_timed_and_a_failure_is_one(

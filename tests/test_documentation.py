@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import re
-import shlex
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from guide_pages import REPOSITORY, Page, sd2_arguments
 
 from sd2app.command_line import full_parser
 from sd2core.cli.running import attach_negative_values
+from tools.documentation.command_pages import commands_of
 
-REPOSITORY = Path(__file__).resolve().parent.parent
+COMMAND_PAGES = REPOSITORY / "docs" / "commands"
 DOCUMENTS = [
     REPOSITORY / name
     for name in ("README.md", "CONTRIBUTING.md", "resources/README.md", "tools/README.md")
-] + sorted((REPOSITORY / "docs").rglob("*.md"))
+] + [path for path in sorted((REPOSITORY / "docs").rglob("*.md")) if path.parent != COMMAND_PAGES]
 
 
 PARSER = full_parser()
@@ -24,8 +25,7 @@ PARSER = full_parser()
 
 def command_lines() -> Iterator[str]:
     for document in DOCUMENTS:
-        for block in re.findall(r"```sh\n(.*?)```", document.read_text("utf-8"), re.DOTALL):
-            yield from (line for line in block.splitlines() if line.startswith("sd2 "))
+        yield from Page(document).sd2_lines()
     parsers = [PARSER]
     while parsers:
         parser = parsers.pop()
@@ -37,8 +37,7 @@ def command_lines() -> Iterator[str]:
 
 @pytest.mark.parametrize("line", sorted(set(command_lines())))
 def test_commands_are_understood(line: str) -> None:
-    arguments = shlex.split(line, comments=True)[1:]
-    options = PARSER.parse_args(attach_negative_values(arguments))
+    options = PARSER.parse_args(attach_negative_values(sd2_arguments(line)))
     assert callable(options.handler)
 
 
@@ -47,5 +46,23 @@ def test_commands_are_understood(line: str) -> None:
 )
 def test_links_lead_somewhere(document: Path) -> None:
     for target in re.findall(r"\]\(([^)#]+)", document.read_text("utf-8")):
-        if "://" not in target:
-            assert (document.parent / target).exists(), target
+        if "://" in target:
+            continue
+        path = document.parent / target
+        if path.resolve().parent == COMMAND_PAGES:  # written by `make docs`
+            assert path.stem in {"index", *commands_of(PARSER)}, target
+        else:
+            assert path.exists(), target
+
+
+def test_the_site_fetches_nothing(built_guide: Path) -> None:
+    pages = sorted(built_guide.rglob("*.html"))
+    assert len(pages) > 100
+    for page in pages:
+        text = page.read_text("utf-8")
+        loaded = re.findall(r"<(?:script|img|iframe|link|source)\b[^>]*>", text)
+        assert loaded
+        for tag in loaded:
+            assert not re.search(r"""(?:src|href)=["'](?:https?:)?//""", tag), (page, tag)
+    for sheet in built_guide.rglob("*.css"):
+        assert not re.search(r"(?:url\(|@import)\s*[\"']?(?:https?:)?//", sheet.read_text("utf-8"))

@@ -137,16 +137,26 @@ def test_the_wheel_holds_the_program_and_nothing_else(wheel: Path) -> None:
     }
     assert "sd2core/resources/swipes.sd2/recording.json" in resources
     assert resources <= names
-    guide = {
-        f"sd2app/{path.relative_to(REPOSITORY).as_posix()}"
-        for path in (REPOSITORY / "docs").rglob("*")
-        if path.is_file()
-    }
-    assert "sd2app/docs/manual.md" in guide
-    assert guide <= names
+    guide = {name for name in names if name.startswith("sd2app/docs/")}
     others = {name for name in names if ".dist-info/" not in name} - sources - resources - guide
     assert not others
     assert any(name.endswith("/LICENSE") for name in names)
+
+
+def test_the_wheel_brings_the_guide(wheel: Path, built_guide: Path) -> None:
+    with zipfile.ZipFile(wheel) as archive:
+        names = set(archive.namelist())
+        search = archive.read("sd2app/docs/searchindex.js").decode()
+    pages = {
+        f"sd2app/docs/{path.relative_to(built_guide).as_posix()}"
+        for path in built_guide.rglob("*")
+        if path.is_file()
+    }
+    assert {"sd2app/docs/index.html", "sd2app/docs/first-five-minutes.html"} <= pages
+    assert pages <= names
+    assert not any(name.startswith("sd2app/docs/") for name in names - pages)
+    for page in ("first-five-minutes", "tutorials/mesh-to-denoiser", "commands/synth"):
+        assert f'"{page}"' in search
 
 
 @pytest.mark.slow

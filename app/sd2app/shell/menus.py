@@ -68,7 +68,7 @@ LAYOUT: Mapping[str, tuple[str, ...]] = {
         "-", "@classifiers", "open_classifier", "classifier_card", "show_classes",
         "train_classifier",
     ),
-    "Help": ("getting_started", "manual", "keys", "-", "sample", "-", "about"),
+    "Help": ("first_five_minutes", "manual", "keys", "-", "sample", "-", "about"),
 }  # fmt: skip
 """Order of the menus: ids of actions, ``-`` lines, ``@`` places that a feature fills, ``>`` menus
 within a menu."""

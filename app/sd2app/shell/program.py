@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QMessageBox
 from sd2app.feature import Action, Feature, Shell
 from sd2app.labels.feature import LabelsFeature
 from sd2app.session.session import Session
-from sd2app.shell.guide import GETTING_STARTED, MANUAL, GuideWindow
+from sd2app.shell.guide import FIRST_FIVE_MINUTES, MANUAL, open_page
 from sd2app.shell.keys.bindings import KeyBindings
 from sd2app.shell.keys.dialog import KeysDialog
 from sd2app.shell.keys.model import KeyListModel
@@ -48,7 +48,6 @@ class ProgramFeature(Feature):
 
     def __init__(self, session: Session, shell: Shell, labels: LabelsFeature) -> None:
         self._session, self._shell, self._labels = session, shell, labels
-        self._guide: GuideWindow | None = None
         stack = session.document.undo_stack
         self.changing = (stack.indexChanged, stack.cleanChanged, session.display.theme_changed)
 
@@ -81,12 +80,14 @@ class ProgramFeature(Feature):
                 checked=lambda: not shell.side_folded,
             ),
             Action(
-                "getting_started", "Help", "Getting started", (),
-                "The first ten minutes with the program", lambda: self._show_page(GETTING_STARTED),
+                "first_five_minutes", "Help", "First five minutes", (),
+                "What one sees, and why, in a browser",
+                lambda: shell.attempt(lambda: open_page(FIRST_FIVE_MINUTES)),
             ),
             Action(
-                "manual", "Help", "Manual", ("F1",), "What can be done, and how",
-                lambda: self._show_page(MANUAL),
+                "manual", "Help", "Manual", ("F1",),
+                "The whole guide in a browser; needs no network",
+                lambda: shell.attempt(lambda: open_page(MANUAL)),
             ),
             Action(
                 "keys", "Help", "Keys…", ("?",), "All keys, to be found and changed",
@@ -104,11 +105,6 @@ class ProgramFeature(Feature):
 
     def _quit(self) -> None:
         self._shell.dialog_parent.close()
-
-    def _show_page(self, name: str) -> None:
-        if self._guide is None:
-            self._guide = GuideWindow(self._shell.dialog_parent)
-        self._shell.attempt(lambda: self._guide and self._guide.show_page(name))
 
     def _show_keys(self) -> None:
         bindings = self._shell.keys
