@@ -11,7 +11,7 @@ import sys
 from dataclasses import asdict, dataclass
 from typing import Literal
 
-from sd2app.system_libraries import install_line, missing_libraries, uses_x11
+from sd2app.system_libraries import install_line, missing_libraries
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import user_cache, user_data
 from sd2core.files.resources import resource_path
@@ -66,7 +66,7 @@ def examine() -> list[Finding]:
 
 
 def _libraries() -> Finding:
-    missing = missing_libraries(uses_x11())
+    missing = missing_libraries()
     if missing:
         return Finding(
             "System libraries",
