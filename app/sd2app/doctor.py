@@ -23,10 +23,13 @@ _PROBE_S = 120.0
 
 PROBE = """
 import json, sys
-from PySide6.QtGui import QFontDatabase
+from PySide6.QtGui import QFont, QFontDatabase, QFontMetrics
 from PySide6.QtWidgets import QApplication
 application = QApplication(sys.argv[:1])
-found = {"platform": application.platformName(), "fonts": len(QFontDatabase.families())}
+# A font may be there that has no letters, such as one of symbols.
+letters = all(map(QFontMetrics(QFont()).inFont, "az09"))
+families = len(QFontDatabase.families()) if letters else 0
+found = {"platform": application.platformName(), "fonts": families}
 try:
     from sd2app.scene.offscreen_backend import ImageBackend
     ImageBackend()
@@ -114,7 +117,7 @@ def _window() -> list[Finding]:
         else Finding(
             "Fonts",
             "problem",
-            "none: texts would be boxes",
+            "none with letters: texts would be boxes",
             install_line(["fonts-dejavu-core"]),
         ),
     ]
