@@ -86,7 +86,8 @@ def test_the_description_for_software_centres_is_valid() -> None:
     assert done.returncode == 0, done.stdout
 
 
-def test_the_icon_can_be_drawn(qtbot: object) -> None:
+@pytest.mark.usefixtures("qapp")
+def test_the_icon_can_be_drawn() -> None:
     from PySide6.QtGui import QIcon
 
     picture = QIcon(str(ICON)).pixmap(64, 64).toImage()
