@@ -34,7 +34,8 @@ def main() -> None:
     work = ("--noconfirm", "--workpath", "build/bundle")
     call(python, "-m", "PyInstaller", *work, "app/packaging/sd2-studio.spec")
     call(FOLDER / "sd2", "demo", "--screenshot", FOLDER.parent / "bundle.png")
-    total = sum(path.stat().st_size for path in FOLDER.rglob("*") if path.is_file())
+    files = (path for path in FOLDER.rglob("*") if path.is_file() and not path.is_symlink())
+    total = sum(path.stat().st_size for path in files)
     print(f"{FOLDER} holds {total / 1e9:.1f} GB; look at {FOLDER.parent / 'bundle.png'}")
 
 
