@@ -12,7 +12,7 @@ COMPILED := .venv/.compiled
 # Among them every module in KERNEL_MODULES of sd2core/numerics/compiled.py.
 KERNELS := $(wildcard sd2core/numerics/*.py sd2core/body/*.py sd2core/scattering/*.py sd2core/doppler/*.py sd2core/fmcw/*.py)
 
-.PHONY: help setup demo test test-slow lint docs format bench fuzz wheel screenshots accuracy fitting denoiser denoiser-comparison range-synthesis scale classifier real-gestures whole-loop paper soak clean
+.PHONY: help setup demo test test-slow lint docs format bench fuzz wheel bundle screenshots accuracy fitting denoiser denoiser-comparison range-synthesis scale classifier real-gestures whole-loop paper soak clean
 
 help:
 	@echo "make demo         set up, and open the sample recording in the window"
@@ -24,7 +24,8 @@ help:
 	@echo "make test-slow    the slow tests"
 	@echo "make bench        the benchmarks"
 	@echo "make fuzz         10,000 damaged files of all kinds, each read or refused (half an hour)"
-	@echo "make wheel        dist/*.whl, with the guide in it"
+	@echo "make wheel        dist/*.whl: the program with its guide, and the library alone"
+	@echo "make bundle       dist/sd2-studio/: the program with all it needs, in one folder"
 	@echo "make screenshots  the pictures in docs/"
 	@echo "make accuracy     docs/accuracy-and-speed.md, measured (some five minutes)"
 	@echo "make fitting      docs/fitting.md, measured (some ten minutes)"
@@ -93,6 +94,10 @@ fuzz: $(INSTALLED)
 
 wheel: docs
 	$(BIN)/python -m build --wheel --no-isolation
+	$(BIN)/python -m build --wheel --no-isolation --outdir dist library
+
+bundle: docs
+	$(BIN)/python -m PyInstaller --noconfirm --workpath build/bundle app/packaging/sd2-studio.spec
 
 screenshots: system-packages-for-tests setup
 	scripts/on_display.sh $(BIN)/python -m tools.documentation.screenshots

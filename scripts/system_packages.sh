@@ -13,9 +13,12 @@ cd "$(dirname "$0")/.."
 # What must be there = the Debian package that brings it.
 DRAWING="libGL.so.1=libgl1 libEGL.so.1=libegl1 libgthread-2.0.so.0=libglib2.0-0
     libxkbcommon.so.0=libxkbcommon0 libdbus-1.so.3=libdbus-1-3 libfontconfig.so.1=libfontconfig1"
-SCREEN="libxcb-cursor.so.0=libxcb-cursor0 libxcb-icccm.so.4=libxcb-icccm4
-    libxcb-keysyms.so.1=libxcb-keysyms1 libxkbcommon-x11.so.0=libxkbcommon-x11-0
-    libxcb-shape.so.0=libxcb-shape0"
+SCREEN="libX11-xcb.so.1=libx11-xcb1 libxcb-cursor.so.0=libxcb-cursor0
+    libxcb-icccm.so.4=libxcb-icccm4 libxcb-keysyms.so.1=libxcb-keysyms1
+    libxkbcommon-x11.so.0=libxkbcommon-x11-0 libxcb-randr.so.0=libxcb-randr0
+    libxcb-shape.so.0=libxcb-shape0 libxcb-sync.so.1=libxcb-sync1
+    libxcb-xfixes.so.0=libxcb-xfixes0"
+WAYLAND="libwayland-client.so.0=libwayland-client0 libwayland-cursor.so.0=libwayland-cursor0"
 VIRTUAL_SCREEN="xvfb-run=xvfb xauth=xauth"
 
 missing=""
@@ -39,8 +42,10 @@ if [ "$(uname -s)" = Linux ]; then
     wanted=$DRAWING
     if [ "${1:-}" = tests ]; then
         wanted+=" $SCREEN $VIRTUAL_SCREEN"
-    elif [ -n "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ]; then
+    elif [ -n "${DISPLAY:-}" ]; then
         wanted+=" $SCREEN"
+    elif [ -n "${WAYLAND_DISPLAY:-}" ]; then
+        wanted+=" $WAYLAND"
     fi
     known=$(PATH="$PATH:/sbin:/usr/sbin" ldconfig -p)
     for entry in $wanted; do

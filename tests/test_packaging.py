@@ -2,28 +2,35 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 import sysconfig
 import venv
 import zipfile
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-REPOSITORY = Path(__file__).resolve().parent.parent
+from tests.environments import (
+    REPOSITORY,
+    assert_shows_a_window,
+    build_wheel,
+    call,
+    install,
+    scripts,
+    site_packages,
+)
+
+SHARED = {
+    "share/applications/sd2-studio.desktop",
+    "share/icons/hicolor/scalable/apps/sd2-studio.svg",
+    "share/metainfo/sd2-studio.metainfo.xml",
+}
+"""What desktops look for under the environment's prefix."""
 
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The wheel of this checkout."""
-    folder = tmp_path_factory.mktemp("wheel")
-    build = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", folder]
-    call(*build, REPOSITORY, cwd=folder)
-    (built,) = folder.glob("*.whl")
-    return built
+    return build_wheel(REPOSITORY, tmp_path_factory.mktemp("wheel"))
 
 
 @pytest.fixture(scope="module")
@@ -44,40 +51,6 @@ def away(tmp_path: Path) -> Path:
     """An empty folder to work in, outside the checkout."""
     assert not tmp_path.is_relative_to(REPOSITORY)
     return tmp_path
-
-
-def call(*command: object, cwd: Path) -> str:
-    """Run a program without anything that leads to the checkout; return its output."""
-    environment = {
-        name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "SD2_"))
-    }
-    environment["QT_QPA_PLATFORM"] = ""
-    done = subprocess.run(
-        [str(part) for part in command],
-        capture_output=True,
-        text=True,
-        cwd=cwd,
-        env=environment,
-        stdin=subprocess.DEVNULL,
-        check=False,
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
-
-
-def install(environment: Path, *arguments: object) -> None:
-    pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--no-input"]
-    python = scripts(environment) / "python"
-    call(*pip, "--python", python, "install", "--quiet", *arguments, cwd=environment)
-
-
-def scripts(environment: Path) -> Path:
-    return environment / ("Scripts" if os.name == "nt" else "bin")
-
-
-def site_packages(environment: Path) -> Path:
-    variables = {"base": str(environment), "platbase": str(environment)}
-    return Path(sysconfig.get_path("purelib", "venv", variables))
 
 
 def check(environment: Path, away: Path) -> None:
@@ -103,18 +76,6 @@ def check(environment: Path, away: Path) -> None:
     assert_shows_a_window(away / "window.png")
 
 
-def assert_shows_a_window(picture: Path) -> None:
-    import av
-
-    with av.open(str(picture)) as container:
-        pixels = next(container.decode(video=0)).to_ndarray(format="rgb24")
-    height, width, _ = pixels.shape
-    assert width >= 800
-    assert height >= 600
-    # Heatmap, video and scene are full of colours; an empty window has a few.
-    assert len(np.unique(pixels.reshape(-1, 3), axis=0)) > 500
-
-
 def test_the_wheel_holds_the_program_and_nothing_else(wheel: Path) -> None:
     with zipfile.ZipFile(wheel) as archive:
         names = set(archive.namelist())
@@ -138,6 +99,9 @@ def test_the_wheel_holds_the_program_and_nothing_else(wheel: Path) -> None:
     assert "sd2core/resources/swipes.sd2/recording.json" in resources
     assert resources <= names
     guide = {name for name in names if name.startswith("sd2app/docs/")}
+    shared = {name for name in names if ".data/" in name}
+    assert {name.split(".data/data/")[1] for name in shared} == SHARED
+    names -= shared
     others = {name for name in names if ".dist-info/" not in name} - sources - resources - guide
     assert not others
     assert any(name.endswith("/LICENSE") for name in names)

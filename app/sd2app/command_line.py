@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from sd2app.plain_imports import plain_imports
-from sd2app.system_libraries import explain_missing, missing_libraries, uses_x11
+from sd2app.system_libraries import explain_missing, missing_libraries
 from sd2core.cli import build_parser, run
 from sd2core.cli.options import add_command, add_json
 from sd2core.errors import Sd2Error
@@ -132,7 +132,7 @@ def _show(paths: Sequence[Path], screenshot: Path | None) -> int:
             "There is no display to open a window on",
             remedy="Draw the same window into a picture with --screenshot FILE.png",
         )
-    if missing := missing_libraries(uses_x11()):
+    if missing := missing_libraries():
         raise explain_missing(missing)
     with plain_imports():
         from sd2app.shell.app import run as run_window

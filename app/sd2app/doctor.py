@@ -11,7 +11,7 @@ import sys
 from dataclasses import asdict, dataclass
 from typing import Literal
 
-from sd2app.system_libraries import install_line, missing_libraries, uses_x11
+from sd2app.system_libraries import install_line, missing_libraries
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import user_cache, user_data
 from sd2core.files.resources import resource_path
@@ -23,10 +23,13 @@ _PROBE_S = 120.0
 
 PROBE = """
 import json, sys
-from PySide6.QtGui import QFontDatabase
+from PySide6.QtGui import QFont, QFontDatabase, QFontMetrics
 from PySide6.QtWidgets import QApplication
 application = QApplication(sys.argv[:1])
-found = {"platform": application.platformName(), "fonts": len(QFontDatabase.families())}
+# A font may be there that has no letters, such as one of symbols.
+letters = all(map(QFontMetrics(QFont()).inFont, "az09"))
+families = len(QFontDatabase.families()) if letters else 0
+found = {"platform": application.platformName(), "fonts": families}
 try:
     from sd2app.scene.offscreen_backend import ImageBackend
     ImageBackend()
@@ -66,7 +69,7 @@ def examine() -> list[Finding]:
 
 
 def _libraries() -> Finding:
-    missing = missing_libraries(uses_x11())
+    missing = missing_libraries()
     if missing:
         return Finding(
             "System libraries",
@@ -114,7 +117,7 @@ def _window() -> list[Finding]:
         else Finding(
             "Fonts",
             "problem",
-            "none: texts would be boxes",
+            "none with letters: texts would be boxes",
             install_line(["fonts-dejavu-core"]),
         ),
     ]

@@ -20,28 +20,42 @@ DRAWING = {
 """Libraries without which nothing is drawn, and the packages of Debian and Ubuntu that bring them
 (`scripts/system_packages.sh` has the same)."""
 
-ON_A_SCREEN = {
+UNDER_X11 = {
+    "libX11-xcb.so.1": "libx11-xcb1",
     "libxcb-cursor.so.0": "libxcb-cursor0",
     "libxcb-icccm.so.4": "libxcb-icccm4",
     "libxcb-keysyms.so.1": "libxcb-keysyms1",
     "libxkbcommon-x11.so.0": "libxkbcommon-x11-0",
+    "libxcb-randr.so.0": "libxcb-randr0",
     "libxcb-shape.so.0": "libxcb-shape0",
+    "libxcb-sync.so.1": "libxcb-sync1",
+    "libxcb-xfixes.so.0": "libxcb-xfixes0",
 }
 """Those without which Qt ends the process when it opens a window under X11."""
 
+UNDER_WAYLAND = {
+    "libwayland-client.so.0": "libwayland-client0",
+    "libwayland-cursor.so.0": "libwayland-cursor0",
+}
+"""The same under Wayland, where there is no X11 for Qt to fall back on."""
 
-def missing_libraries(on_a_screen: bool) -> dict[str, str]:
+
+def missing_libraries(environment: Mapping[str, str] = os.environ) -> dict[str, str]:
     """Libraries that cannot be loaded, and their packages; only Linux lacks any."""
     if not sys.platform.startswith("linux"):
         return {}
-    wanted = DRAWING | (ON_A_SCREEN if on_a_screen else {})
+    wanted = wanted_libraries(environment)
     return {library: package for library, package in wanted.items() if not loads(library)}
 
 
-def uses_x11(environment: Mapping[str, str] = os.environ) -> bool:
-    """True if Qt will open its windows under X11."""
+def wanted_libraries(environment: Mapping[str, str]) -> dict[str, str]:
+    """Libraries that a window needs on the display that Qt will choose, and their packages."""
     platform = environment.get("QT_QPA_PLATFORM", "")
-    return platform.startswith("xcb") or (not platform and bool(environment.get("DISPLAY")))
+    if platform.startswith("xcb") or (not platform and environment.get("DISPLAY")):
+        return DRAWING | UNDER_X11
+    if platform.startswith("wayland") or (not platform and environment.get("WAYLAND_DISPLAY")):
+        return DRAWING | UNDER_WAYLAND
+    return DRAWING
 
 
 def explain_missing(missing: Mapping[str, str]) -> Sd2Error:

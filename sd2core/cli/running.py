@@ -13,6 +13,8 @@ from sd2core.errors import Sd2Error
 from sd2core.processes import INTERRUPTED
 
 _STARTS_WITH_NEGATIVE_NUMBER = re.compile(r"-\.?\d")
+_LEARNING = ("lightning", "torch")
+"""Packages that the library alone does not bring (extra `learn`)."""
 
 
 def run(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> int:
@@ -43,7 +45,7 @@ def run(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> int:
             _discard_output()
             return _explain(f"The output cannot be written ({error.strerror}).")
         text = error_text(error)
-        if not isinstance(error, OSError | MemoryError):
+        if not (isinstance(error, OSError | MemoryError) or _cannot_learn(error)):
             text += (
                 " Please report it, with what is printed when the same command runs with"
                 " SD2_TRACEBACK=1 set."
@@ -59,7 +61,16 @@ def error_text(error: Exception) -> str:
         return f"{error.filename}: {error.strerror}." if error.filename else f"{error.strerror}."
     if isinstance(error, MemoryError):
         return f"There is not enough memory for this ({error})."
+    if _cannot_learn(error):
+        return (
+            "torch and lightning are needed for this, which denoises, classifies or trains."
+            ' Install them: pip install "sd2-core[learn]".'
+        )
     return f"This should not happen ({type(error).__name__}: {error})."
+
+
+def _cannot_learn(error: Exception) -> bool:
+    return isinstance(error, ModuleNotFoundError) and error.name in _LEARNING
 
 
 def attach_negative_values(arguments: Sequence[str]) -> list[str]:

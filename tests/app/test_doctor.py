@@ -9,7 +9,13 @@ from pathlib import Path
 import pytest
 
 from sd2app import command_line, doctor, system_libraries
-from sd2app.system_libraries import DRAWING, ON_A_SCREEN, missing_libraries, uses_x11
+from sd2app.system_libraries import (
+    DRAWING,
+    UNDER_WAYLAND,
+    UNDER_X11,
+    missing_libraries,
+    wanted_libraries,
+)
 from sd2core.errors import Sd2Error
 
 SCRIPT = Path(__file__).parents[2] / "scripts" / "system_packages.sh"
@@ -30,28 +36,31 @@ def without_egl(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_the_script_that_installs_them_has_the_same_libraries() -> None:
     listed = dict(re.findall(r"(lib[\w.+-]+\.so\.\d+)=([\w.+-]+)", SCRIPT.read_text("utf-8")))
-    assert listed == DRAWING | ON_A_SCREEN
+    assert listed == DRAWING | UNDER_X11 | UNDER_WAYLAND
 
 
 @pytest.mark.parametrize(
-    ("environment", "wanted"),
+    ("environment", "besides"),
     [
-        ({"DISPLAY": ":0"}, True),
-        ({"DISPLAY": ":0", "QT_QPA_PLATFORM": "offscreen"}, False),
-        ({"QT_QPA_PLATFORM": "xcb"}, True),
-        ({"WAYLAND_DISPLAY": "wayland-0"}, False),
-        ({}, False),
+        ({"DISPLAY": ":0"}, UNDER_X11),
+        ({"DISPLAY": ":0", "QT_QPA_PLATFORM": "offscreen"}, {}),
+        ({"QT_QPA_PLATFORM": "xcb"}, UNDER_X11),
+        # Qt falls back on X11 where Wayland's libraries are missing.
+        ({"WAYLAND_DISPLAY": "wayland-0", "DISPLAY": ":0"}, UNDER_X11),
+        ({"WAYLAND_DISPLAY": "wayland-0"}, UNDER_WAYLAND),
+        ({"WAYLAND_DISPLAY": "wayland-0", "QT_QPA_PLATFORM": "offscreen"}, {}),
+        ({}, {}),
     ],
 )
-def test_libraries_of_a_screen_are_wanted_under_x11(
-    environment: dict[str, str], wanted: bool
+def test_libraries_of_the_display_that_qt_chooses_are_wanted(
+    environment: dict[str, str], besides: dict[str, str]
 ) -> None:
-    assert uses_x11(environment) is wanted
+    assert wanted_libraries(environment) == DRAWING | besides
 
 
 @pytest.mark.usefixtures("without_egl")
 def test_a_missing_library_is_named_with_its_package(capsys: pytest.CaptureFixture[str]) -> None:
-    assert missing_libraries(on_a_screen=False) == {"libEGL.so.1": "libegl1"}
+    assert missing_libraries({}) == {"libEGL.so.1": "libegl1"}
     assert doctor.report(as_json=False) == 1
     said = capsys.readouterr().out
     assert "PROBLEM" in said

@@ -10,6 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from PySide6.QtCore import QTimer
+from PySide6.QtGui import QIcon
 from PySide6.QtWidgets import QApplication
 
 from sd2app.settings import Settings
@@ -18,6 +19,9 @@ from sd2app.shell.window import MainWindow, is_dark
 from sd2app.widgets.picture import write_picture
 from sd2app.widgets.theme import apply_theme
 from sd2core.processes import keep_little_free_memory
+
+ICON = Path(__file__).with_name("sd2-studio.svg")
+"""Icon of the window, which the wheel also puts where desktops look for it."""
 
 _SCREENSHOT_LIMIT_S = 120
 _SETTLE_S = 0.5
@@ -43,6 +47,8 @@ def run(paths: Sequence[Path] = (), *, screenshot: Path | None = None) -> int:
     window = MainWindow(settings, Parts(recovery=None if aside is None else Path(aside.name)))
 
     def fill() -> None:
+        # Loading Qt's reader of SVG does not delay the skeleton.
+        application.setWindowIcon(QIcon(str(ICON)))
         window.populate()
         if paths:
             window.open_paths(paths)
