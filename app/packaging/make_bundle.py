@@ -31,7 +31,9 @@ def main() -> None:
     """Install, make, start."""
     venv.create(ENVIRONMENT, with_pip=True, clear=True)
     python = ENVIRONMENT / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
-    call(python, "-m", "pip", "install", "--constraint", "constraints.txt", ".[docs]", "pyinstaller")
+    call(
+        python, "-m", "pip", "install", "--constraint", "constraints.txt", ".[docs]", "pyinstaller"
+    )
     call(python, "-m", "sphinx", "-q", "-d", "build/doctrees", "docs", "build/docs")
     work = ("--noconfirm", "--workpath", "build/bundle")
     call(python, "-m", "PyInstaller", *work, "app/packaging/sd2-studio.spec")

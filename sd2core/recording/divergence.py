@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from sd2core.files.digests import file_digest
+from sd2core.files.texts import EXPECTED_JSON, read_content
 from sd2core.labels.comparison import compare
 from sd2core.labels.merging import chosen, merge
 from sd2core.labels.spans import Labels
@@ -96,8 +97,15 @@ class Divergence:
 
 
 def digests_of(paths: Iterable[Path]) -> dict[str, str]:
-    """Hashes of files' contents by their names, without those that are not there."""
-    return {path.name: file_digest(path) for path in paths if path.is_file()}
+    """Hashes of texts by their files' names, without those that are not there.
+
+    Raises Sd2Error, unread, for one that is larger than a text can be.
+    """
+    return {
+        path.name: sha256(read_content(path, EXPECTED_JSON)).hexdigest()
+        for path in paths
+        if path.is_file()
+    }
 
 
 def _named(names: Iterable[str]) -> list[str]:

@@ -396,17 +396,16 @@ def _parse_times(path: Path) -> NDArray[np.float64]:
     times = []
     with open_regular(path) as stream:
         texts = (line.decode(errors="replace").strip() for line in lines_of(stream))
-        lines = [text for text in texts if text]
-    for number, line in enumerate(lines, start=1):
-        try:
-            times.append(float(line.split(",")[0]))
-        except ValueError as error:
-            if number == 1:
-                continue
-            raise Sd2Error(
-                f"{path}, line {number}: {line[:40]!r} is not a time",
-                "one unix time in seconds per line",
-                "Remove the file to place frames by the frame repetition time",
-            ) from error
+        for number, line in enumerate(filter(None, texts), start=1):
+            try:
+                times.append(float(line.split(",")[0]))
+            except ValueError as error:
+                if number == 1:
+                    continue
+                raise Sd2Error(
+                    f"{path}, line {number}: {line[:40]!r} is not a time",
+                    "one unix time in seconds per line",
+                    "Remove the file to place frames by the frame repetition time",
+                ) from error
     found = np.array(times, dtype=np.float64)
     return np.where(np.abs(found) < _LARGEST_TIME_S, found, np.nan)
