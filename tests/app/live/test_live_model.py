@@ -100,6 +100,7 @@ def test_the_map_on_screen_is_that_of_the_recording_stopped_and_continued(
     assert "continued once" in " ".join(session.document.capture.notes)
 
 
+@pytest.mark.slow
 def test_a_source_that_ends_ends_it(session, tmp_path, qtbot):
     capture = written(tmp_path / "swipes", np.arange(40) / 60)
     model = LiveModel(session, QObject(session.document))
@@ -125,6 +126,7 @@ def test_edits_while_listening_stay_and_can_be_taken_back(session, endless, tmp_
     assert document.recording.radar_offset_s == 0.0
 
 
+@pytest.mark.slow
 def test_listening_goes_on_beside_another_recording(session, endless, tmp_path, qtbot):
     request = ListenRequest(tmp_path / "walk.sd2", replay=endless)
     model = heard(session, request, qtbot, 12)

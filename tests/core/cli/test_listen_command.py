@@ -188,6 +188,7 @@ def test_killed_continued_and_interrupted(tmp_path: Path) -> None:
     assert "continued once" in " ".join(found.notes)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo-terminals")
 def test_q_stops_on_a_terminal(tmp_path: Path) -> None:
     ours, theirs = os.openpty()
@@ -242,6 +243,7 @@ def test_a_request_to_end_stores_what_was_received(tmp_path: Path) -> None:
     _stopped(process, out)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no keys by a pipe")
 def test_a_program_presses_q(tmp_path: Path) -> None:
     out, pipe = tmp_path / "walk.sd2", subprocess.PIPE
@@ -252,6 +254,7 @@ def test_a_program_presses_q(tmp_path: Path) -> None:
     _stopped(process, out)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no keys by a pipe")
 def test_nobody_to_press_keys_is_no_reason_to_stop(tmp_path: Path) -> None:
     out, pipe = tmp_path / "walk.sd2", subprocess.PIPE
