@@ -17,6 +17,7 @@ from sd2app.session.maps import MapModel
 from sd2core.denoise.resample_to_model import check_bins, is_regular, stretches
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
+from sd2core.timebase import Timebase
 
 if TYPE_CHECKING:
     from sd2core.classify.card import ClassifierCard
@@ -209,6 +210,8 @@ class ClassTrack(QObject):
         """Copy values, which may change while they are classified."""
         assert self.card is not None
         before = self._given
+        if before is not None and _is_longer(doppler, before):
+            before = self._lengthen(before, doppler.timebase)
         if before is None or not np.array_equal(before.times_s, doppler.times_s):
             self.shares = np.full((len(known), len(self.card.classes)), np.nan, np.float32)
             self.done = np.zeros(len(known), bool)
@@ -242,6 +245,18 @@ class ClassTrack(QObject):
             self.done[nobody] = True
         self.changed.emit()
 
+    def _lengthen(self, before: DopplerMap, timebase: Timebase) -> DopplerMap:
+        """Make room for frames that were added to the map."""
+        more = len(timebase) - len(self._known)
+        self._known = np.append(self._known, np.zeros(more, bool))
+        self.done = np.append(self.done, np.zeros(more, bool))
+        self.shares = np.pad(self.shares, ((0, more), (0, 0)), constant_values=np.nan)
+        values = np.pad(before.values, ((0, 0), (0, more)))
+        present = None
+        if before.present is not None:
+            present = np.append(before.present, np.ones(more, bool))
+        return replace(before, values=values, timebase=timebase, present=present)
+
     def _differs(
         self, before: DopplerMap, doppler: DopplerMap, known: NDArray[np.bool_], part: slice
     ) -> NDArray[np.bool_]:
@@ -264,6 +279,7 @@ class ClassTrack(QObject):
             return
         self._until = int(numbers[-1]) + 1
         known, going, rate_hz = self._known, self._going, card.frame_rate_hz
+        is_growing = self.source is not None and self.source.growing
 
         def work(emit: Emit) -> None:
             there = replace(doppler, present=_present(doppler) & known)
@@ -271,7 +287,7 @@ class ClassTrack(QObject):
                 if not waiting[start:stop].any():
                     continue
                 # What follows is still to come: the last frames have no answer until then.
-                grows = stop < len(known) and not known[stop]
+                grows = not known[stop] if stop < len(known) else is_growing
                 if is_regular(doppler.times_s[start:stop], rate_hz):
                     _in_order(classifier, doppler, (start, stop), grows, going, emit)
                 else:
@@ -325,6 +341,12 @@ def _in_order(
         emit(_Piece(answered, shares, going))
     if going.answered < stop and not grows:
         emit(_Piece(going.answered, going.session.finish(), going))
+
+
+def _is_longer(doppler: DopplerMap, before: DopplerMap) -> bool:
+    """True if frames were added at the end of a map, whatever became of the others."""
+    count = len(before.timebase)
+    return len(doppler.timebase) > count and np.array_equal(doppler.times_s[:count], before.times_s)
 
 
 def _present(doppler: DopplerMap) -> NDArray[np.bool_]:

@@ -72,6 +72,7 @@ class MapModel(QObject):
         self.offset_s = 0.0  # start of the map's clock on the recording's clock
         self.reference = 1.0  # value shown as 0 dB
         self.part = ""  # part of the body that is shown alone, where its map is known
+        self.growing = False  # frames are being added at its end
         self.awaited = False  # is going to be made: its place is kept while it is not there
         self.status = ""  # quality of the map in a few words, e.g. "exact"
         self._gaps: tuple[tuple[int, int], ...] = ()

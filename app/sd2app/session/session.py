@@ -89,6 +89,7 @@ class Session:
     def follow_capture(self, new: bool = False) -> None:
         """Show the radar's map as the document has it; of a new document at its own 0 dB."""
         real, radar_map = self.maps.real, self.document.radar_map
+        real.growing = self.document.growing
         if self.document.recording is not None:
             real.set_offset(self.document.recording.radar_offset_s)
         if radar_map is real.map and not new:

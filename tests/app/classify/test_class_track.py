@@ -85,6 +85,42 @@ def test_a_map_that_grows_is_gone_on_with(set_up):
     np.testing.assert_allclose(set_up.track.shares, expected(doppler.values.T), rtol=1e-6)
 
 
+@pytest.mark.parametrize("delay_frames", [0, 6])
+def test_a_map_to_which_frames_are_added_is_gone_on_with(set_up, delay_frames):
+    set_up.fake.delay_frames = delay_frames
+    card = replace(class_card("/late.safetensors"), delay_frames=delay_frames)
+    set_up.track.use(FakeClassifier(set_up.fake), card)
+    whole, set_up.source.growing = a_map(), True
+    told = expected(whole.values.T)
+    for frames in (1, 2, 11, 40, 41, 89, 90):
+        set_up.source.set_map(whole.between(0, frames))
+        set_up.settle()
+        answered = max(frames - delay_frames, 0)
+        assert set_up.track.done.tolist() == [True] * answered + [False] * (frames - answered)
+        np.testing.assert_allclose(set_up.track.shares[:answered], told[:answered], rtol=1e-6)
+        if answered:
+            assert set_up.track.at((frames - 1) / RATE).shares == pytest.approx(told[answered - 1])
+    assert (set_up.fake.sessions, set_up.fake.frames) == (1, 90)
+    set_up.source.growing = False
+    set_up.source.set_map(whole)  # it has ended: nothing else is to come
+    set_up.settle()
+    assert set_up.track.complete
+    np.testing.assert_allclose(set_up.track.shares, told, rtol=1e-6)
+
+
+def test_frames_added_without_pause_are_classified(set_up, qtbot):
+    """As a radar does that gives more of them than are asked about at a time."""
+    whole, set_up.source.growing = a_map(frames=300), True
+    for frames in range(1, 301):
+        set_up.source.set_map(whole.between(0, frames))
+        if frames % 50 == 0:
+            qtbot.wait(1)
+    set_up.settle()
+    assert set_up.track.done.all()
+    np.testing.assert_allclose(set_up.track.shares, expected(whole.values.T), rtol=1e-6)
+    assert set_up.fake.frames == 300
+
+
 def test_a_map_that_grows_is_read_where_it_has_got_to(set_up):
     doppler = a_map()
     set_up.source.set_map(doppler, np.arange(90) < 40)
