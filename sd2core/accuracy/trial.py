@@ -94,7 +94,7 @@ class Trial:
         self._unsmoothed = replace(options, velocity_sigma_bins=0.0, time_sigma_s=0.0)
         self._meshes: dict[float, MeshSequence] = {}
         self._decimating_s: dict[float, float] = {}
-        self._prepared: dict[tuple[float, int], Synthesizer] = {}
+        self._prepared: dict[tuple[float, int, int | None], Synthesizer] = {}
         self._references: dict[Run, Columns] = {}
         self._tried = 0
 
@@ -217,14 +217,16 @@ class Trial:
         progress: Progress = silent,
     ) -> Synthesizer:
         """Synthesizer of a plan for the sampled frames, prepared for some runs or for all."""
-        key = plan.vertices_kept, plan.frame_rate_factor
+        # As small blocks take their own time, all frames are in those of any synthesizer.
+        block_frames = None if runs is None else _BLOCK_FRAMES
+        key = plan.vertices_kept, plan.frame_rate_factor, block_frames
         like = self._prepared.get(key)
         made = Synthesizer(
             self._sampled(plan.vertices_kept),
             plan.options(self._unsmoothed),
             blocks_of=like,
             threads=threads,
-            block_frames=_BLOCK_FRAMES,
+            block_frames=block_frames,
         )
         made.prepare(progress, None if runs is None else _spans(runs))
         self._prepared.setdefault(key, made)
