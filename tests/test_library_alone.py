@@ -145,6 +145,7 @@ def test_what_needs_the_window_is_said_in_one_sentence(command: list[object]) ->
     )
 
 
+@pytest.mark.slow
 def test_what_needs_torch_says_how_to_get_it(tmp_path: Path) -> None:
     map_file = tmp_path / "map.npz"
     done = sd2_alone("synth", SAMPLE, "--out", map_file, "--visibility", "facing")

@@ -130,6 +130,7 @@ def test_a_process_that_ends_at_once_is_an_error_in_words(folder):
     process.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "delay"), [("lstm", 0), ("s4", 9)])
 def test_a_classifier_beside_the_denoisers_answers_as_the_library(
     process, folder, tmp_path, kind, delay

@@ -303,6 +303,7 @@ def test_a_batch_outlives_the_model_and_is_found_again(qtbot, made, meshes):
     assert any("come to its end" in words for words in said)
 
 
+@pytest.mark.slow
 def test_stop_keeps_what_is_done_and_the_same_goes_on(qtbot, made, meshes):
     model = made("--step-s", 0.3)
     begin(qtbot, model, meshes)

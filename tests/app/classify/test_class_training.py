@@ -239,6 +239,7 @@ def test_time_left_is_told_from_what_it_took(set_up, qtbot):
     assert run_headline(model.run) == f"Training: step {history.steps_done} of 6"
 
 
+@pytest.mark.slow
 def test_stop_keeps_the_best(set_up, qtbot):
     model = set_up.training("--step-s", "0.5")
     set_up.ready(model)
@@ -253,6 +254,7 @@ def test_stop_keeps_the_best(set_up, qtbot):
     assert model.run.result.is_file()
 
 
+@pytest.mark.slow
 def test_cancel_deletes_what_it_made(set_up, qtbot):
     model = set_up.training("--step-s", "0.5")
     set_up.ready(model)
@@ -283,6 +285,7 @@ def test_one_that_is_killed_is_not_taken_for_one_under_way(set_up):
     assert not model.why_not_train
 
 
+@pytest.mark.slow
 def test_another_window_finds_what_is_under_way(set_up, qtbot):
     first = set_up.training("--step-s", "0.5")
     set_up.ready(first)

@@ -51,6 +51,7 @@ def test_spans_of_a_lane_do_not_overlap(places) -> None:
         assert lanes == max(most, 1)
 
 
+@pytest.mark.slow
 @given(st.lists(placed, max_size=40), st.integers(1, 57), st.booleans(), SCALES)
 def test_columns_hold_what_spans_hold(places, columns, together, wide_columns) -> None:
     arrays = SpanArrays.of(labels_of(places))

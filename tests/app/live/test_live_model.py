@@ -147,6 +147,7 @@ def test_listening_goes_on_beside_another_recording(session, endless, tmp_path, 
     assert session.document.capture.frame_count == 12
 
 
+@pytest.mark.slow
 def test_closing_stores_what_was_received(session, endless, tmp_path, qtbot):
     request = ListenRequest(tmp_path / "walk.sd2", replay=endless)
     model = heard(session, request, qtbot, 12)

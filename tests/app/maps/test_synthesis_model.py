@@ -131,6 +131,7 @@ def test_another_recording_replaces_work_under_way(context, qtbot, ball, tmp_pat
     assert context.synthetic.map.values.max() == 0
 
 
+@pytest.mark.slow
 def test_without_machine_code_exact_waits_for_the_compiler(context, qtbot, ball, monkeypatch):
     state = {"ready": False, "exit": None, "compiled": (0, 11)}
     compiler = SimpleNamespace(poll=lambda: state["exit"], terminate=lambda: None)

@@ -44,6 +44,7 @@ def test_a_body_half_behind_a_plate_requires_occlusion() -> None:
     assert "%" in found.text
 
 
+@pytest.mark.slow
 def test_a_lone_sphere_does_not_require_occlusion() -> None:
     # Fine, because the facing test and the true rim differ by up to a facet.
     choice = chosen(ball(APPROACHING, fineness=5), 0.03)

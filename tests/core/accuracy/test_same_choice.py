@@ -63,6 +63,7 @@ def test_opened_several_times_on_a_machine_of_any_speed(
     assert found[0] == found[1] == found[2]
 
 
+@pytest.mark.slow
 def test_a_survey_from_elsewhere_before_changes_nothing(
     scene: MeshSequence, survey: Survey
 ) -> None:

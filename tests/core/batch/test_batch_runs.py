@@ -351,6 +351,7 @@ def test_recordings_become_a_data_set(run: Runs) -> None:
     assert run.pool.submitted == {"inspect": 1, "export": 1}
 
 
+@pytest.mark.slow
 def test_limb_maps_are_exported_where_the_plan_says_so(run: Runs) -> None:
     from sd2core.datasets.reading import open_dataset
 

@@ -172,6 +172,7 @@ def test_who_passes_does_not_take_over(
     assert track.present[seen].mean() > 0.9
 
 
+@pytest.mark.slow
 def test_another_one_who_comes_when_the_person_has_gone_is_not_taken_for_them(
     models: LandmarkModels, tmp_path: Path
 ) -> None:

@@ -231,11 +231,13 @@ class TestPictures:
         with pytest.raises(Sd2Error, match="holds a single picture"):
             found(path, models)
 
+    @pytest.mark.slow
     def test_nobody(self, models: LandmarkModels, tmp_path: Path) -> None:
         path = film(tmp_path / "empty.mp4", [empty_room()] * 2)
         with pytest.raises(Sd2Error, match=r"No person was found in .*empty.mp4.*\d % sure"):
             found(path, models)
 
+    @pytest.mark.slow
     def test_a_damaged_file(self, swipe: Path, models: LandmarkModels, tmp_path: Path) -> None:
         """What is left of it is used, or a sentence says why not; never anything else."""
         content = swipe.read_bytes()

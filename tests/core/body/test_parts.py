@@ -41,6 +41,7 @@ def test_the_bundled_body_has_every_part_on_its_own_side() -> None:
             assert np.sign(middle[0]) == (side if name.endswith(".L") else -side)
 
 
+@pytest.mark.slow
 @settings(max_examples=12, deadline=None)
 @given(
     resolution=st.sampled_from(["low", "medium", "high"]),

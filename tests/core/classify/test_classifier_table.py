@@ -172,6 +172,7 @@ def test_a_table_that_was_stopped_goes_on(tmp_path: Path) -> None:
         np.testing.assert_array_equal(one.score.frames, other.score.frames)
 
 
+@pytest.mark.slow
 def test_runs_of_other_data_or_settings_are_not_taken(tmp_path: Path) -> None:
     known = clip_set(3, 2, frames=30)
     make_table(tmp_path, known, ONCE)

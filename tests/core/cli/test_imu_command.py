@@ -44,6 +44,7 @@ def test_a_wrist_moves_and_gravity_is_read(sd2: Sd2, body: Path, tmp_path: Path)
     assert "# cutoff_hz: 6.0" in text
 
 
+@pytest.mark.slow
 def test_every_option_changes_what_it_says(sd2: Sd2, body: Path, tmp_path: Path) -> None:
     def made(*options: object) -> np.ndarray:
         out = tmp_path / "one.npz"

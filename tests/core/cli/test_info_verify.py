@@ -67,6 +67,7 @@ def test_a_broken_copy_of_the_sample_is_told_and_the_rest_of_it_used(
         assert np.array_equal(found[:, frames], np.load(whole)["values"][:, frames])
 
 
+@pytest.mark.slow
 def test_no_length_of_a_chunk_of_an_old_mesh_ends_the_command(sd2: Sd2, old_mesh: Path) -> None:
     chunk = old_mesh / CHUNK
     content = chunk.read_bytes()

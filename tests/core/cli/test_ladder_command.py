@@ -29,6 +29,7 @@ def test_the_plan_its_error_and_the_reasons_are_printed(sd2: Sd2, plate: Path) -
     assert any("aliasing" in line for line in lines)
 
 
+@pytest.mark.slow
 def test_the_table_is_kept_and_reused(sd2: Sd2, plate: Path, own_cache: Path) -> None:
     first = sd2("ladder", plate, "--repeats", 1, "--json")
     assert first.code == 0, first.err

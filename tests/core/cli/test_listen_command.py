@@ -63,6 +63,7 @@ def test_a_replay_ends_by_itself_and_says_what_there_is(sd2: Sd2, tmp_path: Path
     assert recording.load_capture().frame_count == 20
 
 
+@pytest.mark.slow
 def test_a_classifier_is_asked(sd2: Sd2, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(listen, "_LINE_S", 0.2)
     save_classifier(tmp_path / "g.safetensors", classifier())

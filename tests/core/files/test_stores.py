@@ -108,6 +108,7 @@ print(refused, len(range(0, len(whole), max(len(whole) // 60, 1))))
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["lz4", "zstd", "version 2"])
 def test_no_cut_ends_the_process(tmp_path: Path, kind: str) -> None:
     version_2 = kind == "version 2"

@@ -35,6 +35,7 @@ def test_one_stretch_per_place_with_what_is_said_in_most_of_it() -> None:
     assert disagreements([], [], FRAMES) == ()
 
 
+@pytest.mark.slow
 @settings(max_examples=60, suppress_health_check=[HealthCheck.too_slow])
 @given(any_labels(edges_s), any_labels(edges_s))
 def test_their_frames_are_those_that_differ(mine, theirs) -> None:

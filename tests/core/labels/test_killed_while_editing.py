@@ -12,6 +12,7 @@ import pytest
 TESTS = Path(__file__).resolve().parents[2]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="forks, so that a hundred starts take seconds")
 def test_a_hundred_kills(tmp_path: Path) -> None:
     done = subprocess.run(

@@ -303,6 +303,7 @@ def test_another_radar_is_not_appended(tmp_path: Path) -> None:
     recording.close()
 
 
+@pytest.mark.slow
 def test_a_card_that_begins_again_goes_on_in_time(tmp_path: Path) -> None:
     with _card(tmp_path) as (source, _, content):
         recording = GrowingRecording(tmp_path / "walk.sd2")

@@ -310,6 +310,7 @@ class TestOptimiser:
         assert rate_factor(0.0, 0.0, 0.5) == 1.0
         assert rate_factor(1.7, 0.0, 0.5) == 0.5
 
+    @pytest.mark.slow
     def test_all_groups_keep_their_ratio(self) -> None:
         optimiser = optimiser_of(build("s4", 32), TrainingConfig())
         assert set_rate(optimiser, 0.5) == pytest.approx(0.5 * TrainingConfig().learning_rate)

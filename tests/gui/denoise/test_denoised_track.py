@@ -266,6 +266,7 @@ def test_the_card_says_what_the_model_is(denoised, qtbot):
     assert "GRU, 4,321 parameters" in texts
 
 
+@pytest.mark.slow
 def test_map_and_figure_are_exported(denoised, qtbot, tmp_path, monkeypatch):
     c = models_of(denoised)
     name = tmp_path / "out.npz"

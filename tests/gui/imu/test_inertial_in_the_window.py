@@ -215,6 +215,7 @@ def test_the_triangle_folds_the_track_for_the_maps(window, placed, qtbot) -> Non
     assert window.maps.height() == before
 
 
+@pytest.mark.slow
 def test_lines_are_drawn_in_the_colours_of_the_axes(window, placed) -> None:
     for dark in (False, True):
         models_of(window).display.set_dark(dark)

@@ -141,6 +141,7 @@ def test_each_mesh_is_drawn_in_its_own_colour(compared, qtbot):
     assert second[1] > 100
 
 
+@pytest.mark.slow
 def test_the_figure_is_written(compared, qtbot, tmp_path, monkeypatch):
     path = tmp_path / "both.svg"
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *a, **k: (str(path), ""))

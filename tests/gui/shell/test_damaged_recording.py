@@ -12,6 +12,7 @@ from sd2core.files.resources import resource_path
 from tests.damaged_files import change, cut, lose
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damage", [cut, change, lose])
 def test_the_rest_of_a_damaged_mesh_is_shown(empty_window, qtbot, tmp_path, damage):
     recording = shutil.copytree(resource_path("swipes.sd2"), tmp_path / "swipes.sd2")

@@ -61,6 +61,7 @@ def test_the_map_is_empty_there_and_says_so_under_the_pointer(window, qtbot):
     assert "no person in 0.50 s" in view._status()
 
 
+@pytest.mark.slow
 def test_what_is_unknown_does_not_have_the_colour_of_nothing(window):
     view = window.findChildren(HeatmapView)[0]
     for dark in (False, True):

@@ -140,6 +140,7 @@ def test_the_next_window_has_the_width_that_was_chosen(windows) -> None:
     assert folded.side.width() == chosen_px
 
 
+@pytest.mark.slow
 def test_the_next_window_has_the_heights_that_were_chosen(windows, qtbot, small_recording) -> None:
     def opened():
         window = windows(1280, 1000)

@@ -424,6 +424,7 @@ def test_curves_are_read_by_mouse_and_keys(made, qtbot, pairs) -> None:
     assert not curves.hasFocus()
 
 
+@pytest.mark.slow
 def test_everything_is_painted_in_both_themes(made, qtbot, pairs) -> None:
     """Every state is painted without a word from Qt."""
     window = made()

@@ -65,6 +65,7 @@ def test_everything_but_the_video_is_the_same_every_time(short: Path, tmp_path: 
         assert first[name] == again[name], name
 
 
+@pytest.mark.slow
 def test_progress_rises_to_its_total(short: Path, steps: list[tuple[int, int]]) -> None:
     assert {total for _, total in steps} == {30}  # 6 frames, 5 stages
     assert [done for done, _ in steps] == sorted(done for done, _ in steps)

@@ -118,6 +118,7 @@ def test_a_fit_that_fails_says_why(
     assert "still could not be fitted: There is nobody in the video" in outcome.err
 
 
+@pytest.mark.slow
 def test_real_videos_are_looked_at_too(
     fitting: Tool, truth: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
