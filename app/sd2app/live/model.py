@@ -58,6 +58,7 @@ class LiveModel(QObject):
         self.received_unix_s = 0.0  # of the newest column
         self._latencies_s: deque[float] = deque(maxlen=_LATENCIES)
         self._reference = 0.0  # that was set here: the strongest bin so far is 0 dB
+        self._is_shown = True  # false where the recording cannot be read
         self._process: QProcess | None = None
         self._said = ""  # on standard error
         self._teller = QTimer(self, singleShot=True, interval=_TELL_MS)
@@ -156,9 +157,12 @@ class LiveModel(QObject):
         """Listen once the recording that is continued is open, with its map."""
         if self.state != "opening" or not self.on_screen or self._document.maps_capture:
             return
-        if (there := self._document.radar_map) is not None:
+        there = self._document.radar_map
+        if there is None and self._document.capture is not None:
+            return  # about to be made
+        if there is not None:
             self._map = GrowingMap(there)
-            self._launch()
+        self._launch()
 
     def _fail_to_open(self, reason: str) -> None:
         if self.state == "opening":
@@ -167,7 +171,7 @@ class LiveModel(QObject):
 
     def _launch(self) -> None:
         assert self.request is not None
-        self._said, self._new = "", []
+        self._said, self._new, self._is_shown = "", [], True
         process = QProcess(self)
         environment = QProcessEnvironment.systemEnvironment()
         for name, value in {**ONE_THREAD, "PYTHONIOENCODING": "utf-8"}.items():
@@ -193,7 +197,12 @@ class LiveModel(QObject):
             # A line that another program wrote, or half of one, is left out.
             with contextlib.suppress(ValueError, KeyError, TypeError):
                 self._take(json.loads(bytes(process.readLine().data())))
-        self._show_new()
+        try:
+            self._show_new()
+        except (Sd2Error, OSError) as error:
+            # Frames are stored all the same.
+            self.warned.emit(f"What comes cannot be shown: {error}")
+            self._is_shown = False
         if not self._teller.isActive():
             self._teller.start()
 
@@ -214,11 +223,11 @@ class LiveModel(QObject):
                 self.counts = Counts.of(event)
 
     def _end(self, code: int) -> None:
+        self._read()
         process, self._process = self._process, None
         assert process is not None
         self._said += bytes(process.readAllStandardError().data()).decode("utf-8", "replace")
         process.deleteLater()
-        self._show_new()
         if self.on_screen:
             try:
                 self._document.end_growth()
@@ -234,7 +243,7 @@ class LiveModel(QObject):
 
     def _show_new(self) -> None:
         """Add the columns that came to the map, and show it."""
-        if not self._new:
+        if not self._new or not self._is_shown:
             return
         if self._map is None:
             self._map = self._first_map()

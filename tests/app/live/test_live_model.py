@@ -17,11 +17,12 @@ from sd2app.live.setup import ListenSetup
 from sd2app.live.text import frames_text, level_text
 from sd2app.session.session import Session, build_session
 from sd2app.settings import Settings
+from sd2core.files.resources import resource_path
 from sd2core.fmcw.processing import doppler_map
 from sd2core.io.radar import write_capture
 from sd2core.live.counts import Counts
 from sd2core.radar_config import CLUTTER
-from sd2core.recording.recording import open_recording
+from sd2core.recording.recording import Recording, open_recording
 from sd2core.sensor import VelocityAxis
 from tests.core.live.fast_captures import fast_swipes
 
@@ -52,6 +53,14 @@ def written(folder: Path, times_s: np.ndarray) -> Path:
 def endless(tmp_path: Path) -> Path:
     """Capture whose last frame is minutes after the others: replaying it does not end by itself."""
     return written(tmp_path / "swipes", np.append(np.arange(12) / 30, 600.0))
+
+
+@pytest.fixture
+def mesh_recording(tmp_path: Path) -> Path:
+    """Recording of a mesh alone."""
+    return Recording.create(
+        tmp_path / "mesh.sd2", mesh=resource_path("swipes.sd2") / "mesh.zarr"
+    ).folder
 
 
 def heard(session: Session, request: ListenRequest, qtbot, frames: int) -> LiveModel:
@@ -208,6 +217,32 @@ def test_a_recording_that_cannot_be_opened_is_not_continued(session, tmp_path, q
     model.start(ListenRequest(folder, replay=tmp_path / "capture"))
     qtbot.waitUntil(lambda: model.state == "failed", timeout=LIMIT_MS)
     assert "recording.json" in model.text
+
+
+def test_a_recording_without_a_radar_is_refused(session, mesh_recording, qtbot):
+    model = LiveModel(session, QObject(session.document))
+    model.start(ListenRequest(mesh_recording, replay=mesh_recording))
+    qtbot.waitUntil(lambda: model.state == "failed", timeout=LIMIT_MS)
+    assert "radar" in model.text
+
+
+def test_what_cannot_be_shown_is_said_once(session, tmp_path, qtbot):
+    folder = tmp_path / "walk.sd2"
+    column = {
+        "event": "column", "time_s": 0.0, "received_unix_s": 0.0, "level_db": None,
+        "values": [0.0] * 32, **vars(Counts(recorded=1)),
+    }  # fmt: skip
+    command = saying(0, column, {**column, "time_s": 0.1})
+    model = LiveModel(session, QObject(session.document), command)
+    warned: list[str] = []
+    model.warned.connect(warned.append)
+    model.start(ListenRequest(folder, replay=tmp_path / "capture"))
+    folder.mkdir()
+    (folder / "recording.json").write_text("{")
+    qtbot.waitUntil(lambda: model.state == "stopped", timeout=LIMIT_MS)
+    assert len(warned) == 1
+    assert "cannot be shown" in warned[0]
+    assert "recording.json" in warned[0]
 
 
 # --- what is asked before ------------------------------------------------------------------
