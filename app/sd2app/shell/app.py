@@ -89,6 +89,7 @@ def _take_screenshot(
     """Write the window as PNG and close it; returns an exit code, or raises OSError."""
     settled = wait_until_settled(application, window, limit_s)
     failure = window.messages.text if window.ready else ""
+    is_empty = window.ready and not window.session.has_content()
     try:
         write_picture(window, path)
     finally:
@@ -100,4 +101,4 @@ def _take_screenshot(
         return 1
     if failure:
         print(failure, file=sys.stderr)
-    return 0
+    return 1 if failure and is_empty else 0

@@ -120,6 +120,17 @@ def test_a_screenshot_is_whole_or_not_there(qtbot, empty_window, tmp_path, capsy
     assert capsys.readouterr().out == ""
 
 
+def test_a_picture_of_what_cannot_be_opened_is_a_failure(
+    qtbot, empty_window, tmp_path, capsys
+) -> None:
+    note = tmp_path / "notes.txt"
+    note.write_text("hello")
+    empty_window.open_paths([note])
+    application = QApplication.instance()
+    assert app._take_screenshot(application, empty_window, tmp_path / "w.png", limit_s=60) == 1
+    assert "notes.txt" in capsys.readouterr().err
+
+
 def test_the_map_of_a_capture_comes_after_the_recording(
     empty_window, qtbot, small_recording, monkeypatch
 ) -> None:
