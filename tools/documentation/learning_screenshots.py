@@ -40,7 +40,8 @@ def learning(application: QApplication) -> None:
         batch(application, sample)
         campaign = place / "campaign.zarr"
         command = [sys.executable, "-m", "sd2app.command_line", "simulate", "campaign"]
-        if subprocess.run([*command, str(campaign), *_CAMPAIGN], check=False).returncode != 0:
+        command += ["--out", str(campaign), *_CAMPAIGN]
+        if subprocess.run(command, check=False).returncode != 0:
             print("No pictures of trainings: there is nothing to learn from", file=sys.stderr)
             return
         training(application, campaign)
