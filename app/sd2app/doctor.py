@@ -11,7 +11,7 @@ import sys
 from dataclasses import asdict, dataclass
 from typing import Literal
 
-from sd2app.system_libraries import install_line, missing_libraries
+from sd2app.system_libraries import how_to_install, missing_libraries
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import user_cache, user_data
 from sd2core.files.resources import resource_path
@@ -75,7 +75,7 @@ def _libraries() -> Finding:
             "System libraries",
             "problem",
             f"{', '.join(missing)} missing",
-            install_line(missing.values()),
+            how_to_install(missing.values()),
         )
     return Finding("System libraries", "ok", "all there")
 
@@ -118,7 +118,7 @@ def _window() -> list[Finding]:
             "Fonts",
             "problem",
             "none with letters: texts would be boxes",
-            install_line(["fonts-dejavu-core"]),
+            how_to_install(["fonts-dejavu-core"]),
         ),
     ]
 

@@ -62,11 +62,11 @@ def explain_missing(missing: Mapping[str, str]) -> Sd2Error:
     """Error that says how to install what is missing."""
     return Sd2Error(
         f"System libraries are missing that the window draws with: {', '.join(missing)}",
-        remedy=install_line(missing.values()),
+        remedy=how_to_install(missing.values()),
     )
 
 
-def install_line(packages: Iterable[str]) -> str:
+def how_to_install(packages: Iterable[str]) -> str:
     """Words on how to install packages on Debian and Ubuntu."""
     names = " ".join(dict.fromkeys(packages))
     return (

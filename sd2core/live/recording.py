@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text, full_disk_named
 from sd2core.files.lock import FileLock
-from sd2core.files.paths import plain_path
 from sd2core.files.recording_json import FILE_NAME
 from sd2core.io.radar.growing import (
     ENTRY,
@@ -25,7 +24,7 @@ from sd2core.io.radar.growing import (
     read_entries,
     read_head,
 )
-from sd2core.recording.recording import SUFFIX, Recording, open_recording
+from sd2core.recording.recording import Recording, folder_named, open_recording
 
 RADAR_FOLDER = "radar"
 _LOCK_NAME = "listening.lock"
@@ -51,8 +50,7 @@ class GrowingRecording:
     """
 
     def __init__(self, folder: Path | str) -> None:
-        folder = plain_path(Path(folder))
-        self.folder = folder if folder.suffix == SUFFIX else folder.with_name(folder.name + SUFFIX)
+        self.folder = folder_named(folder)
         self.radar = self.folder / RADAR_FOLDER
         self.frames = 0
         self._head: GrowingHead | None = None

@@ -583,10 +583,14 @@ def open_recording(path: Path) -> Recording:
     return recording
 
 
+def folder_named(path: Path | str) -> Path:
+    """Folder of a recording that is named with or without its suffix."""
+    folder = plain_path(Path(path))
+    return folder if folder.suffix == SUFFIX else folder.with_name(folder.name + SUFFIX)
+
+
 def _new_folder(folder: Path) -> Path:
-    folder = plain_path(folder)
-    if folder.suffix != SUFFIX:
-        folder = folder.with_name(folder.name + SUFFIX)
+    folder = folder_named(folder)
     if (folder / FILE_NAME).exists():
         raise Sd2Error(
             f"{folder} is a recording already",

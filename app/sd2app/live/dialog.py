@@ -39,9 +39,10 @@ class ListenDialog(QDialog):
         self._address.setPlaceholderText("127.0.0.1:4098, which only this computer reaches")
         self._address.textEdited.connect(lambda text: setup.choose("address", text))
         self._hint = sentence(
-            "A DCA1000 sends to 192.168.33.30, unless it is told otherwise: the network card it is"
-            " plugged into must have that address, and it is what you give here."
+            "A DCA1000 sends to 192.168.33.30, unless it is told otherwise: the network card\n"
+            "it is plugged into must have that address, and it is what you give here."
         )
+        self._hint.setWordWrap(False)  # in a form, what wraps gets too much room or too little
         self._message = sentence("")
         self._file_name, self._address_name = QLabel(self), QLabel("Address", self)
         buttons, self._begin = accepting(self, "Listen")
@@ -58,7 +59,7 @@ class ListenDialog(QDialog):
         )
         setup.changed.connect(self._refresh)
         self._refresh()
-        self.resize(620, 0)
+        self.resize(620, self.sizeHint().height())
 
     def _button(self, run: Callable[[], None]) -> QToolButton:
         return outlined("Choose…", "Choose another", run, self)

@@ -49,7 +49,6 @@ class LiveModel(QObject):
         self._session, self._document, self._command = session, session.document, list(command)
         self.state: State = "idle"
         self.request: ListenRequest | None = None
-        self.about = ""  # radar and place that frames come from
         self.counts = Counts()
         self.level_db: float | None = None  # of the newest column
         self.text = ""  # why it failed
@@ -97,7 +96,7 @@ class LiveModel(QObject):
         """Listen; a recording that is there is opened and continued."""
         if self.busy:
             return
-        self.request, self.text, self._map, self.about = request, "", None, ""
+        self.request, self.text, self._map = request, "", None
         self.counts, self.level_db = Counts(), None
         self._latencies_s.clear()
         if not (request.folder / FILE_NAME).is_file():
@@ -122,8 +121,7 @@ class LiveModel(QObject):
             self._set_state("stopped")
         elif self._process is not None and self.busy:
             self._set_state("stopping")
-            self._process.write(b"q")
-            self._process.closeWriteChannel()
+            _tell_to_stop(self._process)
 
     def dismiss(self) -> None:
         """Forget it, once it has ended."""
@@ -144,8 +142,7 @@ class LiveModel(QObject):
         if process is None:
             return
         process.blockSignals(True)
-        process.write(b"q")
-        process.closeWriteChannel()
+        _tell_to_stop(process)
         if not process.waitForFinished(_STOP_MS):
             process.kill()
             process.waitForFinished(_STOP_MS)
@@ -209,7 +206,6 @@ class LiveModel(QObject):
     def _take(self, event: dict[str, Any]) -> None:
         match event["event"]:
             case "listening":
-                self.about = str(event["source"])
                 if self.state == "starting":
                     self._set_state("listening")
             case "doubt":
@@ -317,3 +313,9 @@ class LiveModel(QObject):
             self.state = state
             self.state_changed.emit()
             self.changed.emit()
+
+
+def _tell_to_stop(process: QProcess) -> None:
+    """Press the key that stops ``sd2 listen`` on a terminal."""
+    process.write(b"q")
+    process.closeWriteChannel()

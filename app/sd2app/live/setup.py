@@ -10,7 +10,7 @@ from PySide6.QtCore import QObject, Signal
 
 from sd2app.live.request import ListenRequest
 from sd2app.settings import Settings, StoredChoices
-from sd2core.recording.recording import FILE_NAME, SUFFIX
+from sd2core.recording.recording import FILE_NAME, SUFFIX, folder_named
 
 Way = Literal["dca1000", "replay"]
 _DEFAULTS = {"way": "dca1000", "setup": "", "address": "", "replay": "", "beside": ""}
@@ -56,7 +56,7 @@ class ListenSetup(QObject):
 
     def choose_folder(self, folder: Path) -> None:
         """Choose the recording's folder."""
-        self.folder = folder if folder.suffix == SUFFIX else folder.with_name(folder.name + SUFFIX)
+        self.folder = folder_named(folder)
         self._choices.set("beside", str(self.folder.parent))
         self.changed.emit()
 

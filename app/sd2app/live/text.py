@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from sd2app.widgets.text import counted
 from sd2core.live.counts import Counts
 
 if TYPE_CHECKING:
@@ -35,7 +36,6 @@ def frames_text(counts: Counts) -> str:
     """Number of frames, and what they lack, in words."""
     if not counts.recorded:
         return ""
-    frames = f"{counts.recorded:,} frame{'' if counts.recorded == 1 else 's'}"
     lacks = [
         (counts.dropped, "dropped (this computer was too slow)"),
         (counts.lost, "lost on the way"),
@@ -43,7 +43,7 @@ def frames_text(counts: Counts) -> str:
         (counts.not_shown, "stored and not shown yet"),
     ]
     told = [f"{number:,} {what}" for number, what in lacks if number]
-    return f"{frames}, {', '.join(told) or 'none missing'}"
+    return f"{counted(counts.recorded, 'frame')}, {', '.join(told) or 'none missing'}"
 
 
 def level_text(level_db: float | None) -> str:
