@@ -7,17 +7,20 @@ export PYTHON
 
 .NOTPARALLEL:
 
-INSTALLED := .venv/.installed
+PROGRAM := .venv/.with-program
 COMPILED := .venv/.compiled
+TESTS = system-packages-for-tests .venv/.with-test $(COMPILED) landmark-models
 # Among them every module in KERNEL_MODULES of sd2core/numerics/compiled.py.
 KERNELS := $(wildcard sd2core/numerics/*.py sd2core/body/*.py sd2core/scattering/*.py sd2core/doppler/*.py sd2core/fmcw/*.py)
 
-.PHONY: help setup demo test test-slow lint docs format bench fuzz wheel bundle screenshots accuracy fitting denoiser denoiser-comparison range-synthesis scale classifier real-gestures whole-loop paper soak clean
+.PHONY: help setup demo test test-slow lint pins fresh-machine docs format bench fuzz wheel bundle screenshots accuracy fitting denoiser denoiser-comparison range-synthesis scale classifier real-gestures whole-loop paper soak clean
 
 help:
 	@echo "make demo         set up, and open the sample recording in the window"
 	@echo "make test         set up, and run the test suite (no display needed)"
-	@echo "make setup        virtual environment in .venv, with pinned dependencies"
+	@echo "make setup        everything that developers need, in .venv"
+	@echo "make pins         the pinned packages are there for every supported Python"
+	@echo "make fresh-machine  the commands of the README, typed on bare systems: docs/fresh-machine.md"
 	@echo "make lint         ruff, mypy and the rules between modules"
 	@echo "make docs         the guide, as a site: build/docs/index.html"
 	@echo "make format       let ruff format the code"
@@ -40,8 +43,8 @@ help:
 	@echo "make soak         an hour of use of the window: memory, threads, event loop (MINUTES=60)"
 	@echo "make clean        remove what the above made, .venv included"
 
-setup: system-packages $(COMPILED) landmark-models
-	@scripts/activation.sh $(if $(filter setup,$(MAKECMDGOALS)),always)
+setup: system-packages-for-tests .venv/.with-dev $(COMPILED) landmark-models
+	@scripts/activation.sh always
 
 .PHONY: system-packages system-packages-for-tests
 system-packages:
@@ -50,46 +53,59 @@ system-packages:
 system-packages-for-tests:
 	@scripts/system_packages.sh tests
 
-$(INSTALLED): pyproject.toml constraints.txt scripts/virtual_environment.sh | system-packages
-	@scripts/virtual_environment.sh
+# What each purpose needs and nothing else: the program, and the extras of pyproject.toml.
+$(PROGRAM): pyproject.toml constraints.txt scripts/install.py | system-packages
+	@"$$(scripts/find_python.sh)" scripts/install.py
 	@touch $@
 
-$(COMPILED): $(INSTALLED) $(KERNELS)
+.venv/.with-%: $(PROGRAM)
+	@"$$(scripts/find_python.sh)" scripts/install.py $*
+	@touch $@
+
+$(COMPILED): $(PROGRAM) $(KERNELS)
 	@echo "Compiling the kernels (half a minute, once)"
 	@$(BIN)/sd2 warm-up
 	@touch $@
 
 # Needs a connection once; `sd2 fit` fetches them as well, and says what to do without one.
 .PHONY: landmark-models
-landmark-models: $(INSTALLED)
+landmark-models: $(PROGRAM)
 	@$(BIN)/sd2 fetch-models --if-missing > /dev/null || echo "(Only \`sd2 fit\` needs them.)"
 
-demo: setup
+demo: system-packages $(COMPILED)
+	@scripts/activation.sh
 	@scripts/demo.sh
 
-test: system-packages-for-tests setup
+test: $(TESTS)
 	@scripts/test.sh "not slow"
 
-test-slow: system-packages-for-tests setup
+test-slow: $(TESTS) .venv/.with-dev
 	@scripts/test.sh "slow"
 
-lint: $(INSTALLED)
+lint: .venv/.with-dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-docs: $(COMPILED)
+# Resolved for each Python and system, without installing anything. UPDATE=1 pins what is new.
+pins: .venv/.with-dev
+	@$(BIN)/python scripts/pins.py $(if $(UPDATE),--update)
+
+fresh-machine:
+	@scripts/fresh_machine.sh
+
+docs: .venv/.with-docs $(COMPILED)
 	$(BIN)/python -m sphinx -W --keep-going -q -d build/doctrees docs build/docs
 
-format: $(INSTALLED)
+format: .venv/.with-dev
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-bench: system-packages-for-tests setup
+bench: $(TESTS)
 	scripts/on_display.sh $(BIN)/python -m pytest tests/benchmarks --benchmark-only --timeout=0 --capture=no
 
-fuzz: $(INSTALLED)
+fuzz: $(TESTS)
 	$(BIN)/python -m tests.mutants --count 10000
 
 wheel: docs
@@ -99,7 +115,7 @@ wheel: docs
 bundle: docs
 	$(BIN)/python -m PyInstaller --noconfirm --workpath build/bundle app/packaging/sd2-studio.spec
 
-screenshots: system-packages-for-tests setup
+screenshots: $(TESTS)
 	scripts/on_display.sh $(BIN)/python -m tools.documentation.screenshots
 
 accuracy: setup
@@ -133,7 +149,7 @@ scale: setup
 	$(BIN)/python -m tools.documentation.scale
 
 MINUTES ?= 60
-soak: system-packages-for-tests setup
+soak: $(TESTS)
 	scripts/on_display.sh $(BIN)/python -m tools.documentation.soak --minutes $(MINUTES) \
 		$(if $(TRAINING),--training $(TRAINING))
 

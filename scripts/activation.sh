@@ -4,7 +4,7 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 
 told=.venv/.told
-if [ "${1:-}" != always ] && [ ! $told -ot .venv/.installed ]; then exit 0; fi
+if [ "${1:-}" != always ] && [ ! $told -ot .venv/.with-program ]; then exit 0; fi
 touch $told
 
 shell=${SHELL:-sh}

@@ -34,18 +34,30 @@ def checkout(tmp_path: Path) -> Path:
 @pytest.mark.parametrize(
     ("failing", "code", "parts"),
     [
-        ("", 0, ["setup", "guide", "tests without a display", "tests on a display", "lint"]),
-        ("system-packages-for-tests setup", 3, ["setup failed (3)"]),
+        (
+            "",
+            0,
+            ["setup", "pins", "guide", "tests without a display", "tests on a display", "lint"],
+        ),
+        ("setup", 3, ["setup failed (3)"]),
         (
             "offscreen",
             7,
-            ["setup", "guide", "tests without a display failed (7)", "tests on a display"],
+            ["setup", "pins", "guide", "tests without a display failed (7)", "tests on a display"],
         ),
-        ("docs", 3, ["setup", "guide failed (3)"]),
+        ("pins", 3, ["setup", "pins failed (3)"]),
+        ("docs", 3, ["setup", "pins", "guide failed (3)"]),
         (
             "lint",
             3,
-            ["setup", "guide", "tests without a display", "tests on a display", "lint failed (3)"],
+            [
+                "setup",
+                "pins",
+                "guide",
+                "tests without a display",
+                "tests on a display",
+                "lint failed (3)",
+            ],
         ),
     ],
 )
