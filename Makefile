@@ -13,7 +13,7 @@ TESTS = system-packages-for-tests .venv/.with-test $(COMPILED) landmark-models
 # Among them every module in KERNEL_MODULES of sd2core/numerics/compiled.py.
 KERNELS := $(wildcard sd2core/numerics/*.py sd2core/body/*.py sd2core/scattering/*.py sd2core/doppler/*.py sd2core/fmcw/*.py)
 
-.PHONY: help setup demo test test-slow lint pins fresh-machine docs format bench fuzz wheel bundle screenshots accuracy fitting denoiser denoiser-comparison range-synthesis scale classifier real-gestures whole-loop paper soak clean
+.PHONY: help setup demo test test-slow lint pins fresh-machine docs format bench fuzz wheel bundle screenshots moving-picture accuracy fitting denoiser denoiser-comparison range-synthesis scale classifier real-gestures whole-loop paper soak clean
 
 help:
 	@echo "make demo         set up, and open the sample recording in the window"
@@ -30,6 +30,7 @@ help:
 	@echo "make wheel        dist/*.whl: the program with its guide, and the library alone"
 	@echo "make bundle       dist/sd2-studio/: the program with all it needs, in one folder"
 	@echo "make screenshots  the pictures in docs/"
+	@echo "make moving-picture  the one of the README"
 	@echo "make accuracy     docs/accuracy-and-speed.md, measured (some five minutes)"
 	@echo "make fitting      docs/fitting.md, measured (some ten minutes)"
 	@echo "make denoiser     docs/denoiser.md, measured (half an hour)"
@@ -93,7 +94,7 @@ pins: .venv/.with-dev
 	@$(BIN)/python scripts/pins.py $(if $(UPDATE),--update)
 
 fresh-machine:
-	@scripts/fresh_machine.sh
+	@python3 scripts/fresh_machine.py
 
 docs: .venv/.with-docs $(COMPILED)
 	$(BIN)/python -m sphinx -W --keep-going -q -d build/doctrees docs build/docs
@@ -108,15 +109,21 @@ bench: $(TESTS)
 fuzz: $(TESTS)
 	$(BIN)/python -m tests.mutants --count 10000
 
-wheel: docs
-	$(BIN)/python -m build --wheel --no-isolation
-	$(BIN)/python -m build --wheel --no-isolation --outdir dist library
+# Of a plain clone, with nothing but the build backend.
+wheel:
+	@"$$(scripts/find_python.sh)" -m venv build/wheel-environment
+	@build/wheel-environment/bin/python -m pip install --quiet --constraint constraints.txt build hatchling
+	build/wheel-environment/bin/python -m build --wheel --no-isolation
+	build/wheel-environment/bin/python -m build --wheel --no-isolation --outdir dist library
 
-bundle: docs
+bundle: .venv/.with-dev $(COMPILED)
 	$(BIN)/python -m PyInstaller --noconfirm --workpath build/bundle app/packaging/sd2-studio.spec
 
 screenshots: $(TESTS)
 	scripts/on_display.sh $(BIN)/python -m tools.documentation.screenshots
+
+moving-picture: $(TESTS)
+	scripts/on_display.sh $(BIN)/python -m tools.documentation.moving_picture
 
 accuracy: setup
 	$(BIN)/python -m tools.documentation.accuracy_and_speed

@@ -121,25 +121,28 @@ def run_pip(wanted: list[str]) -> int:
     return run([str(PYTHON), "-m", "pip", "--no-input", "install", *wanted], keep)
 
 
+def pip_settings(python: object) -> list[tuple[str, str]]:
+    """Names and values of what pip is configured with."""
+    listed = subprocess.run(
+        [str(python), "-m", "pip", "config", "list"], capture_output=True, text=True, check=False
+    )
+    found = re.findall(r"^[^\s=]*\.([a-z-]+)=(.*)$", listed.stdout, re.MULTILINE)
+    return [(name, str(ast.literal_eval(value))) for name, value in found]
+
+
 def pip_places() -> tuple[list[str], str]:
     """Where pip is configured to look, as options of uv; and its certificates."""
-    listed = subprocess.run(
-        [PYTHON, "-m", "pip", "config", "list"], capture_output=True, text=True, check=False
-    )
-    names = {
+    options = {
         "index-url": "--default-index", "extra-index-url": "--index", "find-links": "--find-links"
     }  # fmt: skip
-    places: list[str] = []
-    cert = ""
-    for key, text in re.findall(r"^[^\s=]*\.([a-z-]+)=(.*)$", listed.stdout, re.MULTILINE):
-        value = str(ast.literal_eval(text))
-        if key in names:
-            for place in value.split():
-                if [names[key], place] not in [places[at : at + 2] for at in range(len(places))]:
-                    places += [names[key], place]
-        elif key == "cert":
-            cert = value
-    return places, cert
+    settings = pip_settings(PYTHON)
+    places = dict.fromkeys(
+        (options[name], place)
+        for name, value in settings
+        if name in options
+        for place in value.split()
+    )
+    return [word for pair in places for word in pair], dict(settings).get("cert", "")
 
 
 def run(command: list[str], environment: dict[str, str] | None = None) -> int:

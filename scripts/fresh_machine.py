@@ -1,0 +1,343 @@
+"""Type the README's commands on systems that have nothing yet, and write docs/fresh-machine.md.
+
+usage: make fresh-machine [SUITES="bookworm jammy"] [TESTS=no]
+
+Each system is a folder of its own, made by debootstrap, in which only git, make, Python, its venv
+module and certificates are installed. Run as root on Linux, with debootstrap, Xvfb, xdotool and
+ImageMagick. What pip is configured for here (a mirror, files at hand) holds there as well. Every
+line that was printed, and when, is kept in build/fresh-machine/*.log.
+"""
+
+from __future__ import annotations
+
+import datetime
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from install import ROOT, pip_settings
+
+PLACE = ROOT / "build" / "fresh-machine"
+PACKAGES = "git,make,python3,python3-venv,ca-certificates"
+DEBIAN, UBUNTU = "http://deb.debian.org/debian", "http://archive.ubuntu.com/ubuntu"
+SYSTEMS = {
+    "bookworm": ("Debian 12", DEBIAN),
+    "trixie": ("Debian 13", DEBIAN),
+    "noble": ("Ubuntu 24.04", UBUNTU),
+    "jammy": ("Ubuntu 22.04", UBUNTU),
+}
+"""Name and archive by code name; Ubuntu 22.04 has Python 3.10, which is refused in words."""
+
+DISPLAY = ":77"
+TITLE = "SD² Studio"
+WEIGHED = 8  # packages that the page names
+
+PAGE = """\
+# On a machine that has nothing yet
+
+`make fresh-machine` makes bare systems (`debootstrap --variant=minbase`, and in them only
+`{packages}`), clones this checkout into each and types what the README says. On {date}, commit
+`{commit}`, {machine}:
+
+| system | Python | typed | came to | time | longest silence | written |
+|---|---|---|---|---|---|---|
+{rows}
+
+*Time* is from typing to the window, to the picture, or to the end; *written* is what the system's
+folder grew by, with system packages and what is fetched. The environment that `make demo` makes
+takes {environment_gb:.2f} GB, of which:
+
+| package | MB |
+|---|---|
+{weights}
+| {others} others | {others_mb:.0f} |
+"""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a typed line."""
+
+    typed: str
+    result: str
+    seconds: float
+    silence_s: float
+    written_mb: float
+
+
+def main() -> int:
+    """Try all systems; 1 if one of them could not do what the README says."""
+    missing = [name for name in ("debootstrap", "Xvfb", "xdotool", "import", "chroot")
+               if not shutil.which(name)]  # fmt: skip
+    if missing or os.geteuid():
+        print(f"Needs root, and these programs: {', '.join(missing) or 'all there'}")
+        return 1
+    suites = os.environ.get("SUITES", " ".join(SYSTEMS)).split()
+    rows, weights = [], []
+    for suite in suites:
+        name, _ = SYSTEMS[suite]
+        python, outcomes = try_system(suite)
+        rows += [
+            f"| {name} | {python} | `{one.typed}` | {one.result} | {one.seconds:.0f} s |"
+            f" {one.silence_s:.0f} s | {one.written_mb:,.0f} MB |"
+            for one in outcomes
+        ]
+        weights = weights or weigh(PLACE / suite / "root/sd2/.venv")
+        print("\n".join(rows), flush=True)
+    write_page(rows, weights)
+    return int(any("failed" in row for row in rows))
+
+
+def try_system(suite: str) -> tuple[str, list[Outcome]]:
+    """Make a system, type everything there, and say which Python it has and what came of it."""
+    root = bare_system(suite)
+    run = Typist(root, PLACE / f"{suite}.log")
+    python = run.output("python3 --version").split()[1]
+    if tuple(map(int, python.split(".")[:2])) < (3, 11):
+        outcome = run("make demo", lambda line: "is needed" in line)
+        return python, [outcome]
+    with_display = run("make demo", window_picture(PLACE / f"{suite}.png"), display=DISPLAY)
+    outcomes = [with_display, run("make demo", None)]
+    if os.environ.get("TESTS", "yes") == "yes":
+        outcomes.append(run("make test", None))
+    root = bare_system(suite, again="-pip")
+    run = Typist(root, PLACE / f"{suite}-pip.log")
+    *lines, last = pip_lines()
+    outcomes.append(run("\n".join(lines), None))
+    # What a bare system lacks is printed as a line to type.
+    window = f". sd2-environment/bin/activate\n{last}"
+    refused = run(window, lambda line: "apt-get install" in line)
+    if refused.result == "refused in words":
+        told = re.findall(r"(apt-get update.*apt-get install.*)", run.log.read_text("utf-8"))
+        outcomes += [
+            refused,
+            run(told[-1].replace("sudo ", "").replace("install", "install -y"), None),
+        ]
+    outcomes.append(run(window, window_picture(PLACE / f"{suite}-pip.png"), display=DISPLAY))
+    return python, outcomes
+
+
+def bare_system(suite: str, again: str = "") -> Path:
+    """A system with only PACKAGES and a clone of this checkout in /root/sd2."""
+    PLACE.mkdir(parents=True, exist_ok=True)
+    base, root = PLACE / f"{suite}-base", PLACE / f"{suite}{again}"
+    if not base.is_dir():
+        archive = SYSTEMS[suite][1]
+        # Ubuntu's keys and code names are not known to Debian's debootstrap.
+        own = [] if archive == DEBIAN else ["--no-check-gpg", "--components=main,universe"]
+        script = [] if archive == DEBIAN else ["gutsy"]
+        made = base.with_suffix(".part")
+        shutil.rmtree(made, ignore_errors=True)
+        subprocess.run(
+            ["debootstrap", "--variant=minbase", f"--include={PACKAGES}", *own, suite, str(made),
+             archive, *script],
+            check=True, stdout=subprocess.DEVNULL,
+        )  # fmt: skip
+        own_certificates = Path("/usr/local/share/ca-certificates")
+        if own_certificates.is_dir():
+            shutil.copytree(own_certificates, made / str(own_certificates)[1:], dirs_exist_ok=True)
+            subprocess.run(["chroot", made, "update-ca-certificates"], check=True)
+        made.rename(base)
+    release(root)
+    shutil.rmtree(root, ignore_errors=True)
+    subprocess.run(["cp", "-a", base, root], check=True)
+    shutil.copy("/etc/resolv.conf", root / "etc/resolv.conf")
+    subprocess.run(["git", "clone", "--quiet", ROOT, root / "root/sd2"], check=True)
+    for place in ("/proc", "/dev", *local_places()):
+        inner = root / place[1:]
+        inner.mkdir(parents=True, exist_ok=True)
+        subprocess.run(["mount", "--bind", place, inner], check=True)
+    return root
+
+
+def release(root: Path) -> None:
+    """Take off what was mounted in a system, so that removing it removes nothing else."""
+    mounted = Path("/proc/mounts").read_text("utf-8").splitlines()
+    inside = [line.split()[1] for line in mounted if line.split()[1].startswith(f"{root}/")]
+    for place in reversed(inside):
+        subprocess.run(["umount", "--lazy", place], check=True)
+
+
+def local_places() -> list[str]:
+    """Folders of this machine that pip looks into."""
+    values = [value for name, value in pip_settings(sys.executable) if name == "find-links"]
+    return sorted({one for value in values for one in value.split() if Path(one).is_dir()})
+
+
+class Typist:
+    """Types lines into a system, as its root in the clone, and notes when what is printed."""
+
+    def __init__(self, root: Path, log: Path) -> None:
+        self._root, self.log = root, log
+        self._environment = {
+            name: value
+            for name, value in os.environ.items()
+            if name.startswith(("PIP_", "UV_", "SSL_")) or name.lower().endswith("_proxy")
+        } | {"HOME": "/root", "TERM": "dumb", "PATH": "/usr/sbin:/usr/bin:/sbin:/bin"}
+        log.write_text("", "utf-8")
+
+    def output(self, line: str) -> str:
+        """What a line prints."""
+        words = ["chroot", str(self._root), "bash", "-c", line]
+        return subprocess.run(
+            words, env=self._environment, check=True, capture_output=True, text=True
+        ).stdout
+
+    def __call__(
+        self, line: str, until: Callable[[str], bool] | None, display: str = ""
+    ) -> Outcome:
+        """Type a line and wait for its end, or until what is printed or to be seen is enough."""
+        with virtual_display() if display else _nothing(), self.log.open("a") as log:
+            before = used_mb(self._root)
+            began = last = time.monotonic()
+            silence_s, reached = 0.0, False
+            process = subprocess.Popen(
+                ["chroot", str(self._root), "bash", "-c", f"cd /root/sd2 && {line}"],
+                env=self._environment | ({"DISPLAY": display} if display else {}),
+                stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                text=True, errors="replace", start_new_session=True,
+            )  # fmt: skip
+            print(f"$ {line}", file=log, flush=True)
+            watching = threading.Event()
+            if until and display:
+                threading.Thread(
+                    target=_watch, args=(until, process, watching), daemon=True
+                ).start()
+            assert process.stdout is not None
+            for printed in process.stdout:
+                now = time.monotonic()
+                silence_s, last = max(silence_s, now - last), now
+                print(f"{now - began:7.1f} s  {printed}", end="", file=log, flush=True)
+                reached = reached or bool(until and not display and until(printed))
+            code = process.wait()
+            seconds = time.monotonic() - began
+            silence_s = max(silence_s, time.monotonic() - last)
+            reached = reached or watching.is_set()
+        good = reached if until else code == 0
+        result = "the window" if display else "refused in words" if until else "done"
+        return Outcome(
+            line.splitlines()[-1] + (" (with a display)" if display else ""),
+            result if good else f"failed ({code})",
+            seconds,
+            silence_s,
+            used_mb(self._root) - before,
+        )
+
+
+def _watch(
+    seen: Callable[[str], bool], process: subprocess.Popen[str], done: threading.Event
+) -> None:
+    """End the process once something is to be seen on the display."""
+    while process.poll() is None and not done.is_set():
+        time.sleep(0.5)
+        if seen(""):
+            done.set()
+            os.killpg(process.pid, signal.SIGTERM)
+
+
+def window_picture(path: Path) -> Callable[[str], bool]:
+    """A check that the window is on the display; it takes a picture of it."""
+
+    def seen(_: str) -> bool:
+        environment = os.environ | {"DISPLAY": DISPLAY}
+        found = subprocess.run(
+            ["xdotool", "search", "--onlyvisible", "--name", TITLE],
+            env=environment, capture_output=True, check=False,
+        )  # fmt: skip
+        if found.returncode or not found.stdout.strip():
+            return False
+        time.sleep(5)  # for the maps, which follow the empty window
+        subprocess.run(["import", "-window", "root", path], env=environment, check=True)
+        return True
+
+    return seen
+
+
+@contextmanager
+def virtual_display() -> Iterator[None]:
+    """A display that the systems reach as well: they share this machine's network."""
+    server = subprocess.Popen(
+        ["Xvfb", DISPLAY, "-screen", "0", "1600x1000x24", "-noreset"],
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    time.sleep(1)
+    try:
+        yield
+    finally:
+        server.terminate()
+        server.wait()
+
+
+@contextmanager
+def _nothing() -> Iterator[None]:
+    yield
+
+
+def used_mb(root: Path) -> float:
+    """Space that a system takes, without what is mounted into it."""
+    done = subprocess.run(["du", "-smx", root], capture_output=True, text=True, check=False)
+    return float(done.stdout.split()[0]) * 1.048576
+
+
+def pip_lines() -> list[str]:
+    """The lines of the README for pip."""
+    text = (ROOT / "README.md").read_text("utf-8")
+    block = re.search(r"```sh\n((?:(?!```).)*pip install.*?)```", text, re.DOTALL)
+    assert block is not None
+    return [line.split("  #")[0].strip() for line in block[1].splitlines()]
+
+
+def weigh(environment: Path) -> list[tuple[str, float]]:
+    """Packages of an environment and their MB, the heaviest first."""
+    code = (
+        "import importlib.metadata as m, os\n"
+        "for d in m.distributions():\n"
+        "    files = [str(d.locate_file(f)) for f in d.files or []]\n"
+        "    size = sum(os.path.getsize(f) for f in files if os.path.isfile(f))\n"
+        "    print(d.metadata['Name'], size / 1e6)\n"
+    )
+    root = environment.parents[2]
+    inside = f"/{environment.relative_to(root)}/bin/python"
+    done = subprocess.run(
+        ["chroot", root, inside, "-c", code], check=True, capture_output=True, text=True
+    )
+    pairs = [line.split() for line in done.stdout.splitlines()]
+    return sorted(((name, float(mb)) for name, mb in pairs), key=lambda pair: -pair[1])
+
+
+def write_page(rows: list[str], weights: list[tuple[str, float]]) -> None:
+    """Write docs/fresh-machine.md."""
+    commit = subprocess.run(
+        ["git", "rev-parse", "--short", "HEAD"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout.strip()
+    model = re.search(r"^model name\s*: (.+)$", Path("/proc/cpuinfo").read_text(), re.MULTILINE)
+    heavy, others = weights[:WEIGHED], weights[WEIGHED:]
+    text = PAGE.format(
+        packages=PACKAGES.replace(",", " "),
+        date=datetime.date.today().isoformat(),
+        commit=commit,
+        machine=f"{model[1].strip() if model else 'unknown processor'}, {os.cpu_count()} cores",
+        rows="\n".join(rows),
+        environment_gb=sum(mb for _, mb in weights) / 1e3,
+        weights="\n".join(f"| {name} | {mb:.0f} |" for name, mb in heavy),
+        others=len(others),
+        others_mb=sum(mb for _, mb in others),
+    )
+    (ROOT / "docs/fresh-machine.md").write_text(text, "utf-8")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,147 @@
+"""Pages of measurements: what each was made from, and whether that has changed since.
+
+``python -m tools.documentation.measured`` says it of every page; ``--mark`` also writes it at the
+head of the pages. The test suite fails where a page does not say what is true of it, or is older
+than the program without standing in ``OLD``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import datetime
+import hashlib
+import re
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+
+from sd2core.files.atomic import atomic_write_text
+from tools.documentation.places import DOCS, REPOSITORY
+
+OLD = {}
+"""Pages that may be older than the program, and why they were not measured anew."""
+
+_DOPPLER = ("sd2core/doppler", "sd2core/scattering", "sd2core/maps")
+_BODY = ("sd2core/body", "resources/lifter.npz", "resources/sides.npz")
+_DENOISERS = ("resources/denoiser.safetensors", "resources/denoiser-limbs.safetensors")
+_CAMPAIGN = ("sd2core/simulate", "resources/fit_errors.json")
+
+
+@dataclass(frozen=True)
+class Measured:
+    """How a page is made, and the files and folders whose change makes it old."""
+
+    command: str
+    of: tuple[str, ...]
+
+
+PAGES = {
+    "accuracy-and-speed.md": Measured("make accuracy", (*_DOPPLER, "sd2core/accuracy", "sd2core/fmcw")),
+    "nulling.md": Measured("", ("sd2core/doppler",)),
+    "performance.md": Measured("make bench", (*_DOPPLER, "sd2core/fmcw")),
+    "scale.md": Measured("make scale", ("sd2core/batch", "sd2core/datasets")),
+    "fitting.md": Measured("make fitting", (*_BODY, "tools/fitting")),
+    "denoiser.md": Measured("make denoiser", ("sd2core/denoise", *_DENOISERS, *_CAMPAIGN)),
+    "denoiser-comparison.md": Measured(
+        "make denoiser-comparison", ("sd2core/denoise", "sd2core/train", *_CAMPAIGN)
+    ),
+    "range-synthesis.md": Measured("make range-synthesis", ("sd2core/denoise", "sd2core/train", *_CAMPAIGN)),
+    "real-pairs.md": Measured("", ("sd2core/pairs", "sd2core/denoise", "sd2core/train")),
+    "classifier.md": Measured("make classifier", ("sd2core/classify", *_DENOISERS, *_CAMPAIGN)),
+    "real-gestures.md": Measured("make real-gestures", ("sd2core/classify", "sd2core/labels/suggest.py")),
+    "whole-loop.md": Measured("make whole-loop", ("sd2core/classify", *_DENOISERS, *_CAMPAIGN)),
+    "paper.md": Measured("make paper", ("sd2core/classify", *_DENOISERS, *_CAMPAIGN)),
+}  # fmt: skip
+
+_STAMP = re.compile(r"\n*<!-- measured (\S+) at (\S+) of: (.*?) -->\s*\Z", re.DOTALL)
+_NOTE = re.compile(r"\n> \*\*Older than the program\.\*\*.*?\n(?=\n)", re.DOTALL)
+
+
+def write_page(name: str, text: str) -> None:
+    """Write a page of ``docs/`` that has just been measured, with what it was made from."""
+    commit = _git("rev-parse", "--short=8", "HEAD")
+    atomic_write_text(DOCS / name, stamped(text, name, datetime.date.today().isoformat(), commit))
+
+
+def stamped(text: str, name: str, date: str, commit: str, root: Path = REPOSITORY) -> str:
+    """A page with the hashes of what it was made from at its end."""
+    parts = ", ".join(f"{part} {digest(root / part)}" for part in PAGES[name].of)
+    bare = _NOTE.sub("", _STAMP.sub("", text)).rstrip("\n")
+    return f"{bare}\n\n<!-- measured {date} at {commit} of: {parts} -->\n"
+
+
+def changed(text: str, name: str) -> list[str]:
+    """What has changed of what a page was made from; everything if it does not say."""
+    stamp = _STAMP.search(text)
+    if stamp is None:
+        return list(PAGES[name].of)
+    then = dict(part.split(" ") for part in stamp[3].split(", "))
+    return [part for part in PAGES[name].of if then.get(part) != digest(REPOSITORY / part)]
+
+
+def marked(text: str, name: str) -> str:
+    """A page that says at its head whether it is older than the program."""
+    bare = _NOTE.sub("", text)
+    parts = changed(bare, name)
+    if not parts:
+        return bare
+    stamp = _STAMP.search(bare)
+    since = f"since {stamp[1]} (commit {stamp[2]})" if stamp else "since it was written"
+    command = PAGES[name].command
+    anew = f" `{command}` measures it anew." if command else ""
+    note = f"> **Older than the program.** Changed {since}: {', '.join(parts)}.{anew}"
+    title, _, rest = bare.partition("\n")
+    return f"{title}\n\n{note}\n{rest}"
+
+
+def digest(path: Path) -> str:
+    """Hash of a file, or of all Python in a folder; comments and docstrings do not count."""
+    if not path.exists():
+        return "-"
+    total = hashlib.sha256()
+    for file in sorted(path.rglob("*.py")) if path.is_dir() else [path]:
+        if file.suffix != ".py":
+            total.update(file.read_bytes())
+            continue
+        tree = ast.parse(file.read_text("utf-8"))
+        for node in ast.walk(tree):
+            body = getattr(node, "body", None)
+            if isinstance(body, list):
+                node.body = [one for one in body if not _is_text(one)]  # type: ignore[attr-defined]
+        total.update(ast.dump(tree).encode())
+    return total.hexdigest()[:8]
+
+
+def _is_text(statement: ast.AST) -> bool:
+    return (
+        isinstance(statement, ast.Expr)
+        and isinstance(statement.value, ast.Constant)
+        and isinstance(statement.value.value, str)
+    )
+
+
+def _git(*arguments: str) -> str:
+    done = subprocess.run(
+        ["git", *arguments], cwd=REPOSITORY, check=True, capture_output=True, text=True
+    )
+    return done.stdout.strip()
+
+
+def main() -> None:
+    """Say of each page whether it is as new as the program; with ``--mark`` in the page too."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--mark", action="store_true", help="write it at the head of the pages")
+    options = parser.parse_args()
+    for name in PAGES:
+        text = (DOCS / name).read_text("utf-8")
+        parts = changed(text, name)
+        print(
+            f"{name}: {'changed since: ' + ', '.join(parts) if parts else 'as new as the program'}"
+        )
+        if options.mark and (new := marked(text, name)) != text:
+            atomic_write_text(DOCS / name, new)
+
+
+if __name__ == "__main__":
+    main()

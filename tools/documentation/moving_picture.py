@@ -1,0 +1,85 @@
+"""The moving picture of the README: the sensor is dragged round the body, and the maps follow.
+
+``make moving-picture`` draws the real window on the bundled sample, which is simulated, and
+writes ``docs/images/dragging.gif``.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+
+from PIL import Image
+from PySide6.QtGui import QImage
+from PySide6.QtWidgets import QApplication
+
+from sd2app.shell.window import MainWindow
+from sd2core.files.resources import resource_path
+from tools.documentation.places import IMAGES, REPOSITORY
+from tools.documentation.windows import opened
+
+SIZE = (1280, 720)
+SHOWN_WIDTH = 880
+STEPS = 36
+"""Pictures of one way to the side and back."""
+
+FRAME_MS = 90
+FOLLOWS_S = 0.35
+"""Longer than any map takes to follow the hand."""
+
+COLOURS = 256
+LIMIT_BYTES = 3_000_000
+
+
+def main() -> None:
+    """Drag, draw, write."""
+    application = QApplication(sys.argv[:1])
+    window = opened(application, [resource_path("swipes.sd2")])
+    window.resize(*SIZE)
+    window.session.playback.seek(1.9)
+    _run(application, 1.0)
+    edits = window.session.edits
+    pictures = [_picture(window)]
+    edits.begin_sensor_drag()
+    for step in range(1, STEPS + 1):
+        turned = math.sin(math.pi * step / STEPS) ** 2
+        edits.drag_sensor((2.2 * turned, -0.25 * turned, 1.3 * turned))
+        _run(application, FOLLOWS_S)
+        pictures.append(_picture(window))
+    edits.end_sensor_drag()
+    palette = pictures[STEPS // 2].quantize(COLOURS, method=Image.Quantize.MAXCOVERAGE)
+    frames = [one.quantize(palette=palette, dither=Image.Dither.NONE) for one in pictures]
+    path = IMAGES / "dragging.gif"
+    frames[0].save(
+        path, save_all=True, append_images=frames[1:], duration=FRAME_MS, loop=0, optimize=True
+    )
+    size = path.stat().st_size
+    print(f"{path.relative_to(REPOSITORY)}: {size / 1e6:.1f} MB")
+    window.session.document.undo_stack.setClean()
+    window.close()
+    if size > LIMIT_BYTES:
+        raise SystemExit(f"It may have {LIMIT_BYTES / 1e6:.0f} MB: take fewer STEPS or COLOURS")
+
+
+def _run(application: QApplication, seconds: float) -> None:
+    """Let the window work for a while."""
+    until = time.monotonic() + seconds
+    while time.monotonic() < until:
+        application.processEvents()
+        time.sleep(0.005)
+
+
+def _picture(window: MainWindow) -> Image.Image:
+    """The window as it is, in the width that a page shows."""
+    drawn = window.grab().toImage().convertToFormat(QImage.Format.Format_RGB888)
+    pixels = bytes(drawn.constBits())
+    whole = Image.frombytes(
+        "RGB", (drawn.width(), drawn.height()), pixels, "raw", "RGB", drawn.bytesPerLine()
+    )
+    height = round(SHOWN_WIDTH * drawn.height() / drawn.width())
+    return whole.resize((SHOWN_WIDTH, height), Image.Resampling.LANCZOS)
+
+
+if __name__ == "__main__":
+    main()
