@@ -64,8 +64,7 @@ $(PROGRAM): pyproject.toml constraints.txt scripts/install.py | system-packages
 	@touch $@
 
 $(COMPILED): $(PROGRAM) $(KERNELS)
-	@echo "Compiling the kernels (half a minute, once)"
-	@$(BIN)/sd2 warm-up
+	@"$$(scripts/find_python.sh)" scripts/install.py kernels
 	@touch $@
 
 # Needs a connection once; `sd2 fit` fetches them as well, and says what to do without one.

@@ -19,8 +19,8 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -39,6 +39,7 @@ SYSTEMS = {
 
 DISPLAY = ":77"
 TITLE = "SD² Studio"
+MAPS_S = 6.0  # what the window shows follows the window
 WEIGHED = 8  # packages that the page names
 
 PAGE = """\
@@ -103,26 +104,22 @@ def try_system(suite: str) -> tuple[str, list[Outcome]]:
     run = Typist(root, PLACE / f"{suite}.log")
     python = run.output("python3 --version").split()[1]
     if tuple(map(int, python.split(".")[:2])) < (3, 11):
-        outcome = run("make demo", lambda line: "is needed" in line)
-        return python, [outcome]
-    with_display = run("make demo", window_picture(PLACE / f"{suite}.png"), display=DISPLAY)
-    outcomes = [with_display, run("make demo", None)]
+        return python, [run("make demo", printed="is needed")]
+    outcomes = [run("make demo", seen=PLACE / f"{suite}.png"), run("make demo")]
     if os.environ.get("TESTS", "yes") == "yes":
-        outcomes.append(run("make test", None))
+        outcomes.append(run("make test"))
     root = bare_system(suite, again="-pip")
     run = Typist(root, PLACE / f"{suite}-pip.log")
     *lines, last = pip_lines()
-    outcomes.append(run("\n".join(lines), None))
+    outcomes.append(run("\n".join(lines)))
     # What a bare system lacks is printed as a line to type.
     window = f". sd2-environment/bin/activate\n{last}"
-    refused = run(window, lambda line: "apt-get install" in line)
-    if refused.result == "refused in words":
-        told = re.findall(r"(apt-get update.*apt-get install.*)", run.log.read_text("utf-8"))
-        outcomes += [
-            refused,
-            run(told[-1].replace("sudo ", "").replace("install", "install -y"), None),
-        ]
-    outcomes.append(run(window, window_picture(PLACE / f"{suite}-pip.png"), display=DISPLAY))
+    outcomes.append(run(window, printed="apt-get install", display=True))
+    told = re.findall(r"apt-get update.*apt-get install[^.]*", run.log.read_text("utf-8"))
+    if told:
+        install = told[-1].replace("sudo ", "").replace(" install ", " install --yes ")
+        outcomes.append(run(install, shown="apt-get install … (as printed)"))
+    outcomes.append(run(window, seen=PLACE / f"{suite}-pip.png"))
     return python, outcomes
 
 
@@ -193,39 +190,45 @@ class Typist:
         ).stdout
 
     def __call__(
-        self, line: str, until: Callable[[str], bool] | None, display: str = ""
+        self,
+        line: str,
+        *,
+        printed: str = "",
+        seen: Path | None = None,
+        display: bool = False,
+        shown: str = "",
     ) -> Outcome:
-        """Type a line and wait for its end, or until what is printed or to be seen is enough."""
-        with virtual_display() if display else _nothing(), self.log.open("a") as log:
+        """Type a line and wait for its end; it must print a text, or show the window.
+
+        The window is drawn into the file ``seen``, and closed.
+        """
+        display = display or seen is not None
+        environment = self._environment | ({"DISPLAY": DISPLAY} if display else {})
+        with virtual_display() if display else nullcontext(), self.log.open("a") as log:
             before = used_mb(self._root)
             began = last = time.monotonic()
-            silence_s, reached = 0.0, False
+            silence_s, found, there = 0.0, False, threading.Event()
             process = subprocess.Popen(
-                ["chroot", str(self._root), "bash", "-c", f"cd /root/sd2 && {line}"],
-                env=self._environment | ({"DISPLAY": display} if display else {}),
-                stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                text=True, errors="replace", start_new_session=True,
+                ["chroot", str(self._root), "bash", "-e", "-c", f"cd /root/sd2\n{line}"],
+                env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT, text=True, errors="replace", start_new_session=True,
             )  # fmt: skip
             print(f"$ {line}", file=log, flush=True)
-            watching = threading.Event()
-            if until and display:
-                threading.Thread(
-                    target=_watch, args=(until, process, watching), daemon=True
-                ).start()
+            if seen is not None:
+                threading.Thread(target=_watch, args=(seen, process, there), daemon=True).start()
             assert process.stdout is not None
-            for printed in process.stdout:
+            for text in process.stdout:
                 now = time.monotonic()
                 silence_s, last = max(silence_s, now - last), now
-                print(f"{now - began:7.1f} s  {printed}", end="", file=log, flush=True)
-                reached = reached or bool(until and not display and until(printed))
+                print(f"{now - began:7.1f} s  {text}", end="", file=log, flush=True)
+                found = found or bool(printed and printed in text)
             code = process.wait()
             seconds = time.monotonic() - began
             silence_s = max(silence_s, time.monotonic() - last)
-            reached = reached or watching.is_set()
-        good = reached if until else code == 0
-        result = "the window" if display else "refused in words" if until else "done"
+        good = there.is_set() if seen else found if printed else code == 0
+        result = "the window" if seen else "said what to do" if printed else "done"
         return Outcome(
-            line.splitlines()[-1] + (" (with a display)" if display else ""),
+            (shown or line.splitlines()[-1]) + (" (on a display)" if display else ""),
             result if good else f"failed ({code})",
             seconds,
             silence_s,
@@ -233,33 +236,21 @@ class Typist:
         )
 
 
-def _watch(
-    seen: Callable[[str], bool], process: subprocess.Popen[str], done: threading.Event
-) -> None:
-    """End the process once something is to be seen on the display."""
-    while process.poll() is None and not done.is_set():
+def _watch(picture: Path, process: subprocess.Popen[str], there: threading.Event) -> None:
+    """Draw the window once it is on the display, and end the process."""
+    environment = os.environ | {"DISPLAY": DISPLAY}
+    while process.poll() is None:
         time.sleep(0.5)
-        if seen(""):
-            done.set()
-            os.killpg(process.pid, signal.SIGTERM)
-
-
-def window_picture(path: Path) -> Callable[[str], bool]:
-    """A check that the window is on the display; it takes a picture of it."""
-
-    def seen(_: str) -> bool:
-        environment = os.environ | {"DISPLAY": DISPLAY}
         found = subprocess.run(
             ["xdotool", "search", "--onlyvisible", "--name", TITLE],
             env=environment, capture_output=True, check=False,
         )  # fmt: skip
-        if found.returncode or not found.stdout.strip():
-            return False
-        time.sleep(5)  # for the maps, which follow the empty window
-        subprocess.run(["import", "-window", "root", path], env=environment, check=True)
-        return True
-
-    return seen
+        if found.stdout.strip():
+            there.set()
+            time.sleep(MAPS_S)
+            subprocess.run(["import", "-window", "root", picture], env=environment, check=True)
+            os.killpg(process.pid, signal.SIGTERM)
+            return
 
 
 @contextmanager
@@ -275,11 +266,6 @@ def virtual_display() -> Iterator[None]:
     finally:
         server.terminate()
         server.wait()
-
-
-@contextmanager
-def _nothing() -> Iterator[None]:
-    yield
 
 
 def used_mb(root: Path) -> float:

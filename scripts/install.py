@@ -1,6 +1,7 @@
 """Install this checkout and what it needs into .venv, and say what is being done.
 
 usage: python3 scripts/install.py [EXTRA]      EXTRA: test, docs or dev of pyproject.toml
+       python3 scripts/install.py kernels      compile the kernels of what is installed
 
 The versions are those of constraints.txt. uv installs, because it does so in seconds and can be
 told to take the CPU build of torch; where it cannot be had or fails, pip does. Either asks the
@@ -31,7 +32,7 @@ PACKAGES = BUILD / "packages"
 CONSTRAINTS = "constraints.txt"
 
 SILENCE_S = 8.0
-"""After so long without a line, what is being waited for is said."""
+"""After so long without a line, what is waited for is said."""
 NEEDED_GB = {"program": 3.2, "docs": 1.0, "test": 1.0, "dev": 1.5}
 """Free space that an installation takes, with what is fetched for it and removed again."""
 
@@ -56,6 +57,10 @@ def main() -> int:
     """Install the program, or an extra of it; 1 if neither uv nor pip could."""
     extra = sys.argv[1] if len(sys.argv) > 1 else "program"
     BUILD.mkdir(exist_ok=True)
+    if extra == "kernels":
+        print("Compiling the kernels (half a minute, once)", flush=True)
+        code = run([str(PYTHON.with_name("sd2")), "warm-up"], waiting="the compiler")
+        return explain(code) if code else 0
     free_gb = shutil.disk_usage(ROOT).free / 1e9
     if free_gb < NEEDED_GB[extra]:
         print(
@@ -145,8 +150,10 @@ def pip_places() -> tuple[list[str], str]:
     return [word for pair in places for word in pair], dict(settings).get("cert", "")
 
 
-def run(command: list[str], environment: dict[str, str] | None = None) -> int:
-    """Run a program, print its lines and what it waits for, and keep all of it in the log."""
+def run(
+    command: list[str], environment: dict[str, str] | None = None, waiting: str = "unpacking"
+) -> int:
+    """Run a program, print its lines and what is waited for, and keep all of it in the log."""
     process = subprocess.Popen(
         command,
         cwd=ROOT,
@@ -168,9 +175,10 @@ def run(command: list[str], environment: dict[str, str] | None = None) -> int:
             except queue.Empty:
                 written_mb = max(0, free - shutil.disk_usage(ROOT).free) / 1e6
                 names = [f"{name} ({size})" for name, size in fetched.items()]
+                awaited = ", ".join(names[:3]) or waiting
+                passed_s = time.monotonic() - began
                 print(
-                    f"  … {time.monotonic() - began:.0f} s: {written_mb:,.0f} MB written;"
-                    f" waiting for {', '.join(names[:3]) or 'packages to be unpacked'}",
+                    f"  … {passed_s:.0f} s: {written_mb:,.0f} MB written; waiting for {awaited}",
                     flush=True,
                 )
                 continue
@@ -204,7 +212,9 @@ def _worth_saying(line: str, fetched: dict[str, str]) -> str:
         return f"Unpacking {line.count(',') + 1} packages"
     if line.startswith("Successfully installed"):
         return f"{len(line.split()) - 2} packages installed"
-    return line if re.match(r"(Resolved|Prepared|Installed|Building|Built) ", line) else ""
+    return (
+        line if re.match(r"(Resolved|Prepared|Installed|Building|Built|Compiling:?) ", line) else ""
+    )
 
 
 def explain(code: int) -> int:

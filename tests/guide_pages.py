@@ -12,7 +12,10 @@ from pathlib import Path
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 
-_FENCE = re.compile(r"^( *)```(\S*)[^\n]*\n(.*?)^\1``` *$", re.DOTALL | re.MULTILINE)
+_FENCE = re.compile(
+    r"^(?P<indent> *)```(?P<language>\S*)(?P<words>[^\n]*)\n(?P<text>.*?)^(?P=indent)``` *$",
+    re.DOTALL | re.MULTILINE,
+)
 _COMMENT = r"<!-- {}: ((?:(?!-->).)+?) -->"
 _OPERATORS = {"|", "||", "&", "&&", ";", ">", ">>", "<"}
 
@@ -25,6 +28,24 @@ class Block:
     line: int  # of its first line of code, from 1
     text: str
     not_run: str  # the reason; empty for what is run
+    seen: bool  # it shows lines that the block before prints
+
+    @property
+    def to_run(self) -> bool:
+        """True if a reader is meant to run it, and a test does."""
+        return self.language in ("sh", "python") and not self.not_run
+
+    def line_not_printed(self, printed: str) -> str | None:
+        """First of its lines that was not printed, or not below the lines above it.
+
+        Other lines may stand between them; "…" is any text, and a run of spaces is one.
+        """
+        lines = iter([" ".join(line.split()) for line in printed.splitlines()])
+        for line in self.text.splitlines():
+            pattern = re.escape(" ".join(line.split())).replace("…", ".*")
+            if line.strip() != "…" and not any(re.fullmatch(pattern, one) for one in lines):
+                return line
+        return None
 
 
 @dataclass(frozen=True)
@@ -52,10 +73,11 @@ class Page:
             )
             found.append(
                 Block(
-                    language=fence[2],
-                    line=self.text.count("\n", 0, fence.start(3)) + 1,
-                    text=textwrap.dedent(fence[3]),
+                    language=fence["language"],
+                    line=self.text.count("\n", 0, fence.start("text")) + 1,
+                    text=textwrap.dedent(fence["text"]),
                     not_run=said[1] if said else "",
+                    seen=fence["language"] == "text" and "seen" in fence["words"].split(),
                 )
             )
         return tuple(found)
@@ -63,9 +85,7 @@ class Page:
     @property
     def to_run(self) -> tuple[Block, ...]:
         """Blocks that a reader is meant to run, in order."""
-        return tuple(
-            one for one in self.blocks if one.language in ("sh", "python") and not one.not_run
-        )
+        return tuple(one for one in self.blocks if one.to_run)
 
     @property
     def slow(self) -> bool:
@@ -78,12 +98,22 @@ class Page:
         told = re.search(_COMMENT.format("needs shared data"), self.text, re.S)
         return dict(one.split("=", 1) for one in told[1].split()) if told else {}
 
-    def sd2_lines(self) -> Iterator[str]:
-        """Every line that calls ``sd2``, run or not."""
+    def inline_code(self) -> Iterator[tuple[int, str]]:
+        """Line and text of what stands between backticks in the prose."""
+
+        def blank(found: re.Match[str]) -> str:
+            return "\n" * found[0].count("\n")
+
+        prose = re.sub(r"<!--.*?-->", blank, _FENCE.sub(blank, self.text), flags=re.DOTALL)
+        for code in re.finditer(r"(`+)((?:(?!\n *\n).)+?)(?<!`)\1(?!`)", prose, re.DOTALL):
+            yield prose.count("\n", 0, code.start()) + 1, " ".join(code[2].split())
+
+    def lines_calling(self, program: str) -> Iterator[str]:
+        """Every line of a shell's block that calls a program, run or not."""
         for block in self.blocks:
             if block.language == "sh":
                 lines = block.text.replace("\\\n", " ").splitlines()
-                yield from (line for line in lines if line.startswith("sd2 "))
+                yield from (line for line in lines if line.startswith(f"{program} "))
 
 
 def sd2_arguments(line: str) -> list[str]:

@@ -7,32 +7,24 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from guide_pages import REPOSITORY, Page, sd2_arguments
+from guide_pages import REPOSITORY, Page, pages_to_follow, sd2_arguments
+from named_commands import PARSER, commands_of, fault_of, parsers_of
 
-from sd2app.command_line import full_parser
 from sd2core.cli.running import attach_negative_values
-from tools.documentation.command_pages import commands_of
 
 COMMAND_PAGES = REPOSITORY / "docs" / "commands"
 DOCUMENTS = [
     REPOSITORY / name
     for name in ("README.md", "CONTRIBUTING.md", "resources/README.md", "tools/README.md")
 ] + [path for path in sorted((REPOSITORY / "docs").rglob("*.md")) if path.parent != COMMAND_PAGES]
-
-
-PARSER = full_parser()
+FOR_USERS = {page.path for page in pages_to_follow()}
 
 
 def command_lines() -> Iterator[str]:
     for document in DOCUMENTS:
-        yield from Page(document).sd2_lines()
-    parsers = [PARSER]
-    while parsers:
-        parser = parsers.pop()
+        yield from Page(document).lines_calling("sd2")
+    for parser in parsers_of():
         yield from re.findall(r"^  (sd2 .*?)(?:   .*)?$", parser.epilog or "", re.MULTILINE)
-        for action in parser._actions:
-            if isinstance(action.choices, dict):
-                parsers.extend(action.choices.values())
 
 
 @pytest.mark.parametrize("line", sorted(set(command_lines())))
@@ -41,9 +33,81 @@ def test_commands_are_understood(line: str) -> None:
     assert callable(options.handler)
 
 
-@pytest.mark.parametrize(
+each_document = pytest.mark.parametrize(
     "document", DOCUMENTS, ids=lambda path: path.relative_to(REPOSITORY).as_posix()
 )
+
+
+@each_document
+def test_what_prose_names_is_there(document: Path) -> None:
+    """Commands, options and choices, and targets of make, between backticks."""
+    faults = [
+        f"{document.relative_to(REPOSITORY)}:{line}: `{code}`: {fault}"
+        for line, code in Page(document).inline_code()
+        if (fault := fault_of(code, tool_options=document not in FOR_USERS))
+    ]
+    faults += [
+        f"{document.relative_to(REPOSITORY)}: {line}: {fault}"
+        for line in Page(document).lines_calling("make")
+        if (fault := fault_of(line.partition("#")[0], tool_options=False))
+    ]
+    assert not faults, "\n".join(faults)
+
+
+def test_what_help_texts_name_is_there() -> None:
+    faults = []
+    for parser in parsers_of():
+        own = [action.help or "" for action in parser._actions]
+        groups = [group.description or "" for group in parser._action_groups]
+        for text in (parser.description or "", *groups, *own):
+            named = [" ".join(code.split()) for code in re.findall(r"`([^`]+)`", text)]
+            rest = " ".join(re.sub(r"`[^`]+`", "", text).split())
+            named += re.findall(r"(?<![\w.-])(?:--[a-z][\w-]*|sd2 [a-z-]+)", rest)
+            faults += [
+                f"{parser.prog} --help: {code}: {fault}"
+                for code in named
+                if (fault := fault_of(code, tool_options=False))
+            ]
+    assert not faults, "\n".join(faults)
+
+
+@pytest.mark.parametrize(
+    ("code", "fault"),
+    [
+        ("sd2", None),
+        ("sd2 fit", None),
+        ("sd2 COMMAND --help", None),
+        ("sd2 import … --copy", None),
+        ("sd2 … --background", None),
+        ("sd2 synth --sensor -1,0,2 --visibility exact", None),
+        ("sd2 labels convert FILE --out FILE", None),
+        ("sd2 simulate campaign --protocol paper|varied", None),
+        ("--null-bins none", None),
+        ("make soak MINUTES=4", None),
+        ("pip install --user", None),
+        ("python -m tools.fitting score FOLDER --keep FITS", None),
+        ("sd2 fits", "sd2 has no command fits"),
+        ("sd2 simulate people", "sd2 simulate has no command people"),
+        ("sd2 fit --camera", "sd2 fit has no --camera"),
+        ("sd2 radar --clutter most", "sd2 radar --clutter: most is none of"),
+        ("sd2 synth --bins many", "sd2 synth --bins:"),
+        ("sd2 doctor walk.mp4", "sd2 doctor takes no word such as walk.mp4"),
+        ("sd2 … --camera", "no command has --camera"),
+        ("--camera", "no command has --camera"),
+        ("--clutter most", "most is none of"),
+        ("--placements N", "takes no number N"),
+        ("python -m tools.fitting score --camera", "no tool has --camera"),
+        ("python -m tools.tea", "there is no tools.tea"),
+        ("make tea", "the Makefile has no target tea"),
+        ("make soak HOURS=1", "the Makefile has no variable HOURS"),
+    ],
+)
+def test_names_are_understood_as_far_as_they_go(code: str, fault: str | None) -> None:
+    found = fault_of(code, tool_options=False)
+    assert found is None if fault is None else fault in (found or "")
+
+
+@each_document
 def test_links_lead_somewhere(document: Path) -> None:
     for target in re.findall(r"\]\(([^)#]+)", document.read_text("utf-8")):
         if "://" in target:
