@@ -77,7 +77,7 @@ class Outcome:
 
 def main() -> int:
     """Try all systems; 1 if one of them could not do what the README says."""
-    missing = [name for name in ("debootstrap", "Xvfb", "xdotool", "import", "chroot")
+    missing = [name for name in ("debootstrap", "Xvfb", "xdotool", "import", "unshare")
                if not shutil.which(name)]  # fmt: skip
     if missing or os.geteuid():
         print(f"Needs root, and these programs: {', '.join(missing) or 'all there'}")
@@ -92,7 +92,9 @@ def main() -> int:
             f" {one.silence_s:.0f} s | {one.written_mb:,.0f} MB |"
             for one in outcomes
         ]
-        weights = weights or weigh(PLACE / suite / "root/sd2/.venv")
+        environment = PLACE / suite / "root/sd2/.venv"
+        if not weights and environment.is_dir():
+            weights = weigh(environment)
         print("\n".join(rows), flush=True)
     write_page(rows, weights)
     return int(any("failed" in row for row in rows))
@@ -144,24 +146,34 @@ def bare_system(suite: str, again: str = "") -> Path:
             shutil.copytree(own_certificates, made / str(own_certificates)[1:], dirs_exist_ok=True)
             subprocess.run(["chroot", made, "update-ca-certificates"], check=True)
         made.rename(base)
-    release(root)
     shutil.rmtree(root, ignore_errors=True)
     subprocess.run(["cp", "-a", base, root], check=True)
     shutil.copy("/etc/resolv.conf", root / "etc/resolv.conf")
     subprocess.run(["git", "clone", "--quiet", ROOT, root / "root/sd2"], check=True)
-    for place in ("/proc", "/dev", *local_places()):
-        inner = root / place[1:]
-        inner.mkdir(parents=True, exist_ok=True)
-        subprocess.run(["mount", "--bind", place, inner], check=True)
     return root
 
 
-def release(root: Path) -> None:
-    """Take off what was mounted in a system, so that removing it removes nothing else."""
-    mounted = Path("/proc/mounts").read_text("utf-8").splitlines()
-    inside = [line.split()[1] for line in mounted if line.split()[1].startswith(f"{root}/")]
-    for place in reversed(inside):
-        subprocess.run(["umount", "--lazy", place], check=True)
+def inside(root: Path, script: str) -> list[str]:
+    """The command that runs a script in a system.
+
+    What it needs of this machine is mounted where that command alone sees it, read only: mounts
+    that others see are emptied by whoever removes the folder.
+    """
+    mounts = ["mount -t proc proc $0/proc"]
+    for place in local_places():
+        mounts += [f"mkdir -p $0{place}", f"mount --bind -o ro {place} $0{place}"]
+    enter = " && ".join([*mounts, 'exec chroot "$0" bash -e -c "$1"'])
+    return [
+        "unshare",
+        "--mount",
+        "--propagation",
+        "private",
+        "bash",
+        "-c",
+        enter,
+        str(root),
+        script,
+    ]
 
 
 def local_places() -> list[str]:
@@ -184,9 +196,12 @@ class Typist:
 
     def output(self, line: str) -> str:
         """What a line prints."""
-        words = ["chroot", str(self._root), "bash", "-c", line]
         return subprocess.run(
-            words, env=self._environment, check=True, capture_output=True, text=True
+            inside(self._root, line),
+            env=self._environment,
+            check=True,
+            capture_output=True,
+            text=True,
         ).stdout
 
     def __call__(
@@ -209,7 +224,7 @@ class Typist:
             began = last = time.monotonic()
             silence_s, found, there = 0.0, False, threading.Event()
             process = subprocess.Popen(
-                ["chroot", str(self._root), "bash", "-e", "-c", f"cd /root/sd2\n{line}"],
+                inside(self._root, f"cd /root/sd2\n{line}"),
                 env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT, text=True, errors="replace", start_new_session=True,
             )  # fmt: skip
