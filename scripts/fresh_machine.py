@@ -88,7 +88,7 @@ def main() -> int:
         name, _ = SYSTEMS[suite]
         python, outcomes = try_system(suite)
         rows += [
-            f"| {name} | {python} | `{one.typed}` | {one.result} | {one.seconds:.0f} s |"
+            f"| {name} | {python} | {one.typed} | {one.result} | {one.seconds:.0f} s |"
             f" {one.silence_s:.0f} s | {one.written_mb:,.0f} MB |"
             for one in outcomes
         ]
@@ -117,10 +117,10 @@ def try_system(suite: str) -> tuple[str, list[Outcome]]:
     # What a bare system lacks is printed as a line to type.
     window = f". sd2-environment/bin/activate\n{last}"
     outcomes.append(run(window, printed="apt-get install", display=True))
-    told = re.findall(r"apt-get update.*apt-get install[^.]*", run.log.read_text("utf-8"))
+    told = re.findall(r"apt-get update.*apt-get install.*[^.\s]", run.log.read_text("utf-8"))
     if told:
         install = told[-1].replace("sudo ", "").replace(" install ", " install --yes ")
-        outcomes.append(run(install, shown="apt-get install … (as printed)"))
+        outcomes.append(run(install, shown="the line that it printed"))
     outcomes.append(run(window, seen=PLACE / f"{suite}-pip.png"))
     return python, outcomes
 
@@ -243,7 +243,7 @@ class Typist:
         good = there.is_set() if seen else found if printed else code == 0
         result = "the window" if seen else "said what to do" if printed else "done"
         return Outcome(
-            (shown or line.splitlines()[-1]) + (" (on a display)" if display else ""),
+            (shown or f"`{line.splitlines()[-1]}`") + (", on a display" if display else ""),
             result if good else f"failed ({code})",
             seconds,
             silence_s,

@@ -11,6 +11,16 @@ from pathlib import Path
 import numpy as np
 
 REPOSITORY = Path(__file__).resolve().parent.parent
+MANUAL_PAGES = """
+from PySide6.QtGui import QGuiApplication, QImageReader
+from sd2app.command_line import full_parser
+from sd2app.manual.pages import Manual, manual_folder
+manual = Manual(manual_folder(), full_parser)
+application = QGuiApplication(["sd2", "-platform", "offscreen"])
+assert QImageReader(str(manual_folder() / "images/concepts/aliasing.svg")).canRead()
+print(manual_folder(), sum(bool(manual.text(name)) for name in manual.titles))
+"""
+"""Program that prints where the pages of the manual are, and how many of them it can read."""
 
 
 def build_wheel(project: Path, into: Path) -> Path:

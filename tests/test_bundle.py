@@ -7,9 +7,21 @@ from pathlib import Path
 
 import pytest
 
-from tests.environments import REPOSITORY, assert_shows_a_window, call
+from sd2app.command_line import full_parser
+from tests.environments import MANUAL_PAGES, REPOSITORY, assert_shows_a_window, call
 
 RECIPE = REPOSITORY / "app" / "packaging" / "sd2-studio.spec"
+PICTURE = ("demo", "--screenshot", "window.png")
+CAMPAIGN = (
+    *("simulate", "campaign", "--out", "pairs.zarr"),
+    *("--minutes", "0.5", "--take-seconds", "5", "--workers", "2"),
+)
+TRAINING = ("train", "pairs.zarr", "--epochs", "1", "--background", "--out", "run")
+
+
+@pytest.mark.parametrize("words", [PICTURE, CAMPAIGN, TRAINING])
+def test_what_the_bundle_is_asked_to_do_is_understood(words: tuple[str, ...]) -> None:
+    full_parser().parse_args(words)
 
 
 @pytest.mark.slow
@@ -21,10 +33,11 @@ def test_the_program_in_a_folder_starts_and_starts_its_own_processes(tmp_path: P
     sd2, away = tmp_path / "sd2-studio" / "sd2", tmp_path / "away"
     away.mkdir()
     # Compiled kernels in a background process, models in another.
-    call(sd2, "demo", "--screenshot", "window.png", cwd=away)
+    call(sd2, *PICTURE, cwd=away)
     assert_shows_a_window(away / "window.png")
-    campaign = ("simulate", "campaign", "pairs.zarr", "--minutes", "0.5", "--processes", "2")
-    call(sd2, *campaign, cwd=away)
-    training = ("train", "pairs.zarr", "--epochs", "1", "--background", "--out", "run")
-    call(sd2, *training, cwd=away)
+    folder, pages = call(sd2, "-c", MANUAL_PAGES, cwd=away).split()
+    assert Path(folder).is_relative_to(tmp_path)
+    assert int(pages) > 80
+    call(sd2, *CAMPAIGN, cwd=away)
+    call(sd2, *TRAINING, cwd=away)
     assert (away / "run" / "best.safetensors").is_file()

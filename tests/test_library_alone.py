@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 import sysconfig
@@ -97,6 +98,7 @@ def test_the_wheel_holds_the_library_and_nothing_else(wheel: Path) -> None:
         (metadata,) = (name for name in archive.namelist() if name.endswith("/METADATA"))
         said = Parser().parsestr(archive.read(metadata).decode())
         assert any(name.endswith("/LICENSE") for name in archive.namelist())
+    assert "sd2core/py.typed" in names
     assert names == {
         (prefix / path.relative_to(REPOSITORY)).as_posix()
         for folder, prefix in (("sd2core", Path()), ("resources", Path("sd2core")))
@@ -140,9 +142,25 @@ def test_what_needs_the_window_is_said_in_one_sentence(command: list[object]) ->
     done = sd2_alone(*command)
     assert done.returncode == 1
     assert done.stderr == (
-        f"sd2: `sd2 {command[0]}` needs the window, which is not in the library alone (sd2-core):"
-        " type `pip uninstall sd2-core`, then `pip install sd2_studio-….whl`.\n"
+        f"sd2: `sd2 {command[0]}` needs the window, which is not in the library alone (sd2-core)."
+        " Type `pip uninstall sd2-core`, then `pip install sd2_studio-….whl`.\n"
     )
+
+
+def test_commands_that_are_not_there_are_not_listed() -> None:
+    done = sd2_alone("--help")
+    listed = set(re.findall(r"^    ([a-z][\w-]*)", done.stdout, re.M))
+    shown = set(re.findall(r"^  sd2 (\S+)", done.stdout, re.M))
+    assert {"info", "synth", "compare-meshes", "demo"} <= listed
+    assert not {"open", "doctor"} & (listed | shown)
+    assert shown <= listed
+    assert "--screenshot" not in sd2_alone("demo", "--help").stdout
+
+
+def test_a_copy_of_the_sample_is_made_without_the_window(tmp_path: Path) -> None:
+    done = sd2_alone("demo", "--out", tmp_path / "mine.sd2")
+    assert (done.returncode, done.stdout) == (0, f"Wrote {tmp_path / 'mine.sd2'}\n"), done.stderr
+    assert "(simulated)" in sd2_alone("info", tmp_path / "mine.sd2").stdout
 
 
 @pytest.mark.slow
@@ -177,7 +195,8 @@ def test_the_wheel_works_where_there_is_no_window_and_no_torch(wheel: Path, tmp_
     assert "sd2core/resources" in (where.parent / "resources").as_posix()
     sample = where.parent / "resources" / "swipes.sd2"
     assert "(simulated)" in call(sd2, "info", sample, cwd=away)
-    call(sd2, "synth", sample, "--out", "map.npz", cwd=away)
+    call(sd2, "demo", "--out", "mine.sd2", cwd=away)
+    call(sd2, "synth", "mine.sd2", "--out", "map.npz", cwd=away)
     assert (away / "map.npz").is_file()
     assert "needs the window" in refused(sd2, "open", sample, cwd=away)
     assert "sd2-core[learn]" in refused(sd2, "denoise", "map.npz", "--out", "d.npz", cwd=away)

@@ -6,12 +6,14 @@ say of its blocks is in CONTRIBUTING.md.
 
 from __future__ import annotations
 
+import io
 import os
 import shutil
 import signal
 import subprocess
 import sys
 import traceback
+from contextlib import redirect_stdout
 from pathlib import Path
 
 import pytest
@@ -29,6 +31,8 @@ pytestmark = [
 
 _NO_WINDOW = ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM")
 _TAIL_LINES = 25
+_FAULTS = ("Traceback (most recent call last)", "Exception ignored")
+"""What Python prints of an error that nobody caught, and which may leave the exit code at 0."""
 _SLOW_S, _QUICK_S = 1800, 300
 
 # What a block leaves in its shell (folder, variables) is there in the next one.
@@ -102,14 +106,24 @@ def test_the_page_works_as_typed(
 def follow(page: Page, state: Path) -> None:
     """Run the blocks of a page in the current folder; ``state`` is another one."""
     names: dict[str, object] = {"__name__": "__main__"}
-    for block in page.to_run:
-        if block.language == "sh":
-            _run_shell(page, block, state)
-        else:
-            _run_python(page, block, names)
+    printed = ""
+    for block in page.blocks:
+        if block.to_run:
+            printed = (
+                _run_shell(page, block, state)
+                if block.language == "sh"
+                else _run_python(page, block, names)
+            )
+        elif block.seen and (line := block.line_not_printed(printed)) is not None:
+            pytest.fail(
+                f"{page.name}, below line {block.line}: not printed, or not there:\n{line}\n"
+                f"What was printed:\n{printed}",
+                pytrace=False,
+            )
 
 
-def _run_shell(page: Page, block: Block, state: Path) -> None:
+def _run_shell(page: Page, block: Block, state: Path) -> str:
+    """Run a block, and return what it printed."""
     text, failed = state / "block.sh", state / "failed"
     text.write_text(block.text)
     failed.unlink(missing_ok=True)
@@ -127,21 +141,25 @@ def _run_shell(page: Page, block: Block, state: Path) -> None:
         finally:
             if shell.poll() is None:
                 os.killpg(shell.pid, signal.SIGKILL)
-    if code != 0:
+    said = output.read_text(errors="replace")
+    if code != 0 or any(sign in said for sign in _FAULTS):
         line, _, command = (failed.read_text() if failed.exists() else "1 ").partition(" ")
         pytest.fail(
             f"{page.name}, line {block.line + int(line) - 1}: {command.strip() or block.text}\n"
-            f"ended with exit code {code}:\n"
-            + "\n".join(output.read_text(errors="replace").splitlines()[-_TAIL_LINES:]),
+            f"ended with exit code {code}:\n" + "\n".join(said.splitlines()[-_TAIL_LINES:]),
             pytrace=False,
         )
+    return said
 
 
-def _run_python(page: Page, block: Block, names: dict[str, object]) -> None:
+def _run_python(page: Page, block: Block, names: dict[str, object]) -> str:
+    """Run a block, and return what it printed."""
     # Lines are counted as in the page, in errors as well.
     source = "\n" * (block.line - 1) + block.text
+    printed = io.StringIO()
     try:
-        exec(compile(source, page.name, "exec"), names)
+        with redirect_stdout(printed):
+            exec(compile(source, page.name, "exec"), names)
     except Exception as error:
         steps = [
             one for one in traceback.extract_tb(error.__traceback__) if one.filename == page.name
@@ -153,13 +171,21 @@ def _run_python(page: Page, block: Block, names: dict[str, object]) -> None:
             + "".join(traceback.format_exception(error)[-_TAIL_LINES:]),
             pytrace=False,
         )
+    return printed.getvalue()
 
 
 @pytest.mark.parametrize("page", pages_to_follow(), ids=lambda page: page.name)
 def test_blocks_are_called_what_the_test_runs(page: Page) -> None:
     unseen = {"bash", "shell", "console", "zsh", "py", "python3", "pycon", "ipython"}
+    before = None
     for block in page.blocks:
-        assert block.language not in unseen, f"{page.name}, line {block.line}: sh or python"
+        place = f"{page.name}, line {block.line}"
+        assert block.language not in unseen, f"{place}: sh or python"
+        if block.seen:
+            assert before is not None, f"{place}: what is seen comes after what is run"
+            assert before.to_run, f"{place}: shows what a block prints that is not run"
+        elif block.language in ("sh", "python"):
+            before = block
 
 
 def page_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str) -> Page:
@@ -225,6 +251,10 @@ def test_blocks_share_folder_shell_and_names(
             ["page.md, line 5: grep nothing /dev/null", "exit code 1", "said"],
         ),
         ("```sh\ntrue | false\n```", ["page.md, line 4:", "false"]),
+        (
+            f"```sh\n'{sys.executable}' -c 'import atexit; atexit.register(lambda: 1 / 0)'\n```",
+            ["page.md, line 4:", "exit code 0", "ZeroDivisionError"],
+        ),
         ("```python\nvalue = 1\nvalue / 0\n```", ["page.md, line 5: value / 0", "ZeroDivision"]),
         ("```python\nvalue = \n```", ["page.md, line 4: value =", "SyntaxError"]),
     ],
@@ -239,6 +269,37 @@ def test_a_failure_names_page_line_and_command(
     for text in told:
         assert text in str(caught.value)
     assert "after" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("shown", "missed"),
+    [
+        ("size 3 m\nmade: 2.50 s", None),  # spaces do not count, lines between may be left out
+        ("size …\n…\nmade: … s", None),
+        ("from…\nsize 3 m", None),
+        ("size 4 m", "size 4 m"),
+        ("size 3", "size 3"),  # a line as a whole
+        ("made: … s\nsize 3 m", "size 3 m"),  # in order
+        ("size 3 m\nsize 3 m", "size 3 m"),  # each as often as shown
+        ("from (a.c", "from (a.c"),  # no regular expression
+    ],
+)
+def test_what_a_page_shows_was_printed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, shown: str, missed: str | None
+) -> None:
+    shell = "```sh\necho 'from (abc)'; echo 'size   3 m' >&2; echo; echo 'made: 2.50 s'\n```"
+    python = "```python\nprint('from (abc)\\nsize   3 m\\n\\nmade: 2.50 s')\n```"
+    monkeypatch.chdir(tmp_path)
+    for block in (shell, python):
+        page = page_of(
+            tmp_path, monkeypatch, f"{block}\n\nIt prints\n\n```text seen\n{shown}\n```\n"
+        )
+        if missed is None:
+            follow(page, tmp_path)
+        else:
+            with pytest.raises(pytest.fail.Exception, match="below line 8") as caught:
+                follow(page, tmp_path)
+            assert f":\n{missed}\n" in str(caught.value)
 
 
 def test_a_page_says_what_it_needs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,7 +15,7 @@ from sd2app.system_libraries import how_to_install, missing_libraries
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import user_cache, user_data
 from sd2core.files.resources import resource_path
-from sd2core.numerics.compiled import kernels_ready, modules_compiled, worker_count
+from sd2core.numerics.compiled import kernels_compiled, kernels_ready, worker_count
 from sd2core.version import __version__
 
 _FREE_GB = 2.0
@@ -126,11 +126,11 @@ def _window() -> list[Finding]:
 def _kernels() -> Finding:
     if kernels_ready():
         return Finding("Kernels", "ok", "compiled for this processor")
-    done, total = modules_compiled()
+    done, total = kernels_compiled()
     return Finding(
         "Kernels",
         "note",
-        f"{done} of {total} modules compiled",
+        f"{done} of {total} compiled",
         "sd2 warm-up (half a minute; otherwise that is done in the background)",
     )
 

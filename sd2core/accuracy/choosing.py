@@ -259,11 +259,11 @@ def choose(
     Raises
     ------
     Sd2Error
-        Unless one of tolerance and budget is given and positive, or when the
-        options take Vid2Doppler's velocities.
+        Unless one of tolerance and budget is given, the tolerance above 0 and up to 1, the
+        budget positive; or when the options take Vid2Doppler's velocities.
     """
     started = time.perf_counter()
-    _check(tolerance, budget_ms)
+    check_wish(tolerance, budget_ms)
     if survey is None:
         survey = survey_scene(mesh, sensor, check_options(mesh, options), progress)
     tried: dict[AccuracyPlan, Errors] = {}
@@ -313,15 +313,18 @@ def check_options(mesh: MeshSequence, options: SynthesisOptions | None) -> Synth
     return options
 
 
-def _check(tolerance: float | None, budget_ms: float | None) -> None:
+def check_wish(tolerance: float | None, budget_ms: float | None = None) -> None:
+    """Raise Sd2Error unless one of the two is given, and can be wished for."""
     if (tolerance is None) == (budget_ms is None):
         raise Sd2Error(
             f"The tolerance is {tolerance} and the budget {budget_ms} ms", "one of the two"
         )
-    wanted = tolerance if tolerance is not None else budget_ms
-    if wanted is None or not 0 < wanted < float("inf"):
-        name = "tolerance" if tolerance is not None else "budget"
-        raise Sd2Error(f"The {name} is {wanted}", "a number above 0")
+    if tolerance is not None and not 0 < tolerance <= 1:
+        raise Sd2Error(
+            f"The tolerance is {tolerance:g}", "a share above 0 and up to 1", "Take 0.02 for 2 %"
+        )
+    if budget_ms is not None and not 0 < budget_ms < float("inf"):
+        raise Sd2Error(f"The budget is {budget_ms} ms", "a number above 0")
 
 
 def _by_tolerance(

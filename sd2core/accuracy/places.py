@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from sd2core.accuracy.choosing import check_options, choose, survey_scene
+from sd2core.accuracy.choosing import check_options, check_wish, choose, survey_scene
 from sd2core.accuracy.plans import AccuracyPlan, reference_plan
 from sd2core.accuracy.sample import take_sample
 from sd2core.accuracy.trial import Trial, synthesizer_for
@@ -79,6 +79,7 @@ def choose_for_places(
     be made, together. Tolerance and errors are those of
     :func:`~sd2core.accuracy.choosing.choose`; progress may raise Cancelled.
     """
+    check_wish(tolerance)
     options = check_options(mesh, options)
     search = _Search(mesh, places, tolerance, options, progress)
     if frames < _FEWEST_FRAMES:

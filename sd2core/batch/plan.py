@@ -44,6 +44,7 @@ STEPS: tuple[Step, ...] = get_args(Step)
 
 Text = Annotated[str, StringConstraints(pattern=r"\S")]
 Positive = Annotated[FiniteFloat, Field(gt=0)]
+Share = Annotated[FiniteFloat, Field(gt=0, le=1)]
 NotNegative = Annotated[FiniteFloat, Field(ge=0)]
 
 
@@ -85,11 +86,11 @@ class Synthesise(_Section):
     """
 
     preset: Literal["paper", "vid2doppler"] = "paper"
-    tolerance: Positive | None = None
+    tolerance: Share | None = None
     """Allowed error, as a share. The cheapest plan within it is chosen once for each mesh and
     checked at the first, the middle and the last of its placements. Without it the options
     decide."""
-    vertices_kept: Annotated[FiniteFloat, Field(gt=0, le=1)] | None = None
+    vertices_kept: Share | None = None
     visibility: Visibility | None = None
     depth_resolution: DepthResolution | None = None
     mask_stride: PositiveInt | None = None

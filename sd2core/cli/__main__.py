@@ -4,29 +4,51 @@ from __future__ import annotations
 
 import argparse
 import sys
+from pathlib import Path
+from typing import NoReturn
 
 from sd2core.cli import build_parser, run
-from sd2core.cli.options import add_command
+from sd2core.cli.importing import copy_sample
+from sd2core.cli.options import add_command, add_json, add_output
 from sd2core.errors import Sd2Error
 
-_WINDOW_COMMANDS = ("open", "demo", "doctor")
+_WINDOW_COMMANDS = ("open", "doctor")
+_EXAMPLES = "  sd2 demo --out sample.sd2                   a copy of the bundled sample recording\n"
 
 
 def main() -> int:
     """Run one of the library's commands and return its exit code."""
-    parser, commands = build_parser()
-    for name in _WINDOW_COMMANDS:
-        absent = add_command(commands, name, "(with the window, sd2-studio)", handler=_absent)
-        absent.set_defaults(name=name)
+    parser, commands = build_parser(_EXAMPLES)
+    demo = add_command(
+        commands,
+        "demo",
+        "write a copy of the bundled sample recording",
+        handler=_demo,
+        description="A simulated body makes eight swipes in front of a simulated radar.",
+    )
+    add_output(demo, "NAME.sd2", "the copy to write", required=False)
+    demo.add_argument("--screenshot", type=Path, help=argparse.SUPPRESS)
+    for name in _WINDOW_COMMANDS:  # not listed
+        absent = commands.add_parser(name)
+        absent.set_defaults(handler=_absent, name=name)
+        add_json(absent)
     words = sys.argv[1:]
-    # Whatever else is asked of a command that is not there.
-    return run(parser, words[:1] if words and words[0] in _WINDOW_COMMANDS else words)
+    if words and words[0] in _WINDOW_COMMANDS:
+        # Whatever else is asked of a command that is not there.
+        words = [words[0], *{"--json"}.intersection(words)]
+    return run(parser, words)
 
 
-def _absent(options: argparse.Namespace) -> int:
+def _demo(options: argparse.Namespace) -> None:
+    if options.out is None:
+        _absent(argparse.Namespace(name="demo"))
+    copy_sample(options.out)
+
+
+def _absent(options: argparse.Namespace) -> NoReturn:
     raise Sd2Error(
-        f"`sd2 {options.name}` needs the window, which is not in the library alone (sd2-core):"
-        " type `pip uninstall sd2-core`, then `pip install sd2_studio-….whl`"
+        f"`sd2 {options.name}` needs the window, which is not in the library alone (sd2-core)",
+        remedy="Type `pip uninstall sd2-core`, then `pip install sd2_studio-….whl`",
     )
 
 

@@ -55,7 +55,7 @@ def run_in_folder(folder: CommandFolder, command: Callable[[], int]) -> int:
         code = command()
     except KeyboardInterrupt:
         code = INTERRUPTED
-    except SystemExit as error:  # what was typed wrong
+    except SystemExit as error:  # --version, --help
         code = error.code if isinstance(error.code, int) else 1
     over.set()
     folder.note_end(code)

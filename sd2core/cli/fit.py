@@ -17,7 +17,7 @@ from sd2core.cli.options import (
     positive_float,
 )
 from sd2core.cli.output import print_event, print_facts, print_json, progress_bar, progress_events
-from sd2core.cli.running import error_text
+from sd2core.cli.running import explanation
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
@@ -146,7 +146,7 @@ def _fit(options: argparse.Namespace) -> None:
         _make(options)
     except Exception as error:
         if options.progress_json:
-            print_event("error", text=error_text(error))
+            print_event("error", text=str(explanation(error)))
         raise
 
 

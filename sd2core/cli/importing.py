@@ -95,6 +95,15 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     add_json(parser)
 
 
+def copy_sample(out: Path) -> None:
+    """Write a copy of the bundled sample recording."""
+    from sd2core.files.resources import resource_path
+    from sd2core.recording.recording import open_recording
+
+    copy = open_recording(resource_path("swipes.sd2")).save_as(out, copy=True)
+    print(f"Wrote {copy.folder}")
+
+
 def _import(options: argparse.Namespace) -> None:
     from sd2core.cli.info.description import describe_parts, describe_recording, show
     from sd2core.cli.reading import mesh_reading, refuse_unused_mesh_options

@@ -35,7 +35,9 @@ def add_command(
 
 def add_json(parser: argparse._ActionsContainer) -> None:
     """Add ``--json``."""
-    parser.add_argument("--json", action="store_true", help="print JSON, for other programs")
+    parser.add_argument(
+        "--json", action="store_true", help="print JSON, for other programs; an error as well"
+    )
 
 
 def add_json_and_progress(parser: argparse.ArgumentParser) -> None:
@@ -281,9 +283,16 @@ def positive_float(text: str) -> float:
 
 
 def share(text: str) -> float:
-    """Parse a share above 0, as ``2%`` or ``0.02``."""
-    value = positive_float(text.removesuffix("%").rstrip())
-    return value / 100 if text.endswith("%") else value
+    """Parse a share above 0 and up to 1, as ``2%`` or ``0.02``."""
+    try:
+        value = float(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
+    except ValueError:
+        value = math.nan
+    if not 0 < value <= 1:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not a share above 0 and up to 100%, e.g. 2% or 0.02"
+        )
+    return value
 
 
 def not_negative_float(text: str) -> float:

@@ -29,6 +29,7 @@ from sd2core.cli import (
     synth,
     train,
 )
+from sd2core.cli.command_parser import CommandParser
 from sd2core.version import __version__
 
 _DESCRIPTION = """\
@@ -38,8 +39,7 @@ would have measured, at any place one puts it.
 
 _EPILOG = """\
 examples:
-  sd2 demo                                    look at the bundled sample recording
-  sd2 open walk.sd2                           look at a recording, a video or a mesh
+{}\
   sd2 info walk.npz                           what is in a file
   sd2 fit walk.mp4 --out walk.zarr            a moving mesh from a video of a person
   sd2 import --video walk.mkv --mesh walk.npz --out walk.sd2
@@ -56,16 +56,18 @@ examples:
   sd2 batch plan.toml                         all of that for many recordings and places
   sd2 ladder walk.npz --quick                 what accuracy this scene requires
 
-`sd2 COMMAND --help` explains one command.
+`sd2 COMMAND --help` explains one command. With --json what went wrong is JSON as
+well, {{"error": {{"found": …, "expected": …, "remedy": …}}}}, and the exit code is
+1, or 2 for what was typed wrong.
 """
 
 
-def build_parser() -> tuple[argparse.ArgumentParser, argparse._SubParsersAction]:
-    """Parser of the library's commands, and where the window adds its own."""
-    parser = argparse.ArgumentParser(
+def build_parser(examples: str = "") -> tuple[argparse.ArgumentParser, argparse._SubParsersAction]:
+    """Parser of the library's commands, and where others are added, with their examples."""
+    parser = CommandParser(
         prog="sd2",
         description=_DESCRIPTION,
-        epilog=_EPILOG,
+        epilog=_EPILOG.format(examples),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"SD² Studio {__version__}")

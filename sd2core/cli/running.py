@@ -8,6 +8,7 @@ import re
 import sys
 from collections.abc import Sequence
 
+from sd2core.cli.command_parser import UsageError
 from sd2core.cli.output_folders import output_folders
 from sd2core.errors import Sd2Error
 from sd2core.processes import INTERRUPTED
@@ -20,17 +21,16 @@ _LEARNING = ("lightning", "torch")
 def run(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> int:
     """Parse, call the handler and turn errors into a sentence on standard error.
 
-    Returns 0, or the handler's code; 1 for an error; 130 when interrupted. argparse itself exits
-    with 2.
+    With ``--json`` standard output has the error as well, as JSON. Returns 0, or the handler's
+    code; 1 for an error; 2 for what was typed wrong; 130 when interrupted.
     """
-    options = parser.parse_args(attach_negative_values(arguments))
+    as_json = "--json" in arguments
     try:
+        options = parser.parse_args(attach_negative_values(arguments))
         with output_folders(options):
             code = options.handler(options)
         _flush_output()
         return code or 0
-    except Sd2Error as error:
-        return _explain(str(error))
     except KeyboardInterrupt:
         print("sd2: interrupted", file=sys.stderr)
         return INTERRUPTED
@@ -39,38 +39,47 @@ def run(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> int:
         _discard_output()
         return 0
     except Exception as error:
-        if os.environ.get("SD2_TRACEBACK") == "1":
+        if os.environ.get("SD2_TRACEBACK") == "1" and not isinstance(error, Sd2Error):
             raise
         if isinstance(error, OSError) and not error.filename and error.errno and _output_fails():
             _discard_output()
-            return _explain(f"The output cannot be written ({error.strerror}).")
-        text = error_text(error)
-        if not (isinstance(error, OSError | MemoryError) or _cannot_learn(error)):
-            text += (
-                " Please report it, with what is printed when the same command runs with"
-                " SD2_TRACEBACK=1 set."
-            )
-        return _explain(text)
+            error, as_json = Sd2Error(f"The output cannot be written ({error.strerror})"), False
+        explained = explanation(error)
+        print(f"sd2: {explained}", file=sys.stderr)
+        if as_json:
+            _print_as_json(explained)
+        return 2 if isinstance(error, UsageError) else 1
 
 
-def error_text(error: Exception) -> str:
-    """Sentence that explains any error to the user."""
+def explanation(error: Exception) -> Sd2Error:
+    """Explain any error to the user."""
     if isinstance(error, Sd2Error):
-        return str(error)
+        return error
     if isinstance(error, OSError) and error.strerror:
-        return f"{error.filename}: {error.strerror}." if error.filename else f"{error.strerror}."
+        return Sd2Error(f"{error.filename}: {error.strerror}" if error.filename else error.strerror)
     if isinstance(error, MemoryError):
-        return f"There is not enough memory for this ({error})."
-    if _cannot_learn(error):
-        return (
-            "torch and lightning are needed for this, which denoises, classifies or trains."
-            ' Install them: pip install "sd2-core[learn]".'
+        return Sd2Error(f"There is not enough memory for this ({error})")
+    if isinstance(error, ModuleNotFoundError) and error.name in _LEARNING:
+        return Sd2Error(
+            "torch and lightning are needed for this, which denoises, classifies or trains",
+            remedy='Install them: pip install "sd2-core[learn]"',
         )
-    return f"This should not happen ({type(error).__name__}: {error})."
+    return Sd2Error(
+        f"This should not happen ({type(error).__name__}: {error})",
+        remedy="Please report it, with what is printed when the same command runs with"
+        " SD2_TRACEBACK=1 set",
+    )
 
 
-def _cannot_learn(error: Exception) -> bool:
-    return isinstance(error, ModuleNotFoundError) and error.name in _LEARNING
+def _print_as_json(error: Sd2Error) -> None:
+    from sd2core.cli.output import print_json
+
+    try:
+        parts = {name: getattr(error, name) for name in ("found", "expected", "remedy")}
+        print_json({"error": parts})
+        _flush_output()
+    except OSError:
+        _discard_output()
 
 
 def attach_negative_values(arguments: Sequence[str]) -> list[str]:
@@ -111,8 +120,3 @@ def _output_fails() -> bool:
 def _discard_output() -> None:
     """Keep Python from trying, and complaining, once more when it flushes at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-def _explain(sentence: str) -> int:
-    print(f"sd2: {sentence}", file=sys.stderr)
-    return 1

@@ -6,6 +6,8 @@ end the process.
 
 from __future__ import annotations
 
+import atexit
+import functools
 import itertools
 import json
 import math
@@ -224,9 +226,27 @@ def _chunk_files(path: Path) -> _ChunkFiles:
     return _PackedChunkFiles(path) if path.is_file() else _ChunkFiles(path)
 
 
+@functools.cache
+def _zarr() -> Any:
+    """Zarr, whose thread is waited for at the end of the process.
+
+    Zarr gives it 0.2 s to stop. On a busy machine that is too little, and a traceback is printed.
+    """
+    import zarr
+    from zarr.core import sync
+
+    def stop() -> None:
+        if sync.loop[0] is not None and sync.iothread[0] is not None:
+            sync.loop[0].call_soon_threadsafe(sync.loop[0].stop)
+            sync.iothread[0].join()
+
+    atexit.register(stop)  # called before what Zarr has registered
+    return zarr
+
+
 def open_group(path: Path, mode: Literal["r", "r+"] = "r") -> Any:
     """Open a Zarr group, a folder or a ``.zarr.zip``; Sd2Error if it is none, or damaged."""
-    import zarr
+    zarr = _zarr()
     from zarr.storage import ZipStore
 
     import sd2core.files.chunk_codecs  # noqa: F401  puts checks before the decoders
@@ -318,9 +338,7 @@ def growing(group: Any, path: Path, name: str) -> Any:
 
 def create_group(path: Path, attributes: Mapping[str, Any] | None = None) -> Any:
     """Make an empty group in a folder, in place of what is there."""
-    import zarr
-
-    return zarr.open_group(str(path), mode="w", attributes=dict(attributes or {}))
+    return _zarr().open_group(str(path), mode="w", attributes=dict(attributes or {}))
 
 
 def create_array(group: Any, name: str, *, compressor: Any = None, **how: Any) -> Any:

@@ -107,6 +107,12 @@ def _candidate_folders() -> Iterator[Path]:
     yield Path(platformdirs.user_cache_dir("sd2-studio", appauthor=False))
 
 
+def kernel_folders() -> list[Path]:
+    """Folders with machine code, of any version and processor."""
+    name = "kernels-" + 16 * "[0-9a-f]"
+    return [folder for base in _candidate_folders() for folder in base.glob(name)]
+
+
 def _writable(folder: Path) -> bool:
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -126,7 +132,7 @@ def _fingerprint() -> str:
 
     digest = hashlib.sha256()
     for module in (*KERNEL_MODULES, "sd2core.numerics.compiled"):
-        digest.update(_PACKAGE.parent.joinpath(*module.split(".")).with_suffix(".py").read_bytes())
+        digest.update(_source(module))
     for fact in (
         # Numba keeps code by the place of its source: another installation that
         # shares this cache cannot use it.
@@ -156,19 +162,22 @@ def warm_up(progress: Progress = silent) -> None:
     for done, name in enumerate(KERNEL_MODULES):
         progress(done, len(KERNEL_MODULES))
         importlib.import_module(name).compile_kernels()
-        if directory is not None:
-            (directory / name).touch()
     if directory is not None:
         (directory / _MARKER).touch()
     _ready = True
     progress(len(KERNEL_MODULES), len(KERNEL_MODULES))
 
 
-def modules_compiled() -> tuple[int, int]:
-    """Number of modules whose machine code is on disk, and of all."""
+def kernels_compiled() -> tuple[int, int]:
+    """Number of kernels whose machine code is on disk, and of all."""
     directory = cache_directory()
-    there = [name for name in KERNEL_MODULES if directory and (directory / name).exists()]
-    return len(there), len(KERNEL_MODULES)
+    # Numba keeps an index for each.
+    there = sum(1 for _ in directory.rglob("*.nbi")) if directory else 0
+    return there, sum(_source(name).count(b"\n@compiled") for name in KERNEL_MODULES)
+
+
+def _source(module: str) -> bytes:
+    return _PACKAGE.parent.joinpath(*module.split(".")).with_suffix(".py").read_bytes()
 
 
 def compile_in_background(*, awaited: bool = False) -> subprocess.Popen[bytes] | None:

@@ -11,7 +11,7 @@ from sd2app.background.latest import Emit, LatestRunner
 from sd2app.maps.partial_map import View
 from sd2app.maps.quality import SynthesizerCache
 from sd2app.session.tasks import Job, TaskList
-from sd2core.numerics.compiled import compile_in_background, kernels_ready, modules_compiled
+from sd2core.numerics.compiled import compile_in_background, kernels_compiled, kernels_ready
 from sd2core.sensor import VirtualSensor
 
 if TYPE_CHECKING:
@@ -97,4 +97,4 @@ class CompilerModel(QObject):
             self.stop()
             self.finished.emit()
         elif self._job is not None:
-            self._jobs.report(self._job, *modules_compiled())
+            self._jobs.report(self._job, *kernels_compiled())

@@ -137,7 +137,7 @@ def test_without_machine_code_exact_waits_for_the_compiler(context, qtbot, ball,
     compiler = SimpleNamespace(poll=lambda: state["exit"], terminate=lambda: None)
     asked = []
     monkeypatch.setattr(map_warm_up, "kernels_ready", lambda: state["ready"])
-    monkeypatch.setattr(map_warm_up, "modules_compiled", lambda: state["compiled"])
+    monkeypatch.setattr(map_warm_up, "kernels_compiled", lambda: state["compiled"])
     monkeypatch.setattr(
         map_warm_up, "compile_in_background", lambda **how: asked.append(how) or compiler
     )

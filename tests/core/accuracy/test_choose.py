@@ -116,6 +116,7 @@ def test_a_choice_can_be_written_down(scene: MeshSequence) -> None:
         {"tolerance": 0.1, "budget_ms": 1.0},
         {"tolerance": 0.0},
         {"tolerance": -1.0},
+        {"tolerance": 1.01},
         {"tolerance": float("nan")},
         {"budget_ms": 0.0},
         {"budget_ms": float("inf")},

@@ -16,6 +16,7 @@ from sd2core.accuracy.places import MOST_PLACES, choose_for_places, spread
 from sd2core.accuracy.plans import AccuracyPlan, reference_plan
 from sd2core.accuracy.trial import synthesizer_for
 from sd2core.doppler import PRESETS
+from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import silent
 from sd2core.sensor import VirtualSensor
@@ -40,6 +41,13 @@ def test_places_to_check_on_are_the_ends_and_the_middle(count: int) -> None:
     assert chosen == sorted({*chosen})
     assert len(chosen) == min(count, MOST_PLACES)
     assert {chosen[0], chosen[-1]} == {0, count - 1}
+
+
+def test_a_tolerance_is_a_share() -> None:
+    with pytest.raises(
+        Sd2Error, match=r"The tolerance is 2\. Expected: a share above 0 and up to 1"
+    ):
+        choose_for_places(swinging_sphere(5), AROUND, 10**6, 2.0, PAPER)
 
 
 @pytest.mark.usefixtures("free")

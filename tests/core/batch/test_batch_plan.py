@@ -82,6 +82,7 @@ def test_paths_are_relative_to_the_plan_s_folder(tmp_path: Path) -> None:
         (LEAST + "mask_strid = 2\n", 5, ("synthesise.mask_strid", "not known")),
         (LEAST + 'bins = "32"\n', 5, ("synthesise.bins", "integer")),
         (LEAST + "null_bins = [40]\n", 4, ("synthesise", "null_bins", "40")),
+        (LEAST + "tolerance = 2\n", 5, ("synthesise.tolerance", "less than or equal to 1")),
         (LEAST + "tolerance = 0.02\nvisibility = 'none'\n", 4, ("tolerance", "visibility")),
         (LEAST + "[denoise]\nmodel = ' '\n", 6, ("denoise.model",)),
         (LEAST + "[export]\nsegment_frames = 8\n", 5, ("overlap_frames",)),

@@ -275,12 +275,14 @@ def test_agree_refuses_what_it_cannot_do(sd2: Sd2, anna: Path, ben: Path) -> Non
     for arguments, words in (
         ((anna, ben), "Comparing labels needs the times of frames"),
         ((anna, ben, "--fps", 10, "--track", "Other"), "no track 'Other'"),
-        ((anna, ben, "--fps", 10, "--min-iou", 2), "The least IoU of a match is 2"),
         ((anna, ben.with_name("missing.json"), "--fps", 10), "missing.json does not exist"),
     ):
         refused = sd2("labels", "agree", *arguments)
         assert refused.code == 1
         assert words in refused.err
+    refused = sd2("labels", "agree", anna, ben, "--fps", 10, "--min-iou", 2)
+    assert refused.code == 2
+    assert "--min-iou: '2' is not a share above 0 and up to 100%" in refused.err
 
 
 def test_every_format_is_named_in_the_help(sd2: Sd2) -> None:

@@ -79,9 +79,13 @@ def test_what_does_not_go_together(
     assert message in outcome.err
 
 
-@pytest.mark.parametrize("wrong", ["0", "-1%", "lots", "nan"])
-def test_a_tolerance_is_a_share(sd2: Sd2, plate: Path, wrong: str) -> None:
-    assert sd2("ladder", plate, f"--tolerance={wrong}").code == 2
+@pytest.mark.parametrize("wrong", ["0", "-1%", "lots", "nan", "%", "200%", "1.01"])
+@pytest.mark.parametrize("command", ["ladder", "synth", "placements", "export"])
+def test_a_tolerance_is_a_share(sd2: Sd2, plate: Path, command: str, wrong: str) -> None:
+    outcome = sd2(command, plate, f"--tolerance={wrong}", *(["--out", "x"] * (command != "ladder")))
+    assert outcome.code == 2
+    assert f"{wrong!r} is not a share above 0 and up to 100%, e.g. 2% or 0.02" in outcome.err
+    assert f"`sd2 {command} --help`" in outcome.err
 
 
 def test_synth_carries_the_plan_out(sd2: Sd2, plate: Path, tmp_path: Path) -> None:

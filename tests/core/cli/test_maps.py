@@ -104,7 +104,7 @@ def test_fewer_vertices_are_said(sd2: Sd2, plate: Path, tmp_path: Path, method: 
     assert re.search(r"plate.npz, decimated to \d\d of 81 vertices", str(doppler.meta))
     assert doppler.peak_velocity_mps() == pytest.approx(1.3, abs=doppler.axis.bin_width_mps)
     outcome = sd2("synth", plate, "--out", out, "--vertices-kept", 3)
-    assert outcome.code == 1
+    assert outcome.code == 2
     assert "a share above 0 and up to 1" in outcome.err
 
 

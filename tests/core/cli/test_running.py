@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import subprocess
 import sys
@@ -58,8 +59,73 @@ def test_a_traceback_on_request(monkeypatch: pytest.MonkeyPatch) -> None:
 )
 def test_wrong_usage_is_2(sd2: Sd2, arguments: list[str]) -> None:
     outcome = sd2(*arguments)
+    assert (outcome.code, outcome.out) == (2, "")
+    (line,) = outcome.err.splitlines()
+    assert line.startswith("sd2: ")
+    asked = [word for word in arguments[:1] if word != "nonsense"]
+    assert f"`{' '.join(['sd2', *asked, '--help'])}`" in line
+
+
+@pytest.mark.parametrize(
+    ("typed", "says"),
+    [
+        ("sinth x", "There is no command 'sinth'. Did you mean `sd2 synth`? `sd2 --help`"),
+        ("labels sugest", "no command 'sugest'. Did you mean `sd2 labels suggest`? `sd2 labels -"),
+        ("synth a.npz --out b.npz --visibilty depth", "no option --visibilty. Did you mean --visi"),
+        ("synth a.npz --out b.npz --binz=4", "option --binz. Did you mean --bins? `sd2 synth --"),
+        ("opne a.sd2", "Did you mean `sd2 open`?"),
+        ("zzz", "There is no command 'zzz'. `sd2 --help` lists all."),
+        ("synth a.npz b.npz --out c.npz", "'b.npz' is one argument too many. `sd2 synth --help`"),
+    ],
+)
+def test_what_was_meant_is_said(sd2: Sd2, typed: str, says: str) -> None:
+    outcome = sd2(*typed.split())
     assert outcome.code == 2
-    assert outcome.err.startswith("usage: sd2")
+    assert says in outcome.err
+
+
+@pytest.mark.parametrize(
+    ("error", "expected"),
+    [
+        (Sd2Error("a.npz is empty", "a mesh", "Fit it"), ("a.npz is empty", "a mesh", "Fit it")),
+        (PermissionError(13, "Permission denied", "/a.npz"), ("/a.npz: Permission denied", "", "")),
+    ],
+)
+def test_an_error_as_json(
+    error: BaseException, expected: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    parser = failing(error)
+    parser.add_argument("--json", action="store_true")
+    assert run(parser, ["--json"]) == 1
+    captured = capsys.readouterr()
+    parts = dict(zip(("found", "expected", "remedy"), expected, strict=True))
+    assert json.loads(captured.out) == {"error": parts}
+    assert captured.err.startswith(f"sd2: {expected[0]}")
+
+
+def test_what_was_typed_wrong_as_json(sd2: Sd2) -> None:
+    outcome = sd2("synth", "a.npz", "--json")
+    assert outcome.code == 2
+    error = json.loads(outcome.out)["error"]
+    assert error["found"].endswith("required: --out")
+    assert "`sd2 synth --help`" in error["remedy"]
+    assert len(outcome.err.splitlines()) == 1
+
+
+def test_an_error_as_json_for_a_reader_that_has_gone() -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    done = subprocess.run(
+        [sys.executable, "-m", "sd2app.command_line", "info", "nothing.npz", "--json"],
+        stdout=writer,
+        stderr=subprocess.PIPE,
+        text=True,
+        check=False,
+        cwd=repository(),
+    )
+    os.close(writer)
+    assert done.returncode == 1
+    assert len(done.stderr.splitlines()) == 1
 
 
 def test_version(sd2: Sd2) -> None:

@@ -345,3 +345,21 @@ def change_text(path: Path, before: str, after: str) -> None:
     text = path.read_text()
     assert before in text
     path.write_text(text.replace(before, after, 1))
+
+
+@pytest.mark.parametrize("how", ["reading", "writing"])
+def test_the_end_of_a_process_waits_for_zarr_on_a_busy_machine(tmp_path: Path, how: str) -> None:
+    path = store(tmp_path / "a.zarr")
+    opening = "open_group" if how == "reading" else "create_group"
+    script = f"""
+import time
+from pathlib import Path
+from sd2core.files.stores import {opening}
+{opening}(Path({str(path)!r}))
+from zarr.core.sync import _get_loop
+_get_loop().call_soon_threadsafe(time.sleep, 0.5)  # as if the system did not let it run
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert done.stderr == ""

@@ -105,21 +105,21 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path, nargs="?", default=default, metavar="FOLDER")
     folder = parser.parse_args().folder
-    print("| part | smoothing | nulled bins | empty frames | as 0 m/s | left out | best lag |")
-    print("|---|---|---|---|---|---|---|")
+    print("| part | nulled bins | empty frames | unsmoothed | correlation | empty left out |")
+    print("|---|---|---|---|---|---|")
     for part in PARTS:
         segments = read_part(folder, part)
-        for smoothing, change in (("preset", lambda options: options), ("off", unsmoothed)):
-            for name, options in (("none", FULL), ("15, 16", SYMMETRIC), ("14, 15, 16", NULLED)):
-                synthetic = [segment.synthetic_mps(change(options)) for segment in segments]
-                zeroed = at_rest(synthetic)
-                empty = np.isnan(np.concatenate(synthetic)).mean()
-                best = max(LAGS, key=lambda lag: correlation(zeroed, segments, lag))
-                print(
-                    f"| {part} | {smoothing} | {name} | {empty:.1%}"
-                    f" | {correlation(zeroed, segments):.3f}"
-                    f" | {correlation(synthetic, segments):.3f} | {best} |"
-                )
+        for name, options in (("none", FULL), ("15, 16", SYMMETRIC), ("14, 15, 16", NULLED)):
+            synthetic, raw = (
+                [segment.synthetic_mps(used) for segment in segments]
+                for used in (options, unsmoothed(options))
+            )
+            empty, empty_raw = (np.isnan(np.concatenate(one)).mean() for one in (synthetic, raw))
+            print(
+                f"| {part} | {name} | {empty:.1%} | {empty_raw:.1%}"
+                f" | {correlation(at_rest(synthetic), segments):.3f}"
+                f" | {correlation(synthetic, segments):.3f} |"
+            )
 
 
 if __name__ == "__main__":

@@ -121,23 +121,36 @@ def test_warm_up_makes_ready_and_reports(monkeypatch: pytest.MonkeyPatch, tmp_pa
     monkeypatch.setattr(compiled, "_ready", False)
     monkeypatch.setattr(compiled, "cache_directory", lambda: tmp_path)
     reports: list[tuple[int, int]] = []
-    on_disk: list[tuple[int, int]] = []
-
-    def report(done: int, total: int) -> None:
-        reports.append((done, total))
-        on_disk.append(compiled.modules_compiled())
-
-    compiled.warm_up(report)
+    compiled.warm_up(lambda *report: reports.append(report))
     assert compiled.kernels_ready()
     count = len(compiled.KERNEL_MODULES)
-    assert reports == on_disk == [(done, count) for done in range(count + 1)]
+    assert reports == [(done, count) for done in range(count + 1)]
     assert compiled.compile_in_background() is None
+
+
+def test_every_kernel_counts_once_its_code_is_on_disk(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(compiled, "cache_directory", lambda: tmp_path)
+    kernels = [
+        value
+        for name in compiled.KERNEL_MODULES
+        for value in vars(importlib.import_module(name)).values()
+        if hasattr(value, "py_func") and value.py_func.__module__ == name
+    ]
+    assert compiled.kernels_compiled() == (0, len(kernels))
+    (tmp_path / "doppler_1").mkdir()
+    for name in ("a-1.py311.nbi", "a-1.py311.1.nbc", "a-1.py311.2.nbc", "b-1.py311.nbi"):
+        (tmp_path / "doppler_1" / name).touch()
+    assert compiled.kernels_compiled() == (2, len(kernels))
 
 
 @pytest.mark.slow
 def test_warm_up_leaves_nothing_to_compile() -> None:
     """A process that finds the kernels ready compiles nothing when it uses them."""
     compiled.warm_up()
+    done, count = compiled.kernels_compiled()
+    assert done == count
     code = """
 import numpy as np
 from sd2core.numerics import compiled

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from window_models import models_of
 
 from sd2app.session import document
 from sd2app.session.content import reference_of
+from sd2app.session.tasks import Job
 from sd2app.settings import Settings
 from sd2app.shell import app
 from sd2app.shell.loading import LoadingCover
@@ -107,6 +109,46 @@ def test_the_window_fills_itself_once_its_skeleton_is_on_screen(
     assert capsys.readouterr().out == f"Wrote {picture}\n"
     # An empty window has a few colours.
     assert len(np.unique(np.asarray(Image.open(picture)).reshape(-1, 4), axis=0)) > 500
+
+
+class SlowMachine:
+    """A clock on which a turn of the event loop takes a minute, and a compiler that goes on."""
+
+    def __init__(self, kernels: int) -> None:
+        self.now_s, self.kernels = 0.0, kernels
+        self.job = Job("Compiling the numerical kernels", lambda: None, total=kernels)
+        self.ready, self.session = True, SimpleNamespace(jobs=self)
+
+    @property
+    def jobs(self) -> tuple[Job, ...]:
+        self.job.done = min(int(self.now_s / 60), self.kernels - 1)
+        return () if self.settled else (self.job,)
+
+    @property
+    def settled(self) -> bool:
+        return self.now_s >= 60 * self.kernels
+
+    def monotonic(self) -> float:
+        return self.now_s
+
+    def sleep(self, _: float) -> None:
+        self.now_s += 60
+
+
+def test_a_picture_waits_as_long_as_something_is_reported(qtbot, monkeypatch, capsys) -> None:
+    machine = SlowMachine(kernels=6)
+    monkeypatch.setattr(app, "time", machine)
+    assert app.wait_until_settled(QApplication.instance(), machine, limit_s=120)
+    assert machine.now_s > 3 * 120
+    assert "Waiting: Compiling the numerical kernels (2 of 6)\n" in capsys.readouterr().err
+
+
+def test_a_picture_does_not_wait_for_what_reports_nothing(qtbot, monkeypatch) -> None:
+    machine = SlowMachine(kernels=6)
+    monkeypatch.setattr(app, "time", machine)
+    monkeypatch.setattr(SlowMachine, "jobs", (Job("Reading", lambda: None),))
+    assert not app.wait_until_settled(QApplication.instance(), machine, limit_s=120)
+    assert machine.now_s <= 180
 
 
 def test_a_screenshot_is_whole_or_not_there(qtbot, empty_window, tmp_path, capsys) -> None:
