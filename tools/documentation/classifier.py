@@ -1,14 +1,14 @@
-"""Measure docs/classifier.md: trainings with and without synthetic data, on a simulated campaign.
+"""Makes ``classifier.md`` and its pictures: ``make classifier``, an hour.
 
 ::
 
     python -m tools.documentation.classifier [--campaign gestures.zarr] [--large campaign.zarr]
 
-Without ``--campaign`` one is made: six people, 36 minutes, three places of the sensor, of
-another seed than the bundled denoiser's, so of other people. ``--large`` is the denoiser's
-(``make denoiser`` leaves it in ``build/denoiser``); only its radar is used. What was trained
-before is not trained again: the folder ``--out`` keeps every run. ``--only`` measures
-a part, and puts it into the page that is there.
+Trainings with and without synthetic data. Without ``--campaign`` one is made: six people, 36
+minutes, three places of the sensor, of another seed than the bundled denoiser's, so of other
+people. ``--large`` is the denoiser's (``make denoiser`` leaves it in ``build/denoiser``); only its
+radar is used. What was trained before is not trained again: the folder ``--out`` keeps every run.
+``--only`` measures some sections, and leaves the others as the page has them.
 """
 
 from __future__ import annotations
@@ -16,120 +16,155 @@ from __future__ import annotations
 import argparse
 import json
 import shutil
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from sd2core.accuracy.cache import this_machine
+from sd2core.files.tables import markdown_table
 from tools.documentation.classifier_protocols import (
     FULL_HEADING,
     HEADING,
     full_size_section,
     protocols_section,
 )
+from tools.documentation.measured import write_page
 from tools.documentation.places import BUILD, DOCS, IMAGES
-from tools.documentation.runs import campaign_of, printed, sd2
+from tools.documentation.runs import campaign_of, printed, sd2, sections, table_below
 
 SEED = 2
 SAMPLE = "resources/swipes.sd2"
-PAGE = DOCS / "classifier.md"
+NAME = "classifier.md"
 
 HEAD = """\
 # The gesture classifier
 
-What it recognises, and when synthetic data help it, measured. Made by
+How well are gestures recognised, and when do synthetic data help? **Every radar here is
+simulated**; for a real one see [real gestures](real-gestures.md). That synthetic data help a
+classifier on a real radar has not been shown. Made by
 
-```
+```sh
 make classifier
 ```
 
-{here}on {machine}. What is learnt from, what features and networks are and why is
-[decision 37](decisions/0037-gesture-classifiers.md).
-
-## On a simulated campaign
-
-`{campaign}` made {minutes:.0f} minutes of {people} people; each take is seen from {places} places.
-**The radar is simulated.** The denoiser is the bundled one, which learnt from a campaign of another
-seed, so from other people. `{table}` trained {runs} classifiers in {cpu_min:.0f} minutes of
-one core.
-
-Of the takes of the people who are learnt from, five in seven are there as the radar saw them, and
-two in seven, 0.4 times as many frames, as video only: what is added are other movements than the
-radar saw. With less of the radar's data the video stays as much as it was. All trainings have
-equally many steps; the best is chosen on as small a share of the radar's data. *Moved sensors* is
-range synthesis: the added movements also as other places of the sensor see them, so more frames.
-*Moved, frames* judges the radar's maps from those places; *radar of the same movements* is what
-added maps are at best.
+{given}on {machine}. Features and networks: [decision 37](decisions/0037-gesture-classifiers.md).
+Numbers are per cent, mean ± standard deviation over {seeds} seeds (each other people to judge,
+another draw and network). *Frames*: share found, mean over horizontal, vertical and background;
+*gestures*: whole ones.
 
 """
-CURVE = """
+CAMPAIGN_HEADING = "On a simulated campaign"
+CAMPAIGN = """
+{minutes:.0f} minutes of {people} people from {places} places (`sd2 simulate campaign --sensors
+{places} --seed {seed}`): `sd2 classify table` trained {runs} classifiers, with equally many steps,
+in {cpu_min:.0f} minutes of one core, and judged them on people not learnt from. Networks there, and
+on the {large_minutes:.0f} minutes that the bundled denoiser learnt from:
+
+{networks}
+
+What is added to all of the radar's data: maps of other movements, of which there is only video.
+*Moved sensors*: also as the other places see them. *Radar of the same movements*: what added maps
+are at best. The bundled denoiser learnt from other people.
+
+{added}
+
+Learning curve, frames:
+
+{curve}
+
+{helps}
+
 ![Learning curve](images/classifier-curve.png)
 
 ![Confusion matrices](images/classifier-confusion.png)
 
-"""
-LARGE = """\
-## With more of the radar's data
-
-`{made}` made {minutes:.0f} minutes of {people} people, the campaign
-that the bundled denoiser learnt from; here only its simulated radar is used: `{command}`.
+{sample}
 
 """
-REAL_HEADING = "## On real radar"
-REAL = f"""\
-{REAL_HEADING}
-
-Trained on recordings of a real radar and evaluated on others:
-[real-gestures.md](real-gestures.md).
-
-"""
-SAMPLE_HEAD = """\
-## On the sample recording
-
-`{train}`, then the maps of the bundled sample (simulated, one person), whom no training has seen.
-Its simulated radar has noise in every cell, which a campaign's targets do not have.
-
+LIMITS_HEADING = "What this cannot say"
+LIMITS = """
+- Anything about a real radar ([not simulated](decisions/0026-the-simulated-campaign.md)).
+- Longer trainings gain less by what is added
+  ([decision 37](decisions/0037-gesture-classifiers.md)).
+- Whether the task is the paper's: it tells neither its background nor who is judged.
 """
 
 
 def main() -> None:
-    """Measure and write."""
+    """Measure what is asked for and write the page."""
     options = _options()
-    before, _, after = PAGE.read_text("utf-8").partition(REAL_HEADING)
-    before, _, full = before.partition(FULL_HEADING)
-    before, _, protocols = before.partition(HEADING)
-    protocols, full = f"{HEADING}{protocols}", f"{FULL_HEADING}{full}"
-    if options.only in (None, "campaign"):
-        before, _, after = _page(options).partition(REAL_HEADING)
-    if options.only in (None, "protocols"):
-        folder = options.out / "protocols"
-        protocols = protocols_section(folder, options.protocol_minutes, options.seeds)
-    if options.only in (None, "full-size"):
-        full = full_size_section(options.out / "full-size", options.seeds)
-    PAGE.write_text(f"{before}{protocols}{full}{REAL_HEADING}{after.rstrip()}\n", "utf-8")
+    kept = sections((DOCS / NAME).read_text("utf-8"))
+    page = _head(options)
+    for name, (heading, measure) in _SECTIONS.items():
+        text = measure(options) if name in options.only else kept[heading]
+        page += f"## {heading}\n{text}"
+    write_page(NAME, f"{page}## {LIMITS_HEADING}\n{LIMITS}")
 
 
-def _page(options: argparse.Namespace) -> str:
+def _head(options: argparse.Namespace) -> str:
+    given = f"with `--shares {options.shares}`, " if options.shares else ""
+    return HEAD.format(given=given, machine=this_machine(), seeds=options.seeds)
+
+
+def _campaign(options: argparse.Namespace) -> str:
     """All but the paper's experiment."""
     folder: Path = options.out
-    campaign = options.campaign
-    made = f"sd2 simulate campaign --people 6 --minutes {options.minutes:g} --out gestures.zarr"
-    made += f" --sensors 3 --seed {SEED} --out gestures.zarr"
+    campaign, large = options.campaign, options.large
     if campaign is None:
         campaign = campaign_of(
             folder, options.minutes, "--sensors", 3, "--seed", SEED, "--workers", 2
         )
-    tables = folder / "table"
-    chosen = ["--seeds", options.seeds, *(["--shares", options.shares] if options.shares else [])]
-    sd2("classify", "table", campaign, "--out", tables, *chosen)
-    told = json.loads((tables / "table.json").read_text("utf-8"))
-    page = [_head(options, campaign, told, made), (tables / "table.md").read_text("utf-8")]
+    if large is None:
+        large = campaign_of(folder / "large", options.large_minutes, "--seed", 1)
+    shares = ("--shares", options.shares) if options.shares else ()
+    text = _table(campaign, folder / "table", "--seeds", options.seeds, *shares)
+    told = json.loads((folder / "table" / "table.json").read_text("utf-8"))
     for name in ("curve", "confusion"):
-        shutil.copyfile(tables / f"{name}.png", IMAGES / f"classifier-{name}.png")
-    page.append(CURVE)
-    page.append(_findings(told))
-    page.append(_large(options, folder))
-    page.append(REAL)
-    page.append(_sample(campaign, folder))
-    return "".join(page)
+        shutil.copyfile(folder / "table" / f"{name}.png", IMAGES / f"classifier-{name}.png")
+    radar_only = ("--radar-only", "--seeds", options.seeds, "--shares", "100%")
+    more = _table(large, folder / "large-table", *radar_only)
+    facts = json.loads(printed("info", campaign, "--json"))
+    minutes = sum(facts["minutes_of_subject"].values()) / facts["placements"]
+    runs = [run for one in told["conditions"] for run in one["runs"]]
+    return CAMPAIGN.format(
+        minutes=minutes,
+        seed=SEED,
+        people=len(facts["minutes_of_subject"]),
+        places=facts["placements"],
+        runs=len(runs),
+        cpu_min=sum(run["cpu_s"] for run in runs) / 60.0,
+        large_minutes=options.large_minutes,
+        networks=networks_table(
+            {f"{minutes:.0f} min": text, f"{options.large_minutes:.0f} min": more}
+        ),
+        added=added_table(text),
+        curve=curve_table(text),
+        helps=where_it_helps(told),
+        sample=_sample(campaign, folder),
+    )
+
+
+def _table(campaign: Path, out: Path, *options: object) -> str:
+    """What ``sd2 classify table`` says, in Markdown."""
+    sd2("classify", "table", campaign, "--out", out, *options)
+    return (out / "table.md").read_text("utf-8")
+
+
+_SECTIONS = {
+    "campaign": (CAMPAIGN_HEADING, _campaign),
+    "protocols": (
+        HEADING,
+        lambda options: protocols_section(
+            options.out / "protocols", options.protocol_minutes, options.seeds
+        ),
+    ),
+    "full-size": (
+        FULL_HEADING,
+        lambda options: full_size_section(options.out / "full-size", options.seeds),
+    ),
+}
 
 
 def _options() -> argparse.Namespace:
@@ -141,10 +176,7 @@ def _options() -> argparse.Namespace:
         "--large-minutes", type=float, default=168.0, help="of that one (default: 168)"
     )
     parser.add_argument(
-        "--only",
-        choices=("campaign", "protocols", "full-size"),
-        help="everything but the paper's experiment; that one in all its variants; or that with as"
-        " many frames as the paper's",
+        "--only", nargs="+", choices=_SECTIONS, default=tuple(_SECTIONS), help="sections to measure"
     )
     parser.add_argument(
         "--protocol-minutes", type=float, default=18.0, help="of its campaigns (default: 18)"
@@ -155,103 +187,71 @@ def _options() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def _head(options: argparse.Namespace, campaign: Path, told: dict, made: str) -> str:
-    facts = json.loads(printed("info", campaign, "--json"))
-    runs = [run for one in told["conditions"] for run in one["runs"]]
-    given = [f"--seeds {options.seeds}"] if options.seeds != 5 else []
-    given += [f"--minutes {options.minutes:g}"] if options.minutes != 36 else []
-    given += [f"--shares {options.shares}"] if options.shares else []
-    return HEAD.format(
-        here=f"here with `{' '.join(given)}`, " if given else "here ",
-        machine=this_machine(),
-        campaign=made,
-        minutes=sum(facts["minutes_of_subject"].values()) / facts["placements"],
-        people=len(facts["minutes_of_subject"]),
-        places=facts["placements"],
-        table=f"sd2 classify table gestures.zarr --out tables --seeds {options.seeds}"
-        + (f" --shares {options.shares}" if options.shares else ""),
-        runs=len(runs),
-        cpu_min=sum(run["cpu_s"] for run in runs) / 60.0,
+def networks_table(tables: Mapping[str, str]) -> str:
+    """Networks on all of the radar's data of campaigns, by their names."""
+    heading = "Networks, all of the radar's data, equal steps of training:"
+    rows: list[list[str]] = []
+    for name, text in tables.items():
+        own = table_below(text, heading, "network", "frames", "gestures")
+        own[0][1] = f"{name}: frames"
+        rows = [[*row, *more[1:]] for row, more in zip(rows, own, strict=True)] if rows else own
+    return "\n".join(markdown_table(rows))
+
+
+def added_table(text: str) -> str:
+    """What is added to all of the radar's data, of ``sd2 classify table``."""
+    heading = "What is added to all of the radar's data:"
+    rows = table_below(text, heading, "trained on", "frames", "gain, points")
+    return "\n".join(markdown_table(rows))
+
+
+def curve_table(text: str) -> str:
+    """Recall with less and less of the radar's data, and what is gained by added maps."""
+    gains = ("gain + synthetic", "gain + denoised synthetic")
+    rows = table_below(
+        text, "Learning curve, frames:", "share of radar data", "frames", "radar only", *gains
     )
+    return "\n".join(markdown_table(rows))
 
 
-def _findings(told: dict) -> str:
-    """Sentences about the table, from its numbers."""
-    conditions = told["conditions"]
-
-    def of(**wanted: object) -> dict:
-        default = {"share": 1.0, "added": "nothing", "moved": False, "network": told["network"]}
-        wanted = default | wanted
-        return next(c for c in conditions if all(c[key] == value for key, value in wanted.items()))
-
-    def percent(one: dict, key: str = "mean_recall_frames") -> str:
-        return f"{100 * one[key]['mean']:.1f} ± {100 * one[key]['sd']:.1f} %"
-
-    lines = ["### What that says", ""]
-    lines.append(
-        f"- The {told['radar']} radar's data only, unseen people: {percent(of())} of the frames"
-        " (mean over classes),"
-        f" {percent(of(), 'mean_recall_gestures')} of the gestures. The paper reports 87 to 92 %"
-        " per class, of a sensor and movements of its own."
-    )
-    s4, hasty = ({**told["network"], **other} for other in ({"model": "s4"}, {"delay_s": 0.0}))
-    lines.append(
-        f"- S4 on the same columns: {percent(of(network=s4))}, the LSTM {percent(of())}; the LSTM"
-        f" that answers at once: {percent(of(network=hasty))}."
-    )
-    for added, name in (("denoised", "denoised synthetic"), ("synthetic", "synthetic")):
-        shares = sorted({c["share"] for c in conditions if c["added"] == added and not c["moved"]})
-        gains = [(share, of(share=share, added=added)["gain"]) for share in shares]
-        words = ", ".join(
-            f"{100 * gain['mean']:+.1f} ± {100 * gain['sd']:.1f} at {share:.0%}"
-            for share, gain in gains
+def where_it_helps(told: Mapping[str, Any]) -> str:
+    """Sentence on the shares at which more is gained than the standard deviation over seeds."""
+    words = []
+    for added in ("synthetic", "denoised"):
+        shares = sorted(
+            one["share"]
+            for one in told["conditions"]
+            if one["added"] == added
+            and not one["moved"]
+            and one["gain"]["mean"] > one["gain"]["sd"]
         )
-        lines.append(f"- Adding {name} maps changes the mean recall by {words} (points).")
-        helps = [share for share, gain in gains if gain["mean"] > gain["sd"]]
-        if helps:
-            lines.append(
-                "  More than its standard deviation over seeds is gained with"
-                f" {', '.join(f'{share:.0%}' for share in helps)} of the radar's data."
-            )
-        else:
-            lines.append("  Nowhere is that more than its standard deviation over seeds.")
-    lines.append(
-        "- Trainings are short. Longer ones help most where there is little to learn from, and gain"
-        " less by what is added: [decision 37](decisions/0037-gesture-classifiers.md)."
-    )
-    return "\n".join([*lines, "", ""])
-
-
-def _large(options: argparse.Namespace, out: Path) -> str:
-    campaign, minutes = options.large, options.large_minutes
-    if campaign is None:
-        campaign = campaign_of(out / "large", minutes, "--seed", 1)
-    how = ("--radar-only", "--seeds", options.seeds, "--shares", "30%,100%")
-    sd2("classify", "table", campaign, "--out", out / "large-table", *how)
-    facts = json.loads(printed("info", campaign, "--json"))["minutes_of_subject"]
-    words = LARGE.format(
-        made=f"sd2 simulate campaign --people 6 --minutes {minutes:g} --seed 1 --out campaign.zarr",
-        minutes=sum(facts.values()),
-        people=len(facts),
-        command=_command(["classify", "table", "campaign.zarr", "--out", "tables", *how], {}),
-    )
-    return words + (out / "large-table" / "table.md").read_text("utf-8") + "\n"
+        words.append(f"{', '.join(f'{share:.0%}' for share in shares) or 'no share'} ({added})")
+    return f"More than its standard deviation over seeds is gained at {' and '.join(words)}."
 
 
 def _sample(campaign: Path, out: Path) -> str:
+    """Sentence on the bundled recording, of a person whom no training has seen."""
     model = out / "sample.safetensors"
-    train = ["classify", "train", campaign, "--maps", "radar,denoised", "--out", model]
-    sd2(*train)
-    shown = {str(campaign): "gestures.zarr", str(model): "g.safetensors"}
-    parts = [SAMPLE_HEAD.format(train=_command(train, shown))]
-    for maps in ("radar", "denoised"):
-        evaluate = ["classify", "eval", SAMPLE, "--maps", maps, "--model", model]
-        parts.append(f"`{_command(evaluate, shown)}`:\n\n```\n{printed(*evaluate)}```\n\n")
-    return "".join(parts)
+    sd2("classify", "train", campaign, "--maps", "radar,denoised", "--out", model)
+    told = {
+        maps: json.loads(
+            printed("classify", "eval", SAMPLE, "--maps", maps, "--model", model, "--json")
+        )
+        for maps in ("radar", "denoised")
+    }
+    return sample_words(told)
 
 
-def _command(arguments: list[object], shown: dict[str, str]) -> str:
-    return " ".join(["sd2", *(shown.get(str(one), str(one)) for one in arguments)])
+def sample_words(told: Mapping[str, Mapping[str, Any]]) -> str:
+    """Sentence on scores of the bundled recording by its maps."""
+    words = []
+    for maps, score in told.items():
+        gestures = np.array(score["gestures"])
+        words.append(
+            f"{100 * score['mean_recall_frames']:.1f} % of the frames and {np.trace(gestures)} of"
+            f" {gestures.sum()} swipes of the {maps} map"
+        )
+    return f"Found in the bundled sample, a person no training has seen: {', '.join(words)}."
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Makes ``denoiser-comparison.md`` and its pictures: ``make denoiser-comparison``, hours.
+"""Makes ``denoiser-comparison.md``: ``make denoiser-comparison``, hours.
 
 Campaign, pairs and runs stay in ``build/denoiser-comparison`` (or ``--folder``); what is there is
 not made again, a run that was broken off goes on. Runs are as many at once as the machine has
@@ -10,32 +10,32 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-
-from matplotlib.figure import Figure
+from typing import Any
 
 from sd2core.accuracy.cache import this_machine
 from sd2core.denoise.registry import options as options_of
-from sd2core.files.atomic import atomic_write_text
-from sd2core.files.figure_files import save_figure
+from sd2core.files.tables import markdown_table
 from sd2core.pairs.store import read_pairs
-from sd2core.runs.progress import read_events, standing
-from sd2core.train.folder import TrainingFolder
-from tools.documentation.places import BUILD, DOCS, IMAGES, SHARED
+from tools.documentation.measured import write_page
+from tools.documentation.places import BUILD, DOCS, SHARED
 from tools.documentation.runs import (
-    PILOT_EPOCHS,
+    ERRORS,
     Job,
     TimedJob,
     campaign_of,
     epoch_ends_s,
+    errors_of,
+    evaluated,
     sd2,
     settings,
-    tables,
+    spread,
     timed,
     train,
 )
 
+NAME = "denoiser-comparison.md"
 MARS = (SHARED / "paired" / "mars_subject1", SHARED / "paired" / "mars_subject4")
 
 WITH_LIMBS = {f"{name}-limbs": (name, "--inputs", "limbs") for name in ("s4", "gru", "unet")}
@@ -56,61 +56,44 @@ DROPOUT = 0.1
 PAGE = """\
 # Denoisers compared
 
-The bundled one is measured in [denoiser.md](denoiser.md), which also says what the campaign is;
-here the errors of its fits are as measured.
-This page is made by
+Which network denoises best at equal time, and what do denoisers make of a real radar? The first
+table is of a **simulated** radar, the second of a **real** one. Made by
 
-```
+```sh
 make denoiser-comparison
 ```
 
-here with `--campaign-minutes {campaign_minutes:g} --minutes {minutes:g} --seeds {seeds}`, on
-{machine}.
-The people that are judged were seen neither in training nor in choosing the best epoch. What the
-errors are is written in `sd2core/denoise/metrics.py`.
+with `--campaign-minutes {campaign_minutes:g} --minutes {minutes:g} --seeds {seeds}`, on {machine}.
+Nobody who is judged was learnt from. *Peak*: velocity of the strongest bin, *mean*: of the whole
+column, both where the radar shows movement; *map*: all cells. The bundled models are measured in
+[the denoiser](denoiser.md).
 
 ## Models at equal time
 
-Every model trained from {seeds} seed(s), for {minutes:g} minutes of processor time each on
-one thread, with a dropout of {dropout:g}. All have about as many parameters. Three
-also learn from the maps of five parts of the body (`limbs`). A run of {pilot} epochs tells the
-processor time of one, and so how many epochs fit: other work on the machine does not change what is
-learnt.
+A simulated campaign as [there](denoiser.md#the-simulated-campaign), with errors of fits as
+measured; {moving:,} moving frames of one person. Each model: {seeds} seed(s), {minutes:g} minutes
+of processor time on one thread, a dropout of {dropout:g}, about as many parameters as the S4.
 
-{epochs}
+{simulated}
 
-{tables}
-![Error of every model, per gesture and per person](images/denoiser-campaign.png)
+{leader}
 
-Validation error of the same runs against the processor time they had trained:
+*None* is the synthetic map; the next three are filters. `-limbs` takes maps of five parts of the
+body ([decision 52](decisions/0052-limb-maps.md)); `-step` has fewer channels, so a step takes as
+long as the S4's; `-both` also looks ahead, as U-Net and Swin transformer do, and cannot run live;
+`-range` scales input and target together (`--range-factor 2`; moved sensors:
+[range synthesis](range-synthesis.md)); `{serial}` is the paper's literal form, whose one epoch took
+{serial_minutes:.1f} minutes.
 
-![Validation error against training time](images/denoiser-curves.png)
+"""
+LIMITS = """\
+## What this cannot say
 
-### As long a step
-
-The U-Net and the Swin transformer take longer for a step than the S4. With fewer channels, so that
-a step takes as long (one run each):
-
-{same_step}
-{variants}{real}"""
-
-VARIANTS = """\
-### Variants of the S4
-
-`s4-serial` is the paper's literal form, 2,304 samples of one channel; it had one epoch, which took
-{serial_minutes:.1f} minutes of processor time.
-`bidirectional` also looks ahead, as the U-Net and the Swin transformer do, and cannot run live.
-Judged on the same takes.
-
-{tables}
-### Range synthesis
-
-Input and target of a segment scaled together, as if the person were up to twice as near or as far
-(`--range-factor 2`); everything else as the S4 above. The campaign itself has people at 1.5 to 4 m.
-What learning from moved sensors gives (`--placements all`) is in
-[range-synthesis.md](range-synthesis.md).
-
-{range_tables}
+- Who leads on a simulated radar need not lead on a real one
+  ([decision 26](decisions/0026-the-simulated-campaign.md)).
+- One seed has no spread: differences of some thousandths rank nothing.
+- The real pairs are two persons' exercises, not swipes, and their input is a Kinect's skeleton, not
+  a fitted video.
 """
 
 # At 10 frames/s the S4's steps are longer.
@@ -123,23 +106,27 @@ REAL_MODELS = {
     "unet-limbs": ("unet", "--inputs", "limbs"),
 }
 
-REAL_HEAD = "## Real pairs\n"
+REAL_HEADING = "Real pairs"
 REAL = """\
+## {heading}
 
-MARS: a body driven by a Kinect's skeleton, and what a real 77 GHz radar saw of the same person at
-10 frames/s ([decision 27](decisions/0027-real-pairs.md); what the pairs are worth before denoising:
-[real-pairs.md](real-pairs.md)). Every person is judged by models that have seen nothing of them:
-they learn from the other person, whose last fifth of the takes chooses the best epoch. One learns
-from the map, as in the paper, the others from the maps of five parts of the body (`limbs`: trunk,
-upper arms, forearms, thighs, lower legs; [decision 52](decisions/0052-limb-maps.md)). As there are
-3 to 8 minutes to learn from, batches are of 16 segments and the dropout is 0.3; the S4's steps are
-longer; `bidirectional` looks ahead as well. What a linear map makes of the same pairs is in
-[real-pairs.md](real-pairs.md).
+MARS: a body driven by a Kinect's skeleton, and what a **real** 77 GHz radar saw of the same person,
+10 frames/s ([decision 27](decisions/0027-real-pairs.md)). Each of the two persons is judged by
+models that learnt from the other one alone; ± is over {seeds} seeds. The dropout is 0.3, the S4's
+steps are longer. Made by
 
-This section alone is made by `python -m tools.documentation.denoiser_comparison --only-real`, here
-with `--seeds {seeds} --real-minutes {real_minutes:g}`, on {machine}.
+```sh
+python -m tools.documentation.denoiser_comparison --only-real --seeds {seeds} \\
+  --real-minutes {real_minutes:g}
+```
 
-{tables}
+on {machine}. *Corr.* is that of the mean velocity; how much of it the radar's few points allow:
+[real pairs](real-pairs.md#what-the-radar-allows).
+
+{table}
+
+{beside_ridge}
+
 """
 
 
@@ -147,44 +134,67 @@ def main() -> None:
     """Make what is missing, measure everything and write the page."""
     options = _options()
     folder: Path = options.folder
-    path = DOCS / "denoiser-comparison.md"
     if options.only_real:
-        before = path.read_text("utf-8").partition(REAL_HEAD)[0]
-        atomic_write_text(path, before + _real(folder, options))
+        before, *_ = (DOCS / NAME).read_text("utf-8").partition(f"## {REAL_HEADING}")
+        write_page(NAME, before + _real(folder, options) + LIMITS)
         return
     campaign = campaign_of(folder, options.campaign_minutes, "--seed", 1, "--limbs")
     jobs = {name: _timed(folder, campaign, name, options) for name in ALL}
     compared = [jobs[name].seeded(seed) for seed in range(options.seeds) for name in COMPARED]
     alone = {name: jobs[name].seeded(0) for name in ALL if name not in COMPARED}
     # A pilot of several epochs would take longer than all runs of another model.
-    alone[SERIAL] = TimedJob(_job(campaign, SERIAL, (SERIAL,)), math.nan, epochs=1).seeded(0)
+    serial = TimedJob(_job(campaign, SERIAL, (SERIAL,)), math.nan, epochs=1)
+    alone[SERIAL] = serial.seeded(0)
     train(folder, [*compared, *alone.values()])
-    _curves(folder, jobs, options.seeds)
-    s4 = folder / jobs["s4"].seeded(0).name
-
-    def beside(*names: str) -> str:
-        return tables(folder, [s4, *(folder / alone[name].name for name in names)], campaign)
-
-    runs = [folder / job.name for job in compared]
+    # Alone: beside the S4 it would count as a second seed of it.
+    scaled = alone.pop("s4-range")
+    runs = [[*compared, *alone.values()], [scaled]]
+    evaluations = [evaluated([folder / job.name for job in those], campaign) for those in runs]
     page = PAGE.format(
         machine=this_machine(),
         campaign_minutes=options.campaign_minutes,
         seeds=options.seeds,
         minutes=options.minutes,
         dropout=DROPOUT,
-        pilot=PILOT_EPOCHS,
-        epochs=_epochs(jobs),
-        same_step=beside("unet-step", "swin-step"),
-        tables=tables(folder, runs, campaign, "--figure", IMAGES / "denoiser-campaign.png"),
-        variants=VARIANTS.format(
-            tables=beside("s4-both", SERIAL),
-            serial_minutes=epoch_ends_s(folder / alone[SERIAL].name)[0] / 60.0,
-            # Alone: beside the other one it would count as a second seed of it.
-            range_tables=tables(folder, [folder / alone["s4-range"].name], campaign),
-        ),
-        real=_real(folder, options),
+        moving=evaluations[0]["moving_frames"],
+        simulated=_simulated(evaluations, {**jobs, SERIAL: serial}),
+        leader=_leader(evaluations[0]),
+        serial=SERIAL,
+        serial_minutes=epoch_ends_s(folder / alone[SERIAL].name)[0] / 60.0,
     )
-    atomic_write_text(path, page)
+    write_page(NAME, page + _real(folder, options) + LIMITS)
+
+
+def _simulated(evaluations: Sequence[Mapping[str, Any]], jobs: Mapping[str, TimedJob]) -> str:
+    """Errors of the filters and of every run, as a table."""
+    rows = [["run", "epochs", *ERRORS.values()]]
+    for evaluation in evaluations:
+        for group in evaluation["groups"]:
+            name = _run_of(group)
+            if group["trained"] or evaluation is evaluations[0]:
+                epochs = str(jobs[name].epochs) if group["trained"] else ""
+                rows.append([name, epochs, *errors_of(group)])
+    return "\n".join(markdown_table(rows))
+
+
+def _leader(evaluation: Mapping[str, Any]) -> str:
+    """Sentence on which network does best of those that learn from the map, as the paper's do."""
+    mae_mps = {
+        _run_of(group): group["peak_mae_mps"]["mean"]
+        for group in evaluation["groups"]
+        if group["trained"] and _run_of(group) not in WITH_LIMBS
+    }
+    best = min(mae_mps, key=mae_mps.__getitem__)
+    return (
+        f"Of what learns from the map, as the paper's models do, `{best}` has the nearest peaks"
+        f" ({mae_mps[best]:.3f} m/s); the S4 that does not look ahead errs by {mae_mps['s4']:.3f},"
+        f" the U-Net by {mae_mps['unet']:.3f}. All are regularised, by the dropout."
+    )
+
+
+def _run_of(group: Mapping[str, Any]) -> str:
+    """Name of the run without its seed, or of the filter."""
+    return group["models"][0]["name"].rpartition("-")[0] if group["trained"] else group["name"]
 
 
 def _timed(folder: Path, campaign: Path, name: str, options: argparse.Namespace) -> TimedJob:
@@ -193,12 +203,6 @@ def _timed(folder: Path, campaign: Path, name: str, options: argparse.Namespace)
 
 def _job(campaign: Path, name: str, model: tuple[str, ...]) -> Job:
     return Job(name, campaign, ("--model", *model, *settings({"dropout": DROPOUT})))
-
-
-def _epochs(jobs: Mapping[str, TimedJob]) -> str:
-    lines = ["| run | s per epoch | epochs |", "| --- | ---: | ---: |"]
-    lines += [f"| {name} | {job.epoch_s:.1f} | {job.epochs} |" for name, job in jobs.items()]
-    return "\n".join(lines)
 
 
 def _options() -> argparse.Namespace:
@@ -231,44 +235,50 @@ def _real(folder: Path, options: argparse.Namespace) -> str:
             job = timed(folder, Job(f"mars-{judged}-{name}", mars, how), options.real_minutes)
             runs.setdefault(judged, []).extend(map(job.seeded, range(options.seeds)))
     train(folder, [job for own in runs.values() for job in own])
-    shown = [
-        f"### Person {judged}\n\n"
-        + tables(folder, [folder / job.name for job in own], mars, "--subjects", judged)
+    evaluations = {
+        judged: evaluated([folder / job.name for job in own], mars, "--subjects", judged)
         for judged, own in runs.items()
-    ]
-    return REAL_HEAD + REAL.format(
+    }
+    return REAL.format(
+        heading=REAL_HEADING,
         seeds=options.seeds,
         real_minutes=options.real_minutes,
         machine=this_machine(),
-        tables="\n".join(shown),
+        table=_real_table(evaluations),
+        beside_ridge=_beside_ridge(evaluations.values()),
     )
 
 
-def _curves(folder: Path, jobs: Mapping[str, TimedJob], seeds: int) -> None:
-    """Validation error of the map and of the peak velocity, against time."""
-    figure = Figure(figsize=(9.6, 3.6), dpi=110, layout="constrained")
-    axes = figure.subplots(1, 2)
-    for colour, name in enumerate(COMPARED):
-        for seed in range(seeds):
-            run = TrainingFolder(folder / jobs[name].seeded(seed).name)
-            epochs = [one for one in standing(read_events(run.progress)) if one["event"] == "epoch"]
-            minutes = [event["epoch"] * jobs[name].epoch_s / 60 for event in epochs]
-            for axis, part in zip(axes, ("validation_rmse", "validation_mae_mps"), strict=True):
-                axis.plot(
-                    minutes,
-                    [event[part] for event in epochs],
-                    color=f"C{colour}",
-                    linewidth=1.0,
-                    label=None if seed else name,
-                )
-    axes[0].set_ylabel("RMSE of compressed values")
-    axes[1].set_ylabel("mean error of the peak velocity (m/s)")
-    axes[0].legend(fontsize=8)
-    for axis in axes:
-        axis.set_yscale("log")
-        axis.set_xlabel("minutes of training")
-        axis.grid(alpha=0.25, which="both")
-    save_figure(figure, IMAGES / "denoiser-curves.png")
+def _real_table(evaluations: Mapping[str, Mapping[str, Any]]) -> str:
+    """Errors of the filters and models for each person, side by side."""
+    rows: dict[str, list[str]] = {"model": ["model"]}
+    for judged, evaluation in evaluations.items():
+        rows["model"] += [f"person {judged}: peak MAE m/s", "mean MAE m/s", "corr."]
+        for group in evaluation["groups"]:
+            name = _run_of(group).removeprefix(f"mars-{judged}-")
+            rows.setdefault(name, [name]).extend(
+                [
+                    spread(group["peak_mae_mps"]),
+                    spread(group["mean_mae_mps"]),
+                    spread(group["mean_correlation"], 2),
+                ]
+            )
+    return "\n".join(markdown_table(list(rows.values())))
+
+
+def _beside_ridge(evaluations: Iterable[Mapping[str, Any]]) -> str:
+    """Sentence on how often a network does better than the best of the filters."""
+    better = []
+    for evaluation in evaluations:
+        ridge, *trained = [
+            one for one in evaluation["groups"] if one["trained"] or one["name"] == "ridge"
+        ]
+        better += [[one[name]["mean"] < ridge[name]["mean"] for name in ERRORS] for one in trained]
+    peak, mean, _ = map(sum, zip(*better, strict=True))
+    return (
+        f"A network has nearer peaks than `ridge`, a linear filter, in {peak} of {len(better)}"
+        f" cases, and a nearer mean velocity in {mean}."
+    )
 
 
 if __name__ == "__main__":

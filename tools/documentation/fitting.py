@@ -17,12 +17,12 @@ from matplotlib.figure import Figure
 from sd2core.accuracy.cache import this_machine
 from sd2core.compare.figure import draw_comparison
 from sd2core.compare.meshes import compare_meshes
-from sd2core.files.atomic import atomic_write_text
 from sd2core.files.figure_files import save_figure
 from sd2core.io.mesh import load_mesh
 from sd2core.io.video import open_video
 from sd2core.numerics.compiled import warm_up
-from tools.documentation.places import BUILD, DOCS, IMAGES, SHARED
+from tools.documentation.measured import write_page
+from tools.documentation.places import BUILD, IMAGES, SHARED
 from tools.fitting.__main__ import main as run_fitting
 from tools.fitting.truth import read_truth
 from tools.motion_capture.__main__ import main as run_motion_capture
@@ -44,43 +44,36 @@ COMPARED = "all-normal"
 PAGE = """\
 # How good the fit from video is
 
-What `sd2 fit` makes of videos whose motion is known, measured. Made by
+How well does a body that `sd2 fit` makes of a video follow the person, above all along the line of
+sight? Measured by
 
 ```
 make fitting
 ```
 
-on {machine}: sixteen videos of simulated people (`python -m tools.fitting clips`) and, where the
-motion capture is there, twenty-two whose motion is that of recorded people, all of motions and
-persons that nothing in the program was trained with; fitted by `sd2 fit` with the camera's focal
-length and the person's height given, and measured by `python -m tools.fitting score`. What the
-clips can and cannot say is [decision 19](decisions/0019-known-truth-for-the-fit.md); how the
-lifter came about is [decision 46](decisions/0046-depth-from-real-motion.md).
+on {machine}: videos of simulated people, sixteen with made motions and, where the motion capture is
+there, twenty-two that move as recorded people did; nothing in the program was trained with these
+motions and persons. The fit is given the camera's focal length and the person's height. The motion
+in real videos is not known: there a body can only be held against the picture.
 
 ![Frames of eight of the clips](images/fit-truth.png)
 
-**Line-of-sight velocity** is that of a limb towards the camera, by the exact change of range
-over the central difference, as the Doppler chain takes it. **Map L1** is the sum of the absolute
-differences between the synthetic Doppler maps of the fitted and of the true mesh (the paper's
-preset, smoothed) over the sum of the true one. **Peak kept** is the fitted hand's largest speed
-along the line of sight over the true one's; more than 1 is too much. **Ends** are the first and
-last five frames, over those between. Joints are patches of the surface. The **residual** is the
-mean distance in space of the landmarks that were seen, at the depth that the lifter gives them,
-from the body. Time by the clock counts whatever else the machine did; processor time is the fit's
-own, on all cores together.
-
-Of a real video neither focal length nor height is known. A wrong height scales the residual, every
-distance and every velocity alike; how much of the residual may be due to the focal length is told
-by fits with others (last table).
-
-What limits the figures is depth: given the true depths and velocities along the optical axis in
-the lifter's place, the same fit of the same landmarks is well within all of them ([decision
-19](decisions/0019-known-truth-for-the-fit.md), last paragraph).
+**Line-of-sight velocity** is that of a limb towards the camera. **Map L1** is the sum of the
+absolute differences between the synthetic Doppler maps of the fitted and of the true mesh over the
+sum of the true one. **Peak kept** is the hand's largest fitted speed along the line of sight over
+the true one. **Ends** are the first and last five frames, over those between. **Bold**: missed.
 
 {tables}
 The clip {compared}, true and fitted:
 
 ![Doppler maps and velocities of one clip, true and fitted](images/fit-compared.png)
+
+**What limits it** is depth: given the true depths and velocities along the optical axis, the same
+fit is well within all that is wanted ([decision 19](decisions/0019-known-truth-for-the-fit.md)).
+
+**What this cannot say.** The simulated bodies are of the family that is fitted, their cloth has
+no folds and nothing stands before them. Of a real video neither focal length nor height is known; a
+wrong height scales all distances and velocities alike.
 """
 
 
@@ -105,7 +98,7 @@ def main() -> None:
     compared = compare_meshes(pair, ["true", "fitted"])
     save_figure(draw_comparison(compared), IMAGES / "fit-compared.png")
     page = PAGE.format(machine=this_machine(), tables=tables.read_text("utf-8"), compared=COMPARED)
-    atomic_write_text(DOCS / "fitting.md", page)
+    write_page("fitting.md", page)
 
 
 def _run(program: Callable[[Sequence[str]], int], *arguments: object) -> None:

@@ -38,7 +38,7 @@ class Measured:
 
 PAGES = {
     "accuracy-and-speed.md": Measured("make accuracy", (*_DOPPLER, "sd2core/accuracy", "sd2core/fmcw")),
-    "nulling.md": Measured("", ("sd2core/doppler",)),
+    "nulling.md": Measured("python tests/core/mocap/mars_nulling.py", ("sd2core/doppler",)),
     "performance.md": Measured("make bench", (*_DOPPLER, "sd2core/fmcw")),
     "scale.md": Measured("make scale", ("sd2core/batch", "sd2core/datasets")),
     "fitting.md": Measured("make fitting", (*_BODY, "tools/fitting")),
@@ -47,7 +47,10 @@ PAGES = {
         "make denoiser-comparison", ("sd2core/denoise", "sd2core/train", *_CAMPAIGN)
     ),
     "range-synthesis.md": Measured("make range-synthesis", ("sd2core/denoise", "sd2core/train", *_CAMPAIGN)),
-    "real-pairs.md": Measured("", ("sd2core/pairs", "sd2core/denoise", "sd2core/train")),
+    "real-pairs.md": Measured(
+        "python -m tools.documentation.real_pairs",
+        ("sd2core/pairs", "sd2core/denoise", "sd2core/train"),
+    ),
     "classifier.md": Measured("make classifier", ("sd2core/classify", *_DENOISERS, *_CAMPAIGN)),
     "real-gestures.md": Measured("make real-gestures", ("sd2core/classify", "sd2core/labels/suggest.py")),
     "whole-loop.md": Measured("make whole-loop", ("sd2core/classify", *_DENOISERS, *_CAMPAIGN)),

@@ -9,7 +9,6 @@ and leaves the others as the page has them.
 from __future__ import annotations
 
 import argparse
-import json
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,10 +18,11 @@ from typing import Any
 import numpy as np
 
 from sd2core.accuracy.cache import this_machine
+from sd2core.classify.comparison import Table
+from sd2core.classify.experiment import PAPER as PAPER_NETWORK
 from sd2core.denoise.files import load_model
 from sd2core.denoise.metrics import VelocityError, peak_error, stands_out
 from sd2core.figures.maps import Levels, MapRow, draw_maps
-from sd2core.files.atomic import atomic_write_text
 from sd2core.files.figure_files import save_figure
 from sd2core.files.tables import markdown_table
 from sd2core.maps import DopplerMap, MapKind
@@ -31,18 +31,23 @@ from sd2core.simulate.campaign.protocol import PAPER
 from sd2core.timebase import Timebase
 from tools.documentation.classifier_protocols import (
     ADDED,
+    CLASSES,
     FULL_MINUTES,
+    GIVEN,
     RANDOM,
     SEED,
-    confusion_table,
-    means_table,
+    confusions,
+    given_mean,
+    means,
     protocol_campaign,
     protocol_clips,
     protocol_tables,
 )
+from tools.documentation.classifier_protocols import spread as class_spread
+from tools.documentation.measured import write_page
 from tools.documentation.paper_bodies import draw_bodies
 from tools.documentation.places import BUILD, DOCS, IMAGES, REPOSITORY
-from tools.documentation.runs import Job, printed, settings, timed, train
+from tools.documentation.runs import Job, evaluated, sections, settings, spread, timed, train
 
 PAGE = DOCS / "paper.md"
 LINES = Path(__file__).with_name("paper_lines.md")
@@ -60,62 +65,49 @@ HEAD = """\
 What "SD²: Synthetic Doppler Spectrum Denoiser using SSM" shows and says, and where this program
 does it. Made by
 
-```
+```sh
 make paper
 ```
 
-**No real radar has part in this page, but in the paper's own numbers.** Its data are not
-published; what stands for its six people, camera and 60 GHz radar is `sd2 simulate campaign
---protocol paper`, with bodies that err as fits of videos do and a *simulated* radar ([decision
-26](decisions/0026-the-simulated-campaign.md)). Beside a real radar the program is measured in
-[denoiser-comparison.md](denoiser-comparison.md), [real-pairs.md](real-pairs.md) and
-[real-gestures.md](real-gestures.md). [Line by line](#line-by-line) says what was chosen where the
-paper is silent, [what differs](#what-differs-and-why) why numbers are not the paper's.
+on {machine}. **No real radar has part in this page, but in the paper's own numbers**: its data are
+not published, and `sd2 simulate campaign --protocol paper` stands in
+([decision 26](decisions/0026-the-simulated-campaign.md)). Beside a real radar:
+[denoisers compared](denoiser-comparison.md#real-pairs), [real gestures](real-gestures.md).
 
 """
 
 PICTURES = """
 ![Five frames of a horizontal swipe](images/paper-mesh.png)
 
-**Figure 2.** Frames 100, 110, … 140 of the bundled sample, a simulated recording: a swipe from
-right to left, and the hand after it. Dots are vertices of the mesh, in the colour of their velocity
-towards the sensor.
-`sd2 strip resources/swipes.sd2 --frames 100:141:10 --dots --v-max 1.5 --out mesh.png`
+**Figure 2.** Frames 100, 110, … 140 of the bundled sample, which is simulated; dots are vertices,
+coloured by their velocity towards the sensor.
 
 ![Distance of the body's surface from sensors at two ranges](images/paper-range.png)
 
-**Figure 4.** Frame {frame} of the same mesh from sensors {near:g} and {far:g} m before the body,
-each with its own colours: the distance of the surface from the sensor. Seen from {far:g} m
-(`sd2 synth resources/swipes.sd2 --sensor 0,0,{z:g} --out far.npz`), the synthetic map of the
-recording keeps {share:.1f} % of its energy. The radar equation gives ({near:g} / {far:g})⁴ =
-{law:.1f} % where the trunk is, and less for hands, which are nearer and move most.
+**Figure 4.** Frame {frame} from {near:g} and {far:g} m. From {far:g} m the synthetic map of the
+recording keeps {share:.1f} % of its energy; the radar equation gives ({near:g} / {far:g})⁴ =
+{law:.1f} % where the trunk is.
 
 ![Doppler maps of a take of horizontal and one of vertical swipes](images/paper-swipes.png)
 
-**Figure 7.** Doppler of a take of horizontal and one of vertical swipes by one person (*paper*, to
-and fro, seed {seed}): of the **simulated** radar, and synthetic of a body with the errors of a fit,
-before denoising. Each level is relative to the map's own strongest cell.
+**Figure 7.** Horizontal and vertical swipes by one person: the **simulated** radar, and synthetic
+of a body with the errors of a fit.
 
 """
 
 DENOISERS = """
-On {machine}. Campaign: `sd2 simulate campaign --out random.zarr --protocol paper --order random
---seed {seed} --minutes {campaign_minutes:g}`: six people, who make all four swipes in random order
-(4.1) in two of three takes, and let their hands hang in the third. Four are learnt from, one
-chooses the best epoch, one is judged. Each model is trained {seeds} times with different seeds,
-for {minutes:g} minutes of processor time on one thread, with a dropout of {dropout:g} and about as
-many parameters: {epochs}. More data and more rivals are in
-[denoiser-comparison.md](denoiser-comparison.md).
+`--order random --seed {seed} --minutes {campaign_minutes:g}`, six people: four are learnt from, one
+chooses the best epoch, one is judged. Each model: {seeds} seeds, {minutes:g} minutes of processor
+time on one thread, a dropout of {dropout:g}, about as many parameters: {epochs}. S4 sees only the
+past, its rivals whole windows; [looking ahead](denoiser-comparison.md) it does better.
 
 ![One take: synthetic, denoised by three models, and the simulated radar](images/paper-denoised.png)
 
-**Figure 6.** The liveliest take of the person judged. The radar is **simulated**. Each level is
-relative to the map's own strongest cell.
+**Figure 6.** The liveliest take of the person judged. The radar is **simulated**.
 
-**Table 1.** Error of the velocity of the strongest bin, m/s, in the {moving:,} of {frames:,} frames
-in which the **simulated** radar shows movement (`sd2 eval`); ± is the standard deviation over the
-trainings. *S4 to it*: S4's MAE compared with this one's. *None*: the synthetic map as it is.
-*Nothing moves*: an answer of 0 m/s everywhere.
+**Table 1.** Error of the velocity of the strongest bin, m/s, in {moving:,} of {frames:,} frames in
+which the **simulated** radar shows movement; ± is over the seeds. *S4 to it*: S4's MAE compared
+with this one's. *None*: the synthetic map.
 
 {table}
 {findings}
@@ -123,15 +115,15 @@ trainings. *S4 to it*: S4's MAE compared with this one's. *None*: the synthetic 
 """
 
 CLASSIFIERS = """
-On {machine}. Two campaigns of {campaign_minutes:g} minutes of the same six people: one kind of
-swipe to and fro in a take (`--protocol paper`), or all four (`--order random`). Ours, of the
-**simulated** radar, in per cent of frames, mean ± standard deviation over {seeds} seeds; how they
-are made is told in [classifier.md](classifier.md#the-papers-experiment), which has the same runs.
-*Unseen*: people are judged who were not learnt from; *same*: other takes of those who were. The
-paper does not say which its numbers are. *Ours* is the network of `sd2 classify train`, *the
-paper's* that of its 5.1, here. Denoised maps are of the bundled denoiser.
+{campaign_minutes:g} minutes, to and fro, unseen people, per cent of frames, means over {seeds}
+seeds: what rows, the true classes, are taken for, horizontal / vertical / background. The paper's
+radar is real, ours **simulated**; *the paper's network* is that of its 5.1, here. Other people and
+orders: [classifier](classifier.md#as-many-frames-as-the-papers).
 
-Mean of the three classes:
+{table}
+
+Denoised is what the bundled denoiser makes. That it helps on a real radar is the paper's finding;
+here it has not been shown.
 
 """
 
@@ -147,20 +139,14 @@ class Section:
 def main() -> None:
     """Measure what is asked for and write the page."""
     options = _options()
-    page = HEAD
+    page = HEAD.format(machine=this_machine())
     kept = sections(PAGE.read_text("utf-8")) if PAGE.exists() else {}
     for name, section in SECTIONS.items():
         missing = f"\nNot measured yet: `python -m tools.documentation.paper --only {name}`.\n\n"
         made = name in options.only
         text = section.make(options) if made else kept.get(section.heading, missing)
         page += f"## {section.heading}\n{text}"
-    atomic_write_text(PAGE, page + linked(LINES.read_text("utf-8")))
-
-
-def sections(page: str) -> dict[str, str]:
-    """Text below every heading of the second level, up to the next."""
-    _, *parts = re.split(r"^## (.+)\n", page, flags=re.MULTILINE)
-    return dict(zip(parts[::2], parts[1::2], strict=True))
+    write_page(PAGE.name, page + linked(LINES.read_text("utf-8")))
 
 
 def linked(text: str) -> str:
@@ -225,7 +211,7 @@ def _pictures(options: argparse.Namespace) -> str:
         )
     ]
     _save_maps("paper-swipes.png", rows, "Figure 7 on simulated people before a simulated radar")
-    return PICTURES.format(seed=SEED, **bodies)
+    return PICTURES.format(**bodies)
 
 
 def _first(pairs: PairSet, swipes: Sequence[str]) -> Take:
@@ -259,12 +245,11 @@ def _denoisers(options: argparse.Namespace) -> str:
     runs = {name: [job.seeded(seed) for seed in range(options.seeds)] for name, job in jobs.items()}
     train(folder, [run for those in runs.values() for run in those])
     models = [folder / run.name for those in runs.values() for run in those]
-    evaluation = json.loads(printed("eval", *models, "--data", campaign, "--json"))
+    evaluation = evaluated(models, campaign)
     judged = read_pairs(campaign).of(evaluation["subjects"])
     _compare(judged, {name: folder / those[0].name for name, those in runs.items()})
     bin_mps = judged.axis.bin_width_mps
     return DENOISERS.format(
-        machine=this_machine(),
         seed=SEED,
         campaign_minutes=options.campaign_minutes,
         seeds=options.seeds,
@@ -308,12 +293,12 @@ def table_1(evaluation: Mapping[str, Any], nothing: VelocityError) -> str:
                 TITLES[name],
                 *(f"{value:.4f}" for value in of_paper),
                 _change(PRINTED["s4"][0], of_paper[0]),
-                *(_spread(groups[name][key]) for key in ("peak_mae_mps", "peak_sd_mps")),
+                *(spread(groups[name][key]) for key in ("peak_mae_mps", "peak_sd_mps")),
                 _change(ours["s4"], ours[name]),
                 _change(ours[name], ours["none"]),
             ]
         )
-    none = (_spread(groups["none"][key]) for key in ("peak_mae_mps", "peak_sd_mps"))
+    none = (spread(groups["none"][key]) for key in ("peak_mae_mps", "peak_sd_mps"))
     rows.append(["none", "", "", "", *none, _change(ours["s4"], ours["none"]), ""])
     still = (f"{nothing.mae_mps:.3f}", f"{nothing.sd_mps:.3f}")
     rows.append(["nothing moves", "", "", "", *still, _change(ours["s4"], nothing.mae_mps)])
@@ -342,26 +327,29 @@ def _change(value: float, reference: float) -> str:
     return "" if value == reference else f"{100 * (value / reference - 1):+.0f} %".replace("-", "−")
 
 
-def _spread(values: Mapping[str, Any]) -> str:
-    spread = values["sd"]
-    return f"{values['mean']:.3f}" + (f" ± {spread:.3f}" if spread is not None else "")
-
-
 def _classifiers(options: argparse.Namespace) -> str:
     """Tables 2 and 3."""
     out: Path = options.full_size
     known = {one: protocol_clips(out, one, FULL_MINUTES) for one in (PAPER, RANDOM)}
     tables = protocol_tables(out, known, options.classifier_seeds)
-    text = CLASSIFIERS.format(
-        machine=this_machine(),
+    return CLASSIFIERS.format(
         campaign_minutes=FULL_MINUTES,
         seeds=options.classifier_seeds,
+        table=tables_2_and_3(tables["to and fro", "unseen"]),
     )
-    text += means_table(tables)
-    for number, kind in enumerate(ADDED, start=2):
-        text += f"\n**Table {number}**, {ADDED[kind]}. Rows are true classes.\n\n"
-        text += confusion_table(tables, kind)
-    return text + "\n"
+
+
+def tables_2_and_3(table: Table) -> str:
+    """The paper's Tables 2 and 3 beside ours, in Markdown; only means over the classes have a ±."""
+    rows = [["true"], *([name] for name in CLASSES), ["mean"], ["the paper's network, mean"]]
+    for kind, words in ADDED.items():
+        rows[0] += [f"the paper, {words}", f"ours, {words}"]
+        ours = confusions(table, kind).mean(axis=0)
+        for row, given, found in zip(rows[1:], GIVEN[kind], ours, strict=False):
+            row += [" / ".join(f"{value:.1f}" for value in values) for values in (given, found)]
+        rows[-2] += [f"{given_mean(kind):.1f}", class_spread(means(table, kind))]
+        rows[-1] += ["", class_spread(means(table, kind, PAPER_NETWORK))]
+    return "\n".join(markdown_table(rows))
 
 
 SECTIONS = {

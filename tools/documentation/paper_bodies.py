@@ -36,8 +36,8 @@ def draw_bodies(mesh_figure: Path, range_figure: Path) -> dict[str, float]:
     _draw_ranges(mesh, source, range_figure)
     maps = Synthesizer(mesh)
     near, far = (maps.map(_sensor(range_m)).values.sum() for range_m in (NEAR_M, FAR_M))
-    numbers = {"frame": FRAME, "near": NEAR_M, "far": FAR_M, "z": _sensor(FAR_M).position_m[2]}
-    return {**numbers, "share": 100 * float(far / near), "law": 100 * (NEAR_M / FAR_M) ** 4}
+    shares = {"share": 100 * float(far / near), "law": 100 * (NEAR_M / FAR_M) ** 4}
+    return {"frame": FRAME, "near": NEAR_M, "far": FAR_M, **shares}
 
 
 def _sensor(range_m: float) -> VirtualSensor:

@@ -1,22 +1,16 @@
-"""Print the tables of docs/real-pairs.md.
+"""Makes ``real-pairs.md``: ``python -m tools.documentation.real_pairs``, from MARS recordings.
 
-::
-
-    python -m tools.documentation.real_pairs inputs FOLDER...
-    python -m tools.documentation.real_pairs linear PAIRS
-    python -m tools.documentation.real_pairs ceiling FOLDER...
-
-The first compares ways to turn the Kinect's skeleton into synthetic Doppler: its mean
-velocity per frame with that of the radar's points, before any denoising. The second
-shows what the least denoiser makes of the pairs (made with ``--limbs``): a linear map of
-five frames, of the whole body or of its parts. The third shows how far the radar's own
-points agree with one another, which no denoiser can exceed.
+Ways to turn the Kinect's skeleton into synthetic Doppler are compared by the mean velocity per
+frame with that of the radar's points, before any denoising. Then the least denoiser learns from the
+pairs: a linear map of five frames, of the whole body or of its parts. At last, how far the radar's
+own points agree with one another, which no denoiser can exceed. The pairs stay in
+``build/real-pairs`` (or ``--folder``); what is there is not made again.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,6 +19,7 @@ from numpy.typing import NDArray
 
 from sd2core.denoise.card import DENOISER_PARTS
 from sd2core.doppler import Synthesizer
+from sd2core.files.tables import markdown_table
 from sd2core.io.radar.mars import MarsPart, MarsStretch, mars_parts, read_mars
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.vertex_parts import PARTS
@@ -41,14 +36,71 @@ from sd2core.mocap.radar_place import RadarPlace, estimate_place
 from sd2core.pairs.store import PairSet, read_pairs
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
+from tools.documentation.measured import write_page
+from tools.documentation.places import BUILD, SHARED
+from tools.documentation.runs import sd2
 
 Maps = list[NDArray[np.float32]]
+Floats = NDArray[np.float64]
+Parts = list[MarsPart]
+"""Recordings of one person."""
 
 DEFAULT = MarsChoices()
-RIDGES = (10.0, 100.0)
+RIDGE = 10.0
 HALVINGS = 8
 _POINT_ARRAYS = ("point_rows", "point_mps", "point_intensity")
-Answers = tuple[NDArray[np.float64], NDArray[np.float64], float]
+MARS = [SHARED / "paired" / name for name in ("mars_subject1", "mars_subject4")]
+
+PAGE = """\
+# Real pairs
+
+What are pairs with a **real** radar worth, and how much can a denoiser make of them? A body driven
+by a Kinect's skeleton gives the synthetic map; a 77 GHz radar saw the same person at 10 frames/s
+([decision 27](decisions/0027-real-pairs.md)). What trained denoisers make of them:
+[denoisers compared](denoiser-comparison.md#real-pairs). Made by
+
+```sh
+python -m tools.documentation.real_pairs
+```
+
+from the MARS recordings of two persons (rehabilitation exercises, about 2 m away). Nothing here
+depends on the machine.
+
+## What the input may be made of
+
+Mean velocity per frame of the input against that of the radar's points, in frames that have some,
+by person and part of the recordings. *From the Kinect*: the radar taken to be where the Kinect
+is, else where it stands as estimated from the pairs ([decision 52](decisions/0052-limb-maps.md)).
+
+{inputs}
+
+Where the radar was found beside the Kinect:
+
+{places}
+
+## What the least denoiser makes of it
+
+A linear map (ridge regression) from five frames of the input to the radar's mean velocity, learnt
+from the other person: of the map of the body, or of the maps of its parts (*limbs*), left and right
+sides together or apart. *Own other minutes*: a quarter of the person's takes by the other three.
+A denoiser has to beat this.
+
+{linear}
+
+## What the radar allows
+
+A frame has few points. They are parted at random into two halves, eight times: *halves* is the
+correlation of their mean velocities, *all points* that of as many points with as many others
+(Spearman and Brown), *at most* its root: what an estimate could reach that knew all that the points
+have in common.
+
+{ceiling}
+
+## What this cannot say
+
+- Two persons, who exercise and do not swipe; nothing about gestures.
+- A Kinect's skeleton drives the body: the fit of a video errs otherwise ([fitting](fitting.md)).
+"""
 
 
 def skeleton_cloud(clip: SkeletonClip) -> MeshSequence:
@@ -65,14 +117,10 @@ def changed(**options: object) -> MarsChoices:
 
 WAYS = {
     "body, facing, count (default)": DEFAULT,
-    "body, parts alike": replace(DEFAULT, limbs=True),
-    "body, all vertices, count": changed(visibility="none"),
     "body, exact, count": changed(visibility="exact"),
     "body, facing, area": changed(weight="area"),
-    "body, facing, projected area": changed(weight="projected"),
-    "body, 5,000 vertices, facing, count": replace(DEFAULT, resolution="medium"),
-    "body, posed at 30 Hz, facing, count": replace(DEFAULT, moments=3),
-    "body, facing, count, bins 14–16 nulled": changed(null_bins=(14, 15, 16)),
+    "body, 5,000 vertices": replace(DEFAULT, resolution="medium"),
+    "body, bins 14–16 nulled": changed(null_bins=(14, 15, 16)),
 }
 
 
@@ -86,18 +134,11 @@ def cloud_maps(part: MarsPart) -> Maps:
 
 
 def body_maps(driven: list[DrivenClip], choices: MarsChoices, place: RadarPlace) -> Maps:
-    """Synthetic Doppler of a body; with limbs the mean of its parts, each adding up to 1."""
-    maps = []
-    for one in (body_doppler(clip, choices, place) for clip in driven):
-        if one.limbs is None:
-            maps.append(one.values.T)
-        else:
-            total = one.limbs.values.sum(axis=1, keepdims=True)
-            maps.append((one.limbs.values / np.maximum(total, 1e-9)).mean(axis=0).T)
-    return maps
+    """Synthetic Doppler of a body."""
+    return [body_doppler(clip, choices, place).values.T for clip in driven]
 
 
-def mean_mps(maps: Iterable[NDArray[np.float32]]) -> NDArray[np.float64]:
+def mean_mps(maps: Iterable[NDArray[np.float32]]) -> Floats:
     """Mean velocity of every frame, one stretch after the other; an empty one is at rest."""
     values = np.concatenate(list(maps)).astype(np.float64)
     total = values.sum(axis=1)
@@ -105,27 +146,17 @@ def mean_mps(maps: Iterable[NDArray[np.float32]]) -> NDArray[np.float64]:
     return np.divide(moment, total, out=np.zeros(len(total)), where=total > 0)
 
 
-def row(part: MarsPart, name: str, maps: Maps, radar: Maps) -> str:
-    """One line of the table."""
+def errors(maps: Maps, radar: Maps) -> list[str]:
+    """Cells on the mean velocities of an input: their correlation with the radar's, their MAE."""
     seen = np.concatenate(radar).sum(axis=1) > 0
     found, truth = mean_mps(maps)[seen], mean_mps(radar)[seen]
-    correlation = np.corrcoef(found, truth)[0, 1] if found.any() else np.nan
-    gain = (found * truth).sum() / max((found**2).sum(), 1e-12)
-    return (
-        f"| {part.subject}-{part.name} | {name} | {correlation:.3f}"
-        f" | {np.abs(found - truth).mean():.3f} | {np.abs(gain * found - truth).mean():.3f} |"
-    )
+    return agreement_cells(found, truth)
 
 
-def residuals(driven: list[DrivenClip]) -> str:
-    """Sentence on the distance of the body's joints from the skeleton's."""
-    values = np.concatenate([clip.residual_m.ravel() for clip in driven]) * 100.0
-    values = values[np.isfinite(values)]
-    stature = driven[0].puppet.shape.stature_m
-    return (
-        f"a body of {stature:.2f} m, joints {values.mean():.1f} cm from the skeleton's in the"
-        f" mean, 95 % within {np.percentile(values, 95):.1f} cm"
-    )
+def agreement_cells(found: Floats, truth: Floats) -> list[str]:
+    """Cells of a correlation, if anything moves, and of a mean absolute error."""
+    alike = f"{np.corrcoef(found, truth)[0, 1]:.3f}" if found.any() else "–"
+    return [alike, f"{np.abs(found - truth).mean():.3f}"]
 
 
 def drive(part: MarsPart) -> list[DrivenClip]:
@@ -135,54 +166,57 @@ def drive(part: MarsPart) -> list[DrivenClip]:
     return [puppet.pose(clip) for clip in clips]
 
 
-def inputs(folders: list[Path]) -> None:
-    """Print the first table, then where the radar stands and how well the bodies fit."""
-    print("| part | input | correlation | MAE, m/s | MAE after one gain, m/s |")
-    print("|---|---|---|---|---|")
-    notes = []
-    for folder in folders:
-        parts = [read_mars(folder, name) for name in mars_parts(folder)]
+def inputs(people: Sequence[Parts]) -> tuple[str, str]:
+    """Table of ways to make the input, and where the radar stands."""
+    nothing, joints, at_kinect = (
+        "nothing moves",
+        "25 joints, from the Kinect",
+        "body, from the Kinect",
+    )
+    rows = {name: [name] for name in (nothing, joints, at_kinect, *WAYS)}
+    head, notes = ["input"], []
+    for parts in people:
         driven = [drive(part) for part in parts]
         each = [
             [seen_of(*one) for one in zip(clips, part.stretches, strict=True)]
             for clips, part in zip(driven, parts, strict=True)
         ]
         place = estimate_place([one for part in each for one in part])
-        notes.append(f"person {parts[0].subject}, all parts: {place_words(place)}")
-        for part, clips, seen in zip(parts, driven, each, strict=True):
-            axis = DEFAULT.synthesis.axis
-            radar = [radar_doppler(stretch, axis) for stretch in part.stretches]
-            print(row(part, "nothing moves", [0.0 * values for values in radar], radar))
-            print(row(part, "25 joints, from the Kinect", cloud_maps(part), radar), flush=True)
-            at_kinect = body_maps(clips, DEFAULT, AT_THE_CAMERA)
-            print(row(part, "body, facing, count, from the Kinect", at_kinect, radar), flush=True)
+        alone = [place_words(estimate_place(seen)) for seen in each] if len(each) > 1 else []
+        notes.append(
+            f"- person {parts[0].subject}: {place_words(place)}"
+            + "".join(f"; by one part alone {words}" for words in alone)
+        )
+        for part, clips in zip(parts, driven, strict=True):
+            head += [f"{part.subject}-{part.name}: corr.", "MAE m/s"]
+            radar = [radar_doppler(stretch, DEFAULT.synthesis.axis) for stretch in part.stretches]
+            rows[nothing] += errors([0.0 * values for values in radar], radar)
+            rows[joints] += errors(cloud_maps(part), radar)
+            rows[at_kinect] += errors(body_maps(clips, DEFAULT, AT_THE_CAMERA), radar)
             for name, choices in WAYS.items():
-                print(row(part, name, body_maps(clips, choices, place), radar), flush=True)
-            empty = 1.0 - float((np.concatenate(radar).sum(axis=1) > 0).mean())
-            notes.append(
-                f"{part.subject}-{part.name}: {residuals(clips)}; {empty:.1%} of the frames"
-                f" without points; by this part alone {place_words(estimate_place(seen))}"
-            )
-    print("\n" + "\n".join(f"- {note}" for note in notes))
+                rows[name] += errors(body_maps(clips, choices, place), radar)
+    return table([head, *rows.values()]), "\n".join(notes)
+
+
+def table(rows: Sequence[Sequence[str]]) -> str:
+    """Rows in Markdown."""
+    return "\n".join(markdown_table(rows))
 
 
 def place_words(place: RadarPlace) -> str:
     """Place and clock of a radar that was found."""
     right, down, _ = place.position_m
-    return (
-        f"the radar {right:+.2f} m right and {down:+.2f} m below the Kinect, its clock"
-        f" {1e3 * place.offset_s:+.0f} ms"
-    )
+    return f"{right:+.2f} m right, {down:+.2f} m below, clock {1e3 * place.offset_s:+.0f} ms"
 
 
-def features(values: NDArray[np.float32]) -> NDArray[np.float64]:
+def features(values: NDArray[np.float32]) -> Floats:
     """Square roots of the shares in a frame and two on each side, (frames, 5 bins)."""
     shares = np.sqrt(values / np.maximum(values.sum(axis=1, keepdims=True), 1e-9))
     padded = np.pad(shares, ((2, 2), (0, 0)), mode="edge")
     return np.hstack([padded[shift : shift + len(shares)] for shift in range(5)])
 
 
-def examples(pairs: PairSet, parts: tuple[str, ...]) -> tuple[NDArray[np.float64], ...]:
+def examples(pairs: PairSet, parts: tuple[str, ...]) -> tuple[Floats, ...]:
     """Features, mean velocity of the radar and of the input, in frames with points."""
     seen = [take.radar.sum(axis=1) > 0 for take in pairs.takes]
     each = list(zip(pairs.takes, seen, strict=True))
@@ -193,57 +227,39 @@ def examples(pairs: PairSet, parts: tuple[str, ...]) -> tuple[NDArray[np.float64
     )
 
 
-def ridge_map(
-    x: NDArray[np.float64], y: NDArray[np.float64], unseen: NDArray[np.float64], ridge: float
-) -> NDArray[np.float64]:
+def ridge_map(x: Floats, y: Floats, unseen: Floats) -> Floats:
     """Answers to unseen features by a linear map learnt from ``x`` and ``y``."""
     centred = x - (middle := x.mean(axis=0))
     slope = np.linalg.solve(
-        centred.T @ centred + ridge * np.eye(x.shape[1]), centred.T @ (y - y.mean())
+        centred.T @ centred + RIDGE * np.eye(x.shape[1]), centred.T @ (y - y.mean())
     )
     return (unseen - middle) @ slope + y.mean()
 
 
-def judged(person: str, learnt: str, name: str, ridge: float, answers: Answers) -> str:
-    """One line of the second table."""
-    after, truth, plain = answers
-    error = np.abs(after - truth).mean()
-    alike = np.corrcoef(after, truth)[0, 1]
-    return (
-        f"| {person} | {learnt} | {name} | {ridge:g} | {error:.3f} | {error / plain - 1:+.0%} |"
-        f" {alike:.3f} |"
-    )
-
-
-def linear(path: Path) -> None:
-    """Print the second table."""
-    pairs = read_pairs(path)
+def linear(pairs: PairSet) -> str:
+    """Table of what a linear map makes of the pairs."""
     ways: dict[str, tuple[str, ...]] = {
         "map": (),
         "limbs, sides together": DENOISER_PARTS,
         "limbs, sides apart": PARTS,
     }
-    print("| person | learnt from | input | ridge | MAE, m/s | to no denoising | correlation |")
-    print("|---|---|---|---|---|---|---|")
+    none, alone = "no denoising", "limbs, own other minutes"
+    rows = {name: [name] for name in (none, *ways, alone)}
     for test in pairs.subjects:
         own, others = pairs.of([test]), [name for name in pairs.subjects if name != test]
         for name, parts in ways.items():
             x, y, _ = examples(pairs.of(others), parts)
             unseen, truth, before = examples(own, parts)
-            plain = np.abs(before - truth).mean()
             if not parts:
-                alike = np.corrcoef(before, truth)[0, 1]
-                print(f"| {test} | | no denoising | | {plain:.3f} | | {alike:.3f} |")
-            for ridge in RIDGES:
-                after = ridge_map(x, y, unseen, ridge)
-                print(judged(test, "the other", name, ridge, (after, truth, plain)))
-        after, truth = own_minutes(own)
-        print(
-            judged(test, "own other minutes", "limbs, sides together", 10.0, (after, truth, plain))
-        )
+                rows[none] += agreement_cells(before, truth)
+            rows[name] += agreement_cells(ridge_map(x, y, unseen), truth)
+        rows[alone] += agreement_cells(*own_minutes(own))
+    head = [f"person {test}: corr." for test in pairs.subjects]
+    columns = (cell for one in head for cell in (one, "MAE m/s"))
+    return table([["input", *columns], *rows.values()])
 
 
-def own_minutes(pairs: PairSet) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def own_minutes(pairs: PairSet) -> tuple[Floats, Floats]:
     """Answers to a quarter of a person's takes by the other three, and the truth."""
     found, truth = [], []
     for fold in range(4):
@@ -251,14 +267,12 @@ def own_minutes(pairs: PairSet) -> tuple[NDArray[np.float64], NDArray[np.float64
         rest = tuple(take for number, take in enumerate(pairs.takes) if number % 4 != fold)
         x, y, _ = examples(replace(pairs, takes=rest), DENOISER_PARTS)
         asked, wanted, _ = examples(replace(pairs, takes=unseen), DENOISER_PARTS)
-        found.append(ridge_map(x, y, asked, 10.0))
+        found.append(ridge_map(x, y, asked))
         truth.append(wanted)
     return np.concatenate(found), np.concatenate(truth)
 
 
-def halves_mps(
-    stretch: MarsStretch, rng: np.random.Generator
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def halves_mps(stretch: MarsStretch, rng: np.random.Generator) -> tuple[Floats, Floats]:
     """Mean velocity of either half of every frame's points, in frames where both have some."""
     second = rng.integers(0, 2, len(stretch.point_rows)) > 0
     means = []
@@ -283,33 +297,36 @@ def agreement(stretches: Iterable[MarsStretch]) -> tuple[float, float, float]:
     return float(halves), float(whole), float(np.sqrt(max(whole, 0.0)))
 
 
-def ceiling(folders: list[Path]) -> None:
-    """Print how far the radar's points of a frame agree, person by person and take by take."""
-    print("| person | takes | halves | all points | at most |")
-    print("|---|---|---|---|---|")
-    for folder in folders:
-        parts = [read_mars(folder, name) for name in mars_parts(folder)]
+def ceiling(people: Sequence[Parts]) -> str:
+    """Table of how far the radar's points of a frame agree, person by person."""
+    rows = [["person", "takes", "halves", "all points", "at most", "at most, takes"]]
+    for parts in people:
         every = [stretch for part in parts for stretch in part.stretches]
         of_takes = sorted(agreement([one])[2] for one in every)
-        values = " | ".join(f"{value:.2f}" for value in agreement(every))
-        print(
-            f"| {parts[0].subject} | {len(every)} | {values}"
-            f" (takes: {of_takes[0]:.2f} to {of_takes[-1]:.2f}) |"
-        )
+        values = (f"{value:.2f}" for value in agreement(every))
+        takes = f"{of_takes[0]:.2f} to {of_takes[-1]:.2f}"
+        rows.append([parts[0].subject, str(len(every)), *values, takes])
+    return table(rows)
 
 
 def main() -> None:
-    """Print one of the tables."""
+    """Make the pairs if they are missing, measure and write the page."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    tables = parser.add_subparsers(dest="table", metavar="TABLE", required=True)
-    tables.add_parser("inputs").add_argument("paths", type=Path, nargs="+", metavar="FOLDER")
-    tables.add_parser("linear").add_argument("paths", type=Path, nargs=1, metavar="PAIRS")
-    tables.add_parser("ceiling").add_argument("paths", type=Path, nargs="+", metavar="FOLDER")
+    parser.add_argument("recordings", type=Path, nargs="*", default=MARS, help="folders of MARS")
+    parser.add_argument("--folder", type=Path, default=BUILD / "real-pairs")
     options = parser.parse_args()
-    if options.table == "linear":
-        linear(options.paths[0])
-    else:
-        {"inputs": inputs, "ceiling": ceiling}[options.table](options.paths)
+    options.folder.mkdir(parents=True, exist_ok=True)
+    pairs = options.folder / "mars.zarr"
+    if not pairs.exists():
+        sd2("pairs", "mars", *options.recordings, "--limbs", "--out", pairs)
+    people = [
+        [read_mars(folder, name) for name in mars_parts(folder)] for folder in options.recordings
+    ]
+    of_inputs, places = inputs(people)
+    page = PAGE.format(
+        inputs=of_inputs, places=places, linear=linear(read_pairs(pairs)), ceiling=ceiling(people)
+    )
+    write_page("real-pairs.md", page)
 
 
 if __name__ == "__main__":

@@ -1,8 +1,10 @@
-"""Trainings that pages of the documentation are about, and the tables they come to."""
+"""Trainings that pages of the documentation are about, their errors, and parts of such pages."""
 
 from __future__ import annotations
 
+import json
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Iterable, Mapping, Sequence
@@ -10,6 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 from sd2core.runs.progress import read_events, standing
 from sd2core.train.folder import TrainingFolder
@@ -94,11 +97,44 @@ def train(folder: Path, jobs: Iterable[Job]) -> None:
         sys.exit(f"{', '.join(failed)} failed; what is done is kept")
 
 
-def tables(folder: Path, models: Sequence[Path], data: Path, *options: object) -> str:
-    """Tables of ``sd2 eval`` for some models, in Markdown."""
-    written = folder / "tables.md"
-    sd2("eval", *models, "--data", data, "--markdown", written, *options)
-    return written.read_text("utf-8")
+def evaluated(models: Sequence[Path], data: Path, *options: object) -> dict[str, Any]:
+    """What ``sd2 eval`` says of some models, and of the filters that need no training."""
+    told = printed("eval", *models, "--data", data, "--json", *options)
+    return json.loads(told)  # type: ignore[no-any-return]
+
+
+ERRORS = {
+    "peak_mae_mps": "peak MAE m/s",
+    "mean_mae_mps": "mean MAE m/s",
+    "map_rmse": "map RMSE",
+}
+"""Errors of ``sd2 eval --json`` that pages show, and their headings."""
+
+
+def errors_of(group: Mapping[str, Any]) -> list[str]:
+    """Cells of a group of models of ``sd2 eval --json``, as :data:`ERRORS` has them."""
+    return [spread(group[name]) for name in ERRORS]
+
+
+def spread(values: Mapping[str, Any], digits: int = 3) -> str:
+    """Mean over trainings, and their standard deviation where there are several."""
+    sd = values["sd"]
+    return f"{values['mean']:.{digits}f}" + (f" ± {sd:.{digits}f}" if sd is not None else "")
+
+
+def table_below(text: str, heading: str, *columns: str) -> list[list[str]]:
+    """Rows of a Markdown table below a line: some of its columns."""
+    lines = text.partition(f"{heading}\n\n")[2].partition("\n\n")[0].splitlines()
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+    del rows[1]
+    chosen = [rows[0].index(name) for name in columns]
+    return [[row[at] for at in chosen] for row in rows]
+
+
+def sections(page: str) -> dict[str, str]:
+    """Text below every heading of the second level, up to the next."""
+    _, *parts = re.split(r"^## (.+)\n", page, flags=re.MULTILINE)
+    return dict(zip(parts[::2], parts[1::2], strict=True))
 
 
 def _finished(run: Path) -> bool:

@@ -19,20 +19,21 @@ from pathlib import Path
 
 from sd2core.accuracy.cache import this_machine
 from sd2core.batch.denoising import denoise
-from sd2core.batch.driver import AHEAD
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.inputs import find_origins, glance
 from sd2core.batch.plan import BatchPlan
 from sd2core.batch.plan_file import plan_from_text
-from sd2core.batch.synthesis import LONGEST_FRAMES, Choosing, synthesise
+from sd2core.batch.synthesis import Choosing, synthesise
 from sd2core.batch.task_graph import TaskGraph
 from sd2core.cli.batch import bytes_words
+from sd2core.files.atomic import atomic_write_text
 from sd2core.files.limits import size_bytes
 from sd2core.files.resources import resource_path
 from sd2core.numerics.compiled import warm_up
 from sd2core.recording.recording import open_recording
 from sd2core.sensor import VirtualSensor
-from tools.documentation.places import BENCHMARKS, DOCS
+from tools.documentation.measured import write_page
+from tools.documentation.places import BENCHMARKS
 
 sys.path.insert(0, str(BENCHMARKS))
 from batches import (
@@ -50,20 +51,21 @@ from long_fits import LongFit, long_fit, sample_landmarks
 RECORDINGS, FRAMES, PLACES = 1_000_000, 1800, 8
 """Size of the estimated batch: recordings of a minute each at 30 frames/s."""
 
+CHOSEN = "synthesise, 2 %"
+
 _TIMED_FRAMES = (450, 120)
 
 INTRODUCTION = """\
 # Batches at scale
 
-What `sd2 batch` costs, measured, and what a million recordings would need, reckoned from that.
-Made by
+What does `sd2 batch` cost, and what would a million recordings need? Measured by
 
 ```
 make scale
 ```
 
-on {machine}. How it works is [decision 39](decisions/0039-batches.md); what a plan
-and its folder hold, [formats.md](formats.md#batches).
+on {machine}, with copies of the bundled sample and computed meshes of any length (all simulated).
+How batches work: [decision 39](decisions/0039-batches.md).
 """
 
 
@@ -125,13 +127,16 @@ def main() -> None:
     """Measure, and write the page."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true")
-    parser.add_argument("--out", type=Path, default=DOCS / "scale.md")
+    parser.add_argument("--out", type=Path, help="instead of docs/scale.md")
     options = parser.parse_args()
     sizes = QUICK if options.quick else FULL
     warm_up()
     with tempfile.TemporaryDirectory(prefix="sd2-scale-") as name:
         page = _page(Path(name), sizes)
-    options.out.write_text(page, encoding="utf-8")
+    if options.out is None:
+        write_page("scale.md", page)
+    else:
+        atomic_write_text(options.out, page)
 
 
 def _page(root: Path, sizes: Sizes) -> str:
@@ -162,30 +167,22 @@ def _page(root: Path, sizes: Sizes) -> str:
             INTRODUCTION.format(machine=this_machine()) + (LITTLE if sizes is QUICK else ""),
             _processes(two, ten, there_s, sizes.frames),
             _memory(used, fits, long),
-            _steps(costs),
             _million(costs, two, own_s, files),
         ]
     )
 
 
 def _processes(two: Compared, ten: Compared, there_s: float, frames: int) -> str:
-    rounds = "one round" if len(two.one_s) == 1 else f"{len(two.one_s)} rounds"
-    own_ms = 1e3 * statistics.median(ten.own_s) / ten.tasks
     rows = (
         (
             f"{two.tasks} maps of 5,000 vertices and {frames} frames: two processes against one",
-            f"{two.ratio:.2f} times as fast ({_both(two)})",
+            f"{two.ratio:.2f} times as fast",
             "≥ 1.8",
         ),
         (
             f"{ten.tasks} quick maps against a tenth of them",
-            f"{ten.ratio:.2f} times the time ({_both(ten)})",
+            f"{ten.ratio:.2f} times the time",
             "≤ 10.5",
-        ),
-        (
-            "each of these, in the process that gives out and schedules",
-            f"{own_ms:.1f} ms of processor time",
-            "",
         ),
         ("a map that is there already", f"{1e3 * there_s:.2f} ms", ""),
     )
@@ -193,16 +190,9 @@ def _processes(two: Compared, ten: Compared, there_s: float, frames: int) -> str
         [
             "## Processes and tasks",
             "",
-            f"In turns, {rounds}; ratios are the medians of those of the rounds. The processes had",
-            "been started and had loaded the program, which takes some seconds once.",
-            "",
             "| what | measured | wanted |",
             "|---|---|---|",
             *(f"| {what} | {measured} | {wanted} |" for what, measured, wanted in rows),
-            "",
-            "Tasks of one recording that take little go out in bundles of about a second. Each",
-            f"process has {AHEAD} bundles ahead: the scheduler never holds more, however many"
-            " there are.",
             "",
         ]
     )
@@ -210,21 +200,18 @@ def _processes(two: Compared, ten: Compared, there_s: float, frames: int) -> str
 
 def _memory(used: list[Memory], fits: list[Fitted], long: list[LongFit]) -> str:
     rows = [
-        f"| {one.recordings} | {one.minutes:g} min | {one.vertices:,} | {one.how or 'exact'} |"
-        + "|".join(f" {one.peak_mb[step]:.0f} MB " for step in ("synthesise", "denoise", "export"))
-        + "|"
+        f"| {one.recordings} × {one.minutes:g} min | {one.vertices:,}, {one.how or 'exact'}"
+        f" | {one.peak_mb['synthesise']:.0f} | {max(one.peak_mb.values()):.0f} |"
         for one in used
     ]
     return "\n".join(
         [
             "## Memory of one process",
             "",
-            "The most that a process had by the end of a step. Wanted: at most 1 GB, whatever the",
-            "number and length of recordings. A mesh is streamed, and a map is made in stretches",
-            f"of {LONGEST_FRAMES:,} frames. From the step `denoise` on, torch is loaded.",
+            "At most, in MB; wanted: 1 GB, whatever the recordings.",
             "",
-            "| recordings | each | vertices | visibility | synthesise | denoise | export |",
-            "|---|---|---|---|---|---|---|",
+            "| recordings | vertices, visibility | maps | denoised, exported |",
+            "|---|---|---|---|",
             *rows,
             "",
             *_fit_memory(fits, long),
@@ -236,56 +223,19 @@ def _fit_memory(fits: list[Fitted], long: list[LongFit]) -> list[str]:
     """Real fits, and long ones whose landmarks are there already."""
     if not long:
         return []
-    stages = [name for name in long[0].peak_mb if name != "start"]
-    lines = [
-        "A fit reads its clip in parts ([decision 42](decisions/0042-fits-of-any-length.md)). Of "
-        "the sample's video, its",
-        "landmarks found as well: "
-        + ", ".join(f"{one.peak_mb:.0f} MB with {one.frames:,} frames" for one in fits)
-        + ". With landmarks that go",
-        "forwards and backwards through the sample's, the most in each stage:",
-        "",
-        f"| frames | {' | '.join(stages)} |",
-        "|---|" + "---|" * len(stages),
-        *(
-            f"| {one.frames:,} |"
-            + "|".join(f" {one.peak_mb[name]:.0f} MB " for name in stages)
-            + "|"
-            for one in long
-        ),
-        "",
-    ]
+    sizes = ", ".join(f"{one.peak_mb:.0f} MB with {one.frames:,} frames" for one in fits)
     few, many = (max(one.peak_mb.values()) for one in (long[0], long[-1]))
-    each_kb = 1e3 * (many - few) / (long[-1].frames - long[0].frames)
-    if each_kb > 0:
-        hours = (long[-1].frames + 1e3 * (1000 - many) / each_kb) / (30 * 3600)
-        lines += [
-            f"That is {each_kb:.1f} kB per frame; if it goes on so, 1 GB is reached with"
-            f" {hours:.1f} hours of video at 30 frames/s.",
-            "",
-        ]
-    return lines
-
-
-def _steps(costs: list[Cost]) -> str:
-    rows = [
-        f"| {one.step} | {1e3 * one.frame_s:.3f} ms | {1e3 * one.task_s:.0f} ms |"
-        f" {one.frame_bytes:.0f} B | {bytes_words(one.task_bytes)} |"
-        for one in costs
+    each_mb = (many - few) / (long[-1].frames - long[0].frames)
+    reached = ""
+    if each_mb > 0:
+        hours = (long[-1].frames + (1000 - many) / each_mb) / (30 * 3600)
+        reached = f": 1 GB would be reached with {hours:.1f} hours of video at 30 frames/s"
+    return [
+        f"A fit of the sample's video takes {sizes}; of landmarks that are there already,"
+        f" {few:.0f} MB with {long[0].frames:,} and {many:.0f} MB with {long[-1].frames:,}"
+        f"{reached}.",
+        "",
     ]
-    return "\n".join(
-        [
-            "## Steps",
-            "",
-            "On one process, for the sample recording (5,000 vertices); `fit` is of its video, in",
-            "processor time. For a tolerance one plan is chosen per mesh, where that pays.",
-            "",
-            "| step | per frame | and per task | written per frame | and per task |",
-            "|---|---|---|---|---|",
-            *rows,
-            "",
-        ]
-    )
 
 
 def _million(costs: list[Cost], two: Compared, own_s: float, files: tuple[float, float]) -> str:
@@ -297,47 +247,42 @@ def _million(costs: list[Cost], two: Compared, own_s: float, files: tuple[float,
     tasks, total_s = RECORDINGS + sum(count.values()), sum(seconds.values())
     # What each part lets through, in cores that it keeps at work.
     full = {
-        "the process that gives out tasks and schedules them": total_s / (tasks * own_s),
+        "the process that schedules": total_s / (tasks * own_s),
         "a file system that writes no faster than the disk here": total_s / (tasks / files[0]),
     }
     first = min(full, key=lambda part: full[part])
     rows = [
-        f"| {step} | {tasks:,} | {seconds[step] / 3600:,.0f} | {bytes_words(size[step])} |"
-        for step, tasks in count.items()
+        f"| {step} | {1e3 * by_step[step].frame_s:.3f} ms"
+        f" | {seconds[step] / 3600:,.0f} | {bytes_words(size[step])} |"
+        for step in count
     ]
     machines = [
-        f"| {number:,} | {-(-number // 64):,} | {total_s / number / 3600:,.0f} h |"
-        f" {tasks / (total_s / number):,.0f} | {tasks * own_s / (total_s / number):.0%} |"
+        f"| {number:,} | {total_s / number / 3600:,.0f} h |"
+        f" {tasks * own_s / (total_s / number):.0%} |"
         for number in (64, 256, 1024, 4096)
     ]
+    chosen_ms = 1e3 * by_step[CHOSEN].frame_s
     lines = [
         "## A million recordings",
         "",
-        f"Reckoned from the above, for {RECORDINGS:,} videos of {FRAMES:,} frames, each from"
-        f" {PLACES} placements,",
-        f"on processors like this one. Two processes here do {two.ratio / 2:.0%} of twice the work"
-        " of one; more",
-        "are taken to lose no more.",
+        f"{RECORDINGS:,} videos of {FRAMES:,} frames, each from {PLACES} placements, on processors"
+        " like this one, without what they lose to each other (two here do"
+        f" {two.ratio / 2:.0%} of twice the work of one):",
         "",
-        "| step | tasks | hours of one core | written |",
+        "| step | per frame | hours of one core | written |",
         "|---|---|---|---|",
         *rows,
-        f"| all, with the looking | {tasks:,} | {total_s / 3600:,.0f} |"
-        f" {bytes_words(sum(size.values()))} |",
+        f"| all | | {total_s / 3600:,.0f} | {bytes_words(sum(size.values()))} |",
         "",
-        "| cores | machines of 64 | time | tasks/s | load of the scheduler |",
-        "|---|---|---|---|---|",
+        f"With a plan chosen for 2 % tolerance, synthesis takes {chosen_ms:.3f} ms per frame.",
+        "",
+        "| cores | time | load of the scheduler |",
+        "|---|---|---|",
         *machines,
         "",
-        f"- **Scheduler.** {1 / own_s:,.0f} tasks/s at most, in one process beside the batch's",
-        "  own work; above 100 % it keeps cores waiting. Longer recordings load it less, as a task",
-        "  is a map. Beyond that, divide the recordings over several plans, each with a scheduler",
-        "  and a folder.",
-        f"- **File system.** {tasks:,} small files in 256 folders per kind. Here {files[0]:,.0f}",
-        f"  are written in a second, each flushed to disk, and {files[1]:,.0f} looked at; a run",
-        "  that finds all made looks at each.",
-        f"- **First to saturate:** the processors, up to {full[first]:,.0f} cores; from there on",
-        f"  {first}.",
+        f"Processors limit it up to {full[first]:,.0f} cores, from there on {first}: divide the"
+        f" recordings over several plans. The disk here takes {files[0]:,.0f} files a second;"
+        " neither a cluster nor a network file system was measured.",
         "",
     ]
     return "\n".join(lines)
@@ -350,7 +295,7 @@ def _costs(folder: Path, fits: list[Fitted]) -> list[Cost]:
         longest = fits[-1]
         each_s, each_bytes = longest.seconds / longest.frames, longest.bytes / longest.frames
         costs.append(Cost("fit", each_s, 0.0, each_bytes, 0.0))
-    for title, how in (("synthesise", ""), ("synthesise, 2 %", "tolerance = 0.02")):
+    for title, how in (("synthesise", ""), (CHOSEN, "tolerance = 0.02")):
         text = (
             f'out = "{folder / "made"}"\n[recordings]\nfiles = ["{sample}"]\n'
             f"[synthesise]\n{how}\n[denoise]\n"
@@ -425,11 +370,6 @@ def _fits(folder: Path, frames: tuple[int, ...]) -> list[Fitted]:
 def _long_fits(folder: Path, frames: tuple[int, ...]) -> list[LongFit]:
     track = sample_landmarks(folder)
     return [long_fit(track, count, folder) for count in frames]
-
-
-def _both(compared: Compared) -> str:
-    one_s, other_s = map(statistics.median, (compared.one_s, compared.other_s))
-    return f"{one_s:.1f} s and {other_s:.1f} s"
 
 
 def _say(text: str) -> None:

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.camera import PinholeCamera
-from sd2core.body.fit import fit_body
 from sd2core.body.model import own_resolution
 from sd2core.body.shaping import overlap, silhouette
 from sd2core.body.track import LANDMARKS, LandmarkTrack
@@ -38,11 +37,6 @@ class RealScore:
         the joint's depth. Landmarks that are hidden or outside the picture are left out.
     landmarks : int
         That were compared.
-    residual_m : float
-        Mean distance in space of the landmarks that are seen from the fitted body, as `sd2 fit`
-        reports it, with the focal length that is guessed.
-    residual_near_m, residual_far_m : float
-        The same with 0.7 and 1.5 times that focal length.
     """
 
     name: str
@@ -51,9 +45,6 @@ class RealScore:
     reprojection_px: float
     reprojection_m: float
     landmarks: int
-    residual_m: float = float("nan")
-    residual_near_m: float = float("nan")
-    residual_far_m: float = float("nan")
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
@@ -100,17 +91,6 @@ def score_real(
         float(away_m.mean()) if away_m.size else float("nan"),
         len(away_px),
     )
-
-
-def residual_with_focal(track: LandmarkTrack, camera: PinholeCamera, share: float) -> float:
-    """Residual in metres of a fit with this share of the camera's focal length.
-
-    Another stature would only scale it: a fit knows no unit but that one.
-    """
-    other = PinholeCamera(camera.width, camera.height, share * camera.focal_px)
-    residual_m = fit_body(track, other).residual_m
-    seen_m = residual_m[np.isfinite(residual_m)]
-    return float(seen_m.mean()) if seen_m.size else float("nan")
 
 
 def reprojection(

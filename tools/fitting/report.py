@@ -56,7 +56,7 @@ class Row:
             return ""
         if math.isfinite(self.upper):
             return f"{self.reach[1]:g} to {self.upper:g}"
-        return f"{'≤' if self.reach[0] == '<=' else '≥'} {self.reach[1]:g}"
+        return f"{'≤' if self.reach[0] == '<=' else '≥'} {self.reach[1]:.3g}"
 
 
 def reach_table(scores: Sequence[ClipScore], real: Sequence[RealScore] = ()) -> list[Row]:

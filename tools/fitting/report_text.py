@@ -8,7 +8,9 @@ from typing import Any
 
 from tools.fitting.clip_score import ClipScore
 from tools.fitting.real_score import RealScore
-from tools.fitting.report import clip_table, gesture_table, reach_table
+from tools.fitting.report import Row, clip_table, gesture_table, reach_table
+
+Table = list[list[str]]
 
 _GESTURES = (
     ("gesture", "gesture"),
@@ -18,40 +20,30 @@ _GESTURES = (
     ("hand_rms_mps", "error RMS (m/s)"),
     ("hand_correlation", "correlation"),
     ("peak_kept", "peak kept"),
-    ("elbow_rms_mps", "elbow: error RMS (m/s)"),
-    ("elbow_correlation", "correlation"),
     ("map_l1", "map L1"),
 )
 _CLIPS = (
     ("clip", "clip"),
     ("joint_distance_m", "joints (m)"),
-    ("joint_distance_from_pelvis_m", "from pelvis (m)"),
     ("velocity_rms_mps", "velocity error RMS (m/s)"),
     ("velocity_correlation", "correlation"),
     ("map_l1", "map L1"),
-    ("edge_velocity_ratio", "ends: velocity"),
-    ("edge_place_ratio", "ends: place"),
-    ("silhouette_overlap", "silhouette"),
-    ("sigma_coverage", "1σ covers"),
-    ("residual_m", "residual (m)"),
-    ("seconds_per_frame", "s/frame"),
 )
 _REAL = (
     ("name", "video"),
-    ("overlap", "silhouette, mean"),
-    ("overlap_least", "least"),
-    ("reprojection_px", "landmarks (px)"),
-    ("reprojection_m", "(m)"),
-    ("residual_m", "residual (m)"),
-    ("residual_near_m", "with 0.7 of the focal length"),
-    ("residual_far_m", "with 1.5 of it"),
+    ("overlap", "silhouette"),
+    ("reprojection_m", "landmarks (m)"),
 )
 
 
 def as_text(scores: Sequence[ClipScore], real: Sequence[RealScore] = ()) -> str:
     """For a terminal."""
+    reach = [["what", "measured", "wanted", "met", "remarks"]]
+    for row in reach_table(scores, real):
+        met = {None: "", True: "yes", False: "no"}[row.met]
+        reach.append([row.what, _measured(row), row.wanted, met, row.detail])
     parts = []
-    for heading, rows in _tables(scores, real):
+    for heading, rows in _tables(reach, gesture_table(scores), scores, real):
         widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
         lines = [
             "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
@@ -62,29 +54,30 @@ def as_text(scores: Sequence[ClipScore], real: Sequence[RealScore] = ()) -> str:
 
 
 def as_markdown(scores: Sequence[ClipScore], real: Sequence[RealScore] = ()) -> str:
-    """For docs/fitting.md."""
+    """For docs/fitting.md: what has a target, in bold where missed, and gestures at all speeds."""
+    reach = [["what", "measured", "wanted"]]
+    for row in reach_table(scores, real):
+        if row.reach is not None:
+            mark = "**" if row.met is False else ""
+            reach.append([row.what, f"{mark}{_measured(row)}{mark}", row.wanted])
+    gestures = [one for one in gesture_table(scores) if one["speed"] == "all"]
     parts = []
-    for heading, rows in _tables(scores, real):
-        lines = [f"**{heading}**", ""]
-        for number, row in enumerate(rows):
-            lines.append("| " + " | ".join(row) + " |")
-            if number == 0:
-                lines.append("|" + "---|" * len(row))
-        parts.append("\n".join(lines))
+    for heading, rows in _tables(reach, gestures, scores, real):
+        lines = [f"| {' | '.join(row)} |" for row in rows]
+        lines.insert(1, "|" + "---|" * len(rows[0]))
+        parts.append("\n".join([f"**{heading}**", "", *lines]))
     return "\n\n".join(parts) + "\n"
 
 
 def _tables(
-    scores: Sequence[ClipScore], real: Sequence[RealScore]
-) -> list[tuple[str, list[list[str]]]]:
-    reach = [["what", "measured", "wanted", "met", "remarks"]]
-    for row in reach_table(scores, real):
-        value = f"{_number(row.value)} {row.unit}".strip()
-        met = {None: "", True: "yes", False: "no"}[row.met]
-        reach.append([row.what, value, row.wanted, met, row.detail])
+    reach: Table,
+    gestures: Sequence[dict[str, Any]],
+    scores: Sequence[ClipScore],
+    real: Sequence[RealScore],
+) -> list[tuple[str, Table]]:
     tables = [("Reach", reach)]
     for heading, columns, rows in (
-        ("Gestures", _GESTURES, gesture_table(scores)),
+        ("Gestures", _GESTURES, gestures),
         ("Clips", _CLIPS, clip_table(scores)),
         ("Real videos", _REAL, [one.as_dict() for one in real]),
     ):
@@ -92,6 +85,10 @@ def _tables(
             body = [[_cell(row[key]) for key, _ in columns] for row in rows]
             tables.append((heading, [[name for _, name in columns], *body]))
     return tables
+
+
+def _measured(row: Row) -> str:
+    return f"{_number(row.value)} {row.unit}".strip()
 
 
 def _cell(value: Any) -> str:

@@ -6,7 +6,6 @@ import os
 import subprocess
 import sys
 import time
-from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -19,7 +18,7 @@ from sd2core.errors import Sd2Error
 from sd2core.io.mesh import load_mesh
 from sd2core.io.video import open_video
 from tools.fitting.clip_score import ClipScore, score_clip
-from tools.fitting.real_score import RealScore, residual_with_focal, score_real
+from tools.fitting.real_score import RealScore, score_real
 from tools.fitting.truth import Truth
 
 _SUFFIXES = (".zarr", ".npz")
@@ -53,15 +52,7 @@ class MeshSource(NamedTuple):
             found = find_landmarks(reader, landmark_models(), silhouettes=None, progress=progress)
         track = found.part(0, len(found))
         camera = PinholeCamera.default(track.width, track.height)
-        near_m, guessed_m, far_m = (
-            residual_with_focal(track, camera, share) for share in (0.7, 1.0, 1.5)
-        )
-        return replace(
-            score_real(name, load_mesh(path), track, camera),
-            residual_m=guessed_m,
-            residual_near_m=near_m,
-            residual_far_m=far_m,
-        )
+        return score_real(name, load_mesh(path), track, camera)
 
     def _fitted(
         self, name: str, video: Path, known: list[str]
