@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from pathlib import Path
 
 from sphinx.application import Sphinx
+from sphinx.environment import BuildEnvironment
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 for _folder in (REPOSITORY / "app", REPOSITORY):
@@ -14,7 +16,6 @@ for _folder in (REPOSITORY / "app", REPOSITORY):
 
 from sd2core.version import __version__  # noqa: E402
 from tools.documentation.command_pages import write_command_pages  # noqa: E402
-from tools.documentation.outside_pages import TEXTS, page_text  # noqa: E402
 
 # What the notebook's kernel keeps for itself stays out of the user's folders.
 _KERNEL = REPOSITORY / "build" / "notebook"
@@ -41,6 +42,11 @@ extensions = [
     "sphinx.ext.napoleon",
     "sphinx_copybutton",
 ]
+
+# For users and what is measured; developers read the rest in the checkout.
+exclude_patterns = ["architecture.md", "decisions"]
+MEASURED = "how-good-is-it"
+"""Page that lists those measured, which the search leaves to that list."""
 
 # Markdown. Links to files outside docs/ become downloads, so that they work without a network;
 # one that leads nowhere is a warning, and warnings are errors.
@@ -88,23 +94,23 @@ copybutton_prompt_is_regexp = True
 
 
 def setup(app: Sphinx) -> None:
-    """Write the pages of the commands before pages are looked for, and follow reading."""
+    """Write the pages of the commands before pages are looked for, and follow the reading."""
     for variable in ("IPYTHONDIR", "JUPYTER_RUNTIME_DIR"):
         Path(os.environ[variable]).mkdir(parents=True, exist_ok=True)
     write_command_pages(Path(app.srcdir) / "commands")
-    app.connect("source-read", _read)
+    app.connect("source-read", _unlink_what_is_left_out)
+    app.connect("env-updated", _leave_measured_out_of_the_search)
     app.connect("autodoc-process-signature", _with_readable_defaults)
 
 
-def _read(app: Sphinx, name: str, source: list[str]) -> None:
-    """Fill in pages whose text lies elsewhere, and give the decisions a place in the navigation."""
-    page = Path(app.env.doc2path(name, base=False)).as_posix()
-    if page.endswith(".md"):
-        source[0] = page_text(page, source[0], REPOSITORY)
-    if page in TEXTS:
-        app.env.note_dependency(str(REPOSITORY / TEXTS[page]))
-    if page == "decisions/README.md":
-        source[0] += "\n\n```{toctree}\n:hidden:\n:glob:\n\n0*\n```\n"
+def _unlink_what_is_left_out(app: Sphinx, name: str, source: list[str]) -> None:
+    left_out = r"\[([^\]]+)\]\((?:\.\./)?(?:decisions/|architecture\.md)[^)]*\)"
+    source[0] = re.sub(left_out, r"\1", source[0])
+
+
+def _leave_measured_out_of_the_search(app: Sphinx, env: BuildEnvironment) -> None:
+    for page in env.toctree_includes.get(MEASURED, ()):
+        env.metadata[page]["nosearch"] = True
 
 
 def _with_readable_defaults(

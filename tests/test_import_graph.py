@@ -14,7 +14,7 @@ import pytest
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 ROOTS = {"sd2core": REPOSITORY / "sd2core", "sd2app": REPOSITORY / "app" / "sd2app"}
-SHARED = {"background", "session", "widgets"}
+SHARED = {"background", "manual", "session", "widgets"}
 """Packages of the window that are no features."""
 ASSEMBLING = {"feature", "actions"}
 """Modules of a feature that hand its models and views to the shell."""

@@ -9,7 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from sd2app.command_line import full_parser
+from sd2app.manual.pages import Manual
 from tests.environments import (
+    MANUAL_PAGES,
     REPOSITORY,
     assert_shows_a_window,
     build_wheel,
@@ -72,6 +75,10 @@ def check(environment: Path, away: Path) -> None:
     for part in ("Video", "Mesh", "Radar capture"):
         assert f"{part} {sample}" in told
 
+    folder, pages = call(python, "-c", MANUAL_PAGES, cwd=away).split()
+    assert Path(folder).is_relative_to(environment)
+    assert int(pages) > 80
+
     call(sd2, "demo", "--screenshot", "window.png", cwd=away)
     assert_shows_a_window(away / "window.png")
 
@@ -91,6 +98,8 @@ def test_the_wheel_holds_the_program_and_nothing_else(wheel: Path) -> None:
         if path.is_file() and "__pycache__" not in path.parts
     }
     assert sources <= names
+    # Type checkers use the annotations of packages that say so (PEP 561).
+    assert {"sd2core/py.typed", "sd2app/py.typed"} <= names
     resources = {
         f"sd2core/{path.relative_to(REPOSITORY).as_posix()}"
         for path in (REPOSITORY / "resources").rglob("*")
@@ -107,20 +116,15 @@ def test_the_wheel_holds_the_program_and_nothing_else(wheel: Path) -> None:
     assert any(name.endswith("/LICENSE") for name in names)
 
 
-def test_the_wheel_brings_the_guide(wheel: Path, built_guide: Path) -> None:
+def test_the_wheel_brings_the_manual_and_no_other_page(wheel: Path) -> None:
     with zipfile.ZipFile(wheel) as archive:
         names = set(archive.namelist())
-        search = archive.read("sd2app/docs/searchindex.js").decode()
-    pages = {
-        f"sd2app/docs/{path.relative_to(built_guide).as_posix()}"
-        for path in built_guide.rglob("*")
-        if path.is_file()
-    }
-    assert {"sd2app/docs/index.html", "sd2app/docs/first-five-minutes.html"} <= pages
-    assert pages <= names
-    assert not any(name.startswith("sd2app/docs/") for name in names - pages)
-    for page in ("first-five-minutes", "tutorials/mesh-to-denoiser", "commands/synth"):
-        assert f'"{page}"' in search
+    manual = Manual(REPOSITORY / "docs", full_parser).files()
+    assert {"index.md", "images/sample.png", "tutorials/mesh-to-denoiser.ipynb"} <= manual
+    brought = {name.removeprefix("sd2app/docs/") for name in names if "app/docs/" in name}
+    assert manual <= brought
+    # A picture that no page shows any more costs room only.
+    assert {name for name in brought - manual if not name.startswith("images/")} == set()
 
 
 @pytest.mark.slow

@@ -1,8 +1,7 @@
 """Make the program in one folder from a checkout, on Linux, Windows or macOS, and start it once.
 
 ``python app/packaging/make_bundle.py`` with Python 3.11 or newer: installs what is pinned into an
-environment of its own (a connection is needed), builds the guide, runs the recipe, and draws a
-window.
+environment of its own (a connection is needed), runs the recipe, and draws a window.
 """
 
 from __future__ import annotations
@@ -31,10 +30,7 @@ def main() -> None:
     """Install, make, start."""
     venv.create(ENVIRONMENT, with_pip=True, clear=True)
     python = ENVIRONMENT / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
-    call(
-        python, "-m", "pip", "install", "--constraint", "constraints.txt", ".[docs]", "pyinstaller"
-    )
-    call(python, "-m", "sphinx", "-q", "-d", "build/doctrees", "docs", "build/docs")
+    call(python, "-m", "pip", "install", "--constraint", "constraints.txt", ".", "pyinstaller")
     work = ("--noconfirm", "--workpath", "build/bundle")
     call(python, "-m", "PyInstaller", *work, "app/packaging/sd2-studio.spec")
     call(FOLDER / "sd2", "demo", "--screenshot", FOLDER.parent / "bundle.png")

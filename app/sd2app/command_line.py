@@ -12,8 +12,14 @@ from pathlib import Path
 from sd2app.plain_imports import plain_imports
 from sd2app.system_libraries import explain_missing, missing_libraries
 from sd2core.cli import build_parser, run
+from sd2core.cli.importing import copy_sample
 from sd2core.cli.options import add_command, add_json
 from sd2core.errors import Sd2Error
+
+_EXAMPLES = """\
+  sd2 demo                                    look at the bundled sample recording
+  sd2 open walk.sd2                           look at a recording, a video or a mesh
+"""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -23,7 +29,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def full_parser() -> argparse.ArgumentParser:
     """The library's commands and those that open the window."""
-    parser, commands = build_parser()
+    parser, commands = build_parser(_EXAMPLES)
     _add_window_commands(commands)
     return parser
 
@@ -85,13 +91,27 @@ def _add_window_commands(commands: argparse._SubParsersAction) -> None:
         handler=_doctor,
         description=(
             "Looks at system libraries, display, OpenGL, fonts, compiled kernels, models, GPU and\n"
-            "room on the disk. The exit code is 1 where something must be mended."
+            "room on the disk. The exit code is 1 where something must be mended.\n\n"
+            "--clean lists what the program keeps outside of recordings and can make again, such\n"
+            "as compiled kernels and landmark models, and removes it. Settings, trained models,\n"
+            "runs, and edits that were not saved stay."
         ),
+        examples="  sd2 doctor\n  sd2 doctor --clean    (before pip uninstall sd2-studio)",
     )
-    add_json(examining)
+    instead = examining.add_mutually_exclusive_group()
+    add_json(instead)
+    instead.add_argument("--clean", action="store_true", help="remove caches, after asking")
+    examining.add_argument("--yes", action="store_true", help="with --clean, do not ask")
 
 
 def _doctor(options: argparse.Namespace) -> int:
+    if options.clean:
+        from sd2core.cli.caches import remove_caches
+
+        remove_caches(ask=not options.yes)
+        return 0
+    if options.yes:
+        raise Sd2Error("--yes is given without --clean", remedy="Add --clean, or leave it out")
     from sd2app.doctor import report
 
     return report(options.json)
@@ -113,13 +133,9 @@ def _open(options: argparse.Namespace) -> int:
 def _demo(options: argparse.Namespace) -> int:
     from sd2core.files.resources import resource_path
 
-    sample = resource_path("swipes.sd2")
     if options.out is None:
-        return _show([sample], options.screenshot)
-    from sd2core.recording.recording import open_recording
-
-    copy = open_recording(sample).save_as(options.out, copy=True)
-    print(f"Wrote {copy.folder}")
+        return _show([resource_path("swipes.sd2")], options.screenshot)
+    copy_sample(options.out)
     return 0
 
 
@@ -140,7 +156,7 @@ def _show(paths: Sequence[Path], screenshot: Path | None) -> int:
     # Qt's event loop gives Python no turn to raise KeyboardInterrupt.
     previous = signal.signal(signal.SIGINT, signal.SIG_DFL)
     try:
-        return run_window(paths, screenshot=screenshot)
+        return run_window(paths, screenshot=screenshot, parser=full_parser)
     finally:
         signal.signal(signal.SIGINT, previous)
 

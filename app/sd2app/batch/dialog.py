@@ -10,6 +10,7 @@ from sd2app.batch.model import BatchModel
 from sd2app.batch.questions import BatchQuestions
 from sd2app.batch.run_view import BatchRunView
 from sd2app.batch.setup_view import BatchSetupView
+from sd2app.manual.help import help_button
 from sd2app.widgets.layouts import column_of, row_of
 from sd2app.widgets.panel import outlined, sentence, show_words, title
 
@@ -32,7 +33,8 @@ class BatchWindow(QDialog):
         self._pages.addWidget(self._run)
         self._warning = sentence("", "warning")
         self._warning.hide()
-        parts = (row_of((self._title, 1), another), self._warning, (self._pages, 1))
+        head = row_of((self._title, 1), another, help_button("Batch", self))
+        parts = (head, self._warning, (self._pages, 1))
         self.setLayout(column_of(*parts, spacing_px=10, margins_px=(16, 12, 16, 16)))
         # Not while the user still changes a number.
         self._patience = delayed(self._estimate, _ESTIMATE_MS, self)

@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
 )
 
 from sd2app.classify.result import ClassResult, Matrix
+from sd2app.manual.help import help_button
 from sd2app.session.display import DisplayModel
 from sd2app.widgets.canvas import AT_RIGHT, Canvas
 from sd2app.widgets.chart import Chart, ChartView, Curve, Mark, Scale
@@ -131,7 +132,7 @@ class ClassResultDialog(QDialog):
             self._right = _MatrixColumn(display, self._what_else(others))
             self._choose(_usual(others))
             columns.append(self._right)
-        layout = column_of(title(result.heading))
+        layout = column_of(row_of((title(result.heading), 1), help_button("Classifier", self)))
         self.setLayout(layout)  # first, so that the keyboard goes from top to bottom
         if result.summary:
             layout.addWidget(sentence(result.summary))

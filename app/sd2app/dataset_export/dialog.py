@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
 
 from sd2app.dataset_export.model import MAPS, ExportModel
 from sd2app.dataset_export.text import inertial_words, label_words, size_words, split_words
+from sd2app.manual.help import help_button
 from sd2app.widgets.dialogs import ask_folder, with_suffix
 from sd2app.widgets.inputs import CheckBox, Choice, NumberBox
 from sd2app.widgets.layouts import STRETCH, column_of, form_of, row_of
@@ -118,7 +119,8 @@ class ExportDialog(QDialog):
         self._open = outlined("Open folder", "Show the data set's folder", self._show_folder, self)
         self._close = outlined("Close", "An export under way goes on", self.close, self)
         buttons = (self._stop, self._export, self._close)
-        self._foot = row_of(self._open, STRETCH, *buttons, spacing_px=8)
+        guide = help_button("Export data set", self)
+        self._foot = row_of(guide, self._open, STRETCH, *buttons, spacing_px=8)
 
     def _frames(self, tip: str, low: int) -> NumberBox:
         return NumberBox(low, 10_000, " frames", tip, decimals=0, step=1.0)

@@ -17,6 +17,7 @@ from PySide6.QtWidgets import (
 )
 
 from sd2app.figures.model import DrawnFigure
+from sd2app.manual.help import with_help
 from sd2app.palette import Palette
 from sd2app.widgets.canvas import Canvas
 from sd2app.widgets.dialogs import ExportButtons, ask_figure
@@ -66,7 +67,8 @@ class FigureDialog(QDialog):
         self._model, self._name = model, name
         self.setWindowTitle(self.TITLE)
         self._buttons = ExportButtons(self, self._ask)
-        parts = ((FigurePreview(model, palette, self), 1), self._choices(), self._buttons)
+        foot = with_help("Export figure", self._buttons)
+        parts = ((FigurePreview(model, palette, self), 1), self._choices(), foot)
         self.setLayout(column_of(*parts, spacing_px=16, margins_px=16))
         model.changed.connect(self._refresh)
         model.written.connect(lambda _: self.accept())

@@ -15,6 +15,7 @@ from PySide6.QtWidgets import (
 
 from sd2app.fit.person_picker import PersonPicker
 from sd2app.fit.setup import ANGLES_DEG, DEFAULT_STATURE_M, STATURES_M, FitSetupModel
+from sd2app.manual.help import with_help
 from sd2app.palette import Palette
 from sd2app.widgets.dialogs import accepting, ask_file, ask_new
 from sd2app.widgets.inputs import CheckBox, Choice, NumberBox
@@ -119,7 +120,8 @@ class NewFromVideoDialog(QDialog):
         left = column_of((self.picker, 1), row_of((self._slider, 1), self._where))
         right = column_of(form, STRETCH, self._message)
         columns = row_of((left, 3), (right, 2), spacing_px=24)
-        self.setLayout(column_of((columns, 1), self._buttons, spacing_px=16, margins_px=16))
+        buttons = with_help("New from video", self._buttons)
+        self.setLayout(column_of((columns, 1), buttons, spacing_px=16, margins_px=16))
 
     # --- following the model --------------------------------------------------------------
 

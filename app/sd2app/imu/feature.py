@@ -12,6 +12,7 @@ from sd2app.feature import Action, Feature, Shell
 from sd2app.imu.model import ImuModel, place_words
 from sd2app.imu.text import reading_lines
 from sd2app.imu.track import InertialTrack
+from sd2app.manual.help import show_help
 from sd2app.session.session import Session
 from sd2app.widgets.canvas import Overlay
 from sd2app.widgets.dialogs import ask_new
@@ -94,3 +95,5 @@ class ImuFeature(Feature):
             )
         if model.file is not None:
             menu.addAction(f"Remove {model.file.name}", model.remove_file)
+        menu.addSeparator()
+        menu.addAction("&Help on this track", lambda: show_help("Inertial sensor"))

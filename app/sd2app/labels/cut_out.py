@@ -13,9 +13,10 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from sd2app.background.latest import Emit
+from sd2app.background.latest import BackgroundModel, Emit
 from sd2app.feature import Shell
 from sd2app.labels.model import LabelsModel
+from sd2app.manual.help import with_help
 from sd2app.session.session import Session
 from sd2app.session.tasks import ListedRunner
 from sd2app.widgets.dialogs import accepting, ask_folder
@@ -45,7 +46,7 @@ class _Done(NamedTuple):
     same: int
 
 
-class CutOutModel(QObject):
+class CutOutModel(BackgroundModel):
     """Cuts spans out into folders; asks first where a folder holds something else."""
 
     asked = Signal(int, str)  # number of occupied folders, one of them; answer: go_on or give_up
@@ -112,10 +113,6 @@ class CutOutModel(QObject):
         """Stop; complete folders stay, and the next export continues from there."""
         self._runner.cancel()
         self._plan = None
-
-    def close(self) -> None:
-        """Stop, and wait until nothing is being written."""
-        self._runner.close()
 
     def _receive(self, result: _Plan | _Done) -> None:
         if isinstance(result, _Plan):
@@ -209,7 +206,8 @@ class CutOutDialog(QDialog):
         buttons, self._go = accepting(self, "Choose folder…")
         parts = side_by_side(*self._parts.values(), spacing_px=16)
         form = form_of(("Spans", self._which), ("Parts", parts))
-        content = form, self._size, sentence(_ABOUT), STRETCH, buttons
+        foot = with_help("Export cut-outs", buttons)
+        content = form, self._size, sentence(_ABOUT), STRETCH, foot
         self.setLayout(column_of(*content, spacing_px=12, margins_px=16))
         self._refresh()
         self.setMinimumWidth(520)

@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QDialog, QWidget
 from sd2app.background.latest import Emit, LatestRunner
 from sd2app.feature import Shell
 from sd2app.labels.model import LabelsModel
+from sd2app.manual.help import with_help
 from sd2app.session.session import Session
 from sd2app.widgets.dialogs import ExportButtons, ask_new
 from sd2app.widgets.inputs import Choice
@@ -80,7 +81,7 @@ class LabelExportDialog(QDialog):
             rule(),
             self._said,
             STRETCH,
-            self._buttons,
+            with_help("Export labels", self._buttons),
         )
         self.setLayout(column_of(*parts, spacing_px=8, margins_px=16))
         self._look()

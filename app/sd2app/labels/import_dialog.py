@@ -15,6 +15,7 @@ from PySide6.QtWidgets import (
 from sd2app.background.latest import Emit, LatestRunner
 from sd2app.feature import Shell
 from sd2app.labels.edits import LabelEdits
+from sd2app.manual.help import with_help
 from sd2app.widgets.dialogs import LABEL_FILES, LABEL_SUFFIXES, accepting, ask_file
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.layouts import column_of, form_of
@@ -108,7 +109,7 @@ class LabelImportDialog(QDialog):
         form = form_of(("Read as", self._format), (self._observation_name, self._observation))
         take = form_of(("Take them", self._way))
         content = form, rule(), self._said, self._facts, rule(), take, self._consequence
-        parts = title(path.name), *content, 8, buttons
+        parts = title(path.name), *content, 8, with_help("Import labels", buttons)
         self.setLayout(column_of(*parts, spacing_px=8, margins_px=16))
         self._read()
         self.setMinimumWidth(560)

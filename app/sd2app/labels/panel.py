@@ -117,6 +117,11 @@ class LabelsPanel(QWidget):
             signal.connect(self._show_count)
         self._show_count()
 
+    @property
+    def page(self) -> str:
+        """Name of the page that is shown."""
+        return self._pages.page
+
     def turn_to(self, page: str) -> None:
         """Show a page, or the search in the spans, with the keyboard there."""
         if page == "Search":

@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
 from sd2app.feature import Shell
 from sd2app.labels.autosave import LabelAutosave
 from sd2app.labels.edits import LabelEdits
+from sd2app.manual.help import with_help
 from sd2app.session.document import DocumentModel
 from sd2app.widgets.dialogs import ask_new, may_delete
 from sd2app.widgets.layouts import column_of
@@ -149,7 +150,8 @@ class RecoverLabelsDialog(QDialog):
         self._write.clicked.connect(self._write_file)
         self._discard.clicked.connect(self._give_up)
         buttons.rejected.connect(self.reject)
-        self.setLayout(column_of(self._said, self._list, self._notes, buttons))
+        foot = with_help("Recover labels", buttons)
+        self.setLayout(column_of(self._said, self._list, self._notes, foot))
         self.resize(800, 320)
         self._fill()
 

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from PySide6.QtWidgets import QDialog, QLabel, QLineEdit, QToolButton, QWidget
 
 from sd2app.live.setup import ListenSetup
+from sd2app.manual.help import with_help
 from sd2app.widgets.dialogs import accepting, ask_file, ask_new
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.layouts import STRETCH, column_of, form_of, row_of
@@ -54,9 +55,8 @@ class ListenDialog(QDialog):
             ("Into", row_of((self._folder, 1), self._button(self._ask_folder), spacing_px=8)),
             gaps_px=(16, 12),
         )
-        self.setLayout(
-            column_of(form, STRETCH, self._message, buttons, spacing_px=16, margins_px=16)
-        )
+        foot = with_help("Listen to a radar", buttons)
+        self.setLayout(column_of(form, STRETCH, self._message, foot, spacing_px=16, margins_px=16))
         setup.changed.connect(self._refresh)
         self._refresh()
         self.resize(620, self.sizeHint().height())

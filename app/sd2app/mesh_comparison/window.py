@@ -8,6 +8,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QAction, QCloseEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QWidget
 
+from sd2app.manual.help import help_button
 from sd2app.mesh_comparison.model import ComparisonModel
 from sd2app.mesh_comparison.views import ComparedPicture, JointCurves, JointTable
 from sd2app.session.maps import MapModel
@@ -71,7 +72,8 @@ class ComparisonWindow(QWidget):
         tip = "Write maps and velocities of both (.png, .svg, .pdf)"
         self._export = outlined("Export figure…", tip, self._ask, self)
         against = QLabel("measured against", self)
-        return row_of((self._summary, 1), against, self._reference, self._export, spacing_px=8)
+        parts = (against, self._reference, self._export, help_button("Compare meshes", self))
+        return row_of((self._summary, 1), *parts, spacing_px=8)
 
     # --- following the model --------------------------------------------------------------
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QDialog, QWidget
 
+from sd2app.manual.help import with_help
 from sd2app.sensor.alignment import AlignmentModel, result_text
 from sd2app.widgets.chart import Chart, ChartView, Curve, Mark, Scale
 from sd2app.widgets.dialogs import accepting
@@ -41,7 +42,7 @@ class AlignmentDialog(QDialog):
                 self._result,
                 self._problem,
                 form_of(("Search within ±", side_by_side(self._within))),
-                buttons,
+                with_help("Align automatically", buttons),
                 spacing_px=12,
                 margins_px=16,
             )

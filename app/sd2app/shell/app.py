@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Sequence
+from argparse import ArgumentParser
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -25,13 +26,19 @@ ICON = Path(__file__).with_name("sd2-studio.svg")
 
 _SCREENSHOT_LIMIT_S = 120
 _SETTLE_S = 0.5
+_SAY_EVERY_S = 10
 
 
-def run(paths: Sequence[Path] = (), *, screenshot: Path | None = None) -> int:
+def run(
+    paths: Sequence[Path] = (),
+    *,
+    screenshot: Path | None = None,
+    parser: Callable[[], ArgumentParser] | None = None,
+) -> int:
     """Open the window on a recording or its files, and run until it is closed.
 
     With ``screenshot``, draw it off-screen when everything is computed, and write it there.
-    Returns an exit code.
+    ``parser`` has the commands that the manual describes. Returns an exit code.
     """
     if screenshot is not None:
         os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
@@ -44,7 +51,8 @@ def run(paths: Sequence[Path] = (), *, screenshot: Path | None = None) -> int:
     apply_theme(application, is_dark(settings))
     # A picture takes no lock on labels.
     aside = None if screenshot is None else TemporaryDirectory()
-    window = MainWindow(settings, Parts(recovery=None if aside is None else Path(aside.name)))
+    recovery = None if aside is None else Path(aside.name)
+    window = MainWindow(settings, Parts(recovery=recovery, parser=parser))
 
     def fill() -> None:
         # Loading Qt's reader of SVG does not delay the skeleton.
@@ -65,8 +73,12 @@ def run(paths: Sequence[Path] = (), *, screenshot: Path | None = None) -> int:
 
 
 def wait_until_settled(application: QApplication, window: MainWindow, limit_s: float) -> bool:
-    """Run the event loop until nothing is under way; False when nothing gets on for so long."""
+    """Run the event loop until nothing is under way; False when nothing gets on for so long.
+
+    What takes longer is said on standard error.
+    """
     deadline, calm_since, before = time.monotonic() + limit_s, None, None
+    say_s = time.monotonic() + _SAY_EVERY_S
     while time.monotonic() < deadline:
         application.processEvents()
         time.sleep(0.005)
@@ -74,6 +86,10 @@ def wait_until_settled(application: QApplication, window: MainWindow, limit_s: f
         reached = [(job.title, job.done) for job in jobs]
         if reached != before:
             deadline, before = time.monotonic() + limit_s, reached
+        if jobs and time.monotonic() > say_s:
+            say_s = time.monotonic() + _SAY_EVERY_S
+            how_far = f" ({jobs[0].done} of {jobs[0].total})" if jobs[0].total else ""
+            print(f"Waiting: {jobs[0].title}{how_far}", file=sys.stderr)
         if not (window.ready and window.settled):
             calm_since = None
         elif calm_since is None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from argparse import ArgumentParser
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,7 +19,7 @@ class Parts:
 
     Accuracy functions, denoisers and classifiers are the library's, the commands that fit, train,
     work in batches and listen ``sd2`` itself, and the recovery folder of labels is the user's by
-    default.
+    default. The manual has the commands of ``parser``, those of the library by default.
     """
 
     accuracy: AccuracyLibrary | None = None
@@ -29,3 +30,4 @@ class Parts:
     batch_command: Sequence[str] | None = None
     classifiers: ClassifierLibrary | None = None
     listen_command: Sequence[str] | None = None
+    parser: Callable[[], ArgumentParser] | None = None

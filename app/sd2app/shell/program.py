@@ -8,8 +8,9 @@ from PySide6.QtWidgets import QMessageBox
 
 from sd2app.feature import Action, Feature, Shell
 from sd2app.labels.feature import LabelsFeature
+from sd2app.manual.pages import FIRST_FIVE_MINUTES, INDEX
+from sd2app.manual.window import ManualOpener
 from sd2app.session.session import Session
-from sd2app.shell.guide import FIRST_FIVE_MINUTES, MANUAL, open_page
 from sd2app.shell.keys.bindings import KeyBindings
 from sd2app.shell.keys.dialog import KeysDialog
 from sd2app.shell.keys.model import KeyListModel
@@ -46,13 +47,17 @@ MOUSE = (
 class ProgramFeature(Feature):
     """Actions of the program; the history waits while labels are dragged."""
 
-    def __init__(self, session: Session, shell: Shell, labels: LabelsFeature) -> None:
+    def __init__(
+        self, session: Session, shell: Shell, labels: LabelsFeature, manual: ManualOpener
+    ) -> None:
         self._session, self._shell, self._labels = session, shell, labels
+        self.manual = manual
+        self.closing = (manual,)
         stack = session.document.undo_stack
         self.changing = (stack.indexChanged, stack.cleanChanged, session.display.theme_changed)
 
     def actions(self) -> Sequence[Action]:
-        """Undo, theme, messages, side panel, guide, keys, about, quit."""
+        """Undo, theme, messages, side panel, manual, keys, about, quit."""
         stack, display = self._session.document.undo_stack, self._session.display
         dragging, shell = self._labels.dragging, self._shell
         return (
@@ -81,13 +86,13 @@ class ProgramFeature(Feature):
             ),
             Action(
                 "first_five_minutes", "Help", "First five minutes", (),
-                "What one sees, and why, in a browser",
-                lambda: shell.attempt(lambda: open_page(FIRST_FIVE_MINUTES)),
+                "What one sees, and why",
+                lambda: shell.attempt(lambda: self.manual.show_page(FIRST_FIVE_MINUTES)),
             ),
             Action(
                 "manual", "Help", "Manual", ("F1",),
-                "The whole guide in a browser; needs no network",
-                lambda: shell.attempt(lambda: open_page(MANUAL)),
+                "All pages, with a search; needs no network",
+                lambda: shell.attempt(lambda: self.manual.show_page(INDEX)),
             ),
             Action(
                 "keys", "Help", "Keys…", ("?",), "All keys, to be found and changed",

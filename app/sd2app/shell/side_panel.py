@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from sd2app.manual.help import HELP, help_button
 from sd2app.settings import Settings
 from sd2app.widgets.icons import draw_panel_icon, draw_ring
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
@@ -32,6 +33,8 @@ _STEPS = {Qt.Key.Key_Up: -1, Qt.Key.Key_Down: 1}
 @runtime_checkable
 class Paged(Protocol):
     """Panel of several pages."""
+
+    page: str  # name of the one that is shown
 
     def turn_to(self, page: str) -> None:
         """Show a page by its name."""
@@ -60,7 +63,9 @@ class SidePanel(QFrame):
             icon.clicked.connect(partial(self._click, place))
             icon.stepped.connect(self._step)
             self._stack.addWidget(_scrolled(page))
-        head = row_of((self._title, 1), self._fold, margins_px=(8, 4, 4, 0))
+        # Elsewhere in the window its key opens the first page.
+        guide = help_button(self._topic, self, key="")
+        head = row_of((self._title, 1), guide, self._fold, spacing_px=2, margins_px=(8, 4, 4, 0))
         self._open = QWidget(self)
         self._open.setLayout(column_of(head, (self._stack, 1), spacing_px=2, margins_px=0))
         rail = QFrame(self)
@@ -103,6 +108,12 @@ class SidePanel(QFrame):
     def button(self, name: str) -> RailButton:
         """Icon of a panel."""
         return self._icons[self._names.index(name)]
+
+    def _topic(self) -> str:
+        """What help is about: the page of a panel where that has help of its own."""
+        panel = self._pages[self.shown]
+        page = panel.page if isinstance(panel, Paged) else ""
+        return page if page in HELP else self.shown
 
     def _click(self, place: int) -> None:
         if place == self._stack.currentIndex():

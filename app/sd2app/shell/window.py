@@ -208,6 +208,7 @@ class MainWindow(QMainWindow):
         for feature in features:
             for signal in feature.changing:
                 signal.connect(self._refresh)
+        features.program.manual.answer()
         self.keys.changed.connect(self._refresh)
         self.side.folded_changed.connect(self._refresh)
         s.document.opened.connect(self._show_document)

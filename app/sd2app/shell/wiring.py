@@ -23,6 +23,7 @@ from sd2app.fit.feature import FitFeature
 from sd2app.imu.feature import ImuFeature
 from sd2app.labels.feature import LabelsFeature
 from sd2app.live.feature import LiveFeature
+from sd2app.manual.window import ManualOpener
 from sd2app.maps.feature import MapsFeature
 from sd2app.maps.stack import MapStack
 from sd2app.mesh_comparison.feature import MeshComparisonFeature
@@ -39,6 +40,7 @@ from sd2app.training.feature import TrainingFeature
 from sd2app.video.feature import VideoFeature
 from sd2app.widgets.layouts import pane
 from sd2app.widgets.pages import InnerPage, paged_panel
+from sd2core.cli import build_parser
 from sd2core.labels.recovery import recovery_folder
 
 
@@ -117,7 +119,8 @@ class Features:
         )
         self.live = LiveFeature(session, shell, parts.listen_command, parent)
         self.playback = PlaybackFeature(session)
-        self.program = ProgramFeature(session, shell, labels)
+        manual = ManualOpener(parts.parser or (lambda: build_parser()[0]), session.settings, parent)
+        self.program = ProgramFeature(session, shell, labels, manual)
         self.imu = ImuFeature(session, shell, parent)
         self.files = FilesFeature(
             session, shell, self.fit.model, labels.edits, self.imu.model.add_file

@@ -51,6 +51,11 @@ class InnerPages(QWidget):
         """Number of the page that is shown."""
         return self._pages.currentIndex()
 
+    @property
+    def page(self) -> str:
+        """First name of the page that is shown."""
+        return self._names[self.shown]
+
     def turn_to(self, page: str) -> None:
         """Show a page by its first name."""
         place = self._names.index(page)

@@ -20,7 +20,7 @@ def window(monkeypatch: pytest.MonkeyPatch) -> list[tuple[list[Path], Path | Non
     """Stands in for the window and notes what it was asked to show."""
     shown: list[tuple[list[Path], Path | None]] = []
 
-    def run(paths: list[Path], *, screenshot: Path | None = None) -> int:
+    def run(paths: list[Path], *, screenshot: Path | None = None, parser: object) -> int:
         shown.append((paths, screenshot))
         return 0
 
@@ -127,7 +127,7 @@ def test_ctrl_c_ends_the_window(
 ) -> None:
     handlers = []
 
-    def run(paths: list[Path], *, screenshot: Path | None = None) -> int:
+    def run(paths: list[Path], *, screenshot: Path | None = None, parser: object) -> int:
         handlers.append(signal.getsignal(signal.SIGINT))
         return 0
 

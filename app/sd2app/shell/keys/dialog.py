@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from sd2app.manual.help import help_button
 from sd2app.shell.keys.bindings import KeyBindings
 from sd2app.shell.keys.model import KEYS, KeyListModel
 from sd2app.widgets.inputs import SearchLine
@@ -65,7 +66,8 @@ class KeysDialog(QDialog):
         close.button(QDialogButtonBox.StandardButton.Close).setAutoDefault(False)
         changing = (self._change, self._add, self._clear, self._reset)
         buttons = row_of(*changing, STRETCH, every, close)
-        self.setLayout(column_of(self._search, (self._table, 1), self._said, buttons))
+        head = row_of((self._search, 1), help_button("Keys", self))
+        self.setLayout(column_of(head, (self._table, 1), self._said, buttons))
         self.resize(760, 620)
         self._find()
 
