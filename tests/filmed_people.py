@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from sd2core.body.model import Body
 from sd2core.body.rig import KeypointSpace
 from sd2core.body.shape import BodyShape, ShapeSpace
+from tools.build_sample.posing import posed
 from tools.build_sample.render import Camera, Renderer
 from tools.build_sample.swipes import swipes
 
@@ -35,7 +36,7 @@ def swiping() -> tuple[list[Picture], NDArray[np.float64]]:
     motion = swipes(body.skeleton, _FROM_S + STEP_S * np.arange(FRAMES))
     moved = motion.translation_m + place
     pictures = [
-        _renderer().frame(body.pose(motion.rotations[[k]], moved[[k]])[0]) for k in range(FRAMES)
+        _renderer().frame(posed(body, motion.rotations[[k]], moved[[k]])[0]) for k in range(FRAMES)
     ]
     base = BodyShape(np.zeros(len(space)), space.base_stature_m)
     points = (

@@ -30,6 +30,9 @@ def test_what_the_bundle_is_asked_to_do_is_understood(words: tuple[str, ...]) ->
 def test_the_program_in_a_folder_starts_and_starts_its_own_processes(tmp_path: Path) -> None:
     where = ("--distpath", tmp_path, "--workpath", tmp_path / "build")
     call(sys.executable, "-m", "PyInstaller", "--noconfirm", *where, RECIPE, cwd=tmp_path)
+    licences = (tmp_path / "sd2-studio" / "LICENCES.txt").read_text("utf-8")
+    assert "x264 (in av" in licences
+    assert "Qt 6 (in PySide6" in licences
     sd2, away = tmp_path / "sd2-studio" / "sd2", tmp_path / "away"
     away.mkdir()
     # Compiled kernels in a background process, models in another.

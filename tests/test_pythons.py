@@ -15,6 +15,7 @@ from PIL import Image
 
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+THIS = f"{sys.version_info[0]}.{sys.version_info[1]}"
 CLAIMED = [
     name.rpartition(" ")[2] for name in PROJECT["classifiers"] if "Python :: 3." in name
 ]  # fmt: skip
@@ -31,15 +32,13 @@ def python_of(version: str) -> Path | None:
 
 
 def test_what_is_claimed_is_one_range() -> None:
-    assert CLAIMED == [f"3.{minor}" for minor in range(11, 11 + len(CLAIMED))]
+    assert [f"3.{minor}" for minor in range(11, 11 + len(CLAIMED))] == CLAIMED
     assert PROJECT["requires-python"] == f">={CLAIMED[0]},<3.{11 + len(CLAIMED)}"
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-@pytest.mark.parametrize(
-    "version", [one for one in CLAIMED if one != "%d.%d" % sys.version_info[:2]]
-)
+@pytest.mark.parametrize("version", [one for one in CLAIMED if one != THIS])
 def test_the_window_opens_on_it(version: str, tmp_path: Path) -> None:
     python = python_of(version)
     if python is None:

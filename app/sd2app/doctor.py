@@ -145,18 +145,19 @@ def _bundled() -> Finding:
 
 
 def _landmark_models() -> Finding:
-    from sd2core.body.landmark_models import landmark_models
+    from sd2core.body.landmark_models import LANDMARKERS, landmark_models
 
     try:
-        models = landmark_models(download=False)
+        there = [landmark_models(download=False, model=model) for model in LANDMARKERS]
     except Sd2Error as error:
         return Finding(
             "Landmark models",
             "note",
             error.found,
-            "sd2 fetch-models (36 MB, once; only fits of videos need them)",
+            "sd2 fetch-models (some 80 MB, once; only fits of videos need them)",
         )
-    return Finding("Landmark models", "ok", str(models.detector.parent))
+    names = " and ".join(LANDMARKERS)
+    return Finding("Landmark models", "ok", f"{names} in {there[0].detector.parent}")
 
 
 def _gpu() -> Finding:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.evidence import EvidenceInParts, sight_of, trust_of
 from sd2core.body.fit_windows import Windows
-from sd2core.body.fitted import PER_FRAME, BodyFit, FittedMotion, mean_over_limbs
+from sd2core.body.fitted import BodyFit, FittedMotion, mean_over_limbs
 from sd2core.body.initial import initial_pose
 from sd2core.body.lifter import Lifted, LiftedInParts, Lifter
 from sd2core.body.limbs import LIMBS
@@ -47,46 +46,6 @@ _UNSEEN_MPS = 0.3
 """Velocity deviation of limbs that are cut off or hidden; a guess, not measured."""
 
 
-def fit_body(
-    track: Landmarks,
-    camera: PinholeCamera,
-    *,
-    stature_m: float | None = None,
-    lift: Lift | None = None,
-    workspace: Path | None = None,
-    progress: Progress = silent,
-) -> BodyFit:
-    """Fit a body to landmarks, with everything in memory.
-
-    Parameters
-    ----------
-    stature_m : float, optional
-        The person's height, which fixes the scale; :data:`DEFAULT_STATURE_M` without.
-    lift : callable, optional
-        Gives the landmarks their depth; by default the bundled lifter.
-    workspace : Path, optional
-        Existing folder in which finished stretches are kept, so that a stopped fit goes on there.
-    progress : Progress
-        Counts steps of the solver, at most.
-
-    Raises
-    ------
-    Sd2Error
-        If the height is none of a person, or no frame shows one.
-    """
-    fitting = Fitting(track, camera, stature_m, lift, workspace)
-    found = list(fitting.finished(progress))
-
-    def joined(name: str) -> NDArray[Any]:
-        return np.concatenate([getattr(part, name) for part in found])
-
-    return BodyFit(
-        timebase=track.timebase,
-        shape=found[0].shape,
-        **{name: joined(name) for name in PER_FRAME},
-    )
-
-
 def fit_motion(
     track: Landmarks,
     camera: PinholeCamera,
@@ -97,8 +56,20 @@ def fit_motion(
 ) -> FittedMotion:
     """Fit a body to a clip of any length; the poses stay in the workspace.
 
-    Parameters and errors are those of :func:`fit_body`; the workspace must live as long as the
-    poses are used.
+    Parameters
+    ----------
+    stature_m : float, optional
+        The person's height, which fixes the scale; :data:`DEFAULT_STATURE_M` without.
+    workspace : Path
+        Existing folder in which finished stretches are kept, so that a stopped fit goes on there;
+        it must live as long as the poses are used.
+    progress : Progress
+        Counts steps of the solver, at most.
+
+    Raises
+    ------
+    Sd2Error
+        If the height is none of a person, or no frame shows one.
     """
     fitting = Fitting(track, camera, stature_m, None, workspace)
     along_mps, across_mps = np.zeros((2, len(track), len(LIMBS)), np.float32)
@@ -126,7 +97,7 @@ def fit_motion(
 
 
 class Fitting:
-    """Fit of one clip, with one window of frames in memory at a time; see :func:`fit_body`."""
+    """Fit of one clip, with one window of frames in memory at a time."""
 
     def __init__(
         self,

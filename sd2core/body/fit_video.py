@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import ctypes
 import hashlib
 import json
 import os
 import shutil
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -21,7 +20,7 @@ from sd2core.body.camera import PinholeCamera, Source, camera_of
 from sd2core.body.fit import fit_motion
 from sd2core.body.fitted import FittedMotion
 from sd2core.body.landmark_files import save_track
-from sd2core.body.landmark_models import landmark_models
+from sd2core.body.landmark_models import DEFAULT_MODEL, LandmarkModel, landmark_models
 from sd2core.body.landmarks import DEFAULT_MAX_GAP_S, SIGHTINGS, OnFrame, find_landmarks
 from sd2core.body.limbs import LIMB_LANDMARKS, LIMBS
 from sd2core.body.model import Resolution
@@ -36,6 +35,7 @@ from sd2core.files.resources import resource_path
 from sd2core.files.stores import open_group
 from sd2core.io.mesh import save_mesh
 from sd2core.io.video import VideoReader, open_video
+from sd2core.processes import return_free_memory
 from sd2core.progress import Progress
 from sd2core.version import __version__
 
@@ -72,6 +72,7 @@ class FitChoices:
     stature_m: float | None = None  # height of the person
     max_gap_s: float = DEFAULT_MAX_GAP_S  # longest gap without the person that is bridged
     resolution: Resolution = "medium"  # mesh of 1,229, 5,000 or 13,348 vertices
+    landmark_model: LandmarkModel = DEFAULT_MODEL
 
 
 @dataclass(frozen=True)
@@ -138,7 +139,9 @@ def fit_video(
     partial = out.with_name(out.name + PARTIAL)
     with open_video(path) as video:
         camera, camera_source = camera_of(video, choices.focal_px, choices.field_of_view_deg)
-        found_models = landmark_models(models, report.progress_of("models"))
+        found_models = landmark_models(
+            models, report.progress_of("models"), model=choices.landmark_model
+        )
         with claim_folder(partial, restart), remove_without_landmarks(partial), one_thread():
             report.started(video, (partial / LANDMARKS).is_dir())
             stages = _Stages(report)
@@ -153,7 +156,7 @@ def fit_video(
                 workspace=partial / LANDMARKS,
             )
             video.close()
-            _give_back_memory()
+            return_free_memory()
             motion = fit_motion(
                 track,
                 camera,
@@ -217,16 +220,10 @@ def provenance(made: FittedVideo, path: Path, choices: FitChoices) -> dict[str, 
         "stature_m": DEFAULT_STATURE_M if stature_m is None else stature_m,
         "stature_source": "default" if stature_m is None else "user",
         "max_gap_s": choices.max_gap_s,
+        "landmark_model": choices.landmark_model,
         "notes": list(made.notes),
         "doubts": list(made.doubts),
     }
-
-
-def _give_back_memory() -> None:
-    """Return freed memory of decoder and networks, which the GNU C library would keep."""
-    # Elsewhere there is no such library, or it has no such function.
-    with suppress(AttributeError, OSError, TypeError):
-        ctypes.CDLL(None).malloc_trim(0)
 
 
 class _Stages:

@@ -53,18 +53,6 @@ class BodyFit:
     def __len__(self) -> int:
         return len(self.timebase)
 
-    def mesh(self, resolution: Resolution = "high") -> MeshSequence:
-        """The moving surface of 13,348 (high), 5,000 or 1,229 vertices, posed where it is read."""
-        return surface(
-            self.shape,
-            self.timebase,
-            Pose(self.turns, self.translation_m).at,
-            self.present,
-            mean_over_limbs(self.along_sd_mps),
-            mean_over_limbs(self.across_sd_mps),
-            resolution,
-        )
-
     @property
     def quality(self) -> Floats:
         """Quality of the fit per frame, (T,): from 0 (no person) to 1 (landmarks on the body)."""

@@ -133,7 +133,7 @@ def _unreadable(path: Path, why: object) -> Sd2Error:
 class SearchStore:
     """Arrays by name: files of a folder, or without one in memory.
 
-    Files of another search (video, person, silhouettes) are ignored.
+    Files of another search (video, person, silhouettes, landmark model) are ignored.
     """
 
     def __init__(
@@ -142,6 +142,7 @@ class SearchStore:
         video: VideoReader,
         person: Rectangle | None,
         silhouettes: int | None,
+        landmark_model: str,
     ) -> None:
         self._folder = folder
         self._in_memory: dict[str, dict[str, Any]] = {}
@@ -155,6 +156,7 @@ class SearchStore:
             "frames": [len(video), video.width, video.height],
             "person": None if person is None else list(vars(person).values()),
             "silhouettes": silhouettes,
+            "landmark_model": landmark_model,
         }
         self._key = hashlib.sha256(json.dumps(identity).encode()).hexdigest()
 

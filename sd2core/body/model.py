@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.body.rotations import Floats, applied
+from sd2core.body.rotations import Floats
 from sd2core.files.resources import open_bundled_arrays, resource_path
 from sd2core.mesh.sequence import MeshSequence
 
@@ -138,27 +138,6 @@ class Body:
         """Height at rest."""
         return float(np.ptp(self.vertices_m[:, 1]))
 
-    def pose(self, rotations: Floats, translation_m: Floats | None = None) -> Floats:
-        """Vertices (T, V, 3) by linear blend skinning; arguments of :meth:`Skeleton.transforms`."""
-        transforms = self.skeleton.transforms(rotations, translation_m)  # (T, B, 3, 4)
-        vertices = np.empty((len(transforms), len(self.vertices_m), 3))
-        for frame, bones in enumerate(transforms):
-            blend = np.zeros((len(self.vertices_m), 3, 4))
-            # Slot after slot instead of a matrix product: the same sum in the same
-            # order everywhere, which the sample's reproducibility rests on.
-            for rows, numbers, weights in self._slots:
-                blend[rows] += weights[:, None, None] * bones[numbers]
-            vertices[frame] = _apply(blend, self.vertices_m)
-        return vertices
-
-    @cached_property
-    def _slots(self) -> list[tuple[NDArray[np.intp], NDArray[np.intp], Floats]]:
-        slots = []
-        for slot in range(self.weights.shape[1]):
-            rows = np.flatnonzero(self.weights[:, slot])
-            slots.append((rows, self.bones[rows, slot], self.weights[rows, slot]))
-        return slots
-
 
 def load_skeleton(path: Path | None = None) -> Skeleton:
     """Read the bones of the bundled body (or of another export)."""
@@ -201,10 +180,6 @@ def _summed(left: Floats, right: Floats) -> Floats:
     """Sum of products over the third axis, in the same order on every machine."""
     products = left * right
     return products[:, :, 0] + products[:, :, 1] + products[:, :, 2]
-
-
-def _apply(transform: Floats, point: Floats) -> Floats:
-    return applied(transform[..., :3], point) + transform[..., 3]
 
 
 def own_resolution(mesh: MeshSequence) -> Resolution | None:

@@ -103,47 +103,38 @@ class Landmarks(Protocol):
     @property
     def timebase(self) -> Timebase:
         """Presentation times of the frames."""
-        ...
 
     @property
     def width(self) -> int:
         """Width of the upright picture in pixels."""
-        ...
 
     @property
     def height(self) -> int:
         """Height of the upright picture in pixels."""
-        ...
 
     @property
     def present(self) -> NDArray[np.bool_]:
         """Frames with the person, (T,)."""
-        ...
 
     @property
     def bridged(self) -> NDArray[np.bool_]:
         """Frames that were interpolated, (T,)."""
-        ...
 
     @property
     def silhouette_frames(self) -> NDArray[np.intp]:
         """Frames of which the model's mask is kept, (K,)."""
-        ...
 
     @property
     def silhouettes(self) -> NDArray[np.uint8]:
         """The masks, (K, h, w)."""
-        ...
 
     @property
     def notes(self) -> tuple[str, ...]:
         """Sentences about repairs."""
-        ...
 
     def __len__(self) -> int: ...
     def part(self, start: int, stop: int) -> LandmarkTrack:
         """Frames ``start`` to ``stop`` as a track of their own."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,6 +25,7 @@ from sd2core.cli.options import (
 from sd2core.cli.output import (
     counted,
     duration,
+    listed,
     print_event,
     print_facts,
     print_json,
@@ -317,9 +318,9 @@ def _forecast_facts(forecast: Forecast) -> dict[str, str]:
     return {
         "segments": f"{forecast.segments:,} of {counted(forecast.sources, 'source')}",
         "size": f"{forecast.total_bytes / 1e6:,.1f} MB before compression",
-        "kinds": _listed(forecast.of_kind),
-        "labels": _listed(forecast.of_label),
-        "splits": _listed(forecast.of_split()),
+        "kinds": listed(forecast.of_kind),
+        "labels": listed(forecast.of_label),
+        "splits": listed(forecast.of_split()),
         "frame rate": f"{forecast.frame_rate_hz:g} frames/s",
     }
 
@@ -358,7 +359,3 @@ def _print(written: Written, sheet: Path) -> None:
 def _complain(failed: tuple[str, ...] | list[str]) -> None:
     for one in failed:
         print(f"sd2: left out {one}", file=sys.stderr)
-
-
-def _listed(counts: dict[Any, int]) -> str:
-    return ", ".join(f"{name} {count:,}" for name, count in counts.items())

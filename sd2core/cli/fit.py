@@ -54,7 +54,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             "Finds the person, 33 landmarks in every frame, and the body and motion that fit\n"
             "them. The size of everything follows from the person's height: say it with\n"
             "--stature-m where you know it, every velocity is proportional to it. At first use\n"
-            "the landmark models are fetched (36 MB, see `sd2 fetch-models`).\n\n"
+            "the landmark models are fetched (36 MB, the heavy one 41 MB; `sd2 fetch-models`).\n\n"
             "It can be stopped at any moment: what is done stays in FILE.partial, and the same\n"
             "command goes on from there."
         ),
@@ -108,6 +108,12 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         choices=("low", "medium", "high"),
         default="medium",
         help="1,229, 5,000 or 13,348 vertices (default: medium)",
+    )
+    parser.add_argument(
+        "--landmark-model",
+        choices=("full", "heavy"),
+        default="full",
+        help="the network that finds the landmarks (default: full)",
     )
     parser.add_argument(
         "--models", type=Path, metavar="FOLDER", help="a folder with the landmark models"
@@ -207,6 +213,7 @@ def _choices(options: argparse.Namespace) -> FitChoices:
         stature_m=options.stature_m,
         max_gap_s=DEFAULT_MAX_GAP_S if options.max_gap_s is None else options.max_gap_s,
         resolution=options.resolution,
+        landmark_model=options.landmark_model,
     )
 
 

@@ -73,6 +73,11 @@ def counted(number: int, what: str) -> str:
     return f"{number:,} {what}" + ("" if number == 1 else "s")
 
 
+def listed(counts: Mapping[Any, int]) -> str:
+    """``real 12, synthetic 2,000``."""
+    return ", ".join(f"{name} {count:,}" for name, count in counts.items())
+
+
 def duration(seconds: float) -> str:
     """Duration as text: seconds, minutes, or hours and minutes."""
     if seconds < 60:

@@ -29,20 +29,24 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         "fetch the landmark models that `sd2 fit` needs, once",
         handler=_fetch,
         description=(
-            "They are part of the package mediapipe (Apache-2.0), which pip downloads (36 MB) but\n"
-            "does not install; 9 MB of it are kept in the user's cache. `sd2 fit` does this by\n"
-            "itself at its first use. Without a connection, fetch the wheel elsewhere:\n\n"
+            "Person detector and full model are part of the Python package mediapipe, the heavy\n"
+            "model of the npm package @mediapipe/pose (Apache-2.0). pip and npm download them\n"
+            "(36 and 41 MB; without npm pip brings it, 61 MB), nothing is installed, and 37 MB\n"
+            "are kept in the user's cache. `sd2 fit` fetches what it needs by itself. Without a\n"
+            "connection, fetch them elsewhere:\n\n"
             "  pip download mediapipe==0.10.21 --no-deps --only-binary=:all: \\\n"
-            "      --platform manylinux_2_28_x86_64 --python-version 3.11"
+            "      --platform manylinux_2_28_x86_64 --python-version 3.11\n"
+            "  npm pack @mediapipe/pose@0.5.1675469404"
         ),
-        examples="  sd2 fetch-models\n  sd2 fetch-models --from mediapipe-0.10.21-….whl",
+        examples="  sd2 fetch-models\n  sd2 fetch-models --from mediapipe-0.10.21-….whl\n"
+        "  sd2 fetch-models --from mediapipe-pose-0.5.1675469404.tgz",
     )
     parser.add_argument(
         "--from",
         dest="source",
         type=Path,
         metavar="PATH",
-        help="a wheel of mediapipe 0.10.21, or a folder with it or with the two model files",
+        help="the wheel or the npm archive, a model file out of one, or a folder with them",
     )
     parser.add_argument(
         "--if-missing", action="store_true", help="do nothing when they are there already"
@@ -50,19 +54,19 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 
 def _fetch(options: argparse.Namespace) -> None:
-    from sd2core.body.landmark_models import fetch_models, landmark_models
+    from sd2core.body.landmark_models import LANDMARKERS, fetch_models, landmark_models
 
     if options.if_missing:
         try:
-            models = landmark_models(download=False)
+            there = [landmark_models(download=False, model=model) for model in LANDMARKERS]
         except Sd2Error:
             pass
         else:
-            print(f"The landmark models are in {models.detector.parent}")
+            print(f"The landmark models are in {there[0].detector.parent}")
             return
     with progress_bar("Fetching the landmark models", unit="B") as progress:
-        models = fetch_models(progress, source=options.source)
-    print(f"Fetched the landmark models into {models.detector.parent}")
+        folder = fetch_models(progress, source=options.source)
+    print(f"Fetched the landmark models into {folder}")
 
 
 def _warm_up(options: argparse.Namespace) -> None:

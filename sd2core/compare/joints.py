@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 from sd2core.body.limbs import LIMBS, vertex_limbs
 from sd2core.body.model import Body, Resolution
 from sd2core.errors import Sd2Error
-from sd2core.mesh.sequence import MeshSequence
 
 Floats = NDArray[np.float64]
 
@@ -70,7 +69,6 @@ GROUPS = {
 """Joints that are reported together."""
 
 _PROBED_FRAMES = 24
-_READ_FRAMES = 64
 _FARTHEST_M = 0.10
 
 
@@ -92,14 +90,6 @@ class JointPatches:
         for number, (rows, weights) in enumerate(zip(self.rows, self.weights, strict=True)):
             joints[..., number, :] = weights @ vertices[..., rows, :].astype(np.float64)
         return joints
-
-    def of(self, mesh: MeshSequence) -> Floats:
-        """Joints of every frame, (T, J, 3), read in stretches."""
-        stretches = [
-            self.positions(mesh.read(start, min(start + _READ_FRAMES, mesh.frame_count)))
-            for start in range(0, mesh.frame_count, _READ_FRAMES)
-        ]
-        return np.concatenate(stretches)
 
 
 @lru_cache(maxsize=3)

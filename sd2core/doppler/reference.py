@@ -44,7 +44,7 @@ def reference_stretch(
     middle = 0.5 * (first.min(axis=0) + first.max(axis=0))
     middle = middle.astype(mesh.vertices.dtype).astype(np.float64)
     raw = np.zeros((options.axis.bins, stop - start))
-    for column, (velocities, points) in enumerate(_at_frames(mesh, place, options, start, stop)):
+    for column, (velocities, points) in enumerate(at_frames(mesh, place, options, start, stop)):
         weight, total = _weights(mesh, options, points, place)
         if total == 0 or not len(velocities):
             continue
@@ -61,19 +61,7 @@ def reference_stretch(
     return raw
 
 
-def reference_velocities(
-    mesh: MeshSequence, sensor: VirtualSensor, options: SynthesisOptions, frame: int
-) -> NDArray[np.float64]:
-    """Velocity of every vertex at each of a frame's moments, in double precision.
-
-    Shape (moments, V), m/s, positive when approaching; only moments that lie within the
-    clip.
-    """
-    place = np.asarray(sensor.position_m, np.float64)
-    return next(_at_frames(mesh, place, options, frame, frame + 1))[0]
-
-
-def _at_frames(
+def at_frames(
     mesh: MeshSequence,
     place: NDArray[np.float64],
     options: SynthesisOptions,

@@ -55,11 +55,6 @@ class LiveMap:
         self._chain = Chain(replace(like, samples=newest, timebase=Timebase([0.0])), options)
         self._weights = weights_of(axis, self._chain)
 
-    @property
-    def clipped_share(self) -> float:
-        """Share of the samples so far that sit at the converter's ends."""
-        return self._chain.clipped_share
-
     def column(self, frame: NDArray[Any]) -> NDArray[np.float32]:
         """Column (bins,) of the next frame (1, channels, chirps, samples).
 

@@ -1,17 +1,15 @@
-"""Scenes of an FMCW radar: facets of a moving mesh, or points."""
+"""Scene of an FMCW radar: facets of a moving mesh."""
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
-from sd2core.fmcw.triangle import mean_phasor
 from sd2core.mesh.sequence import MeshSequence, refuse_missing
 from sd2core.radar_config import RadarConfig
 from sd2core.scattering.facets import visible_facets
@@ -22,76 +20,6 @@ NEAREST_M = 0.05
 """The 1/R^2 of the far field is not continued to nearer than this."""
 
 _BLOCK_FRAMES = 64
-
-
-@dataclass(frozen=True, eq=False)
-class Scatterers:
-    """Reflecting centres at one instant."""
-
-    position_m: NDArray[np.float64]  # Camera frame, (n, 3).
-    velocity_mps: NDArray[np.float64]  # (n, 3).
-    # Echo at the sensor, (n,): projected area in m^2 over R^2, times the mean phasor of the facet
-    # about its centre.
-    amplitude: NDArray[np.complex128]
-
-
-def point_scatterers(
-    position_m: ArrayLike,
-    velocity_mps: ArrayLike,
-    area_m2: ArrayLike,
-    sensor: VirtualSensor,
-) -> Scatterers:
-    """Scatterers of a given effective area that reflect alike in all directions.
-
-    Positions and velocities are (n, 3), areas (n,) or one number.
-    """
-    position = np.atleast_2d(np.asarray(position_m, dtype=np.float64))
-    velocity = np.broadcast_to(np.asarray(velocity_mps, dtype=np.float64), position.shape)
-    range_m = np.linalg.norm(position - np.asarray(sensor.position_m), axis=1)
-    amplitude = np.asarray(area_m2, dtype=np.float64) / np.maximum(range_m, NEAREST_M) ** 2
-    return Scatterers(position, velocity, amplitude.astype(np.complex128))
-
-
-def facet_scatterers(
-    vertices_m: NDArray[np.float64],
-    velocity_mps: NDArray[np.float64],
-    faces: NDArray[np.int32],
-    sensor: VirtualSensor,
-    config: RadarConfig,
-    visible: NDArray[np.bool_] | None = None,
-) -> Scatterers:
-    """Scatterers of the facets that face the sensor, of amplitude area * cos(theta) / R^2.
-
-    The phase is linear over a facet, so its sum over the facet is closed form
-    (:func:`~sd2core.fmcw.triangle.mean_phasor`). Points one per facet would have
-    to lie well under a wavelength apart to add up to the same.
-
-    Faces are counter-clockwise seen from outside. ``visible``, (F,), marks the facets that nothing
-    hides; those that face away never count.
-    """
-    corners = vertices_m[faces] - np.asarray(sensor.position_m)  # (F, 3 corners, 3)
-    normal = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    centre = corners.mean(axis=1)
-    range_m = np.linalg.norm(centre, axis=1)
-    # The normal's length is the area, so this is area * cos(theta).
-    towards = -np.einsum("fi,fi->f", normal, centre)
-    projected_m2 = towards / np.maximum(range_m, NEAREST_M)
-    seen = projected_m2 > 0
-    if visible is not None:
-        seen &= visible
-    corners, range_m = corners[seen], range_m[seen]
-    wave_number = 4.0 * np.pi / config.wavelength_m
-    phase = wave_number * (np.linalg.norm(corners, axis=2) - range_m[:, None])  # (F, 3)
-    # Distance is convex: its mean excess over the centre is quadratic, and over a
-    # triangle a quadratic has a quarter of its mean at the corners. Taking the
-    # other three quarters off leaves an error of third order in the edge length.
-    phase -= 0.75 * phase.mean(axis=1, keepdims=True)
-    strength = projected_m2[seen] / np.maximum(range_m, NEAREST_M) ** 2
-    return Scatterers(
-        centre[seen] + np.asarray(sensor.position_m),
-        velocity_mps[faces[seen]].mean(axis=1),
-        strength * mean_phasor(phase),
-    )
 
 
 FacetsSeen = NDArray[np.bool_] | Literal["facing", "exact"]
@@ -149,18 +77,6 @@ class MeshScene:
         """True if there is a person in the mesh frames on both sides of an instant."""
         presence = self.mesh.presence
         return presence.whole or bool(presence.measured[list(self._around(time_s))].all())
-
-    def at(self, time_s: float) -> Scatterers:
-        """Facets at an instant, moving with the central difference over two mesh frames.
-
-        None where there is no person.
-        """
-        if not self.there(time_s):
-            nothing = np.zeros((0, 3))
-            return Scatterers(nothing, nothing, np.zeros(0, np.complex128))
-        position, velocity = self.moving(time_s)
-        visible = self.visible(time_s)
-        return facet_scatterers(position, velocity, self._faces, self.sensor, self.config, visible)
 
     def moving(self, time_s: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Vertices at an instant and their velocity, (V, 3) each; from any thread."""

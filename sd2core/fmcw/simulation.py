@@ -1,6 +1,6 @@
 """Raw samples of a moving mesh by facets, NUFFT and threads, for any mesh and sensor.
 
-The bundled sample keeps its own, simpler path (:mod:`sd2core.fmcw.signal`), whose
+The bundled sample keeps its own, simpler path (``tools/build_sample/signal.py``), whose
 bytes must not change. Source of every formula: :class:`WaveOptions`.
 """
 

@@ -12,8 +12,6 @@ from sd2core.errors import Sd2Error
 from sd2core.fmcw.chain import (
     FrameChain,
     ProcessingOptions,
-    clutter_courses,
-    taper,
 )
 from sd2core.fmcw.options import WaveOptions
 from sd2core.fmcw.processing import rebinning
@@ -76,45 +74,6 @@ def frame_spectra(
     found: Iterable[BeatSignal]
     found = map(signal, times.tolist()) if threads == 1 else workers().map(signal, times.tolist())
     return signal_spectra(np.stack(list(found)), config, axis=axis, processing=processing)
-
-
-def velocity_response(
-    config: RadarConfig,
-    velocity_mps: ArrayLike,
-    *,
-    axis: VelocityAxis | None = None,
-    processing: ProcessingOptions | None = None,
-) -> NDArray[np.float64]:
-    """Response of a radar to an echo of constant velocity: window and clutter filter.
-
-    A histogram over fine bins, multiplied by this, is what the radar would show of it if
-    powers added up.
-
-    Parameters
-    ----------
-    velocity_mps : array_like, shape (n,)
-        Positive when approaching.
-
-    Other parameters are those of :func:`frame_spectra`.
-
-    Returns
-    -------
-    float64 array, shape (bins, n)
-        Power per bin; without a filter columns add up to 1, less what is beyond the axis.
-    """
-    options = processing or ProcessingOptions()
-    _refuse_moving(options)
-    chirps = config.chirps_per_frame
-    doppler_bins = FrameChain(config, options).doppler_bins
-    turns = -2.0 / config.wavelength_m * np.asarray(velocity_mps, dtype=np.float64)
-    signal = np.exp(2j * np.pi * config.chirp_repetition_s * np.outer(turns, np.arange(chirps)))
-    if (courses := clutter_courses(options.clutter, chirps)) is not None:
-        signal -= (signal @ courses) @ courses.T
-    window = taper(options.window, chirps).astype(np.float64)
-    power = np.abs(np.fft.fft(signal * window, n=doppler_bins, axis=1)) ** 2
-    power /= doppler_bins * (window**2).sum()
-    shown: NDArray[np.float64] = rebinning(config, axis or VelocityAxis(), doppler_bins) @ power.T
-    return shown
 
 
 def _refuse_moving(options: ProcessingOptions) -> None:

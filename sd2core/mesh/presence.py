@@ -54,11 +54,6 @@ class Presence:
         """
         return self.there if self.whole else self.there & (self.last > self.first)
 
-    @cached_property
-    def gaps(self) -> tuple[tuple[int, int], ...]:
-        """Half-open runs of frames without a person."""
-        return runs(~self.there)
-
     def between(self, start: int, stop: int) -> Presence:
         """Frames ``start`` to ``stop`` as a clip of their own."""
         return Presence.of(self.there[start:stop], stop - start)

@@ -100,41 +100,6 @@ def interpolate(
             )
 
 
-@compiled
-def lit_share(
-    points: NDArray[np.float32],
-    nearness: NDArray[np.float32],
-    buffer: NDArray[np.float32],
-    offsets: NDArray[np.float32],
-    bias: float,
-    share: NDArray[np.float32],
-) -> None:
-    """Share of a light that reaches points, from the light's depth buffer.
-
-    Parameters
-    ----------
-    points : float32 array, shape (N, 2)
-        In pixels of the light's image.
-    nearness : float32 array, shape (N,)
-    offsets : float32 array, shape (S, 2)
-        Where around each point to look, in pixels: the light's softness.
-    bias : float
-        Slack in nearness, so that a surface does not shade itself.
-    share : float32 array, shape (N,)
-        Filled.
-    """
-    height, width = buffer.shape
-    for n in range(points.shape[0]):
-        lit = 0
-        for s in range(offsets.shape[0]):
-            c = int(points[n, 0] + offsets[s, 0])
-            r = int(points[n, 1] + offsets[s, 1])
-            outside = r < 0 or c < 0 or r >= height or c >= width
-            if outside or nearness[n] + bias >= buffer[r, c]:
-                lit += 1
-        share[n] = np.float32(lit) / np.float32(offsets.shape[0])
-
-
 def compile_kernels() -> None:
     """Call every kernel of this module once."""
     points, nearness = np.zeros((3, 2), np.float32), np.ones(3, np.float32)
@@ -143,4 +108,3 @@ def compile_kernels() -> None:
     pixel, value = np.zeros(1, np.intp), np.zeros((1, 3), np.float32)
     rasterise(points, nearness, faces, buffer, owner)
     interpolate(points, nearness, faces, pixel, pixel, owner, np.zeros((3, 3), np.float32), value)
-    lit_share(points, nearness, buffer, points, 0.0, np.zeros(3, np.float32))

@@ -43,7 +43,6 @@ def exact_visibility(
         views = []
         for axis in range(3):
             for positive in (False, True):
-                axes = np.roll(np.eye(3), axis + 1, axis=1)[[0, 1, 2]]
                 axes = np.eye(3)[[(axis + 1) % 3, (axis + 2) % 3, axis]]
                 axes[2] *= 1.0 if positive else -1.0
                 views.append((axes, needed & (main == axis) & (sign == positive)))

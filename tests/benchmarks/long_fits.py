@@ -32,10 +32,9 @@ from sd2core.body import fit as fitting
 from sd2core.body import fit_windows, lifter
 from sd2core.body import track as tracks
 from sd2core.body.camera import PinholeCamera
-from sd2core.body.fit import fit_body
 from sd2core.body.fit_video import LANDMARKS, MARKER, PARTIAL, FitChoices, FitReport, fit_video
 from sd2core.body.landmark_files import RefinedStretches, SearchStore
-from sd2core.body.landmark_models import landmark_models
+from sd2core.body.landmark_models import DEFAULT_MODEL, landmark_models
 from sd2core.body.landmarks import DEFAULT_SILHOUETTES, SIGHTINGS, find_landmarks
 from sd2core.body.refining import Stretch
 from sd2core.body.track import LandmarkTrack
@@ -43,6 +42,7 @@ from sd2core.files.resources import resource_path
 from sd2core.io.video import VideoReader, open_video
 from sd2core.io.video_writing import write_video
 from sd2core.processes import ONE_THREAD
+from tools.fitting.whole_fit import fit_body, mesh_of
 
 _RATE_HZ = 30
 _STRETCH_FRAMES = 256
@@ -96,7 +96,11 @@ def long_fit(track: LandmarkTrack, frames: int, folder: Path) -> LongFit:
     partial.mkdir()
     (partial / MARKER).write_text("{}")
     with open_video(path) as video:
-        _fill(SearchStore(partial / LANDMARKS, video, None, DEFAULT_SILHOUETTES), video, track)
+        _fill(
+            SearchStore(partial / LANDMARKS, video, None, DEFAULT_SILHOUETTES, DEFAULT_MODEL),
+            video,
+            track,
+        )
     told = subprocess.run(
         [sys.executable, __file__, "fit", str(path), str(out)],
         env=os.environ | ONE_THREAD,
@@ -138,7 +142,7 @@ def seams(track: LandmarkTrack, part_frames: int, window_frames: int) -> Apart:
                 stack.enter_context(patch.object(module, "PART_FRAMES", part))
             stack.enter_context(patch.object(fit_windows, "_WINDOW_FRAMES", window))
             spans = fit_windows.Windows(track.present, None).spans
-            mesh = fit_body(track, camera).mesh("low")
+            mesh = mesh_of(fit_body(track, camera), "low")
         velocities.append(np.gradient(mesh.read(0, frames), mesh.times_s, axis=0))
     shared = np.zeros(frames, bool)
     for start, _, overlap in spans:

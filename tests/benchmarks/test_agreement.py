@@ -12,17 +12,18 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from velocity_response import velocity_response
 
 from sd2core.doppler import SynthesisOptions, Synthesizer
 from sd2core.files.resources import resource_path
-from sd2core.fmcw import ProcessingOptions, WaveOptions, frame_spectra, velocity_response
+from sd2core.fmcw import ProcessingOptions, WaveOptions, frame_spectra
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics.compiled import warm_up
 from sd2core.radar_config import PAPER_RADAR
 from sd2core.recording.recording import open_recording
-from sd2core.scattering.facets import facet_visibility
 from sd2core.sensor import VelocityAxis, VirtualSensor
 from sd2core.timebase import Timebase
+from tools.build_sample.facets import facet_visibility
 
 CAMERA, AXIS = VirtualSensor(), VelocityAxis()
 NULLED = [14, 15, 16]

@@ -29,9 +29,9 @@ from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics.compiled import worker_count
 from sd2core.progress import Cancelled
 from sd2core.radar_config import PAPER_RADAR
-from sd2core.scattering.facets import facet_visibility
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
+from tools.build_sample.facets import facet_visibility
 
 FACETS = 7400
 CAMERA = VirtualSensor()

@@ -21,12 +21,12 @@ from sd2core.fmcw.processing import doppler_map
 from sd2core.fmcw.reference import subdivided
 from sd2core.fmcw.simulation import simulate_radar
 from sd2core.fmcw.sums import NUFFT_TOLERANCE, Echoes, direct, nufft, recurrent
-from sd2core.fmcw.triangle import mean_phasor
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.radar_config import SPEED_OF_LIGHT_MPS, RadarConfig
-from sd2core.scattering.facets import facet_visibility
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
+from tools.build_sample.facets import facet_visibility
+from tools.build_sample.scatterers import mean_phasor
 
 DOUBLE = 2.0**-53
 WAVELENGTHS_M = (1e-3, 5e-3, 1.0)

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.model import Body, vertex_normals
-from sd2core.numerics.raster import interpolate, lit_share, rasterise
+from sd2core.numerics.compiled import compiled
+from sd2core.numerics.raster import interpolate, rasterise
 from tools.build_sample.clothing import Clothes, linear, srgb
 
 Singles = NDArray[np.float32]
@@ -305,3 +306,38 @@ def stamp(picture: Singles, word: str) -> Singles:
     share = (ink / np.float32(255.0))[..., None]
     stamped = picture * (1.0 - 0.35 * np.roll(share, (1, 1), axis=(0, 1)))
     return np.asarray(stamped + 0.85 * share * (1.0 - stamped))
+
+
+@compiled
+def lit_share(
+    points: NDArray[np.float32],
+    nearness: NDArray[np.float32],
+    buffer: NDArray[np.float32],
+    offsets: NDArray[np.float32],
+    bias: float,
+    share: NDArray[np.float32],
+) -> None:
+    """Share of a light that reaches points, from the light's depth buffer.
+
+    Parameters
+    ----------
+    points : float32 array, shape (N, 2)
+        In pixels of the light's image.
+    nearness : float32 array, shape (N,)
+    offsets : float32 array, shape (S, 2)
+        Where around each point to look, in pixels: the light's softness.
+    bias : float
+        Slack in nearness, so that a surface does not shade itself.
+    share : float32 array, shape (N,)
+        Filled.
+    """
+    height, width = buffer.shape
+    for n in range(points.shape[0]):
+        lit = 0
+        for s in range(offsets.shape[0]):
+            c = int(points[n, 0] + offsets[s, 0])
+            r = int(points[n, 1] + offsets[s, 1])
+            outside = r < 0 or c < 0 or r >= height or c >= width
+            if outside or nearness[n] + bias >= buffer[r, c]:
+                lit += 1
+        share[n] = np.float32(lit) / np.float32(offsets.shape[0])

@@ -18,7 +18,6 @@ from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_folder
 from sd2core.files.stores import create_array, create_group
 from sd2core.fmcw.options import Reflector, SignalOptions
-from sd2core.fmcw.signal import simulate_capture
 from sd2core.io.mesh_arrays import write_small
 from sd2core.io.radar.infineon import write_capture
 from sd2core.io.video_writing import write_video
@@ -27,10 +26,12 @@ from sd2core.numerics.compiled import worker_count, workers
 from sd2core.progress import Progress, silent
 from sd2core.radar_config import PAPER_RADAR
 from sd2core.recording.recording import SUFFIX, Recording, Span
-from sd2core.scattering.facets import facet_visibility
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
+from tools.build_sample.facets import facet_visibility
+from tools.build_sample.posing import posed
 from tools.build_sample.render import Camera, Renderer
+from tools.build_sample.signal import simulate_capture
 from tools.build_sample.swipes import DURATION_S, SPANS, swipes
 
 FRAMES_PER_S = 30
@@ -145,7 +146,7 @@ def body_sequence(
     for frame in range(len(times_s)):
         progress(frame, len(times_s))
         one = slice(frame, frame + 1)
-        vertices[one] = body.pose(motion.rotations[one], motion.translation_m[one] + place)
+        vertices[one] = posed(body, motion.rotations[one], motion.translation_m[one] + place)
     return MeshSequence(vertices, body.faces, Timebase(times_s), source="simulated body")
 
 

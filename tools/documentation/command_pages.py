@@ -49,7 +49,7 @@ def _index(parser: argparse.ArgumentParser) -> str:
         [
             "# Command line",
             "",
-            "Everything that the window does has a command, from the same library. These pages are"
+            "Commands do what the window does, by the same library. These pages are"
             " what `sd2 COMMAND --help` prints, of this version.",
             "",
             "Exit codes are 0, 1 (explained in a sentence) and 2 (usage).",

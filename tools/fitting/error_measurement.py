@@ -9,18 +9,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sd2core.body.fit import fit_body
 from sd2core.body.landmark_files import load_track
 from sd2core.body.rig import KeypointSpace, Rig
-from sd2core.body.rotations import Floats
+from sd2core.body.rotations import Floats, applied, product, to_vector, transposed
 from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.errors import Sd2Error
 from sd2core.progress import Progress, silent
 from sd2core.simulate.campaign.fit_errors import FitErrors, GroupErrors
-from sd2core.simulate.campaign.posture import Group, all_groups, errors, posture
+from sd2core.simulate.campaign.posture import Group, Posture, all_groups, posture
 from sd2core.version import __version__
 from tools.fitting.clips import clip_named, scene
 from tools.fitting.truth import Truth
+from tools.fitting.whole_fit import fit_body
 
 _LAGS = (1, 2, 3, 4, 6, 9, 13, 19, 28, 42)
 """Frames apart."""
@@ -187,3 +187,18 @@ def _kernel(
 
 def _shape_error(fitted: BodyShape, true: BodyShape) -> Floats:
     return np.asarray(fitted.coefficients - true.coefficients)
+
+
+def errors(fitted: Posture, true: Posture, group: Group, side: str = "") -> Floats:
+    """Difference of the fitted posture from the true one, (T, n).
+
+    For the place metres along the axes of the line of sight, for the trunk rotation
+    vectors in them, for limbs differences of directions.
+    """
+    frames = len(true.axes)
+    if group == "place":
+        return fitted.place_m - true.place_m
+    if group == "trunk":
+        turned = to_vector(product(fitted.trunk, transposed(true.trunk)))
+        return applied(true.axes[:, None], turned).reshape(frames, -1)
+    return (fitted.limbs[group, side] - true.limbs[group, side]).reshape(frames, -1)

@@ -111,7 +111,9 @@ def reprojection(
     """
     resolution = own_resolution(mesh)
     assert resolution is not None
-    joints = own_patches(resolution).of(mesh)[:, [JOINTS.index(one) for one in _BOTH]]
+    joints = own_patches(resolution).positions(mesh.read(0, mesh.frame_count))[
+        :, [JOINTS.index(one) for one in _BOTH]
+    ]
     rows = [LANDMARKS.index(one) for one in _BOTH]
     pixels = track.image_px[:, rows].astype(np.float64)
     inside = ((pixels >= 0) & (pixels <= (track.width, track.height))).all(axis=-1)

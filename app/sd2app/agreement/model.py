@@ -8,7 +8,7 @@ from typing import Literal
 
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.background.latest import Emit, LatestRunner
+from sd2app.background.latest import BackgroundModel, Emit, LatestRunner
 from sd2app.labels.model import LabelsModel
 from sd2app.session.session import Session
 from sd2core.labels.agreement import Agreement, Disagreement, agreement, disagreements
@@ -19,7 +19,7 @@ from sd2core.labels.spans import Labels
 Compared = tuple[Agreement, tuple[Disagreement, ...]]
 
 
-class AgreementModel(QObject):
+class AgreementModel(BackgroundModel):
     """Agreement with the labels of a file, compared again when the recording's labels change.
 
     Suggestions that are not accepted yet are left out.
@@ -48,11 +48,6 @@ class AgreementModel(QObject):
     def active(self) -> bool:
         """True while another person's labels are open."""
         return self.path is not None
-
-    @property
-    def busy(self) -> bool:
-        """True while a file is read or compared."""
-        return self._reader.busy or self._comparer.busy
 
     @property
     def name(self) -> str:
@@ -98,11 +93,6 @@ class AgreementModel(QObject):
             self._playback.seek(ahead[0].start_s)
             self._span.reveal(ahead[0].start_s)
             self.changed.emit()
-
-    def close(self) -> None:
-        """Stop all work."""
-        self._reader.close()
-        self._comparer.close()
 
     # --- inside ---------------------------------------------------------------------------
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtCore import QObject, Qt, QTimer, Signal
 
 from sd2core.progress import Cancelled
 
@@ -138,3 +138,20 @@ class LatestRunner(QObject):
         if busy != self.busy:
             self.busy = busy
             self.idle_changed.emit(not busy)
+
+
+class BackgroundModel(QObject):
+    """Model that works in the background, by runners that are its children."""
+
+    @property
+    def busy(self) -> bool:
+        """True while one of its runners works."""
+        return any(runner.busy for runner in self._runners())
+
+    def close(self) -> None:
+        """Stop all work for good, and wait until it has ended."""
+        for runner in self._runners():
+            runner.close()
+
+    def _runners(self) -> list[LatestRunner]:
+        return self.findChildren(LatestRunner, options=Qt.FindChildOption.FindDirectChildrenOnly)

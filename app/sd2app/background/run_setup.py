@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.background.latest import LatestRunner
+from sd2app.background.latest import BackgroundModel, LatestRunner
 from sd2app.settings import Settings, StoredChoices
 from sd2core.files.paths import plain_path
 
@@ -28,7 +28,7 @@ class Source(Protocol):
 D = TypeVar("D", bound=Source)
 
 
-class RunSetup(QObject, Generic[D]):
+class RunSetup(BackgroundModel, Generic[D]):
     """Choices for a run and the data that it works on, kept from one start to the next.
 
     The paths of the data are kept in the settings under ``stored``.
@@ -98,10 +98,6 @@ class RunSetup(QObject, Generic[D]):
         chosen = self.data
         if chosen:
             self._runner.submit(lambda emit: tuple(map(self.look_into, chosen)))
-
-    def close(self) -> None:
-        """Stop reading."""
-        self._runner.close()
 
     def _take(self, data: tuple[D, ...]) -> None:
         self.data = data

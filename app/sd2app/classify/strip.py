@@ -13,7 +13,6 @@ from PySide6.QtGui import (
     QImage,
     QMouseEvent,
     QPainter,
-    QWheelEvent,
 )
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
@@ -24,12 +23,12 @@ from sd2app.labels.arrays import UNKNOWN_COLOUR
 from sd2app.labels.model import LabelsModel
 from sd2app.session.display import DisplayModel
 from sd2app.session.session import Session
-from sd2app.widgets.canvas import AT_RIGHT, Canvas, TimePlot, clipped, image_of
+from sd2app.widgets.canvas import AT_RIGHT, Canvas, ZoomedPlot, clipped, image_of
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.layouts import column_of, row_of
 from sd2app.widgets.model_menu import ModelButton
 from sd2app.widgets.panel import ElidedLabel, title
-from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, paint_cursor, turn_wheel
+from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, paint_cursor
 from sd2core.labels.label_set import LabelSet
 
 _PLOT_PX = 30
@@ -175,7 +174,7 @@ class ClassReadout(Canvas):
             x += _BAR_PX[0] + _GAP_PX
 
 
-class ClassPlot(TimePlot):
+class ClassPlot(ZoomedPlot):
     """Probabilities over time, stacked: the background at the bottom. Click or drag seeks."""
 
     TOP_PX, BOTTOM_PX = 1, 3
@@ -250,10 +249,6 @@ class ClassPlot(TimePlot):
             self._playback.seek(self.scale.time_of(event.position().x()))
 
     mouseMoveEvent = mousePressEvent
-
-    def wheelEvent(self, event: QWheelEvent) -> None:
-        """Zoom about the pointer, or pan with Shift or a sideways wheel."""
-        turn_wheel(event, self._span, self.scale)
 
 
 def stacked_image(

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.background.latest import Emit, LatestRunner
+from sd2app.background.latest import BackgroundModel, Emit, LatestRunner
 from sd2app.maps.difference import DifferenceModel
 from sd2app.session.content import UNTITLED, Content
 from sd2app.session.session import Session
@@ -38,7 +38,7 @@ Plot = Callable[[Emit], "Figure"]
 Save = Callable[["Figure", Path], None]
 
 
-class DrawnFigure(QObject):
+class DrawnFigure(BackgroundModel):
     """Draws what is chosen in the background; the newest choice wins.
 
     ``choice`` is a frozen record; a figure says in :meth:`_recipe` how it is drawn and saved.
@@ -56,11 +56,6 @@ class DrawnFigure(QObject):
         self.exporting = False  # the figure is being written
         self._runner = LatestRunner(name, self, self._receive, self._refuse)
         self._runner.idle_changed.connect(lambda _: self.changed.emit())
-
-    @property
-    def busy(self) -> bool:
-        """True while the figure is being drawn or written."""
-        return self._runner.busy
 
     def choose(self, **changes: object) -> None:
         """Change the content of the figure."""
@@ -85,10 +80,6 @@ class DrawnFigure(QObject):
         self.exporting = True
         self._runner.submit(write)
         self.changed.emit()
-
-    def close(self) -> None:
-        """Stop drawing."""
-        self._runner.close()
 
     def _recipe(self) -> tuple[Plot, Save]:
         """Functions that draw and save what is chosen now; raises Sd2Error if nothing can be."""

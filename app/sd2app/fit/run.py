@@ -25,11 +25,10 @@ WORDS = {
     "models": "fetching the landmark models",
     "find": "finding the person",
     "refine": "looking again",
-    "lift": "estimating depth",
     "fit": "fitting the body",
     "write": "writing the mesh",
 }
-_WEIGHTS = {"models": 0.0, "find": 1.0, "refine": 4.0, "lift": 0.1, "fit": 3.0, "write": 0.3}
+_WEIGHTS = {"models": 0.0, "find": 1.0, "refine": 4.0, "fit": 3.0, "write": 0.3}
 """Time of a frame in each stage, relative to the others."""
 _UNKNOWN_WEIGHT = 0.5
 _SETTLING_S = 2.0

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.background.latest import Emit, LatestRunner
+from sd2app.background.latest import BackgroundModel, Emit, LatestRunner
 from sd2app.session.session import Session
 from sd2app.session.tasks import ListedRunner
 from sd2core.errors import Sd2Error
@@ -48,7 +48,7 @@ class _Added(NamedTuple):
     signals: InertialSignals
 
 
-class ImuModel(QObject):
+class ImuModel(BackgroundModel):
     """Sensors of the recording, of which one is shown; its signals are computed in the background.
 
     A recording has any number of virtual sensors, and one file of a real one.
@@ -194,11 +194,6 @@ class ImuModel(QObject):
             return path
 
         self._writer.submit(write, f"Writing {path.name}")
-
-    def close(self) -> None:
-        """Stop all work."""
-        for runner in (self._runner, self._reader, self._adder, self._writer):
-            runner.close()
 
     # --- following ------------------------------------------------------------------------
 

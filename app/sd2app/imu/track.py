@@ -6,14 +6,15 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPen, QResizeEvent, QWheelEvent
+from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPen, QResizeEvent
 
 from sd2app.imu.curves import curve_lines, extent, scale_marks
 from sd2app.imu.model import ImuModel, place_words
 from sd2app.imu.text import AXES, reading_lines, status_parts
 from sd2app.maps.arrangement import BELOW_PX, HEADER_PX
+from sd2app.maps.track_mouse import TrackMouse
 from sd2app.session.session import Session
-from sd2app.widgets.canvas import AT_LEFT, AT_RIGHT, Overlay, TimePlot, clipped
+from sd2app.widgets.canvas import AT_LEFT, AT_RIGHT, Overlay, clipped
 from sd2app.widgets.time_axis import (
     HANDLE_PX,
     MARGIN_PX,
@@ -22,7 +23,6 @@ from sd2app.widgets.time_axis import (
     paint_readout,
     paint_title,
     signed_text,
-    turn_wheel,
 )
 from sd2core.imu.signals import InertialSignals
 
@@ -42,13 +42,14 @@ class Lane(NamedTuple):
 LANES = (Lane("acceleration_mps2", "m/s²"), Lane("turn_rate_radps", "rad/s"))
 
 
-class InertialTrack(TimePlot):
+class InertialTrack(TrackMouse):
     """Shows the current sensor, and the real one dashed.
 
     Click or drag seeks, the wheel zooms, Shift and the wheel pan; a drag of the title moves the
     real sensor in time.
     """
 
+    OFFSET = "imu_offset_s"
     TOP_PX, BOTTOM_PX = HEADER_PX, BELOW_PX
 
     def __init__(self, session: Session, model: ImuModel, overlays: Sequence[Overlay]) -> None:
@@ -241,75 +242,35 @@ class InertialTrack(TimePlot):
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         """Start to drag the cursor, the time axis or the alignment; or fold."""
-        place = event.position()
-        if event.button() == Qt.MouseButton.MiddleButton:
-            self._grab = ("pan", place.x())
-        elif event.button() == Qt.MouseButton.LeftButton:
-            if place.y() >= HEADER_PX:
-                self._grab = ("seek", place.x())
-                self._playback.seek(self.scale.time_of(place.x()))
-            elif place.x() < HANDLE_PX:
-                self._model.set_folded(not self._model.folded)
-            elif self._model.measured is not None:
-                self._grab = ("offset", place.x())
-                self._session.edits.begin_offset_drag("imu_offset_s")
-
-    def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        """Drag what is held, and read what is under the pointer."""
-        place = event.position()
-        self._read(place)
-        if self._grab is None:
-            self.setCursor(self._cursor_at(place))
-            return
-        what, start_x = self._grab
-        if what == "seek":
-            self._playback.seek(self.scale.time_of(place.x()))
-        elif what == "pan":
-            self._span.pan((start_x - place.x()) * self.scale.seconds_per_px)
-            self._grab = ("pan", place.x())
+        if event.button() == Qt.MouseButton.LeftButton and self.use_of(event.position()) == "fold":
+            self._model.set_folded(not self._model.folded)
         else:
-            self._session.edits.drag_offset((place.x() - start_x) * self.scale.seconds_per_px)
-
-    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        """End the drag."""
-        if self._grab is not None and self._grab[0] == "offset":
-            self._session.edits.end_offset_drag()
-        self._grab = None
+            super().mousePressEvent(event)
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         """Show the whole recording; a double click on the title folds or unfolds."""
-        if event.position().y() >= HEADER_PX:
-            self._span.fit()
-        else:
+        super().mouseDoubleClickEvent(event)
+        if event.position().y() < HEADER_PX:
             self.mousePressEvent(event)
-
-    def leaveEvent(self, event: object) -> None:
-        """Clear the reading under the pointer."""
-        self._pointer.leave()
-        self.update()
-
-    def wheelEvent(self, event: QWheelEvent) -> None:
-        """Zoom about the pointer, or pan with Shift or a sideways wheel."""
-        turn_wheel(event, self._span, self.scale)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Draw again for the new width."""
         self.redraw()
 
-    def _read(self, place: QPointF) -> None:
+    def point_at(self, place: QPointF) -> None:
+        """Read the signals under the pointer."""
         if self._model.folded or not self.plot_rect().contains(place):
             self._pointer.leave()
         else:
             self._pointer.point_at(self.scale.time_of(place.x()))
 
-    def _cursor_at(self, place: QPointF) -> Qt.CursorShape:
+    def use_of(self, place: QPointF) -> str:
+        """Use of the left button: the title folds, or drags the real sensor in time."""
         if place.y() >= HEADER_PX:
-            return Qt.CursorShape.CrossCursor
+            return "seek"
         if place.x() < HANDLE_PX:
-            return Qt.CursorShape.PointingHandCursor
-        if self._model.measured is not None:
-            return Qt.CursorShape.SizeHorCursor
-        return Qt.CursorShape.ArrowCursor
+            return "fold"
+        return "offset" if self._model.measured is not None else ""
 
 
 def _pen(colour: QColor, style: Qt.PenStyle) -> QPen:

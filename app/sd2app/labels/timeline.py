@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Literal, NamedTuple
 
 from PySide6.QtCore import QEvent, QObject, QPointF, QRectF, QSize, Qt, QTimer
-from PySide6.QtGui import QColor, QMouseEvent, QPainter, QResizeEvent, QWheelEvent
+from PySide6.QtGui import QColor, QMouseEvent, QPainter, QResizeEvent
 from PySide6.QtWidgets import QFrame, QLabel, QScrollArea, QScrollBar, QSizePolicy
 
 from sd2app.labels.dragging import MOVED_PX, LabelDragging, attraction_s
@@ -15,8 +15,8 @@ from sd2app.labels.model import LabelsModel
 from sd2app.labels.painting import ROW_PX, LabelRows, lane_box, paint_span, paint_tracks
 from sd2app.labels.span_buttons import Decision, SpanButtons
 from sd2app.session.session import Session
-from sd2app.widgets.canvas import AT_LEFT, TimePlot
-from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, paint_cursor, turn_wheel
+from sd2app.widgets.canvas import AT_LEFT, ZoomedPlot
+from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, paint_cursor
 from sd2core.labels.spans import Span
 
 _EDGE_PX = 5.0
@@ -43,7 +43,7 @@ def _tip_of(target: HitTarget) -> str:
 _SCROLL_MS, _SCROLL_SHARE = 30, 0.03
 
 
-class LabelTimeline(TimePlot):
+class LabelTimeline(ZoomedPlot):
     """A row per track. Drag an empty place, a span or an edge of it; with Alt nothing snaps.
 
     With Shift a new span is drawn over others, which it cuts. A click selects a span and goes to
@@ -212,10 +212,6 @@ class LabelTimeline(TimePlot):
             self._loop.play(target.span)
         else:
             self.mousePressEvent(event)
-
-    def wheelEvent(self, event: QWheelEvent) -> None:
-        """Zoom about the mouse, or pan."""
-        turn_wheel(event, self._span, self.scale)
 
     def _button_at(self, place: QPointF) -> Decision | None:
         return self._buttons.at(place, self.scale, self.plot_rect(), self.rows)

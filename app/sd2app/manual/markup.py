@@ -30,7 +30,7 @@ def command_text(parser: argparse.ArgumentParser, name: str) -> str:
         if isinstance(action, argparse._SubParsersAction)
         for row in action._choices_actions
     ]
-    head = "# Command line\n\nEverything that the window does has a command, from the same library."
+    head = "# Command line\n\nCommands do what the window does, by the same library."
     codes = "Exit codes are 0, 1 (explained in a sentence) and 2 (usage)."
     table = "\n".join(("| command | what it does |", "|---|---|", *rows))
     below = "\n".join(("```{toctree}", ":hidden:", "", *commands, "```"))

@@ -8,13 +8,14 @@ from dataclasses import replace
 from typing import Literal
 
 from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QBrush, QColor, QMouseEvent, QPainter, QPen, QWheelEvent
+from PySide6.QtGui import QBrush, QColor, QPainter, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from sd2app.maps.arrangement import BELOW_PX, HEADER_PX
 from sd2app.maps.heatmap_image import MapWidget
 from sd2app.maps.limbs import title_of
 from sd2app.maps.readout import body_range_m, reading_lines
+from sd2app.maps.track_mouse import TrackMouse
 from sd2app.session.maps import UNCERTAIN_SHARE, MapModel, Reading
 from sd2app.session.session import Session
 from sd2app.widgets.canvas import AT_LEFT, AT_RIGHT, Overlay, clipped
@@ -28,9 +29,11 @@ from sd2app.widgets.time_axis import (
     paint_title,
     signed_text,
     ticks,
-    turn_wheel,
 )
 from sd2core.maps import DopplerMap
+
+_HATCH = QColor(255, 255, 255, 80)
+"""Colour of the hatching over bins without information."""
 
 
 def velocity_labels(
@@ -64,12 +67,13 @@ def paint_velocity_labels(
         painter.drawText(room, AT_RIGHT, signed_text(velocity))
 
 
-class HeatmapView(MapWidget):
+class HeatmapView(TrackMouse, MapWidget):
     """Shows one track; click or drag seeks, wheel zooms, Shift+wheel pans.
 
     A drag of the header of a track that is ``alignable`` moves the capture in time.
     """
 
+    OFFSET = "radar_offset_s"
     TOP_PX, BOTTOM_PX = HEADER_PX, BELOW_PX
     USUAL_PX = 640, HEADER_PX + 160  # room for 32 bins of 5 pixels
 
@@ -125,21 +129,6 @@ class HeatmapView(MapWidget):
     def title(self) -> str:
         """Title of the map, with the part of the body that is shown alone."""
         return title_of(self._track)
-
-    def null_colour(self) -> QColor:
-        """Colour of zero."""
-        return QColor.fromRgb(int(lookup_table(self._display.levels.colour_map)[0]))
-
-    def hatch_colour(self) -> QColor:
-        """Colour of the hatching over bins without information."""
-        return QColor(255, 255, 255, 80)
-
-    def marked_bins(self) -> tuple[tuple[tuple[int, ...], Qt.BrushStyle], ...]:
-        """Bins without information, and their hatching."""
-        return (
-            (self._map.null_bins, Qt.BrushStyle.BDiagPattern),
-            (self._map.unseen_bins, Qt.BrushStyle.DiagCrossPattern),
-        )
 
     @property
     def _map(self) -> DopplerMap:
@@ -254,17 +243,20 @@ class HeatmapView(MapWidget):
             (self.scale.x_of(start_s), self.scale.x_of(end_s))
             for start_s, end_s in self._track.covered_s
         ]
-        nothing = self.null_colour()
-        hatch = self.hatch_colour()
+        nothing = QColor.fromRgb(int(lookup_table(self._display.levels.colour_map)[0]))
+        marked = (
+            (self._map.null_bins, Qt.BrushStyle.BDiagPattern),
+            (self._map.unseen_bins, Qt.BrushStyle.DiagCrossPattern),
+        )
         with clipped(painter, plot):
             painter.setPen(Qt.PenStyle.NoPen)
-            for bins, pattern in self.marked_bins():
+            for bins, pattern in marked:
                 for index in bins:
                     top, bottom = self.y_of(edges[index + 1]), self.y_of(edges[index])
                     for left, right in stretches:
                         band = QRectF(left, top, right - left, bottom - top)
                         painter.fillRect(band, nothing)
-                        painter.fillRect(band, QBrush(hatch, pattern))
+                        painter.fillRect(band, QBrush(_HATCH, pattern))
 
     def _paint_axis(self, painter: QPainter, plot: QRectF) -> None:
         colours, v_max = self._display.palette, self._map.axis.v_max_mps
@@ -295,58 +287,9 @@ class HeatmapView(MapWidget):
 
     # --- mouse ----------------------------------------------------------------------------
 
-    def mousePressEvent(self, event: QMouseEvent) -> None:
-        """Start to drag the cursor, the time axis or the alignment."""
-        position = event.position()
-        if event.button() == Qt.MouseButton.MiddleButton:
-            self._grab = ("pan", position.x())
-        elif event.button() == Qt.MouseButton.LeftButton:
-            if self.alignable and position.y() < HEADER_PX:
-                self._grab = ("offset", position.x())
-                self._session.edits.begin_offset_drag()
-            else:
-                self._grab = ("seek", position.x())
-                self._playback.seek(self.scale.time_of(position.x()))
-
-    def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        """Drag what is held, and read what is under the pointer."""
-        position = event.position()
-        self._read(position)
-        if self._grab is None:
-            over_header = self.alignable and position.y() < HEADER_PX
-            self.setCursor(
-                Qt.CursorShape.SizeHorCursor if over_header else Qt.CursorShape.CrossCursor
-            )
-            return
-        what, start_x = self._grab
-        if what == "seek":
-            self._playback.seek(self.scale.time_of(position.x()))
-        elif what == "pan":
-            self._span.pan((start_x - position.x()) * self.scale.seconds_per_px)
-            self._grab = ("pan", position.x())
-        else:
-            shift_s = (position.x() - start_x) * self.scale.seconds_per_px
-            self._session.edits.drag_offset(shift_s)
-
-    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        """End the drag."""
-        if self._grab is not None and self._grab[0] == "offset":
-            self._session.edits.end_offset_drag()
-        self._grab = None
-
-    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
-        """Show the whole recording."""
-        if event.position().y() >= HEADER_PX:
-            self._span.fit()
-
-    def leaveEvent(self, event: object) -> None:
-        """Clear the reading under the pointer."""
-        self._pointer.leave()
-        self.update()
-
-    def wheelEvent(self, event: QWheelEvent) -> None:
-        """Zoom about the pointer, or pan with Shift or a sideways wheel."""
-        turn_wheel(event, self._span, self.scale)
+    def use_of(self, place: QPointF) -> str:
+        """Use of the left button: the header of a measured map drags it in time."""
+        return "offset" if self.alignable and place.y() < HEADER_PX else "seek"
 
     def reading_at(self, position: QPointF) -> Reading | None:
         """Cell at a pixel, None where there is none."""
@@ -354,7 +297,8 @@ class HeatmapView(MapWidget):
             return None
         return self.read(self.scale.time_of(position.x()), self.velocity_of(position.y()))
 
-    def _read(self, position: QPointF) -> None:
+    def point_at(self, position: QPointF) -> None:
+        """Read the cell under the pointer."""
         if self._track.map is None or self.folded or not self.plot_rect().contains(position):
             self._pointer.leave()
             return

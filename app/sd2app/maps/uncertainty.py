@@ -5,6 +5,7 @@ from __future__ import annotations
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.accuracy.model import AccuracyModel
+from sd2app.background.latest import BackgroundModel
 from sd2app.maps.model import SynthesisModel
 from sd2app.session.session import Session
 from sd2app.session.tasks import ListedRunner
@@ -13,7 +14,7 @@ from sd2core.maps import CellUncertainty, DopplerMap
 _SHOWN = "uncertain_cells"
 
 
-class UncertaintyModel(QObject):
+class UncertaintyModel(BackgroundModel):
     """Follows the synthetic map while uncertain cells are shown; the choice is remembered.
 
     Another map has no uncertainty until its own is known: while the sensor moves none
@@ -40,11 +41,6 @@ class UncertaintyModel(QObject):
         session.document.opened.connect(self.changed)
 
     @property
-    def busy(self) -> bool:
-        """True while it is being computed."""
-        return self._runner.busy
-
-    @property
     def why_not(self) -> str:
         """Reason why it cannot be computed for this recording; empty where it can."""
         mesh = self._session.document.mesh
@@ -68,10 +64,6 @@ class UncertaintyModel(QObject):
             self._track.set_uncertainty(None)
         self._follow()
         self.changed.emit()
-
-    def close(self) -> None:
-        """Stop computing."""
-        self._runner.close()
 
     def _follow(self) -> None:
         """Compute for a finished map; stop if that map is gone."""

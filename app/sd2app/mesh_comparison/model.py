@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import Signal
 
-from sd2app.background.latest import Emit
+from sd2app.background.latest import BackgroundModel, Emit
 from sd2app.session.content import UNTITLED, reference_of
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
@@ -42,7 +42,7 @@ class _Result:
     comparison: Comparison
 
 
-class ComparisonModel(QObject):
+class ComparisonModel(BackgroundModel):
     """Two meshes: number 0 is the recording's, number 1 the other.
 
     Others read the attributes; the methods change them.
@@ -73,11 +73,6 @@ class ComparisonModel(QObject):
         own = name_of(recording.mesh) if recording and recording.mesh else "this recording"
         other = name_of(self._other)
         return (own, other) if own != other else (f"{own} (open)", f"{other} (other)")
-
-    @property
-    def busy(self) -> bool:
-        """True while the comparison is being computed."""
-        return self._runner.busy
 
     @property
     def comparison(self) -> Comparison | None:
@@ -173,10 +168,6 @@ class ComparisonModel(QObject):
 
         if self.comparison is not None:
             save_figure(draw_comparison(self.comparison), path)
-
-    def close(self) -> None:
-        """Stop comparing."""
-        self._runner.close()
 
     # --- inside ---------------------------------------------------------------------------
 

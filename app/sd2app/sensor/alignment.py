@@ -6,7 +6,7 @@ from typing import Any
 
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.background.latest import LatestRunner
+from sd2app.background.latest import BackgroundModel, LatestRunner
 from sd2app.maps.model import SynthesisModel
 from sd2app.session.session import Session
 from sd2core.doppler.alignment import WITHIN_S, Alignment, align
@@ -14,7 +14,7 @@ from sd2core.doppler.alignment import WITHIN_S, Alignment, align
 _SURE = 0.99
 
 
-class AlignmentModel(QObject):
+class AlignmentModel(BackgroundModel):
     """Looks in the background for the offset at which the maps on screen fit."""
 
     changed = Signal()
@@ -26,11 +26,6 @@ class AlignmentModel(QObject):
         self.found: Alignment | None = None
         self.problem = ""  # why nothing can be applied
         self._runner = LatestRunner("alignment", self, self._take, self._refuse)
-
-    @property
-    def busy(self) -> bool:
-        """True while it searches."""
-        return self._runner.busy
 
     @property
     def now_s(self) -> float:
@@ -69,10 +64,6 @@ class AlignmentModel(QObject):
     def cancel(self) -> None:
         """Stop searching."""
         self._runner.cancel()
-
-    def close(self) -> None:
-        """Stop searching for good."""
-        self._runner.close()
 
     def _take(self, found: Any) -> None:
         self.found, self.problem = found, found.problem

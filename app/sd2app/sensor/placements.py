@@ -9,7 +9,7 @@ from PySide6.QtCore import QObject, Signal
 
 from sd2app.accuracy.model import AccuracyModel
 from sd2app.accuracy.text import InUse
-from sd2app.background.latest import Emit, LatestRunner
+from sd2app.background.latest import BackgroundModel, Emit, LatestRunner
 from sd2app.session.session import Session
 from sd2app.widgets.text import bytes_text, counted, duration_text, seconds
 from sd2core.mesh.sequence import MeshSequence
@@ -36,7 +36,7 @@ class _Wish(NamedTuple):
     plan: Placements
 
 
-class PlacementsModel(QObject):
+class PlacementsModel(BackgroundModel):
     """Plan of the open recording; its placements are computed in the background."""
 
     changed = Signal()  # places, their coverage or their cost
@@ -76,11 +76,6 @@ class PlacementsModel(QObject):
     def possible(self) -> bool:
         """True if there is a body to place sensors around."""
         return self._document.mesh is not None
-
-    @property
-    def busy(self) -> bool:
-        """True while placements are being computed."""
-        return self._runner.busy
 
     @property
     def radar(self) -> RadarConfig:
@@ -126,10 +121,6 @@ class PlacementsModel(QObject):
         if count:
             current = self.current
             self.use(0 if current is None else (current + by) % count)
-
-    def close(self) -> None:
-        """Stop computing placements."""
-        self._runner.close()
 
     # --- following ------------------------------------------------------------------------
 

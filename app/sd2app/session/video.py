@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.background.latest import Emit, LatestRunner
+from sd2app.background.latest import BackgroundModel, Emit, LatestRunner
 from sd2app.session.playback import PlaybackModel
 from sd2core.io.video import VideoReader
 
 
-class VideoModel(QObject):
+class VideoModel(BackgroundModel):
     """Follows the clock: one picture at a time is decoded, then the newest wanted one."""
 
     frame_changed = Signal()
@@ -29,11 +29,6 @@ class VideoModel(QObject):
         self._runner = LatestRunner("video", self, self._receive, self._report)
         playback.frame_changed.connect(self._follow)
 
-    @property
-    def busy(self) -> bool:
-        """True while a picture is being decoded."""
-        return self._runner.busy
-
     def set_reader(self, reader: VideoReader | None) -> None:
         """Show another video, or none; the one before is closed by its owner."""
         self._runner.cancel()
@@ -42,10 +37,6 @@ class VideoModel(QObject):
         self.shown_frame = self._wanted = -1
         self.frame_changed.emit()
         self._follow()
-
-    def close(self) -> None:
-        """Stop decoding."""
-        self._runner.close()
 
     def _follow(self) -> None:
         reader = self.reader

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.background.latest import LatestRunner
+from sd2app.background.latest import BackgroundModel, LatestRunner
 from sd2app.labels.edits import LabelEdits
 from sd2app.session.maps import MapModel
 from sd2app.suggestions.finders import Found, SpanFinder
@@ -16,7 +16,7 @@ from sd2core.labels.spans import Labels, Span
 from sd2core.labels.suggest import LABEL
 
 
-class SuggestionsModel(QObject):
+class SuggestionsModel(BackgroundModel):
     """Suggested spans to be accepted or rejected; the spans themselves are among the labels.
 
     Another threshold takes the place of the step before as long as nothing else was done, so
@@ -126,10 +126,6 @@ class SuggestionsModel(QObject):
         self._runner.cancel()
         self._wanted, self.active = False, bool(self.pending)
         self.changed.emit()
-
-    def close(self) -> None:
-        """Stop the search."""
-        self._runner.close()
 
     # --- deciding -------------------------------------------------------------------------
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QPainter, QPen, QWheelEvent
+from PySide6.QtGui import QColor, QPainter, QPen
 
 from sd2app.palette import Palette
 
@@ -146,9 +146,6 @@ def paint_readout(
     painter.restore()
 
 
-_ZOOM_PER_NOTCH = 0.8
-
-
 class ShownTime(Protocol):
     """Part of the recording on screen, which can be moved and zoomed."""
 
@@ -169,17 +166,3 @@ class ShownTime(Protocol):
 
     def zoom(self, factor: float, anchor_s: float) -> None:
         """Scale its length about a time."""
-
-
-def turn_wheel(event: QWheelEvent, span: ShownTime, scale: TimeScale) -> None:
-    """Zoom about the pointer, or pan with Shift or a sideways wheel."""
-    delta = event.angleDelta()
-    sideways = delta.x() or (
-        delta.y() if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 0
-    )
-    if sideways:
-        span.pan(-sideways / 120.0 * span.duration_s * 0.1)
-    elif delta.y():
-        anchor_s = scale.time_of(event.position().x())
-        span.zoom(_ZOOM_PER_NOTCH ** (delta.y() / 120.0), anchor_s)
-    event.accept()

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from sd2core.cli.info.description import Description, axis_in_words, bins_in_words
-from sd2core.cli.output import counted
+from sd2core.cli.output import counted, listed
 from sd2core.datasets.card import describe_dataset, duration_text, limits
 from sd2core.datasets.reading import open_dataset
 from sd2core.pairs.store import PairSet
@@ -25,11 +25,11 @@ def describe_dataset_at(path: Path) -> Description:
         "title": card["title"],
         "segments": f"{card['segments']:,} of {card['length']} frames"
         f" ({card['segment_s']:.2f} s at {card['frame_rate_hz']:g} frames/s)",
-        "kinds": _listed(card["segments_of_kind"]),
+        "kinds": listed(card["segments_of_kind"]),
         "limb maps": ", ".join(card["parts"]),
-        "labels": _listed(card["segments_of_label"]),
-        "classes": _listed(card["segments_of_class"]),
-        "splits": _listed(card["segments_of_split"]),
+        "labels": listed(card["segments_of_label"]),
+        "classes": listed(card["segments_of_class"]),
+        "splits": listed(card["segments_of_split"]),
         "from": f"{counted(card['recordings'], 'recording')} of"
         f" {counted(len(card['subjects']), 'subject')}, {duration_text(card)}, up to"
         f" {counted(card['placements'], 'placement')} each",
@@ -39,10 +39,6 @@ def describe_dataset_at(path: Path) -> Description:
     }
     data = {"kind": "dataset", "path": str(path)} | card
     return Description(f"Data set {path}", data, facts, tuple(limits(card)))
-
-
-def _listed(counts: dict[str, int]) -> str:
-    return ", ".join(f"{name} {count:,}" for name, count in counts.items())
 
 
 def describe_pairs(path: Path, pairs: PairSet) -> Description:

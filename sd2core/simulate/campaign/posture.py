@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 
 from sd2core.body.model import Skeleton
-from sd2core.body.rotations import Floats, applied, from_vector, product, to_vector, transposed
+from sd2core.body.rotations import Floats, applied, from_vector, product, transposed
 
 Group = Literal["place", "trunk", "arm", "leg"]
 
@@ -102,21 +102,6 @@ def sight_axes(target_m: Floats) -> Floats:
     return np.stack([np.cross(down, along), down, along], axis=1)
 
 
-def errors(fitted: Posture, true: Posture, group: Group, side: str = "") -> Floats:
-    """Difference of the fitted posture from the true one, (T, n).
-
-    For the place metres along the axes of the line of sight, for the trunk rotation
-    vectors in them, for limbs differences of directions.
-    """
-    frames = len(true.axes)
-    if group == "place":
-        return fitted.place_m - true.place_m
-    if group == "trunk":
-        turned = to_vector(product(fitted.trunk, transposed(true.trunk)))
-        return applied(true.axes[:, None], turned).reshape(frames, -1)
-    return (fitted.limbs[group, side] - true.limbs[group, side]).reshape(frames, -1)
-
-
 def change_posture(
     skeleton: Skeleton,
     transforms: Floats,
@@ -127,7 +112,8 @@ def change_posture(
 
     The skeleton is that of the result and may be of another shape than the one that the posture was
     read from; ``transforms`` are those of the body in the true posture. ``change`` holds, (T, n),
-    the output of :func:`errors`; ``place`` and ``trunk`` have the side "".
+    metres along the axes of the line of sight for the place, rotation vectors in them for the
+    trunk, differences of directions for limbs; ``place`` and ``trunk`` have the side "".
     """
     frames = len(transforms)
     back = transposed(true.axes)  # from the axes of the line of sight to the camera's

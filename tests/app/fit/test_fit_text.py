@@ -18,7 +18,7 @@ START = {
     "frames": 90,
     "width": 640,
     "height": 480,
-    "stages": ["find", "refine", "lift", "fit", "write"],
+    "stages": ["find", "refine", "fit", "write"],
     "resumed": False,
 }
 
@@ -32,7 +32,7 @@ def said(**content: object) -> FitProgress:
 def test_every_event_of_the_format_is_read() -> None:
     begun = said(**START)
     assert (begun.size, begun.resumed) == ((640, 480), False)
-    assert begun._stages == ("find", "refine", "lift", "fit", "write")
+    assert begun._stages == ("find", "refine", "fit", "write")
     progress = said(event="progress", stage="find", done=3, total=90, unit="frame")
     assert (progress.stage, progress.done, progress.total) == ("find", 3, 90)
     assert progress.unit == "frame"

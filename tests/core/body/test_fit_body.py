@@ -10,7 +10,6 @@ import pytest
 from sd2core.body import fit as fitting
 from sd2core.body import fit_windows
 from sd2core.body.camera import PinholeCamera
-from sd2core.body.fit import fit_body
 from sd2core.body.fitted import BodyFit
 from sd2core.body.lifter import FEET, LiftedTrack
 from sd2core.body.rig import KeypointSpace
@@ -22,6 +21,7 @@ from sd2core.errors import Sd2Error
 from sd2core.progress import Cancelled
 from sd2core.timebase import Timebase
 from tools.build_sample.swipes import swipes
+from tools.fitting.whole_fit import fit_body, mesh_of
 
 SPACE = ShapeSpace()
 CAMERA = PinholeCamera()
@@ -177,7 +177,7 @@ def test_a_limb_that_is_hardly_seen_is_not_sure(scene: Scene, fitted: BodyFit) -
 
 
 def test_surface_has_the_outline(scene: Scene, fitted: BodyFit) -> None:
-    vertices = fitted.mesh("low").read(0, 60)
+    vertices = mesh_of(fitted, "low").read(0, 60)
     assert vertices.dtype == np.float32
     shares = [
         overlap(
@@ -211,7 +211,7 @@ def test_outlines_tell_a_heavy_person_from_a_light_one() -> None:
         scene.track.silhouettes[:] = masks
         scene.track.image_px[:] = CAMERA.project(keypoints_m)
         scene.lift = Known(keypoints_m, scene.track.timebase.times_s, shape.stature_m)
-        found = scene.fit().mesh("low").frame(0)
+        found = mesh_of(scene.fit(), "low").frame(0)
         girths[weight] = silhouette(found, body.faces, CAMERA, OUTLINE).sum()
         true = silhouette(vertices[0], body.faces, CAMERA, OUTLINE)
         assert overlap(silhouette(found, body.faces, CAMERA, OUTLINE), true) > 0.88
@@ -308,7 +308,7 @@ def test_impossible_stature_and_nobody_are_refused(scene: Scene) -> None:
 
 @pytest.mark.parametrize("resolution", ["low", "medium", "high"])
 def test_mesh_is_read_in_any_stretch(fitted: BodyFit, resolution) -> None:
-    mesh = fitted.mesh(resolution)
+    mesh = mesh_of(fitted, resolution)
     assert mesh.vertices.shape == (60, mesh.vertex_count, 3)
     whole = mesh.read(10, 14)
     np.testing.assert_array_equal(mesh.frame(12), whole[2])

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from sd2core.body import evidence, fit_windows, landmark_repair, lifter, sides, track
 from sd2core.body import fit as fitting
 from sd2core.body.camera import PinholeCamera
-from sd2core.body.fit import fit_body, fit_motion
+from sd2core.body.fit import fit_motion
 from sd2core.body.landmark_files import (
     RefinedStretches,
     SearchStore,
@@ -34,6 +34,7 @@ from sd2core.body.track import LANDMARKS, PER_FRAME, LandmarkTrack
 from sd2core.errors import Sd2Error
 from sd2core.timebase import Timebase
 from tools.build_sample.swipes import swipes
+from tools.fitting.whole_fit import fit_body, mesh_of
 
 CAMERA = PinholeCamera()
 HIPS = [LANDMARKS.index(f"hip.{side}") for side in "LR"]
@@ -99,7 +100,7 @@ def stored(known: LandmarkTrack, folder: Path | None, max_gap_s: float = 0.5) ->
     """These landmarks as a search leaves them, and mended."""
     path = Path(__file__)  # any file
     video: Any = Video(known.timebase, known.width, known.height, path)
-    store = SearchStore(folder, video, None, None)
+    store = SearchStore(folder, video, None, None, "full")
     refined = RefinedStretches(store, video, 32)
     for start in range(0, len(known), 32):
         part = known.part(start, min(start + 32, len(known)))
@@ -336,7 +337,7 @@ class TestMotion:
             workspace=tmp_path,
             progress=lambda *report: reports.append(report),
         )
-        one, other = whole.mesh("low"), motion.mesh("low")
+        one, other = mesh_of(whole, "low"), motion.mesh("low")
         np.testing.assert_array_equal(other.read(0, 75), one.read(0, 75))
         assert other.vertices[5:5].shape == (0, 1229, 3)
         some = [60, 2, 44, 60]

@@ -10,6 +10,7 @@ from sd2core.body.model import Body
 from sd2core.body.rotations import about
 from sd2core.body.track import LANDMARKS
 from sd2core.errors import Sd2Error
+from tools.build_sample.posing import posed
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +63,7 @@ def test_bending_one_joint_moves_the_limbs_beyond_it_and_no_other(body: Body) ->
     turns[0, body.skeleton.index["lowerarm01.R"]] = about(
         np.array([0.0, 0.0, 1.0]), np.array([40.0])
     )[0]
-    moved = np.linalg.norm(body.pose(turns)[0] - body.vertices_m, axis=1)
+    moved = np.linalg.norm(posed(body, turns)[0] - body.vertices_m, axis=1)
     limbs = vertex_limbs(body)
     typical = {name: np.median(moved[limbs == n]) for n, name in enumerate(LIMBS)}
     beyond = {"forearm.R", "hand.R"}

@@ -6,6 +6,7 @@ import pytest
 from sd2core.body import skinning
 from sd2core.body.model import Body
 from sd2core.body.rotations import about
+from tools.build_sample.posing import posed
 
 
 def random_transforms(body: Body, frames: int) -> tuple[np.ndarray, np.ndarray]:
@@ -16,7 +17,7 @@ def random_transforms(body: Body, frames: int) -> tuple[np.ndarray, np.ndarray]:
         axis = rng.normal(size=3)
         turns[:, bone] = about(axis / np.linalg.norm(axis), rng.uniform(-60, 60, frames))
     place = rng.normal([0.0, 1.0, 3.0], 0.3, (frames, 3))
-    return body.skeleton.transforms(turns, place), body.pose(turns, place)
+    return body.skeleton.transforms(turns, place), posed(body, turns, place)
 
 
 @pytest.mark.parametrize("compiled", [True, False])

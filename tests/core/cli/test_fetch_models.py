@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import hashlib
-import zipfile
 from pathlib import Path
 
 import pytest
@@ -10,17 +9,14 @@ from cli_outcome import Sd2
 from sd2core.body import landmark_models as places
 
 
-def test_a_wheel_of_the_user(sd2: Sd2, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    wheel = tmp_path / "mediapipe-0.10.21.whl"
-    with zipfile.ZipFile(wheel, "w") as archive:
-        archive.writestr(places._NOTICE_IN_WHEEL, "Apache License")
-        for inside in places._IN_WHEEL.values():
-            archive.writestr(inside, b"a model")
+def test_model_files_of_the_user(sd2: Sd2, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     known = hashlib.sha256(b"a model").hexdigest()
     monkeypatch.setattr(places, "_SHA256", dict.fromkeys(places._SHA256, known))
     monkeypatch.setattr(places, "default_folder", lambda: tmp_path / "cache")
     monkeypatch.delenv(places.ENVIRONMENT, raising=False)
-    assert f"{tmp_path / 'cache'}" in sd2("fetch-models", "--from", wheel).out
+    for name in places._SHA256:
+        (tmp_path / name).write_bytes(b"a model")
+        assert f"{tmp_path / 'cache'}" in sd2("fetch-models", "--from", tmp_path / name).out
     assert sd2("fetch-models", "--if-missing").out.startswith("The landmark models are in")
     outcome = sd2("fetch-models", "--from", tmp_path / "none.whl")
     assert outcome.code == 1

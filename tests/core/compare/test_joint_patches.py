@@ -15,6 +15,7 @@ from sd2core.compare.joints import (
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.timebase import Timebase
+from tools.build_sample.posing import posed
 
 BONES = {
     "pelvis": "root",
@@ -36,7 +37,7 @@ def bent(resolution: Resolution) -> tuple[np.ndarray, np.ndarray, Body]:
     move = np.linspace(0, 1, 8)[:, None] * np.array([0.5, 0.0, -1.0]) + [0.0, 1.0, 3.0]
     transforms = body.skeleton.transforms(turns, move)
     heads = (transforms[..., :3] @ body.skeleton.heads_m[..., None])[..., 0] + transforms[..., 3]
-    return body.pose(turns, move), heads, body
+    return posed(body, turns, move), heads, body
 
 
 def sequence(vertices: np.ndarray, faces: np.ndarray | None) -> MeshSequence:
@@ -64,7 +65,7 @@ def test_patches_give_the_joints_of_the_body_at_rest(resolution: Resolution) -> 
 @pytest.mark.parametrize("resolution", ["low", "medium", "high"])
 def test_patches_follow_the_joints(resolution: Resolution) -> None:
     vertices, heads, body = bent(resolution)
-    joints = own_patches(resolution).of(sequence(vertices, body.faces))
+    joints = own_patches(resolution).positions(vertices)
     for joint, bone in BONES.items():
         away = np.linalg.norm(
             joints[:, JOINTS.index(joint)] - heads[:, body.skeleton.index[bone]], axis=1

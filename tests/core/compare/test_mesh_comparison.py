@@ -18,6 +18,7 @@ from sd2core.files.figure_files import save_figure
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
+from tools.build_sample.posing import posed
 
 TIMES = np.arange(24) / 30.0
 
@@ -28,7 +29,7 @@ def waving(times_s: np.ndarray = TIMES) -> MeshSequence:
     turns = np.tile(np.eye(3), (len(times_s), len(body.skeleton), 1, 1))
     angle = 40.0 * np.sin(2.0 * np.pi * 1.2 * times_s)
     turns[:, body.skeleton.index["lowerarm01.R"]] = about(np.array([1.0, 0.0, 0.0]), angle)
-    vertices = body.pose(turns) + np.array([0.0, 1.0, 2.5])
+    vertices = posed(body, turns) + np.array([0.0, 1.0, 2.5])
     return MeshSequence(vertices, body.faces, Timebase(times_s))
 
 

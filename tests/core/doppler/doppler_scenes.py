@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sd2core.doppler import PRESETS, SynthesisOptions
+from sd2core.doppler.reference import at_frames
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
@@ -73,3 +74,11 @@ def wobbling(frames: int = 40, seed: int = 7, divisions: int = 3) -> MeshSequenc
 
 def options(**changes: Any) -> SynthesisOptions:
     return replace(RAW, **changes)
+
+
+def reference_velocities(
+    mesh: MeshSequence, sensor: VirtualSensor, options: SynthesisOptions, frame: int
+) -> NDArray[np.float64]:
+    """Velocity of every vertex at each of a frame's moments, (moments, V), in double precision."""
+    place = np.asarray(sensor.position_m, np.float64)
+    return next(at_frames(mesh, place, options, frame, frame + 1))[0]

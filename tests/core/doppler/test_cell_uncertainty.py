@@ -8,11 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from doppler_scenes import CAMERA, sensor_at, wobbling
+from doppler_scenes import CAMERA, reference_velocities, sensor_at, wobbling
 from numpy.typing import NDArray
 
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer, limb_histograms
-from sd2core.doppler.reference import reference_velocities
 from sd2core.doppler.smoothing import smooth
 from sd2core.errors import Sd2Error
 from sd2core.maps import CellUncertainty, DopplerMap

@@ -8,11 +8,20 @@ from typing import Any
 
 import numpy as np
 import pytest
-from doppler_scenes import CAMERA, RAW, moving, options, plate, sensor_at, wobbling
+from doppler_scenes import (
+    CAMERA,
+    RAW,
+    moving,
+    options,
+    plate,
+    reference_velocities,
+    sensor_at,
+    wobbling,
+)
 from numpy.typing import NDArray
 
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
-from sd2core.doppler.reference import reference_stretch, reference_velocities
+from sd2core.doppler.reference import reference_stretch
 from sd2core.io.mesh import load_mesh
 from sd2core.mesh.decimation import decimate
 from sd2core.mesh.sequence import MeshSequence

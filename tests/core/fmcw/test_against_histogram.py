@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from velocity_response import velocity_response
 
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
 from sd2core.files.resources import resource_path
@@ -15,16 +16,15 @@ from sd2core.fmcw import (
     WaveOptions,
     doppler_map,
     frame_spectra,
-    simulate_capture,
-    velocity_response,
+    simulate_radar,
 )
 from sd2core.io.mesh import load_mesh
 from sd2core.maps import DopplerMap
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.radar_config import PAPER_RADAR
-from sd2core.scattering.facets import facet_visibility
 from sd2core.sensor import VelocityAxis, VirtualSensor
 from sd2core.timebase import Timebase
+from tools.build_sample.facets import facet_visibility
 
 AXIS = VelocityAxis()
 FRAMES = 60
@@ -47,7 +47,7 @@ def plate(distance_m: np.ndarray) -> MeshSequence:
 
 def both(mesh: MeshSequence, sensor: VirtualSensor) -> tuple[DopplerMap, DopplerMap]:
     counted = Synthesizer(mesh, replace(PRESETS["paper"], null_bins=())).map(sensor)
-    capture = simulate_capture(mesh, PAPER_RADAR, sensor=sensor, options=SignalOptions(snr_db=20.0))
+    capture = simulate_radar(mesh, PAPER_RADAR, sensor=sensor, options=SignalOptions(snr_db=20.0))
     return counted, doppler_map(capture, axis=AXIS)
 
 

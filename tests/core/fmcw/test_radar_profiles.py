@@ -19,7 +19,6 @@ from sd2core.fmcw import (
     frame_spectra,
     limits,
     range_doppler,
-    simulate_capture,
     simulate_radar,
 )
 from sd2core.io.radar import load_capture, named_radar, write_described
@@ -165,8 +164,6 @@ def test_what_is_not_simulated_is_refused() -> None:
     turns = replace(PAPER_RADAR, transmitters=2, chirps_per_frame=32)
     with pytest.raises(Sd2Error, match="has several transmitters, which is not simulated"):
         simulate_radar(plate(0.5), turns)
-    with pytest.raises(Sd2Error, match="samples I and Q"):
-        simulate_capture(plate(0.5), RADARS["iwr6843"])
 
 
 def test_a_plain_radar_is_described_as_before() -> None:

@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from velocity_response import velocity_response
 
 from sd2core.errors import Sd2Error
 from sd2core.fmcw import ProcessingOptions, SignalOptions, WaveOptions, doppler_map, simulate_radar
 from sd2core.fmcw.reference import converged_frame, doppler_marginal, subdivided
-from sd2core.fmcw.spectra import frame_spectra, velocity_response
+from sd2core.fmcw.spectra import frame_spectra
 from sd2core.fmcw.sums import direct
 from sd2core.fmcw.wave import WaveScene
 from sd2core.mesh.sequence import MeshSequence

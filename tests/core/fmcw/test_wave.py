@@ -28,11 +28,9 @@ from sd2core.fmcw.options import (
 )
 from sd2core.fmcw.processing import doppler_map
 from sd2core.fmcw.reference import subdivided
-from sd2core.fmcw.scene import MeshScene, facet_scatterers
-from sd2core.fmcw.signal import echo
+from sd2core.fmcw.scene import MeshScene
 from sd2core.fmcw.simulation import simulate_radar
 from sd2core.fmcw.sums import Echoes, direct, nufft, recurrent
-from sd2core.fmcw.triangle import mean_phasor
 from sd2core.fmcw.wave import WaveScene
 from sd2core.io.radar import load_capture, write_capture
 from sd2core.mesh.sequence import MeshSequence
@@ -40,6 +38,8 @@ from sd2core.progress import Cancelled
 from sd2core.radar_config import PAPER_RADAR, SPEED_OF_LIGHT_MPS, RadarConfig
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
+from tools.build_sample.scatterers import facet_scatterers, mean_phasor
+from tools.build_sample.signal import echo
 
 CAMERA = VirtualSensor()
 LAMBDA_M = PAPER_RADAR.wavelength_m

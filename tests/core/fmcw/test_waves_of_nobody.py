@@ -15,15 +15,15 @@ from sd2core.fmcw.options import SignalOptions, WaveOptions
 from sd2core.fmcw.processing import doppler_map
 from sd2core.fmcw.reference import converged_frame
 from sd2core.fmcw.scene import MeshScene
-from sd2core.fmcw.signal import simulate_capture
 from sd2core.fmcw.simulation import simulate_radar
 from sd2core.fmcw.spectra import frame_spectra
 from sd2core.fmcw.wave import WaveScene
 from sd2core.io.radar import load_capture, write_capture
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.radar_config import PAPER_RADAR
-from sd2core.scattering.facets import facet_visibility
 from sd2core.sensor import VirtualSensor
+from tools.build_sample.facets import facet_visibility
+from tools.build_sample.signal import simulate_capture
 
 FRAMES = 15
 THERE = np.ones(FRAMES, bool)

@@ -13,13 +13,14 @@ from sd2core.imu.mounting import PLACES, checked_places, mounted, place_near
 from sd2core.imu.virtual import imu_at_frames, virtual_imu
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.timebase import Timebase
+from tools.build_sample.posing import posed
 
 FRAMES = 12
 TURNS = Rotation.from_rotvec(np.outer(np.arange(FRAMES) / 10, [0.3, -1.0, 0.5]))
 
 
 def body_of(body: Body, rotations: np.ndarray, moved_m: np.ndarray | None = None) -> MeshSequence:
-    vertices = body.pose(rotations, moved_m)
+    vertices = posed(body, rotations, moved_m)
     time = Timebase.regular(len(vertices), 30.0)
     return MeshSequence(vertices.astype(np.float32), body.faces, time, "the body")
 

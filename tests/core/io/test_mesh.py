@@ -17,6 +17,7 @@ from sd2core.errors import Sd2Error
 from sd2core.io import mesh_arrays, stored_vertices
 from sd2core.io.mesh import load_mesh, save_mesh
 from sd2core.mesh.decimation import decimate
+from sd2core.mesh.presence import runs
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Cancelled
 from sd2core.timebase import Timebase
@@ -79,7 +80,7 @@ def test_what_a_file_says_of_empty_frames_may_be_numbers_but_must_fit(tmp_path: 
     given: dict[str, Any] = {"vertices": vertices, "faces": faces, "times_s": times(6)}
     path = write(tmp_path / "m.npz", **given, present=np.array([1, 0, 1, 1, 1, 1]))
     mesh = load_mesh(path)
-    assert mesh.presence.gaps == ((1, 2),)
+    assert runs(~mesh.presence.there) == ((1, 2),)
     assert mesh.notes == ()
     np.testing.assert_array_equal(mesh.frame(1), vertices[0])
     write(path, **given, present=np.ones(5, bool))
@@ -91,7 +92,7 @@ def test_before_the_first_known_pose_stands_that_one(tmp_path: Path) -> None:
     vertices, faces = body()
     vertices[:2] = np.nan
     mesh = load_mesh(write(tmp_path / "m.npz", vertices=vertices, faces=faces, times_s=times(6)))
-    assert mesh.presence.gaps == ((0, 2),)
+    assert runs(~mesh.presence.there) == ((0, 2),)
     np.testing.assert_array_equal(mesh.read(0, 3), vertices[[2, 2, 2]])
 
 

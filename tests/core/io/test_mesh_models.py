@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from sd2core.errors import Sd2Error
 from sd2core.io.mesh import load_mesh
 from sd2core.io.mesh_models import read_model_output, weak_perspective_shift
+from sd2core.mesh.presence import runs
 
 WIDTH, HEIGHT, FOCAL_PX = 1280, 720, 900.0
 
@@ -119,7 +120,7 @@ def test_frames_keep_their_place_in_the_video(tmp_path: Path) -> None:
     mesh = load_mesh(tmp_path / "w.pkl", frames_per_s=30)
     # One frame without a person stands for all that are missing.
     np.testing.assert_allclose(mesh.times_s * 30, [10, 11, 12, 13, 20, 21, 22])
-    assert mesh.presence.gaps == ((3, 4),)
+    assert runs(~mesh.presence.there) == ((3, 4),)
     there = mesh.presence.there
     np.testing.assert_array_equal(mesh.read(0, 7)[there], person["verts"])
     np.testing.assert_array_equal(mesh.frame(3), person["verts"][2])

@@ -13,6 +13,7 @@ from sd2core.body.rotations import about
 from sd2core.errors import Sd2Error
 from sd2core.io.radar.mars import JOINTS
 from sd2core.mocap.driving import KINECT_MARKERS, DrivenClip, SkeletonClip, puppet_of, resample_pose
+from tools.build_sample.posing import posed
 from tools.build_sample.swipes import swipes
 
 FRAMES = 40
@@ -24,7 +25,7 @@ def _swiping() -> tuple[np.ndarray, np.ndarray]:
     motion = swipes(SPACE.base_skeleton, 1.0 + np.arange(FRAMES) / 10.0)
     place_m = motion.translation_m + np.array([0.1, 0.9, 2.0])
     transforms = SPACE.skeleton(SHAPE).transforms(motion.rotations, place_m)
-    vertices = SPACE.load("low", SHAPE).pose(motion.rotations, place_m)
+    vertices = posed(SPACE.load("low", SHAPE), motion.rotations, place_m)
     return KeypointSpace(SPACE).of(SHAPE).positions(transforms), vertices
 
 

@@ -14,10 +14,10 @@ from sd2core.simulate.campaign.posture import (
     Group,
     all_groups,
     change_posture,
-    errors,
     least_turn,
     posture,
 )
+from tools.fitting.error_measurement import errors
 
 FRAMES = 5
 

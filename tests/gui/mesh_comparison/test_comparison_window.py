@@ -22,6 +22,7 @@ from sd2core.mesh.sequence import MeshSequence
 from sd2core.recording.recording import Recording
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
+from tools.build_sample.posing import posed
 
 ASIDE_M = 0.05
 TIMES = np.arange(36) / 30.0
@@ -35,7 +36,7 @@ def waving() -> MeshSequence:
     swing = np.clip((TIMES - 0.3) / 0.6, 0.0, 1.0)
     elbow = body.skeleton.index["lowerarm01.R"]
     turns[:, elbow] = about(np.array([1.0, 0.0, 0.0]), -70.0 * np.sin(np.pi * swing) ** 2)
-    vertices = (body.pose(turns) + np.array([0.0, 1.0, 2.5])).astype(np.float32)
+    vertices = (posed(body, turns) + np.array([0.0, 1.0, 2.5])).astype(np.float32)
     return MeshSequence(vertices, body.faces, Timebase(TIMES))
 
 

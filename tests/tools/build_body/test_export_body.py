@@ -14,6 +14,7 @@ from sd2core.files.resources import resource_path
 from sd2core.progress import Progress
 from tools.build_body import export_body as exporting
 from tools.build_body.__main__ import main
+from tools.build_sample.posing import posed
 
 needs_anny = pytest.mark.skipif(
     importlib.util.find_spec("anny") is None,
@@ -62,7 +63,7 @@ def test_skinning_agrees_with_anny(resolution: Resolution) -> None:
         theirs = model(
             pose, phenotype_kwargs=exporting.PHENOTYPE, pose_parameterization="world-orient"
         )["vertices"].numpy()
-    ours = body.pose(turns, translation)
+    ours = posed(body, turns, translation)
     error = np.linalg.norm(ours - exporting.body_from_anny(theirs, floor_m), axis=2)
     assert error.max() < 1e-3
     assert np.sqrt((error**2).mean()) < 1e-4

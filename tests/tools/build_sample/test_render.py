@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from sd2core.body.model import Body
-from sd2core.numerics.raster import interpolate, lit_share, rasterise
+from sd2core.numerics.raster import interpolate, rasterise
 from tools.build_sample.clothing import SHIRT, TROUSERS
-from tools.build_sample.render import Renderer, stamp
+from tools.build_sample.render import Renderer, lit_share, stamp
 
 PLACE = np.array([0.05, 1.1, 2.2])
 

@@ -16,9 +16,9 @@ from sd2core.io.video import open_video
 from sd2core.progress import Cancelled, Progress
 from sd2core.radar_config import PAPER_RADAR
 from sd2core.recording.recording import Recording, open_recording
-from sd2core.scattering.facets import facet_visibility
 from sd2core.sensor import VirtualSensor
 from tools.build_sample.__main__ import main
+from tools.build_sample.facets import facet_visibility
 from tools.build_sample.render import Camera
 from tools.build_sample.sample import (
     FRAMES_PER_S,

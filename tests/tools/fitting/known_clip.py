@@ -13,6 +13,7 @@ from sd2core.body.rotations import about
 from sd2core.io.mesh import save_mesh
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.timebase import Timebase
+from tools.build_sample.posing import posed
 from tools.fitting.truth import FORMAT, VERSION
 
 TIMES = np.arange(36) / 30.0
@@ -28,7 +29,7 @@ def waving() -> MeshSequence:
     swing = np.clip((TIMES - 0.3) / 0.6, 0.0, 1.0)
     angle_deg = -70.0 * np.sin(np.pi * swing) ** 2
     turns[:, body.skeleton.index["lowerarm01.R"]] = about(np.array([1.0, 0.0, 0.0]), angle_deg)
-    vertices = body.pose(turns) + np.array([0.0, 1.0, 2.5])
+    vertices = posed(body, turns) + np.array([0.0, 1.0, 2.5])
     return MeshSequence(vertices, body.faces, Timebase(TIMES))
 
 

@@ -62,7 +62,7 @@ def test_the_truth_itself_is_perfect(truth: Truth) -> None:
 
 def test_strokes_hold_the_hand_that_makes_them(truth: Truth) -> None:
     score = score_clip(truth, truth.mesh())
-    joints = own_patches("low").of(truth.mesh())
+    joints = own_patches("low").positions(truth.mesh().read(0, len(TIMES)))
     velocity = line_of_sight_velocity(joints, TIMES)[:, JOINTS.index("hand.R")]
     frames = (TIMES >= 0.3) & (TIMES < 0.6)
     np.testing.assert_allclose(score.strokes[0].velocity["hand"].truth, velocity[frames], atol=1e-6)
@@ -73,7 +73,8 @@ def test_a_drift_is_an_error_of_velocity(truth: Truth) -> None:
     drift = -0.1 * TIMES[:, None, None] * np.array([0.0, 0.0, 1.0])
     score = score_clip(truth, moved(truth.mesh(), drift))
     assert score.velocity.error == pytest.approx(0.1, rel=0.06)
-    hand = own_patches("low").of(truth.mesh())[:, JOINTS.index("hand.R")]
+    joints = own_patches("low").positions(truth.mesh().read(0, len(TIMES)))
+    hand = joints[:, JOINTS.index("hand.R")]
     cosine = hand[:, 2] / np.linalg.norm(hand, axis=1)
     for stroke in score.strokes:
         during = (stroke.stroke.start_s <= TIMES) & (stroke.stroke.end_s > TIMES)
@@ -139,7 +140,7 @@ def test_limbs_out_of_the_picture_are_measured_against_what_they_hang_on(truth: 
     camera = {**truth.meta["camera"], "width": 240, "height": 2000}
     narrow = replace(truth, meta={**truth.meta, "camera": camera})
     mesh = truth.mesh()
-    joints = own_patches("low").of(mesh)
+    joints = own_patches("low").positions(mesh.read(0, mesh.frame_count))
     off_px = np.abs(narrow.camera.project(joints)[..., 0] - 120.0) > 120.0
     assert off_px[:, JOINTS.index("hand.R")].sum() > 0
     assert not off_px[:, JOINTS.index("elbow.R")].any()

@@ -31,7 +31,7 @@ def track(mesh: MeshSequence) -> LandmarkTrack:
     """What a landmark model without faults would say of this mesh."""
     frames, count = np.arange(0, len(TIMES), 6), len(TIMES)
     image = np.full((count, 33, 2), 320.0, np.float32)
-    joints = own_patches("low").of(mesh)
+    joints = own_patches("low").positions(mesh.read(0, mesh.frame_count))
     for number, name in enumerate(LANDMARKS):
         if name in JOINTS:
             image[:, number] = CAMERA.project(joints[:, JOINTS.index(name)])

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -21,13 +22,14 @@ from numpy.typing import NDArray
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.converter import check_converter, digitise, simulated_capture
 from sd2core.fmcw.options import SignalOptions
-from sd2core.fmcw.scene import MeshScene, Scatterers, point_scatterers
+from sd2core.fmcw.scene import MeshScene
 from sd2core.io.radar.capture import RadarCapture
 from sd2core.mesh.presence import runs
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Progress, silent
 from sd2core.radar_config import SPEED_OF_LIGHT_MPS, RadarConfig
 from sd2core.sensor import VirtualSensor
+from tools.build_sample.scatterers import Scatterers, point_scatterers, scatterers_at
 
 _CHUNK = 4096
 """Scatterers per matrix product: their phasors stay in the cache."""
@@ -66,7 +68,7 @@ def simulate_capture(
     scene = MeshScene(mesh, config, sensor, visibility)
     times_s = scene.frame_times_s()
     return capture_scene(
-        scene.at,
+        partial(scatterers_at, scene),
         times_s,
         config,
         there=np.array([scene.there(time_s) for time_s in times_s.tolist()]),
@@ -93,7 +95,7 @@ def capture_scene(
     Parameters
     ----------
     scatterers_at : callable
-        Time in seconds → :class:`~sd2core.fmcw.scene.Scatterers`.
+        Time in seconds → :class:`~tools.build_sample.scatterers.Scatterers`.
     times_s : float64 array, shape (frames,)
         Middle of every frame's burst of chirps, increasing.
     there : bool array, shape (frames,), optional

@@ -15,15 +15,22 @@ from hypothesis import strategies as st
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.options import Reflector, SignalOptions
 from sd2core.fmcw.processing import doppler_map, range_doppler
-from sd2core.fmcw.scene import MeshScene, Scatterers, facet_scatterers, point_scatterers
-from sd2core.fmcw.signal import capture_scene, echo, simulate_capture
-from sd2core.fmcw.triangle import mean_phasor
+from sd2core.fmcw.scene import MeshScene
 from sd2core.io.radar import load_capture, write_capture
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Cancelled
 from sd2core.radar_config import PAPER_RADAR, SPEED_OF_LIGHT_MPS
+from sd2core.radar_profiles import RADARS
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
+from tools.build_sample.scatterers import (
+    Scatterers,
+    facet_scatterers,
+    mean_phasor,
+    point_scatterers,
+    scatterers_at,
+)
+from tools.build_sample.signal import capture_scene, echo, simulate_capture
 
 CAMERA = VirtualSensor()
 SILENT = SignalOptions(snr_db=math.inf)
@@ -155,7 +162,7 @@ def test_hidden_facets_do_not_echo() -> None:
     visible = np.zeros((3, len(mesh.faces)), dtype=bool)
     visible[1, :5] = True
     scene = MeshScene(mesh, PAPER_RADAR, CAMERA, visible)
-    assert [len(scene.at(time).amplitude) for time in mesh.times_s] == [0, 5, 0]
+    assert [len(scatterers_at(scene, time).amplitude) for time in mesh.times_s] == [0, 5, 0]
     with pytest.raises(Sd2Error, match=r"visibility has shape \(3, 4\)"):
         MeshScene(mesh, PAPER_RADAR, CAMERA, visible[:, :4])
 
@@ -185,7 +192,7 @@ def test_frames_between_mesh_frames_are_interpolated() -> None:
     times_s = scene.frame_times_s()
     assert len(times_s) == 39
     for time_s in times_s:
-        seen = scene.at(float(time_s))
+        seen = scatterers_at(scene, float(time_s))
         np.testing.assert_allclose(seen.position_m[:, 2], 2.4 - 0.9 * time_s, atol=1e-9)
         np.testing.assert_allclose(seen.velocity_mps[:, 2], -0.9, atol=1e-9)
 
@@ -312,3 +319,8 @@ def test_points_can_be_simulated_without_a_mesh() -> None:
     )
     peaks = doppler_map(capture, bins=32, v_max_mps=2.0).peak_velocity_mps()
     np.testing.assert_allclose(peaks, -0.8125)
+
+
+def test_a_radar_of_complex_samples_is_refused() -> None:
+    with pytest.raises(Sd2Error, match="samples I and Q"):
+        simulate_capture(plate(0.5, 2.0), RADARS["iwr6843"])

@@ -1,0 +1,57 @@
+"""Fit of a short clip with everything in memory, to be measured frame by frame."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.body.camera import PinholeCamera
+from sd2core.body.fit import Fitting, Lift
+from sd2core.body.fitted import PER_FRAME, BodyFit, Pose, mean_over_limbs, surface
+from sd2core.body.model import Resolution
+from sd2core.body.track import Landmarks
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.progress import Progress, silent
+
+
+def fit_body(
+    track: Landmarks,
+    camera: PinholeCamera,
+    *,
+    stature_m: float | None = None,
+    lift: Lift | None = None,
+    workspace: Path | None = None,
+    progress: Progress = silent,
+) -> BodyFit:
+    """Fit a body to landmarks, with everything in memory.
+
+    ``lift`` gives the landmarks their depth, by default the bundled lifter; the rest is as in
+    :func:`~sd2core.body.fit.fit_motion`.
+    """
+    fitting = Fitting(track, camera, stature_m, lift, workspace)
+    found = list(fitting.finished(progress))
+
+    def joined(name: str) -> NDArray[Any]:
+        return np.concatenate([getattr(part, name) for part in found])
+
+    return BodyFit(
+        timebase=track.timebase,
+        shape=found[0].shape,
+        **{name: joined(name) for name in PER_FRAME},
+    )
+
+
+def mesh_of(fit: BodyFit, resolution: Resolution) -> MeshSequence:
+    """The moving surface, posed where it is read."""
+    return surface(
+        fit.shape,
+        fit.timebase,
+        Pose(fit.turns, fit.translation_m).at,
+        fit.present,
+        mean_over_limbs(fit.along_sd_mps),
+        mean_over_limbs(fit.across_sd_mps),
+        resolution,
+    )
