@@ -2,7 +2,7 @@
 
 Carried files are pairs, as PyInstaller's ``Analysis`` has them: the name in the bundle and the path
 that it comes from. ``native_libraries.csv`` names the libraries that packages bring under licences
-of their own, ``notices.txt`` holds the texts that packages should bring and do not.
+of their own.
 """
 
 from __future__ import annotations
@@ -44,6 +44,11 @@ GNU = {
     "LGPL-3.0": ("LESSER GENERAL PUBLIC LICENSE Version 3, 29 June", "choose that version for the"),
 }
 """Words from the beginning and the end of each text that has to be passed on."""
+
+_MISSING = """\
+The notices of these libraries are in none of the packages that bring them. Add them to this file,
+from where their source is, before you pass the folder on:
+"""
 
 Carried = Iterable[tuple[str, str]]
 Imports = Callable[[str], set[str]]
@@ -109,7 +114,7 @@ def of_distribution(one: importlib.metadata.Distribution) -> Component:
     )
     urls = [text.partition(", ") for text in about.get_all("Project-URL", [])]
     found = (url for label, _, url in urls if re.match("(?i)source|repo|code|github", label))
-    source = next(found, about.get("Home-page")) or f"https://pypi.org/project/{name}/"
+    source = next(found, about.get("Home-page")) or f"the package {name} of the index"
     licence = CORRECTED.get(name.lower()) or said or short or "no licence named"
     return Component(name, one.version, licence, source)
 
@@ -242,7 +247,6 @@ def texts(found: Found, common: Path = COMMON) -> dict[str, list[str]]:
         ("SD² Studio", ROOT / "LICENSE"),
         ("resources of SD² Studio", ROOT / "resources" / "LICENSES.md"),
         ("Python", Path(sysconfig.get_path("stdlib"), "LICENSE.txt")),
-        ("libraries whose packages bring no text", HERE / "notices.txt"),
     ):
         if file.is_file():
             collected[file.read_text("utf-8").strip()].append(title)
@@ -271,13 +275,10 @@ def texts(found: Found, common: Path = COMMON) -> dict[str, list[str]]:
                 "https://www.gnu.org/licenses/."
             )
         collected[file.read_text("utf-8").strip()].append(name)
-    for one in sorted(found):
-        if not any(one.text in text for text in words):
-            raise Refused(
-                f"The notice of {one.name} ({one.version}) has to go with the bundle and is in no "
-                f"carried package. Expected is a text with “{one.text}”. Add the notice to "
-                f"{HERE.name}/notices.txt, from {one.source}."
-            )
+    missing = [one for one in sorted(found) if not any(one.text in text for text in words)]
+    if missing:
+        lines = [f"  - {one.name} ({one.version}): {one.source}" for one in missing]
+        collected["\n".join([_MISSING, *lines])].append("NOTICES TO ADD")
     return dict(collected)
 
 
