@@ -14,6 +14,7 @@ import hashlib
 import re
 import subprocess
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 from sd2core.files.atomic import atomic_write_text
@@ -117,16 +118,21 @@ def digest(path: Path) -> str:
         return "-"
     total = hashlib.sha256()
     for file in sorted(path.rglob("*.py")) if path.is_dir() else [path]:
-        if file.suffix != ".py":
-            total.update(file.read_bytes())
-            continue
-        tree = ast.parse(file.read_text("utf-8"))
-        for node in ast.walk(tree):
-            body = getattr(node, "body", None)
-            if isinstance(body, list):
-                node.body = [one for one in body if not _is_text(one)]  # type: ignore[attr-defined]
-        total.update(ast.dump(tree).encode())
+        total.update(_content(file, file.stat().st_mtime_ns))
     return total.hexdigest()[:8]
+
+
+@cache
+def _content(file: Path, changed_ns: int) -> bytes:
+    """What of a file counts; several pages are made from the same files."""
+    if file.suffix != ".py":
+        return file.read_bytes()
+    tree = ast.parse(file.read_text("utf-8"))
+    for node in ast.walk(tree):
+        body = getattr(node, "body", None)
+        if isinstance(body, list):
+            node.body = [one for one in body if not _is_text(one)]  # type: ignore[attr-defined]
+    return ast.dump(tree).encode()
 
 
 def _is_text(statement: ast.AST) -> bool:
