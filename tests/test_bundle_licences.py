@@ -199,6 +199,7 @@ def test_a_text_that_is_nowhere_is_refused_and_a_notice_named(tmp_path: Path) ->
 
 @on_linux
 def test_the_file_names_parts_and_addresses(tmp_path: Path, capsys) -> None:
+    pytest.importorskip("PyInstaller")
     near = [path for name, path in carried() if name.startswith("av.libs")]
     file = licences.write(tmp_path / "LICENCES.txt", carried(), near, "1")
     head, rest = file.read_text("utf-8").split("COMPONENTS")
