@@ -102,24 +102,25 @@ def _tally(  # type: ignore[no-untyped-def]
     for v in range(f.shape[0]):
         if sight[v] == 0:
             continue
-        x = f[v]
-        if (x >= np.float32(0)) & (x <= end):
-            x = min(x, inner)
-        else:
+        x, amount, number = f[v], weight[v] * share, limb[v]
+        inside = (x >= np.float32(0)) & (x <= end)
+        if not inside:
             outside += heads[v] if heads.shape[0] > 0 else 1.0
             if beyond == WRAP:
-                x = min(x - end * np.floor(x / end), inner)
+                x = min(max(x - end * np.floor(x / end), np.float32(0)), end)
             else:
                 x = max(min(x, most), least)
-        amount, number = weight[v] * share, limb[v]
+        if not np.isfinite(x):
+            continue
+        if sigma[number] == 0 and (inside or beyond == WRAP):
+            x = min(x, inner)  # the axis is closed at both ends
         if sigma[number] < SPREAD_AT_ONCE:
             _spread(np.float64(x), amount, sigma[number], bins, beyond, histogram[part[number]])
             continue
         x *= np.float32(PARTS)
-        whole = np.floor(x)
-        place = min(max(int(whole) + room * PARTS, 0), parts - 1)
+        place = min(max(int(np.floor(x)) + room * PARTS, 0), parts - 1)
         fine[number, place, 0] += amount
-        fine[number, place, 1] += amount * (x - whole)
+        fine[number, place, 1] += amount * (x - np.float32(place - room * PARTS))
     return outside
 
 
