@@ -51,6 +51,9 @@ def scene_fingerprint(
         "options": asdict(options),
         "family": family,
     }
+    if options.count == "expected" and (known := mesh.uncertainty) is not None:
+        stated = known.vertex_limb, known.along_mps, known.across_mps
+        what["uncertainty"] = [hashlib.sha256(one.tobytes()).hexdigest() for one in stated]
     return hashlib.sha256(repr(what).encode()).hexdigest()[:16]
 
 

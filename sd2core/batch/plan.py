@@ -21,6 +21,7 @@ from sd2core.datasets.source import KINDS
 from sd2core.doppler.options import (
     PRESETS,
     Beyond,
+    Count,
     DepthResolution,
     RangeLaw,
     SynthesisOptions,
@@ -95,6 +96,7 @@ class Synthesise(_Section):
     depth_resolution: DepthResolution | None = None
     mask_stride: PositiveInt | None = None
     weight: Weight | None = None
+    count: Count | None = None
     bins: PositiveInt | None = None
     v_max_mps: Positive | None = None
     null_bins: tuple[int, ...] | None = None

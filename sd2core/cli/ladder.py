@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING
 
 from sd2core.cli.options import (
     add_command,
+    add_count,
     add_figure_output,
     add_json,
     add_mesh_and_sensor,
     add_mesh_reading,
     add_method,
+    given,
     positive_float,
     positive_int,
     share,
@@ -60,6 +62,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         default="count",
         help="what a vertex counts (default: count)",
     )
+    add_count(parser)
     parser.add_argument(
         "--quick", action="store_true", help="only say what the scene requires, without the table"
     )
@@ -89,8 +92,11 @@ def _ladder(options: argparse.Namespace) -> int:
         check_output(options.figure, *SUFFIXES)
     if options.quick and options.method == "fmcw":
         raise Sd2Error("--quick is given with --method fmcw", "it with --method histogram only")
+    if options.count is not None and options.method == "fmcw":
+        raise Sd2Error("--count is given with --method fmcw", "it with --method histogram only")
     mesh, sensor = mesh_and_sensor(options)
-    synthesis = check_options(mesh, replace(PRESETS["paper"], weight=options.weight))
+    chosen_by_user = given(options, ("weight", "count"))
+    synthesis = check_options(mesh, replace(PRESETS["paper"], **chosen_by_user))
     choice = None
     if options.method == "histogram":
         tolerance = options.tolerance

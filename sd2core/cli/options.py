@@ -180,6 +180,15 @@ def add_placements_used(parser: argparse._ActionsContainer, what: str, usual: st
     )
 
 
+def add_count(parser: argparse.ArgumentParser) -> None:
+    """Add ``--count``."""
+    parser.add_argument(
+        "--count",
+        choices=("plain", "expected"),
+        help="count a vertex in one bin, or spread as its mesh's uncertainty says (default: plain)",
+    )
+
+
 def given(options: argparse.Namespace, names: Iterable[str]) -> dict[str, Any]:
     """Those of the named options that the user gave."""
     values = {name: getattr(options, name) for name in names}

@@ -10,6 +10,7 @@ from sd2core.cli.ladder import add_wish, chosen
 from sd2core.cli.options import (
     add_axis,
     add_command,
+    add_count,
     add_json,
     add_limbs,
     add_map_output,
@@ -49,6 +50,7 @@ _COUNTING_ONLY = (
     "depth_resolution",
     "mask_stride",
     "weight",
+    "count",
     "null_bins",
     "beyond",
     "range_exponent",
@@ -128,6 +130,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         choices=("count", "area", "projected"),
         help="a vertex counts as one, by its area, or by the area it turns towards the sensor",
     )
+    add_count(parser)
     add_axis(parser)
     parser.add_argument(
         "--null-bins",

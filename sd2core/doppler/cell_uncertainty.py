@@ -15,12 +15,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.doppler.frame_counts import FrameCounts
-from sd2core.doppler.limb_histograms import FineAxis, fine_histograms, fine_histograms_of
+from sd2core.doppler.limb_histograms import FineAxis, fine_histograms
 from sd2core.doppler.masks import Visibility
 from sd2core.doppler.parallel import Ticket, run_jobs
 from sd2core.doppler.prepared import Block
@@ -102,11 +103,9 @@ class _Piece:
             mesh.times_s, start, stop, options.time_sigma_s
         )
         frames = slice(self._first, self._last)
-        # A velocity that may be anywhere on the axis is as good as one that may be even farther.
-        self._worst_mps = 2.0 * options.axis.v_max_mps
         most_mps = float(max(known.along_mps[frames].max(), known.across_mps[frames].max()))
-        most_mps = min(most_mps, self._worst_mps)
-        room_bins = math.ceil(_REACH * most_mps / options.axis.bin_width_mps) + 1
+        most_bins = min(most_mps / options.axis.bin_width_mps, options.axis.bins)
+        room_bins = math.ceil(_REACH * most_bins) + 1
         self._axis = FineAxis(counts.counting, 0 if options.beyond == "wrap" else room_bins)
 
     def moments(self, go_on: Callable[[], None]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -160,52 +159,33 @@ class _Piece:
         counts, known = self._counts, self._known
         frames = self._last - self._first
         fine = np.zeros((len(known.limbs), frames, self._axis.parts))
-        sigma_mps = np.zeros((frames, len(known.limbs)))
+        sigma_bins = np.zeros((frames, len(known.limbs)))
         for index, low, high in counts.blocks_between(self._first, self._last):
             go_on()
             block = counts.prepared.block(index)
             rows = slice(low - block.start, high - block.start)
             target = slice(low - self._first, high - self._first)
             fine[:, target] = self._counted(block, rows)
-            sigma_mps[target] = known.towards(
-                self._sensor.position_m, self._limb_places(block, rows), low
-            )
-        sigma_mps = np.minimum(sigma_mps, self._worst_mps)
-        return fine, sigma_mps / counts.options.axis.bin_width_mps
+            sigma_bins[target] = counts.sigma_bins(block, rows, self._sensor.position_m)
+        return fine, sigma_bins
 
     def _counted(self, block: Block, rows: slice) -> NDArray[np.float64]:
         """Shares of some of a block's frames on the fine axis, (limbs, n, parts)."""
         counts, known = self._counts, self._known
-        counting, position_m = counts.counting, self._sensor.position_m
+        position_m = self._sensor.position_m
         place = counts.prepared.sensor(position_m)
         scatterers, _ = counts.scatterers(block, rows, position_m, self._visibility)
-        frames = block.frames.rows(rows)
-        weights = np.empty((len(frames), frames.positions.shape[2]), np.float32)
-        for row, knot in enumerate(frames.centre):
-            points = frames.positions[knot]
-            weights[row] = scatterers.weights(
-                row, points, place, counting.range_exponent, counting.reference_range_m
-            ) * scatterers.seen(row, points, place)
-        limb, count = known.vertex_limb, len(known.limbs)
+        scatterers = replace(scatterers, parts=known.vertex_limb)
+        frames, velocity = block.frames.rows(rows), None
         if counts.options.velocity == "vid2doppler":
             velocity = counts.prepared.velocities_vid2doppler(block, rows, place)
-            measured = frames.duration_s.max(axis=1) > 0
-            fine = fine_histograms_of(velocity, measured, self._axis, weights, limb, count)
-        else:
-            fine = fine_histograms(frames, place, self._axis, weights, limb, count)
+        fine = fine_histograms(
+            frames, place, self._axis, scatterers, len(known.limbs), velocity
+        ).transpose(1, 0, 2)
         total = counts.totals(block, rows)
         law = counts.frame_law(block, rows, position_m)
         factor = np.divide(law, total, out=np.zeros_like(total), where=total > 0)
         return fine * factor[:, None]
-
-    def _limb_places(self, block: Block, rows: slice) -> NDArray[np.float64]:
-        """Mean vertex of every limb in the camera's frame, (n, limbs, 3)."""
-        limb, count = self._known.vertex_limb, len(self._known.limbs)
-        member = np.zeros((len(limb), count), np.float32)
-        member[np.arange(len(limb)), limb] = 1.0
-        member /= np.maximum(member.sum(axis=0), 1.0)
-        points = block.frames.positions[block.frames.centre[rows]]
-        return (points @ member).transpose(0, 2, 1) + self._counts.prepared.origin_m
 
 
 def _grid(most_bins: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.doppler import histogram, vid2doppler
-from sd2core.doppler.histogram import Counting, Counts, Scatterers
-from sd2core.doppler.kernels import CLIP, DROP, WRAP
+from sd2core.doppler.expected import SIGMA_FACTOR, count_expected, sigma_bins
+from sd2core.doppler.histogram import Counts, Scatterers, counting_of
 from sd2core.doppler.masks import Position, Quality, Visibility, VisibilityMasks
 from sd2core.doppler.moving import MovingVertices, count_moving, visible_counts
 from sd2core.doppler.prepared import Block, PreparedMesh
@@ -23,14 +23,8 @@ class FrameCounts:
     def __init__(self, prepared: PreparedMesh) -> None:
         self.prepared = prepared
         self.mesh = prepared.mesh
-        self.options = options = prepared.options
-        self.counting = Counting(
-            options.axis.bins,
-            options.axis.v_max_mps,
-            {"drop": DROP, "wrap": WRAP, "clip": CLIP}[options.beyond],
-            options.range_exponent if options.range_law == "vertex" else 0.0,
-            options.reference_range_m,
-        )
+        self.options = prepared.options
+        self.counting = counting_of(prepared.options)
         self.masks = VisibilityMasks(prepared, self.counting)
 
     def blocks_between(self, start: int, stop: int) -> list[tuple[int, int, int]]:
@@ -72,7 +66,12 @@ class FrameCounts:
         scatterers, quality = self.scatterers(block, rows, position_m, visibility)
         scatterers = replace(scatterers, parts=parts)
         frames = block.frames.rows(rows)
-        if self.options.velocity == "vid2doppler":
+        known = self.mesh.uncertainty
+        if self.prepared.spreads and known is not None:
+            sigma = SIGMA_FACTOR * self.sigma_bins(block, rows, position_m)
+            limb = known.vertex_limb
+            count_expected(frames, place, self.counting, scatterers, sigma, limb, into)
+        elif self.options.velocity == "vid2doppler":
             velocity = self.prepared.velocities_vid2doppler(block, rows, place)
             edges_mps = self.options.axis.edges_mps
             vid2doppler.count(frames, velocity, edges_mps, place, self.counting, scatterers, into)
@@ -95,6 +94,8 @@ class FrameCounts:
             self._of_moving(block, moving, None, facing and not occluded)
             if occluded:
                 prepared.normals(block)
+        if prepared.spreads:
+            prepared.limb_places(block)
         self.totals(block, slice(0, 0))
         if self.options.range_law == "frame":
             prepared.middles(block)
@@ -122,6 +123,12 @@ class FrameCounts:
             normals = prepared.normals(block)[rows] if facing else None
             into.visible[:] = visible_counts(points, place, mask, normals, prepared.heads)
         return quality
+
+    def sigma_bins(self, block: Block, rows: slice, position_m: Position) -> NDArray[np.float64]:
+        """Deviation of each limb's velocity towards a sensor in bins, (n, limbs)."""
+        known, places_m = self.mesh.uncertainty, self.prepared.limb_places(block)[rows]
+        assert known is not None
+        return sigma_bins(known, position_m, places_m, block.start + rows.start, self.options.axis)
 
     def totals(self, block: Block, rows: slice) -> NDArray[np.float64]:
         """Totals that the counts of some of a block's frames are shares of, (n,)."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from sd2core.doppler.kernels import (
     ALL,
     AREA,
+    CLIP,
     DROP,
     FACING,
     HEADS,
@@ -20,6 +21,7 @@ from sd2core.doppler.kernels import (
     count_kernel,
     needed_kernel,
 )
+from sd2core.doppler.options import SynthesisOptions
 from sd2core.scattering.amplitude import projected_areas, range_weight
 from sd2core.scattering.visibility import facing_mask
 
@@ -38,6 +40,24 @@ class Scatterers:
     """Shape (V,): number of vertices that each stands for; None: itself only."""
     parts: NDArray[np.uint8] | None = None
     """Shape (V,): part of the body of each vertex, to count apart; None: all together."""
+
+    @property
+    def kinds(self) -> tuple[int, int]:
+        """Which vertices count, and what, in the words of the kernels."""
+        which = MASK if self.mask is not None else FACING if self.normals is not None else ALL
+        if self.area_vectors is not None:
+            return which, PROJECTED
+        return which, AREA if self.areas is not None else HEADS
+
+    def rows(self, rows: slice) -> Scatterers:
+        """Those of some of the frames; nothing is copied."""
+        return replace(
+            self,
+            normals=None if self.normals is None else self.normals[rows],
+            mask=None if self.mask is None else self.mask[rows],
+            areas=None if self.areas is None else self.areas[rows],
+            area_vectors=None if self.area_vectors is None else self.area_vectors[rows],
+        )
 
     def seen(
         self, row: int, points: NDArray[Any], sensor: NDArray[np.float64]
@@ -121,6 +141,17 @@ class Counting:
         return scale
 
 
+def counting_of(options: SynthesisOptions) -> Counting:
+    """Velocity axis and range law of the options."""
+    return Counting(
+        options.axis.bins,
+        options.axis.v_max_mps,
+        {"drop": DROP, "wrap": WRAP, "clip": CLIP}[options.beyond],
+        options.range_exponent if options.range_law == "vertex" else 0.0,
+        options.reference_range_m,
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class Counts:
     """Result of counting some frames."""
@@ -184,12 +215,20 @@ def bins_plain(
     frames: Frames, t: int, sample: int, sensor: NDArray[np.float64], counting: Counting
 ) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
     """Bin of every vertex (``bins`` where dropped), and a mask of those beyond the axis."""
+    return place_in_bins(places_plain(frames, t, sample, sensor, counting), counting)
+
+
+def places_plain(
+    frames: Frames, t: int, sample: int, sensor: NDArray[np.float64], counting: Counting
+) -> NDArray[Any]:
+    """Position of every vertex (V,) on the velocity axis, which runs from 0 to ``bins``."""
     closer = relative_range(frames.positions[frames.before[t, sample]], sensor) - relative_range(
         frames.positions[frames.after[t, sample]], sensor
     )
     precision = frames.positions.dtype
     per_bin = closer * counting.scale(frames.duration_s[t, sample : sample + 1], precision)
-    return place_in_bins(per_bin + np.float32(0.5 * counting.bins), counting)
+    places: NDArray[Any] = per_bin + np.float32(0.5 * counting.bins)
+    return places
 
 
 def place_in_bins(
@@ -243,11 +282,31 @@ def count(
 
     The sensor is in the frame of the positions.
     """
+    count_kernel(
+        *kernel_arrays(frames, counting, scatterers),
+        scatterers.parts if scatterers.parts is not None else _NO_PARTS,
+        sensor.astype(frames.positions.dtype),
+        *scatterers.kinds,
+        counting.bins,
+        counting.beyond,
+        counting.range_exponent,
+        np.float32(counting.reference_range_m),
+        into.histogram,
+        into.visible,
+        into.beyond,
+    )
+
+
+_A = NDArray[Any]
+
+
+def kernel_arrays(
+    frames: Frames, counting: Counting, scatterers: Scatterers
+) -> tuple[_A, _A, _A, _A, _A, _A, _A, _A, _A, _A]:
+    """Arrays that counting kernels take first, empty where there is none."""
     normals, mask, areas = scatterers.normals, scatterers.mask, scatterers.areas
     vectors, heads = scatterers.area_vectors, scatterers.vertex_counts
-    which = MASK if mask is not None else FACING if normals is not None else ALL
-    weighting = PROJECTED if vectors is not None else AREA if areas is not None else HEADS
-    count_kernel(
+    return (
         frames.positions,
         frames.centre,
         frames.before,
@@ -258,17 +317,6 @@ def count(
         areas if areas is not None else _NO_AREAS,
         vectors if vectors is not None else _NO_VECTORS,
         heads if heads is not None else _NO_HEADS,
-        scatterers.parts if scatterers.parts is not None else _NO_PARTS,
-        sensor.astype(frames.positions.dtype),
-        which,
-        weighting,
-        counting.bins,
-        counting.beyond,
-        counting.range_exponent,
-        np.float32(counting.reference_range_m),
-        into.histogram,
-        into.visible,
-        into.beyond,
     )
 
 

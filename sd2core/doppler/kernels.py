@@ -52,7 +52,7 @@ def distance_of(sensor):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _extend(positions, sensor, distance, known, upto, ring):  # type: ignore[no-untyped-def]
+def extend(positions, sensor, distance, known, upto, ring):  # type: ignore[no-untyped-def]
     """Compute the knots from ``known`` to ``upto``; the ring keeps the newest few."""
     for knot in range(known, upto + 1):
         points = positions[knot]
@@ -217,6 +217,48 @@ def _tally_weights_of_parts(slot, weight, base, sums):  # type: ignore[no-untype
 
 
 @compiled
+def weigh_run(  # type: ignore[no-untyped-def]
+    t, v0, v1, middle, ranges, normals, mask, areas, vectors, heads, sensor, distance,
+    which, weighting, exponent, reference, seen, weight, spare, turned,
+):  # fmt: skip
+    """Visibility of vertices ``v0`` to ``v1`` of a frame; their weights are written unless all 1.
+
+    ``middle`` (3, V) and ``ranges`` (V,) are those of the frame; the last four are work space.
+    """
+    n = v1 - v0
+    x, y, z = middle[0], middle[1], middle[2]
+    sx, sy, sz = sensor[0], sensor[1], sensor[2]
+    sight = seen[:n]
+    if which == FACING:
+        nx, ny, nz = normals[t, 0], normals[t, 1], normals[t, 2]
+        facing_kernel(
+            x[v0:v1], y[v0:v1], z[v0:v1], nx[v0:v1], ny[v0:v1], nz[v0:v1], sx, sy, sz, sight
+        )
+    elif which == MASK:
+        marks = mask[t]
+        sight = marks[v0:v1]
+    if exponent != 0:
+        squared_ratios(ranges[v0:v1], distance, reference, weight[:n])
+        raise_to(weight[:n], exponent, spare[:n])
+    if weighting != HEADS or heads.shape[0] > 0:
+        own = heads[v0:v1]
+        if weighting == AREA:
+            own = areas[t, v0:v1]
+        elif weighting == PROJECTED:
+            own = turned[:n]
+            ax, ay, az = vectors[t, 0], vectors[t, 1], vectors[t, 2]
+            projected(
+                x[v0:v1], y[v0:v1], z[v0:v1], ax[v0:v1], ay[v0:v1], az[v0:v1], sx, sy, sz, own
+            )
+        if exponent != 0:
+            for v in range(n):
+                weight[v] *= own[v]
+        else:
+            weight[:n] = own
+    return sight
+
+
+@compiled
 def count_kernel(  # type: ignore[no-untyped-def]
     positions, centre, before, after, scale, normals, mask, areas, vectors, heads, part, sensor,
     which, weighting, bins, beyond, exponent, reference, histogram, visible, outside,
@@ -229,7 +271,6 @@ def count_kernel(  # type: ignore[no-untyped-def]
     """
     vertices = positions.shape[2]
     samples = before.shape[1]
-    sx, sy, sz = sensor[0], sensor[1], sensor[2]
     offset = np.float32(0.5 * bins)
     f = np.empty(RUN, positions.dtype)
     weight = np.empty(RUN, np.float32)
@@ -243,13 +284,12 @@ def count_kernel(  # type: ignore[no-untyped-def]
     counts = np.zeros((TABLES, parts * slots), np.int32)
     sums = np.zeros((TABLES, parts * slots), np.float64)
     grouped = heads.shape[0] > 0
-    weighted = weighting != HEADS or grouped
-    weights = weighted or exponent != 0
+    weights = weighting != HEADS or grouped or exponent != 0
     distance = distance_of(sensor)
     ring = np.empty((samples + 2, vertices), positions.dtype)
     known = before[0, 0]
     for t in range(centre.shape[0]):
-        known = _extend(positions, sensor, distance, known, after[t, samples - 1], ring)
+        known = extend(positions, sensor, distance, known, after[t, samples - 1], ring)
         if weights:
             sums[:] = 0
         else:
@@ -262,45 +302,19 @@ def count_kernel(  # type: ignore[no-untyped-def]
                 measured += 1
         measured = max(measured, 1)
         middle = positions[centre[t]]
-        x, y, z = middle[0], middle[1], middle[2]
         for v0 in range(0, vertices, RUN):
             v1 = min(v0 + RUN, vertices)
             n = v1 - v0
-            sight = seen[:n]
-            if which == FACING:
-                nx, ny, nz = normals[t, 0], normals[t, 1], normals[t, 2]
-                facing_kernel(
-                    x[v0:v1], y[v0:v1], z[v0:v1], nx[v0:v1], ny[v0:v1], nz[v0:v1],
-                    sx, sy, sz, sight,
-                )  # fmt: skip
-            elif which == MASK:
-                marks = mask[t]
-                sight = marks[v0:v1]
+            sight = weigh_run(
+                t, v0, v1, middle, ring[centre[t] % ring.shape[0]], normals, mask, areas, vectors,
+                heads, sensor, distance, which, weighting, exponent, reference,
+                seen, weight, spare, turned,
+            )  # fmt: skip
             if grouped:
                 seen_count += heads_seen(sight, heads[v0:v1])
             else:
                 for v in range(n):
                     seen_count += np.int64(sight[v])
-            if exponent != 0:
-                here = ring[centre[t] % ring.shape[0]]
-                squared_ratios(here[v0:v1], distance, reference, weight[:n])
-                raise_to(weight[:n], exponent, spare[:n])
-            if weighted:
-                own = heads[v0:v1]
-                if weighting == AREA:
-                    own = areas[t, v0:v1]
-                elif weighting == PROJECTED:
-                    own = turned[:n]
-                    ax, ay, az = vectors[t, 0], vectors[t, 1], vectors[t, 2]
-                    projected(
-                        x[v0:v1], y[v0:v1], z[v0:v1], ax[v0:v1], ay[v0:v1], az[v0:v1],
-                        sx, sy, sz, own,
-                    )  # fmt: skip
-                if exponent != 0:
-                    for v in range(n):
-                        weight[v] *= own[v]
-                else:
-                    weight[:n] = own
             for sample in range(samples):
                 if scale[t, sample] <= 0:
                     continue
@@ -344,7 +358,7 @@ def needed_kernel(  # type: ignore[no-untyped-def]
     ring = np.empty((before.shape[1] + 2, vertices), positions.dtype)
     known = before[0, 0]
     for t in range(needed.shape[0]):
-        known = _extend(positions, sensor, distance, known, after[t, -1], ring)
+        known = extend(positions, sensor, distance, known, after[t, -1], ring)
         for sample in range(before.shape[1]):
             if scale[t, sample] <= 0:
                 continue

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.doppler.histogram import Counting, Frames, relative_range
+from sd2core.doppler.histogram import Counting, Frames, Scatterers, kernel_arrays, places_plain
 from sd2core.doppler.kernels import CLIP, WRAP
-from sd2core.numerics.compiled import compiled, kernels_ready
-
-PARTS = 8
-"""Number of parts per bin."""
+from sd2core.doppler.limb_kernels import PARTS, fine_kernel
+from sd2core.numerics.compiled import kernels_ready
 
 
 @dataclass(frozen=True)
@@ -79,9 +76,9 @@ def fine_histograms(
     frames: Frames,
     sensor: NDArray[np.float64],
     axis: FineAxis,
-    weights: NDArray[np.float32],
-    vertex_limb: NDArray[np.uint8],
+    scatterers: Scatterers,
     limbs: int,
+    velocity_mps: NDArray[np.float64] | None = None,
 ) -> NDArray[np.float64]:
     """Count every limb in every part of a fine axis; the mean over a frame's samples.
 
@@ -89,112 +86,45 @@ def fine_histograms(
     ----------
     sensor : float64 array, shape (3,)
         In the frame of the positions.
-    weights : float32 array, shape (n, V)
-        Weight of each vertex; 0 if it is hidden.
-    vertex_limb : uint8 array, shape (V,)
+    scatterers : Scatterers
+        Their ``parts`` are the limbs.
+    limbs : int
+    velocity_mps : float64 array, shape (n, V), optional
+        Velocities of another rule, for the frames with something to measure.
 
     Returns
     -------
-    float64 array, shape (limbs, n, parts)
+    float64 array, shape (n, limbs, parts)
     """
-    fine = np.zeros((limbs, len(frames), axis.parts))
-    precision = frames.positions.dtype
-    offset = 0.5 * axis.counting.bins + axis.room_bins
-    scale = axis.counting.scale(frames.duration_s, precision)
-    if kernels_ready():
+    limb, counting = scatterers.parts, axis.counting
+    assert limb is not None
+    if kernels_ready() and velocity_mps is None:
+        both = np.zeros((len(frames), limbs, axis.parts, 2))
         fine_kernel(
-            frames.positions, frames.before, frames.after, scale, sensor.astype(precision),
-            weights, vertex_limb, offset, PARTS, axis.periodic, fine,
+            *kernel_arrays(frames, counting, scatterers), limb.astype(np.intp),
+            sensor.astype(frames.positions.dtype), *scatterers.kinds, counting.bins,
+            axis.room_bins, counting.beyond, counting.range_exponent,
+            np.float32(counting.reference_range_m), np.full((len(frames), limbs), np.inf),
+            np.zeros(limbs, np.intp), both, np.empty((len(frames), 1, 0)),
+            np.zeros(len(frames)), np.zeros(len(frames)),
         )  # fmt: skip
-        return fine
-    for t in range(len(frames)):
+        return both[..., 0]
+    fine = np.zeros((len(frames), limbs, axis.parts))
+    for t, knot in enumerate(frames.centre):
+        points = frames.positions[knot]
+        weight = scatterers.seen(t, points, sensor) * scatterers.weights(
+            t, points, sensor, counting.range_exponent, counting.reference_range_m
+        )
         samples = np.flatnonzero(frames.duration_s[t] > 0).tolist()
         for sample in samples:
-            closer = relative_range(
-                frames.positions[frames.before[t, sample]], sensor
-            ) - relative_range(frames.positions[frames.after[t, sample]], sensor)
-            place = (offset + closer * scale[t, sample]) * PARTS
-            _add(fine[:, t], place, weights[t] / len(samples), vertex_limb, axis.periodic)
+            if velocity_mps is None:
+                f = places_plain(frames, t, sample, sensor, counting)
+            else:
+                f = counting.bins * (0.5 + 0.5 / counting.v_max_mps * velocity_mps[t])
+            number = np.floor((f + axis.room_bins) * PARTS)
+            last = axis.parts - 1
+            number = number % axis.parts if axis.periodic else np.clip(number, 0, last)
+            slot = limb * np.intp(axis.parts) + number.astype(np.intp)
+            counted = np.bincount(slot, weight / len(samples), fine[t].size)
+            fine[t] += counted.reshape(fine[t].shape)
     return fine
-
-
-def fine_histograms_of(
-    velocity_mps: NDArray[np.float64],
-    measured: NDArray[np.bool_],
-    axis: FineAxis,
-    weights: NDArray[np.float32],
-    vertex_limb: NDArray[np.uint8],
-    limbs: int,
-) -> NDArray[np.float64]:
-    """Count given velocities (n, V), in the frames that are ``measured`` (n,)."""
-    fine = np.zeros((limbs, len(velocity_mps), axis.parts))
-    per_bin = 0.5 * axis.counting.bins / axis.counting.v_max_mps
-    offset = 0.5 * axis.counting.bins + axis.room_bins
-    for t in np.flatnonzero(measured):
-        place = (offset + velocity_mps[t] * per_bin) * PARTS
-        _add(fine[:, t], place, weights[t], vertex_limb, axis.periodic)
-    return fine
-
-
-def _add(
-    into: NDArray[np.float64],  # (limbs, parts)
-    place: NDArray[Any],
-    weight: NDArray[Any],
-    vertex_limb: NDArray[np.uint8],
-    periodic: bool,
-) -> None:
-    limbs, parts = into.shape
-    number = np.floor(place)
-    number = number % parts if periodic else np.clip(number, 0, parts - 1)
-    slot = vertex_limb * np.intp(parts) + number.astype(np.intp)
-    into += np.bincount(slot, weight, limbs * parts).reshape(limbs, parts)
-
-
-@compiled
-def fine_kernel(  # type: ignore[no-untyped-def]
-    positions, before, after, scale, sensor, weights, vertex_limb, offset, per_bin, periodic, fine
-) -> None:
-    """Compiled form of :func:`fine_histograms`; ``fine`` starts as zeros."""
-    parts = fine.shape[2]
-    sx, sy, sz = np.float64(sensor[0]), np.float64(sensor[1]), np.float64(sensor[2])
-    distance = np.sqrt(sx * sx + sy * sy + sz * sz)
-    for t in range(fine.shape[1]):
-        measured = 0
-        for sample in range(before.shape[1]):
-            measured += scale[t, sample] > 0
-        for sample in range(before.shape[1]):
-            if scale[t, sample] <= 0:
-                continue
-            a, b = positions[before[t, sample]], positions[after[t, sample]]
-            for v in range(vertex_limb.shape[0]):
-                weight = weights[t, v]
-                if weight == 0:
-                    continue
-                closer = _relative(a, v, sx, sy, sz, distance) - _relative(
-                    b, v, sx, sy, sz, distance
-                )
-                number = int(np.floor((offset + closer * scale[t, sample]) * per_bin))
-                if periodic:
-                    number %= parts
-                number = min(max(number, 0), parts - 1)
-                fine[vertex_limb[v], t, number] += weight / measured
-
-
-@compiled
-def _relative(points, v, sx, sy, sz, distance):  # type: ignore[no-untyped-def]
-    x, y, z = np.float64(points[0, v]), np.float64(points[1, v]), np.float64(points[2, v])
-    qx, qy, qz = x - sx, y - sy, z - sz
-    away = np.sqrt(qx * qx + qy * qy + qz * qz)
-    difference = x * (x - 2.0 * sx) + y * (y - 2.0 * sy) + z * (z - 2.0 * sz)
-    return difference / max(away + distance, 1e-30)
-
-
-def compile_kernels() -> None:
-    """Call every kernel of this module once in single and once in double precision."""
-    knots, limbs = np.zeros((1, 1), np.int64), np.zeros(4, np.uint8)
-    for precision in (np.float32, np.float64):
-        fine_kernel(
-            np.ones((1, 3, 4), precision), knots, knots, np.ones((1, 1), precision),
-            np.zeros(3, precision), np.ones((1, 4), np.float32), limbs, 16.0, PARTS, False,
-            np.zeros((1, 1, 256)),
-        )  # fmt: skip

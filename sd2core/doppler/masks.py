@@ -57,7 +57,8 @@ class VisibilityMasks:
         self._prepared = prepared
         self._counting = counting
         live = np.ones(counting.bins + 1, np.uint8)
-        live[list(prepared.options.null_bins)] = 0
+        if not prepared.spreads:
+            live[list(prepared.options.null_bins)] = 0
         # The last entry, beyond the axis, stays live: dropped vertices change no bin,
         # but the share that is reported of them is to be right.
         self._live = live
@@ -129,7 +130,7 @@ class VisibilityMasks:
         # same masks share them. Which vertices are tested depends on the bins they fall into.
         options = self._prepared.options
         pixels = options.depth_resolution if occlusion == "depth" else None
-        needed = options.axis, options.null_bins, options.beyond
+        needed = options.axis, options.null_bins, options.beyond, self._prepared.spreads
         return ("mask", occlusion, pixels, self._stride, needed, index, position_m)
 
     def _frames(self, index: int, rows: slice) -> NDArray[np.intp]:

@@ -18,14 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.doppler.histogram import Counting, Counts, Frames, Scatterers
-from sd2core.doppler.kernels import (
-    ALL,
-    AREA,
-    FACING,
-    HEADS,
-    MASK,
-    PROJECTED,
-)
 from sd2core.doppler.moving_kernels import (
     GROUP,
     add_moving_kernel,
@@ -173,8 +165,6 @@ def count_moving(
     """
     normals, mask, areas = scatterers.normals, scatterers.mask, scatterers.areas
     vectors, heads, parts = scatterers.area_vectors, scatterers.vertex_counts, scatterers.parts
-    which = MASK if mask is not None else FACING if normals is not None else ALL
-    weighting = PROJECTED if vectors is not None else AREA if areas is not None else HEADS
     precision = moving.places.dtype
     add_moving_kernel(
         moving.vertex,
@@ -193,8 +183,7 @@ def count_moving(
         _NO_PARTS if parts is None else parts,
         moving.vertices,
         sensor.astype(precision),
-        which,
-        weighting,
+        *scatterers.kinds,
         counting.bins,
         counting.beyond,
         counting.range_exponent,

@@ -13,6 +13,7 @@ from sd2core.sensor import VelocityAxis
 Visibility = Literal["none", "facing", "depth", "exact"]
 DepthResolution = Literal[128, 256]
 Weight = Literal["count", "area", "projected"]
+Count = Literal["plain", "expected"]
 RangeLaw = Literal["vertex", "frame"]
 Beyond = Literal["drop", "wrap", "clip"]
 VelocityRule = Literal["central", "vid2doppler"]
@@ -45,6 +46,10 @@ class SynthesisOptions:
         plate seen square on gives 1). With a range law of 4 the last is the
         constant-gamma law of rough surfaces. It relies on faces that are
         oriented outwards, as the facing test does.
+    count : {"plain", "expected"}
+        A vertex counts in the bin of its velocity, or is spread over the bins as badly as the
+        mesh says that velocity to be known, as a normal distribution; of a mesh that says
+        nothing both are the same map. ``expected`` takes central differences.
     axis : VelocityAxis
         Up to 254 bins.
     null_bins : tuple of int
@@ -100,6 +105,7 @@ class SynthesisOptions:
     velocity_sigma_bins: float = 1.0
     time_sigma_s: float = 1.0 / 30.0
     null_after_smoothing: bool = True
+    count: Count = "plain"
 
     def __post_init__(self) -> None:
         for name, allowed in (
@@ -109,6 +115,7 @@ class SynthesisOptions:
             ("beyond", Beyond),
             ("range_law", RangeLaw),
             ("velocity", VelocityRule),
+            ("count", Count),
         ):
             value = getattr(self, name)
             if value not in get_args(allowed):
@@ -147,6 +154,11 @@ class SynthesisOptions:
             raise Sd2Error(
                 f"The oversampling is {self.oversampling} with vid2doppler's velocities",
                 "1: that tool works on the video's frames",
+            )
+        if self.velocity == "vid2doppler" and self.count == "expected":
+            raise Sd2Error(
+                "count is 'expected' with vid2doppler's velocities",
+                "plain: that tool counts each vertex in one bin",
             )
 
 

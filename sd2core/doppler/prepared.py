@@ -151,6 +151,11 @@ class PreparedMesh:
         return other
 
     @property
+    def spreads(self) -> bool:
+        """True if vertices are spread over bins, so that all count wherever they are."""
+        return self.options.count == "expected" and self.mesh.uncertainty is not None
+
+    @property
     def closed(self) -> bool:
         """True if the mesh is a closed surface; computed when a depth buffer first needs it."""
         faces = self._faces()
@@ -254,6 +259,10 @@ class PreparedMesh:
         """Mean vertex of each of a block's frames, float64 (n, 3)."""
         return self._kept("middles", block, self._middles)
 
+    def limb_places(self, block: Block) -> NDArray[np.float64]:
+        """Mean vertex of every limb with an uncertainty, in the camera's frame, (n, L, 3)."""
+        return self._kept("limb places", block, self._limb_places)
+
     def area_vectors(self, block: Block) -> NDArray[np.float32]:
         """Vertex area vectors of a block's frames in m², float32 (n, 3, V)."""
         return self._kept("area vectors", block, self._area_vectors)
@@ -261,7 +270,7 @@ class PreparedMesh:
     def moving(self, block: Block, counting: Counting) -> MovingVertices | None:
         """Vertices of a block that can enter a kept bin; None where counting all is as fast."""
         still = still_bins(counting.bins, self.options.null_bins)
-        if self._compatible or still <= 0 or not kernels_ready():
+        if self._compatible or self.spreads or still <= 0 or not kernels_ready():
             return None
 
         def make() -> tuple[tuple[MovingVertices | None], int]:
@@ -283,7 +292,7 @@ class PreparedMesh:
 
     def _moving_key(self, what: str, index: int) -> Hashable:
         # Blocks are shared by options with the same bin width.
-        return what, "moving", self.options.axis.bins, self.options.null_bins, index
+        return what, "moving", self.options.axis.bins, self.options.null_bins, self.spreads, index
 
     def moving_normals(self, block: Block, moving: MovingVertices) -> NDArray[np.int8]:
         """Normals of what moves in a block, as :meth:`MovingVertices.of` orders them."""
@@ -368,6 +377,15 @@ class PreparedMesh:
         heads = np.ones(self.mesh.vertex_count) if self.heads is None else self.heads
         share = heads / heads.sum(dtype=np.float64)
         return np.stack([points @ share for points in self.points(block)])
+
+    def _limb_places(self, block: Block) -> NDArray[np.float64]:
+        known = self.mesh.uncertainty
+        assert known is not None
+        limb, count = known.vertex_limb, len(known.limbs)
+        member = np.zeros((len(limb), count), np.float32)
+        member[np.arange(len(limb)), limb] = 1.0
+        member /= np.maximum(member.sum(axis=0), 1.0)
+        return (self.points(block) @ member).transpose(0, 2, 1) + self.origin_m
 
     def _areas(self, block: Block) -> NDArray[np.float32]:
         points, faces = self._at_frames(block), self._faces()

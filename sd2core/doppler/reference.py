@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.doppler import vid2doppler
+from sd2core.doppler.expected import SIGMA_FACTOR, sigma_bins, spread_over_bins
+from sd2core.doppler.histogram import counting_of
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics.compiled import kernels_ready
@@ -50,15 +52,52 @@ def reference_stretch(
             continue
         weight = weight * _range_law(mesh, options, points, place)
         seen = _visible(mesh, points, place, middle)
-        weight = weight[seen]
-        edges_mps = options.axis.edges_mps
-        folded = _on_axis(velocities[:, seen], edges_mps, options)  # (moments, seen)
-        ends_mps = float(edges_mps[0]), float(edges_mps[-1])
-        weights = np.broadcast_to(weight, folded.shape)
-        counted, _ = np.histogram(folded, options.axis.bins, ends_mps, weights=weights)
+        weights = np.broadcast_to(weight, velocities.shape)[:, seen]
+        sigma = _sigma_bins(mesh, options, points, sensor, start + column)[seen]
+        counted = _counted(velocities[:, seen], weights, sigma, options)
         raw[:, column] = counted / (len(velocities) * total)
     raw[list(options.null_bins)] = 0
     return raw
+
+
+def _counted(
+    velocities: NDArray[np.float64],
+    weights: NDArray[np.float64],
+    sigma: NDArray[np.float64],
+    options: SynthesisOptions,
+) -> NDArray[np.float64]:
+    """Weights per bin of velocities (moments, N), in m/s; those that are known are in one bin."""
+    edges_mps = options.axis.edges_mps
+    ends_mps = float(edges_mps[0]), float(edges_mps[-1])
+    known = sigma == 0
+    folded = _on_axis(velocities[:, known], edges_mps, options)
+    counted, _ = np.histogram(folded, options.axis.bins, ends_mps, weights=weights[:, known])
+    if known.all():
+        return counted
+    places = (velocities[:, ~known] - edges_mps[0]) / options.axis.bin_width_mps
+    deviations = np.broadcast_to(sigma[~known], places.shape).ravel()
+    spread = spread_over_bins(
+        places.ravel(), weights[:, ~known].ravel(), deviations, counting_of(options)
+    )
+    return np.asarray(counted + spread)
+
+
+def _sigma_bins(
+    mesh: MeshSequence,
+    options: SynthesisOptions,
+    points: NDArray[np.float64],
+    sensor: VirtualSensor,
+    frame: int,
+) -> NDArray[np.float64]:
+    """Deviation of every vertex's velocity in bins (V,), 0 where each counts in one bin."""
+    known = mesh.uncertainty
+    if known is None or options.count == "plain":
+        return np.zeros(points.shape[1])
+    limb, limbs = known.vertex_limb, len(known.limbs)
+    members = np.maximum(np.bincount(limb, minlength=limbs), 1)
+    limbs_m = np.stack([np.bincount(limb, line, limbs) / members for line in points], axis=-1)
+    found = sigma_bins(known, sensor.position_m, limbs_m[None], frame, options.axis)
+    return SIGMA_FACTOR * found[0, limb]
 
 
 def at_frames(

@@ -35,7 +35,7 @@ KERNEL_MODULES = (
     "sd2core.scattering.depth",
     "sd2core.doppler.kernels",
     "sd2core.doppler.moving_kernels",
-    "sd2core.doppler.limb_histograms",
+    "sd2core.doppler.limb_kernels",
     "sd2core.fmcw.facet",
     "sd2core.fmcw.kernels",
     "sd2core.body.skinning",

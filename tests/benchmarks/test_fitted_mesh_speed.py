@@ -13,7 +13,7 @@ from sd2core.body.limbs import LIMBS, vertex_limbs
 from sd2core.body.model import Body
 from sd2core.body.rotations import about
 from sd2core.body.skinning import pose_vertices
-from sd2core.doppler import Synthesizer
+from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.files.resources import resource_path
 from sd2core.io.mesh import load_mesh
 from sd2core.mesh.sequence import MeshSequence
@@ -61,6 +61,40 @@ def sample() -> MeshSequence:
     along = np.tile(sigma, (mesh.frame_count, 1))
     known = VelocityUncertainty(LIMBS, vertex_limbs(body), along, 0.3 * along)
     return replace(mesh, uncertainty=known)
+
+
+def test_expected_map(
+    benchmark: Any, sample: MeshSequence, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Target: an expected facing map while the sensor moves takes 30 ms on two idle cores."""
+    facing = replace(PRESETS["paper"], visibility="facing")
+    plain, spread = (
+        Synthesizer(sample, replace(facing, count=count)) for count in ("plain", "expected")
+    )
+    vertices, moves = np.array(sample.read(0, sample.frame_count)), iter(range(1, 10**6))
+
+    def moved(maker: Synthesizer) -> None:
+        place = VirtualSensor((1e-3 * next(moves), 0.0, 0.0))
+        maker.stretch(place, 0, sample.frame_count, shares=False)
+
+    for maker in (plain, spread):
+        maker.prepare()
+        moved(maker)
+    copy_s, plain_s, spread_s = np.min(
+        [
+            [best_s(one, 1) for one in (vertices.copy, lambda: moved(plain), lambda: moved(spread))]
+            for _ in range(20)
+        ],
+        axis=0,
+    )
+    with capsys.disabled():
+        print(
+            f"\nexpected facing map of {sample.frame_count} frames of {sample.vertex_count}"
+            f" vertices: {1e3 * spread_s:.1f} ms, {spread_s / plain_s:.1f} x the plain map,"
+            f" {spread_s / copy_s:.1f} x a copy of the mesh"
+        )
+    assert spread_s <= 60 * copy_s
+    benchmark.pedantic(lambda: moved(spread), rounds=10)
 
 
 def test_finding_how_well_a_map_is_known(

@@ -8,12 +8,16 @@ import numpy as np
 import pytest
 from accuracy_scenes import ball, plate, steady, swinging, together
 
+from sd2core.accuracy.cache import scene_fingerprint
 from sd2core.accuracy.measuring import measure
 from sd2core.accuracy.plans import AccuracyPlan, compared_plans, wave_plans
 from sd2core.accuracy.results import Measurement
+from sd2core.accuracy.sample import take_sample
+from sd2core.accuracy.trial import Trial
 from sd2core.doppler import PRESETS
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
 from sd2core.progress import Cancelled
 from sd2core.sensor import VirtualSensor
 
@@ -45,6 +49,28 @@ def test_every_plan_is_there_once(table: Measurement) -> None:
 def test_the_reference_plan_itself_is_right(table: Measurement) -> None:
     """In single precision only vertices at the very edge of a bin can differ."""
     assert error(table, AccuracyPlan(frame_rate_factor=8)) < 1e-3
+
+
+def test_expected_counts_are_held_against_expected_counts(scene: MeshSequence) -> None:
+    shape = scene.frame_count, 1
+    known = VelocityUncertainty(
+        ("all",), np.zeros(scene.vertex_count, int), np.full(shape, 0.2), np.full(shape, 0.1)
+    )
+    scene, finest = replace(scene, uncertainty=known), AccuracyPlan(frame_rate_factor=8)
+    spread = replace(PRESETS["paper"], count="expected")
+    found = []
+    for options in (spread, PRESETS["paper"]):
+        trial = Trial(scene, CAMERA, options, take_sample(scene, options, runs=2))
+        found.append(trial.reference(trial.sample.runs).smooth)
+        assert trial.errors(finest, trial.sample.runs).l1 < 2e-3
+    assert np.abs(found[0] - found[1]).sum() > 0.1 * found[1].sum()
+    more = replace(scene, uncertainty=known.times(2.0))
+    told = [
+        [scene_fingerprint(one, CAMERA, options, "histogram") for one in (scene, more)]
+        for options in (spread, PRESETS["paper"])
+    ]
+    assert told[0][0] != told[0][1]
+    assert told[1][0] == told[1][1]
 
 
 def test_each_setting_brings_the_map_nearer(table: Measurement) -> None:

@@ -60,7 +60,7 @@ def test_what_cannot_be_is_refused(settings: dict[str, object], message: str) ->
 
 
 def test_a_plan_changes_only_its_settings() -> None:
-    base = replace(PRESETS["paper"], velocity_sigma_bins=3.0, null_bins=())
+    base = replace(PRESETS["paper"], velocity_sigma_bins=3.0, null_bins=(), count="expected")
     plan = AccuracyPlan(visibility="depth", depth_resolution=128, mask_stride=5, range_law="frame")
     options = plan.options(base)
     assert options.visibility == "depth"
@@ -69,6 +69,7 @@ def test_a_plan_changes_only_its_settings() -> None:
     assert options.range_law == "frame"
     assert options.velocity_sigma_bins == 3.0
     assert options.null_bins == ()
+    assert options.count == "expected"
     wave = replace(AccuracyPlan(signal="direct"), blocks=4).wave(WaveOptions(coherent=False))
     assert (wave.model, wave.blocks, wave.coherent) == ("direct", 4, False)
 

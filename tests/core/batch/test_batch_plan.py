@@ -159,3 +159,8 @@ def test_sensors_of_every_kind_of_placement() -> None:
 def test_nothing_to_do_is_refused() -> None:
     with pytest.raises(Sd2Error, match="nothing is to be done"):
         plan_from_text('out = "x"\n[recordings]\nfiles = ["a"]\n', FOLDER)
+
+
+def test_the_count_of_a_plan_arrives() -> None:
+    assert Synthesise(count="expected", tolerance=0.05).options().count == "expected"
+    assert Synthesise().options().count == "plain"

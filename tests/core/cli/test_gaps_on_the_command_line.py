@@ -101,3 +101,22 @@ def test_a_radar_signal_has_none(sd2: Sd2, fitted: Path, tmp_path: Path) -> None
     said = sd2("synth", fitted, "--out", tmp_path / "m.npz", "--uncertainty", "--method", "fmcw")
     assert said.code == 1
     assert "--uncertainty is given with --method fmcw" in said.err
+
+
+def test_synth_spreads_what_is_not_known(sd2: Sd2, fitted: Path, tmp_path: Path) -> None:
+    plain, out = tmp_path / "plain.npz", tmp_path / "map.npz"
+    assert sd2("synth", fitted, "--out", plain, "--count", "plain").code == 0
+    assert sd2("synth", fitted, "--out", out, "--count", "expected", "--uncertainty").code == 0
+    spread = DopplerMap.load(out)
+    assert spread.meta["options"]["count"] == "expected"
+    assert np.abs(spread.values - DopplerMap.load(plain).values).max() > 0.01
+    assert spread.uncertainty is not None
+    assert np.abs(spread.uncertainty.expected - spread.values).max() < 1e-3
+    chosen = sd2("synth", fitted, "--out", out, "--count", "expected", "--tolerance", "5%")
+    assert chosen.code == 0, chosen.err
+    assert DopplerMap.load(out).meta["options"]["count"] == "expected"
+    said = sd2("ladder", fitted, "--count", "expected", "--quick", "--tolerance", "5%")
+    assert said.code == 0, said.err
+    said = sd2("ladder", fitted, "--count", "expected", "--method", "fmcw")
+    assert said.code == 1
+    assert "--count is given with --method fmcw" in said.err

@@ -24,6 +24,7 @@ FURTHER_OUTPUTS = {
 """What some commands write beside their result, or without one, and not by default."""
 
 SEVERAL_MEANINGS = {
+    "--count": {"N", None},  # of pictures; how vertices are counted
     "--imu": {"FILE", "LIST"},  # a real sensor's samples; places of virtual ones
     "--model": {"FILE", "FILE|NAME", "NAME", None},  # one that was trained; kind of one to train
     "--placements": {"FILE", "FILE|planned", None},  # a plan; which of those in pairs are used

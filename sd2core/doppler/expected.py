@@ -1,0 +1,146 @@
+"""Expected maps: every vertex is counted as the normal distribution of its velocity.
+
+A mesh that was fitted to a video states how badly the velocity of each limb is known
+(:class:`~sd2core.mesh.velocity_uncertainty.VelocityUncertainty`). Of the vertices of a limb, each
+is spread over the bins as N(v, σ²) around its own velocity (docs/decisions/0071). They are counted
+on a finer axis first, and each of its parts is spread from the mean velocity of what lies in it;
+where σ is small, each vertex is spread by itself. Of a raw map that is right to 1e-3.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr
+
+from sd2core.doppler import histogram
+from sd2core.doppler.histogram import (
+    Counting,
+    Counts,
+    Frames,
+    Scatterers,
+    kernel_arrays,
+    place_in_bins,
+    places_plain,
+)
+from sd2core.doppler.kernels import CLIP, WRAP
+from sd2core.doppler.limb_histograms import FineAxis
+from sd2core.doppler.limb_kernels import REACH, fine_kernel, spread_kernel
+from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
+from sd2core.numerics.compiled import kernels_ready
+from sd2core.sensor import VelocityAxis
+
+SIGMA_FACTOR = 1.0
+"""Factor on the deviations that a mesh states; still to be calibrated on filmed clips."""
+
+_FRAMES = 16
+"""Frames counted together: their fine histograms stay in the second-level cache."""
+
+
+def sigma_bins(
+    known: VelocityUncertainty,
+    sensor_m: tuple[float, float, float],
+    limbs_m: NDArray[np.float64],
+    start: int,
+    axis: VelocityAxis,
+) -> NDArray[np.float64]:
+    """Deviation of each limb's velocity towards a sensor in bins, (n, limbs).
+
+    The limbs' places (n, limbs, 3) are those of the frames from ``start`` on. A velocity that may
+    be anywhere on the axis is as good as one that may be even farther.
+    """
+    sigma_mps = known.towards(sensor_m, limbs_m, start)
+    return np.minimum(sigma_mps / axis.bin_width_mps, axis.bins)
+
+
+def count_expected(
+    frames: Frames,
+    sensor: NDArray[np.float64],
+    counting: Counting,
+    scatterers: Scatterers,
+    sigma_bins: NDArray[np.float64],
+    vertex_limb: NDArray[np.uint8],
+    into: Counts,
+) -> None:
+    """Count some frames as :func:`sd2core.doppler.histogram.count` does, each vertex spread.
+
+    ``sigma_bins`` (n, limbs) are the deviations of the limbs that ``vertex_limb`` (V,) names.
+    """
+    parts = scatterers.parts
+    number = vertex_limb.astype(np.intp)
+    if parts is not None:
+        number = number + sigma_bins.shape[1] * parts.astype(np.intp)
+    # Of the pairs of a limb and a part of the body those that there are.
+    pairs = np.flatnonzero(np.bincount(number))
+    group = np.searchsorted(pairs, number)
+    limb, part = pairs % sigma_bins.shape[1], pairs // sigma_bins.shape[1]
+    if not kernels_ready():
+        _count_plain(frames, sensor, counting, scatterers, sigma_bins[:, vertex_limb], into)
+        return
+    for first in range(0, len(frames), _FRAMES):
+        rows = slice(first, min(first + _FRAMES, len(frames)))
+        some, counts, sigma = frames.rows(rows), into.rows(rows), sigma_bins[rows, limb]
+        room = 0 if counting.beyond == WRAP else math.ceil(REACH * sigma.max()) + 1
+        fine = np.zeros((len(some), len(pairs), FineAxis(counting, room).parts, 2))
+        fine_kernel(
+            *kernel_arrays(some, counting, scatterers.rows(rows)), group,
+            sensor.astype(frames.positions.dtype), *scatterers.kinds, counting.bins, room,
+            counting.beyond, counting.range_exponent, np.float32(counting.reference_range_m),
+            sigma, part, fine, counts.histogram, counts.visible, counts.beyond,
+        )  # fmt: skip
+        spread_kernel(fine, sigma, part, counting.bins, room, counting.beyond, counts.histogram)
+
+
+def _count_plain(
+    frames: Frames,
+    sensor: NDArray[np.float64],
+    counting: Counting,
+    scatterers: Scatterers,
+    sigma: NDArray[np.float64],
+    into: Counts,
+) -> None:
+    """Count as :func:`count_expected` does, in NumPy, every vertex (n, V) by itself."""
+    histogram.count_plain(frames, sensor, counting, scatterers, into)
+    part = scatterers.parts
+    part = np.zeros(sigma.shape[1], np.uint8) if part is None else part
+    for t, knot in enumerate(frames.centre):
+        points = frames.positions[knot]
+        weight = scatterers.seen(t, points, sensor) * scatterers.weights(
+            t, points, sensor, counting.range_exponent, counting.reference_range_m
+        )
+        samples = np.flatnonzero(frames.duration_s[t] > 0).tolist()
+        into.histogram[t] = 0
+        for sample in samples:
+            place = places_plain(frames, t, sample, sensor, counting)
+            for number in range(into.histogram.shape[1]):
+                own = part == number
+                into.histogram[t, number] += spread_over_bins(
+                    place[own], weight[own] / len(samples), sigma[t, own], counting
+                )
+
+
+def spread_over_bins(
+    place: NDArray[np.float64],
+    weight: NDArray[np.float64],
+    sigma: NDArray[np.float64],
+    counting: Counting,
+) -> NDArray[np.float64]:
+    """Shares (bins,) of what lies at some places of the axis and is spread, all in bins.
+
+    All three are of shape (N,); the axis runs from 0 to ``bins``. What is known counts in one bin.
+    """
+    known, bins, turns = sigma == 0, counting.bins, 0
+    number, _ = place_in_bins(place[known], counting)
+    shares = np.bincount(number, weight[known], bins + 1)[:bins].astype(np.float64)
+    place, weight, sigma = place[~known], weight[~known], sigma[~known]
+    if counting.beyond == WRAP:
+        farthest = np.abs(place - 0.5 * bins) + 2 * REACH * sigma
+        turns = math.ceil(farthest.max(initial=0.0) / bins)
+    edges = np.arange(-turns * bins, (turns + 1) * bins + 1)
+    below = ndtr((edges - place[:, None]) / sigma[:, None])
+    if counting.beyond == CLIP:
+        below[:, 0], below[:, -1] = 0.0, 1.0
+    shares += np.diff(weight @ below).reshape(-1, bins).sum(axis=0)
+    return shares
