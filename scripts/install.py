@@ -166,34 +166,38 @@ def run(
     )
     lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
     threading.Thread(target=_read, args=(process, lines), daemon=True).start()
-    began, free = time.monotonic(), shutil.disk_usage(ROOT).free
+    began = said_s = time.monotonic()
+    free = shutil.disk_usage(ROOT).free
     fetched: dict[str, str] = {}  # size by name, of what is on its way
     with LOG.open("w", encoding="utf-8") as log:
         while True:
             try:
-                line = lines.get(timeout=SILENCE_S)
+                line = lines.get(timeout=max(0.1, said_s + SILENCE_S - time.monotonic()))
             except queue.Empty:
-                written_mb = max(0, free - shutil.disk_usage(ROOT).free) / 1e6
-                names = [f"{name} ({size})" for name, size in fetched.items()]
-                awaited = ", ".join(names[:3]) or waiting
-                passed_s = time.monotonic() - began
-                print(
-                    f"  … {passed_s:.0f} s: {written_mb:,.0f} MB written; waiting for {awaited}",
-                    flush=True,
-                )
-                continue
+                line = ""
             if line is None:
                 return process.wait()
             log.write(line)
-            if said := _worth_saying(line.strip(), fetched):
-                print("  " + said, flush=True)
+            said = _worth_saying(line.strip(), fetched)
+            if not said and time.monotonic() < said_s + SILENCE_S:
+                continue
+            if not said:
+                written_mb = max(0, free - shutil.disk_usage(ROOT).free) / 1e6
+                names = [f"{name} ({size})" for name, size in fetched.items()]
+                said = (
+                    f"… {time.monotonic() - began:.0f} s: {written_mb:,.0f} MB written; "
+                    f"waiting for {', '.join(names[:3]) or waiting}"
+                )
+            print("  " + said, flush=True)
+            said_s = time.monotonic()
 
 
 def _read(process: subprocess.Popen[str], lines: queue.SimpleQueue[str | None]) -> None:
     """Hand the lines of a program on, and None at its end."""
     assert process.stdout is not None
-    for line in process.stdout:
-        lines.put(line)
+    with process.stdout:
+        for line in process.stdout:
+            lines.put(line)
     lines.put(None)
 
 

@@ -23,11 +23,14 @@ from tools.documentation.places import DOCS, REPOSITORY
 _HOURS = "hours of training, due with the next denoisers"
 _BODY_NEXT = "half an hour of rendering and fits, due with the next lifter"
 OLD = {
-    "performance.md": "needs an idle machine for an hour; only words of the core changed",
+    "accuracy-and-speed.md": "needs an idle machine; how the plain map is counted was rearranged",
+    "performance.md": "needs an idle machine for an hour",
+    "scale.md": "needs an idle machine; batches changed in what they check",
     "fitting.md": _BODY_NEXT,
     "denoiser.md": _HOURS,
     "denoiser-comparison.md": _HOURS,
     "range-synthesis.md": _HOURS,
+    "real-pairs.md": "a quarter of an hour; nothing that it measures was meant to change",
     "classifier.md": _HOURS,
     "whole-loop.md": _HOURS,
     "paper.md": _HOURS,
