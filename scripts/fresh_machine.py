@@ -54,7 +54,7 @@ PAGE = """\
 {rows}
 
 *Time* is from typing to the window, to the picture, or to the end; *written* is what the system's
-folder grew by, with system packages and what is fetched. The environment that `make demo` makes
+folder grew by, with system packages and what is fetched.{cuda} The environment that `make demo` makes
 takes {environment_gb:.2f} GB, of which:
 
 | package | MB |
@@ -62,6 +62,10 @@ takes {environment_gb:.2f} GB, of which:
 {weights}
 | {others} others | {others_mb:.0f} |
 """
+
+CUDA = """ Where it is some 7 GB, torch's CPU
+build could not be reached for that Python, and its build for GPUs came instead."""
+WITH_CUDA = re.compile(r" [5-9],\d{3} MB \|$")
 
 
 @dataclass(frozen=True)
@@ -332,6 +336,7 @@ def write_page(rows: list[str], weights: list[tuple[str, float]]) -> None:
         commit=commit,
         machine=f"{model[1].strip() if model else 'unknown processor'}, {os.cpu_count()} cores",
         rows="\n".join(rows),
+        cuda=CUDA if any(WITH_CUDA.search(row) for row in rows) else "",
         environment_gb=sum(mb for _, mb in weights) / 1e3,
         weights="\n".join(f"| {name} | {mb:.0f} |" for name, mb in heavy),
         others=len(others),
