@@ -54,8 +54,8 @@ PAGE = """\
 {rows}
 
 *Time* is from typing to the window, to the picture, or to the end; *written* is what the system's
-folder grew by, with system packages and what is fetched.{cuda} The environment that `make demo` makes
-takes {environment_gb:.2f} GB, of which:
+folder grew by, with system packages and what is fetched.{cuda} The environment, with what tests
+need where they ran, takes {environment_gb:.2f} GB, of which:
 
 | package | MB |
 |---|---|
