@@ -14,6 +14,7 @@ from functools import cache
 from guide_pages import REPOSITORY, sd2_arguments
 
 from sd2app.command_line import full_parser
+from sd2app.manual.markup import commands_of
 from sd2core.cli.running import attach_negative_values
 from sd2core.errors import Sd2Error
 
@@ -23,12 +24,6 @@ _OF_OTHER_PROGRAMS = frozenset(
     {"--no-deps", "--only-binary", "--platform", "--python-version"}  # pip
 )
 _STANDS_FOR_ANYTHING = re.compile(r"[A-Z][A-Z_]*(?![a-z])|.*…|[{<\[]")
-
-
-def commands_of(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
-    """Commands of a parser by name."""
-    kinds = [one for one in parser._actions if isinstance(one, argparse._SubParsersAction)]
-    return {name: command for kind in kinds for name, command in kind.choices.items()}
 
 
 def parsers_of(parser: argparse.ArgumentParser = PARSER) -> Iterator[argparse.ArgumentParser]:

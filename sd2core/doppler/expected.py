@@ -107,9 +107,8 @@ def _count_plain(
     part = np.zeros(sigma.shape[1], np.uint8) if part is None else part
     for t, knot in enumerate(frames.centre):
         points = frames.positions[knot]
-        weight = scatterers.seen(t, points, sensor) * scatterers.weights(
-            t, points, sensor, counting.range_exponent, counting.reference_range_m
-        )
+        seen = scatterers.seen(t, points, sensor)
+        weight = seen * scatterers.weights(t, points, sensor, counting)
         samples = np.flatnonzero(frames.duration_s[t] > 0).tolist()
         into.histogram[t] = 0
         for sample in samples:

@@ -74,8 +74,7 @@ class Scatterers:
         row: int,
         points: NDArray[Any],
         sensor: NDArray[np.float64],
-        range_exponent: float,
-        reference_range_m: float,
+        counting: Counting,
     ) -> NDArray[np.float64]:
         """Weight of each vertex of a frame, float64 (V,); parameters as for :meth:`seen`."""
         if self.area_vectors is not None:
@@ -84,9 +83,10 @@ class Scatterers:
             weight = self.areas[row].astype(np.float64)
         else:
             weight = self.heads(points.shape[1])
-        if range_exponent:
+        if counting.range_exponent:
             distance = np.linalg.norm(points - sensor[:, None], axis=0)
-            weight = weight * range_weight(distance, range_exponent, reference_range_m)
+            law = counting.range_exponent, counting.reference_range_m
+            weight = weight * range_weight(distance, *law)
         return weight
 
     def heads(self, vertices: int) -> NDArray[np.float64]:
@@ -260,9 +260,7 @@ def count_plain(
     for t, knot in enumerate(frames.centre):
         points = frames.positions[knot]
         seen = scatterers.seen(t, points, sensor)
-        weight = scatterers.weights(
-            t, points, sensor, counting.range_exponent, counting.reference_range_m
-        )
+        weight = scatterers.weights(t, points, sensor, counting)
         into.visible[t] = heads[seen].sum()
         measured = max(1, int((frames.duration_s[t] > 0).sum()))
         for sample in np.flatnonzero(frames.duration_s[t] > 0).tolist():

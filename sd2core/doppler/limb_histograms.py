@@ -112,9 +112,8 @@ def fine_histograms(
     fine = np.zeros((len(frames), limbs, axis.parts))
     for t, knot in enumerate(frames.centre):
         points = frames.positions[knot]
-        weight = scatterers.seen(t, points, sensor) * scatterers.weights(
-            t, points, sensor, counting.range_exponent, counting.reference_range_m
-        )
+        seen = scatterers.seen(t, points, sensor)
+        weight = seen * scatterers.weights(t, points, sensor, counting)
         samples = np.flatnonzero(frames.duration_s[t] > 0).tolist()
         for sample in samples:
             if velocity_mps is None:

@@ -103,9 +103,7 @@ def count(
     for row, knot in enumerate(frames.centre):
         points = frames.positions[knot]
         seen = scatterers.seen(row, points, sensor)
-        weight = scatterers.weights(
-            row, points, sensor, counting.range_exponent, counting.reference_range_m
-        )
+        weight = scatterers.weights(row, points, sensor, counting)
         into.visible[row] = heads[seen].sum()
         # With one frame there is no velocity, not a velocity of zero.
         if frames.duration_s[row].any():

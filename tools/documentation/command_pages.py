@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from sd2app.command_line import full_parser
+from sd2app.manual.markup import commands_of
 
 WIDTH = 74  # columns of a usage line
 
@@ -26,16 +27,6 @@ def write_command_pages(folder: Path) -> None:
         # Pages that are as they were are not built again.
         if not path.is_file() or path.read_text("utf-8") != text:
             path.write_text(text, "utf-8")
-
-
-def commands_of(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
-    """Subcommands of a parser by name."""
-    return {
-        name: command
-        for action in parser._actions
-        if isinstance(action, argparse._SubParsersAction)
-        for name, command in action.choices.items()
-    }
 
 
 def _index(parser: argparse.ArgumentParser) -> str:

@@ -21,7 +21,7 @@ def notebook_text(stored: str) -> str:
 
 def command_text(parser: argparse.ArgumentParser, name: str) -> str:
     """Page of a command, of which it tells what ``--help`` prints; of all for ``index``."""
-    commands = _commands_of(parser)
+    commands = commands_of(parser)
     if name != "index":
         return "\n".join(_helps(commands[name], 1))
     rows = [
@@ -37,7 +37,8 @@ def command_text(parser: argparse.ArgumentParser, name: str) -> str:
     return f"{head} {codes}\n\n{table}\n\n{below}\n"
 
 
-def _commands_of(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
+def commands_of(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
+    """Subcommands of a parser by name."""
     subparsers = [one for one in parser._actions if isinstance(one, argparse._SubParsersAction)]
     return {name: command for one in subparsers for name, command in one.choices.items()}
 
@@ -47,7 +48,7 @@ def _helps(parser: argparse.ArgumentParser, level: int) -> Iterator[str]:
     parser.formatter_class = partial(argparse.RawDescriptionHelpFormatter, width=_COLUMNS)
     parser.color = False  # type: ignore[attr-defined, unused-ignore]
     yield f"{'#' * level} {parser.prog}\n\n```text\n{parser.format_help()}```\n"
-    for command in _commands_of(parser).values():
+    for command in commands_of(parser).values():
         yield from _helps(command, level + 1)
 
 
