@@ -14,13 +14,9 @@ from sd2core.body.lifter import FEET, Lifted, LiftedTrack
 from sd2core.body.rotations import Floats
 from sd2core.body.track import TORSO_CORNERS, Landmarks, LandmarkTrack, parts
 
-_PICTURE_SD = 0.006
-"""Standard deviation of a well visible landmark, in apparent statures: 3 pixels of 480."""
-_GUESSED_SHARE = 0.1
-"""Error across the view over that of the depth: of what is hidden both are guessed."""
-_VELOCITY_SHARE = 0.7
-"""Standard deviation of a velocity over the lifter's: depths err for long, so that their many
-frames count for too much beside the velocities."""
+_ACROSS_SHARE = 0.5
+"""Standard deviation of a landmark across the view over the lifter's: errors there are those of
+single frames, which smoothness sees through."""
 _LEAST_TRUST = 0.05
 _OUTSIDE = 0.05
 """Share of the picture's height beyond whose edges a landmark is surely a guess."""
@@ -72,24 +68,20 @@ def evidence_of(
     track: LandmarkTrack, lifted: LiftedTrack, camera: PinholeCamera, stature_m: float
 ) -> Evidence:
     """Landmarks and depths of the same frames in metres and seconds, scaled by the stature."""
-    trust = trust_of(track)
-    depth_m = stature_m * lifted.centre_depth
-    depth_sd_m = stature_m * lifted.depth_sigma / trust
-    across_sd_m = np.hypot(_PICTURE_SD * stature_m / trust, _GUESSED_SHARE * depth_sd_m)
+    moving_mps = _STEPPING_MPS * np.sqrt(1.0 - lifted.standing)
     return Evidence(
         times_s=np.array(track.timebase.times_s),
-        slopes=camera.slopes(track.image_px.astype(np.float64)),
-        slopes_sd=across_sd_m / depth_m[:, None],
+        slopes=camera.slopes(track.image_px.astype(np.float64)) + lifted.across,
+        slopes_sd=_ACROSS_SHARE * lifted.across_sigma,
         size_sd=_SIZE_SD,
         trunk=TORSO_CORNERS,
         depth_m=stature_m * lifted.depth,
-        depth_sd_m=depth_sd_m,
-        trunk_m=depth_m,
+        depth_sd_m=stature_m * lifted.depth_sigma,
+        trunk_m=stature_m * lifted.centre_depth,
         trunk_sd_m=stature_m * lifted.centre_sigma,
         velocity_mps=stature_m * lifted.velocity,
-        velocity_sd_mps=_VELOCITY_SHARE * stature_m * lifted.velocity_sigma / trust,
-        standing_sd_mps=np.hypot(_STANDING_MPS, _STEPPING_MPS * np.sqrt(1.0 - lifted.standing))
-        / trust[:, FEET],
+        velocity_sd_mps=stature_m * lifted.velocity_sigma,
+        standing_sd_mps=np.hypot(_STANDING_MPS, moving_mps) / trust_of(track)[:, FEET],
     )
 
 

@@ -37,13 +37,8 @@ _FINISHED_FRAMES = 600
 _MASK_SURE = 128
 _OUTLINES = 8
 
-# The fit's error along the view per error that the lifter states (docs/decisions/0046), and
-# across the view per error of a landmark there (docs/decisions/0022).
-_ALONG = 0.95
-_ACROSS_PER_S = 3.0
-
-_UNSEEN_MPS = 0.3
-"""Velocity deviation of limbs that are cut off or hidden; a guess, not measured."""
+_ACROSS_PER_S = 3.9
+"""Error of a fit's velocity across the view per error of a landmark there (docs/decisions/0022)."""
 
 
 def fit_motion(
@@ -116,9 +111,8 @@ class Fitting:
         if not track.present.any():
             raise Sd2Error("No frame of the video shows a person", "at least one")
         self._track, self._camera, self._stature_m = track, camera, stature_m
-        lifted = (
-            LiftedInParts(Lifter.load(), track, camera) if lift is None else lift(track, camera)
-        )
+        self._lifter = Lifter.load()
+        lifted = LiftedInParts(self._lifter, track, camera) if lift is None else lift(track, camera)
         self._evidence = EvidenceInParts(track, lifted, camera, stature_m)
         self.windows = Windows(track.present, workspace)
 
@@ -185,14 +179,18 @@ class Fitting:
 
     def _finished(self, rig: Rig, shape: BodyShape, start: int, stop: int) -> BodyFit:
         evidence, track, lifted = self._evidence.part(start, stop)
-        pose = self.windows.poses(np.arange(start, stop))
+        before = min(start, 1)
+        frames = np.arange(start - before, stop)
+        pose = self.windows.poses(frames)
         keypoints_m = rig.keypoints.positions(rig.transforms(*pose))
+        fast_mps = speed_mps(keypoints_m, self._track.timebase.times_s[frames])[before:]
+        pose, keypoints_m = pose.at(slice(before, None)), keypoints_m[before:]
         # A landmark lies on its ray; how far the trunk is, is the fit's own finding.
         trunk_m = keypoints_m[:, evidence.trunk, 2].mean(axis=1)
         seen_m = replace(evidence, trunk_m=trunk_m).points_m
         residual_m = np.linalg.norm(keypoints_m - seen_m, axis=-1)
-        sight = sight_of(track)
-        residual_m[~track.present[:, None] | (sight < _SEEN)] = np.nan
+        residual_m[~track.present[:, None] | (sight_of(track) < _SEEN)] = np.nan
+        along_sd_mps = self._lifter.fit_sigma_mps(shape.stature_m * lifted.velocity_sigma, fast_mps)
         return BodyFit(
             timebase=track.timebase,
             shape=shape,
@@ -201,15 +199,9 @@ class Fitting:
             present=track.present,
             keypoints_m=keypoints_m,
             residual_m=residual_m,
-            along_sd_mps=_there(
-                np.hypot(
-                    _ALONG * shape.stature_m * lifted.velocity_sigma,
-                    _UNSEEN_MPS * (1.0 - sight) ** 4,
-                ),
-                track.present,
-            ),
+            along_sd_mps=_there(along_sd_mps, track.present),
             across_sd_mps=_there(
-                _ACROSS_PER_S * evidence.slopes_sd * keypoints_m[..., 2], track.present
+                _ACROSS_PER_S * lifted.across_sigma * keypoints_m[..., 2], track.present
             ),
         )
 
@@ -236,6 +228,12 @@ def _thinned(rows: NDArray[np.intp], most: int) -> NDArray[np.intp]:
     if not len(rows):
         return rows
     return rows[np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(int)]
+
+
+def speed_mps(points_m: Floats, times_s: Floats) -> Floats:
+    """Speed (T, N) of points (T, N, 3) since the frame before; 0 of the first."""
+    moved_m = np.linalg.norm(np.diff(points_m, axis=0, prepend=points_m[:1]), axis=-1)
+    return np.asarray(moved_m / np.diff(times_s, prepend=times_s[0] - 1.0)[:, None])
 
 
 def _there(values: Floats, present: NDArray[np.bool_]) -> Floats:

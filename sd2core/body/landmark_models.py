@@ -100,6 +100,7 @@ class LandmarkModels:
     """Paths of the checked model files, and which landmark model it is."""
 
     detector: Path
+    follower: Path  # the full model, which is enough to follow a person
     landmarker: Path
     name: LandmarkModel
 
@@ -133,7 +134,7 @@ def landmark_models(
             raise
     cache.mkdir(parents=True, exist_ok=True)
     for package in _PACKAGES:
-        names = {DETECTOR, LANDMARKERS[model]}.intersection(package.holds)
+        names = _needed(model).keys() & package.holds
         if not all(_is_known(cache / name) for name in names):
             _fetch(package, cache, progress)
     return _checked(cache, model)
@@ -177,7 +178,7 @@ def _is_known(path: Path) -> bool:
 
 
 def _checked(folder: Path, model: LandmarkModel) -> LandmarkModels:
-    for name in (DETECTOR, LANDMARKERS[model]):
+    for name in _needed(model):
         path = folder / name
         package = next(one for one in _PACKAGES if name in one.holds)
         if not path.is_file():
@@ -193,7 +194,13 @@ def _checked(folder: Path, model: LandmarkModel) -> LandmarkModels:
                 _SHA256[name],
                 "Fetch it again with `sd2 fetch-models`",
             )
-    return LandmarkModels(folder / DETECTOR, folder / LANDMARKERS[model], model)
+    full, chosen = LANDMARKERS["full"], LANDMARKERS[model]
+    return LandmarkModels(folder / DETECTOR, folder / full, folder / chosen, model)
+
+
+def _needed(model: LandmarkModel) -> dict[str, None]:
+    """Names of the files that a search needs, each once."""
+    return dict.fromkeys((DETECTOR, LANDMARKERS["full"], LANDMARKERS[model]))
 
 
 def _take(source: Path, into: Path) -> None:

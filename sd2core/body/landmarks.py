@@ -129,7 +129,7 @@ def _found(
     if kept is not None:
         return Sightings(**kept)
     detector = PoseDetector(models.detector, threads)
-    landmarker = PoseLandmarker(models.landmarker, threads)
+    landmarker = PoseLandmarker(models.follower, threads)
     kept = store.read("start.npz")
     if kept is not None:
         x, y, size, angle = (float(value) for value in kept["roi"])

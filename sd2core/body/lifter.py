@@ -1,4 +1,4 @@
-"""Depth and motion of landmarks along the line of sight, by a small convolutional network.
+"""Depth and motion of landmarks, and where they really are in the picture, by a small network.
 
 The network was trained on simulated people (decision 18); here it only runs, on NumPy. Tracks
 of any length are lifted in blocks, as they are read.
@@ -49,18 +49,25 @@ Floats = NDArray[np.float64]
 
 
 FORMAT = "sd2-lifter"
-VERSION = 2
+VERSION = 3
 POINTS = len(LANDMARKS)
 FEET = tuple(LANDMARK[f"{place}.{side}"] for place in ("heel", "foot_index") for side in "LR")
 """Landmarks that stand still where they touch the ground."""
-OUTPUTS = 2 + 4 * POINTS + len(FEET)
-"""Root and its spread, depths and theirs, velocities and theirs; spreads as logarithms. Then the
-log odds that each of the feet stands still.
+KINDS = 7
+OUTPUTS = 2 + KINDS * POINTS + len(FEET)
+"""Root and its spread; of all landmarks the depths and their spreads, the velocities and theirs,
+what is to be added to their places in the picture (x, then y) and its spread; spreads as
+logarithms. Then the log odds that each of the feet stands still.
 
-Velocities are what is to be added to the rate of the depths, see :func:`with_rates`.
+Velocities are what is to be added to the rate of the depths, see :func:`with_rates`. What is added
+to places is in typical apparent sizes of the torso.
 """
 
+SPREADS = (1, 3, 6)
+"""Which of the KINDS are spreads."""
+
 _VELOCITIES = slice(2 + 2 * POINTS, 2 + 3 * POINTS)
+_ACROSS_X = slice(2 + 4 * POINTS, 2 + 5 * POINTS)
 STANDING = slice(OUTPUTS - len(FEET), OUTPUTS)
 
 LOG_SIGMA = (-6.0, 1.5)
@@ -68,7 +75,7 @@ LOG_SIGMA = (-6.0, 1.5)
 
 _OTHER_SIDE = [
     *(0, 1),
-    *(2 + POINTS * kind + other for kind in range(4) for other in MIRRORED),
+    *(2 + POINTS * kind + other for kind in range(KINDS) for other in MIRRORED),
     *(STANDING.start + FEET.index(MIRRORED[row]) for row in FEET),
 ]
 """Outputs of the mirror image, in the order of those of the person."""
@@ -88,6 +95,8 @@ class LiftedTrack:
     depth_sigma: Floats  # (T, 33)
     velocity: Floats  # (T, 33) of the landmark's z per second, positive away
     velocity_sigma: Floats  # (T, 33)
+    across: Floats  # (T, 33, 2) to be added to the slopes of the landmarks
+    across_sigma: Floats  # (T, 33) standard deviation of a slope after that
     standing: Floats  # (T, 4) probability that each of FEET stands still
 
     def part(self, start: int, stop: int) -> LiftedTrack:
@@ -106,10 +115,11 @@ class Lifted(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Lifter:
-    """A trained network and the calibration (OUTPUTS,) of its standard deviations."""
+    """A trained network, and how well its outputs and the fits made of them are known."""
 
     network: Network
-    calibration: Singles
+    calibration: Singles  # (OUTPUTS,) added to the logarithms of standard deviations
+    fit_law: Singles  # (2 + 33,), see :meth:`fit_sigma_mps`
     provenance: Mapping[str, Any]
 
     @classmethod
@@ -122,8 +132,20 @@ class Lifter:
             data,
         ):
             network = network_of(meta, data)
-            calibration = data["calibration"].astype(np.float32)
-        return cls(network, calibration, meta["provenance"])
+            calibration, law = (
+                data[name].astype(np.float32) for name in ("calibration", "fit_law")
+            )
+        return cls(network, calibration, law, meta["provenance"])
+
+    def fit_sigma_mps(self, lifted_mps: Floats, speed_mps: Floats) -> Floats:
+        """Standard deviation of the velocity of a fit's landmarks along the view, (T, 33).
+
+        A product of powers of the lifter's own deviation and of the landmark's speed in the fit,
+        with a factor of each landmark, as measured on fits of people not learnt from
+        (docs/decisions/0046): who moves fast is known less well.
+        """
+        logarithm = np.log(fit_law_terms(lifted_mps, speed_mps)) @ self.fit_law[:2]
+        return np.asarray(np.exp(logarithm + self.fit_law[2:]), np.float64)
 
     def outputs(self, seen: Seen, sample: Seen | None = None) -> Singles:
         """Calibrated outputs (T, OUTPUTS) of one stretch, velocities in full.
@@ -133,6 +155,11 @@ class Lifter:
         default the stretch itself.
         """
         return symmetric(self.network, seen, sample) + self.calibration
+
+
+def fit_law_terms(lifted_mps: Floats, speed_mps: Floats) -> Floats:
+    """What the law of a fit's deviations is made of, (T, 33, 2), not below what is left at rest."""
+    return np.stack([lifted_mps + 0.01, speed_mps + 0.03], axis=-1)
 
 
 def symmetric(network: Network, seen: Seen, sample: Seen | None = None) -> Singles:
@@ -148,7 +175,10 @@ def symmetric(network: Network, seen: Seen, sample: Seen | None = None) -> Singl
         back = back[::-1].copy()
         back[:, _VELOCITIES] *= -1.0
         both = ahead + back
-        total += both if view is seen else both[:, _OTHER_SIDE]
+        if view is not seen:
+            both = both[:, _OTHER_SIDE]
+            both[:, _ACROSS_X] *= -1.0
+        total += both
     return np.asarray(total / 4.0, np.float32)
 
 
@@ -164,8 +194,8 @@ def with_rates(out: Singles, size: float) -> Singles:
 
 
 def by_landmark(out: NDArray[Any]) -> NDArray[Any]:
-    """Depths, their spreads, velocities and theirs of outputs (T, OUTPUTS), as (T, 4, 33)."""
-    return out[:, 2 : STANDING.start].reshape(len(out), 4, POINTS)
+    """What outputs (T, OUTPUTS) say of the landmarks, in the order told there, (T, KINDS, 33)."""
+    return out[:, 2 : STANDING.start].reshape(len(out), KINDS, POINTS)
 
 
 def spread(logarithm: NDArray[np.floating]) -> Floats:
@@ -281,7 +311,7 @@ def _seen(track: LandmarkTrack, camera: PinholeCamera) -> Seen:
 
 def _lifted(timebase: Timebase, raw: Floats, size: Floats) -> LiftedTrack:
     root, root_spread, rest = raw[:, 0], raw[:, 1], by_landmark(raw)
-    centre = np.exp(root) / size
+    centre, unit = np.exp(root) / size, size[:, None]
     return LiftedTrack(
         timebase,
         centre,
@@ -290,5 +320,7 @@ def _lifted(timebase: Timebase, raw: Floats, size: Floats) -> LiftedTrack:
         spread(rest[:, 1]),
         rest[:, 2],
         spread(rest[:, 3]),
+        unit[..., None] * rest[:, 4:6].swapaxes(1, 2),
+        unit * spread(rest[:, 6]),
         1.0 / (1.0 + np.exp(-raw[:, STANDING])),
     )

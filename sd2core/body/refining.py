@@ -143,7 +143,12 @@ class Refiner:
         """Landmarks of the frames in between: looked at where something moves fast, or cubics."""
         known = np.flatnonzero(first)
         sizes_px = [np.nan if roi is None else roi.size_px for roi in rois]
-        slow = ~_fast(found, known, times_s, np.array(sizes_px))
+        slow = ~fast_looks(
+            times_s[known],
+            found.image_px[known],
+            found.visibility[known],
+            np.array(sizes_px)[known],
+        )
         numbers = np.array(list(between), np.intp)
         before = np.searchsorted(known, numbers) - 1
         calm = slow[before] & slow[before + 1]
@@ -184,23 +189,22 @@ def _write(found: Stretch, number: int, pose: Pose) -> None:
     found.confidence[number] = pose.confidence
 
 
-def _fast(
-    found: Stretch,
-    known: NDArray[np.intp],
+def fast_looks(
     times_s: NDArray[np.float64],
+    image_px: Singles,
+    visibility: Singles,
     sizes_px: NDArray[np.float64],
 ) -> NDArray[np.bool_]:
-    """Frames of those that are known (K,) at which a landmark that is seen moves fast.
+    """Looks (K,) at which a landmark that is seen moves fast, of places (K, 33, 2).
 
     So are those at both ends, and next to a frame without the person.
     """
-    fast = np.ones(len(known), bool)
-    if len(known) > 2:
-        moved_px = np.diff(found.image_px[known], axis=0)  # (K - 1, 33, 2)
-        rates = moved_px / np.diff(times_s[known])[:, None, None]
-        inner = known[1:-1]
-        changes = np.linalg.norm(np.diff(rates, axis=0), axis=-1) / sizes_px[inner, None]
-        hidden = (found.visibility[inner] < _VISIBLE) & np.isfinite(changes)
+    fast = np.ones(len(times_s), bool)
+    if len(times_s) > 2:
+        moved_px = np.diff(image_px, axis=0)  # (K - 1, 33, 2)
+        rates = moved_px / np.diff(times_s)[:, None, None]
+        changes = np.linalg.norm(np.diff(rates, axis=0), axis=-1) / sizes_px[1:-1, None]
+        hidden = (visibility[1:-1] < _VISIBLE) & np.isfinite(changes)
         fast[1:-1] = ~((changes < _FAST_PER_S) | hidden).all(axis=1)
     return fast
 

@@ -14,7 +14,7 @@ from sd2core.errors import Sd2Error
 from sd2core.simulate.limbs import turn_about
 from tools.fitting.motions import Action
 from tools.motion_capture.bodies import BodyMotion, moved_transforms
-from tools.motion_capture.catalogue import RATE_HZ
+from tools.motion_capture.catalogue import RATE_HZ, Role
 
 _REMEDY = "Make it: python -m tools.motion_capture drive DATA/motion MOTIONS"
 
@@ -25,11 +25,13 @@ def captured_transforms(
     action: Action,
     place_m: Floats,
     motions: Path | None,
+    role: Role,
 ) -> Floats:
     """Transforms (T, B, 3, 4) of a body's bones in the camera frame.
 
     The middle of the way lies at ``place_m`` (3,): to the right, of the floor below the camera,
-    ahead. Raises Sd2Error without the recording, or if it is shorter than the action.
+    ahead. Raises Sd2Error without the recording, if it is for another use than ``role``, or if it
+    is shorter than the action.
     """
     if motions is None:
         raise Sd2Error(f"The motion {action.trial} is not at hand", "--motions MOTIONS", _REMEDY)
@@ -37,8 +39,8 @@ def captured_transforms(
     if not path.is_file():
         raise Sd2Error(f"{path} does not exist", "a motion of that name", _REMEDY)
     motion = BodyMotion.load(path)
-    if motion.role != "measure":
-        raise Sd2Error(f"{path} is a motion to {motion.role} from", "one that only measures")
+    if motion.role != role:
+        raise Sd2Error(f"{path} is a motion to {motion.role}", f"one to {role}")
     start = round(action.start_s * RATE_HZ)
     frames = slice(start, start + round(action.length_s * RATE_HZ))
     if len(motion) < frames.stop:

@@ -44,6 +44,9 @@ _PARENTS = {
 }
 """Joints of limbs, and those that they hang on."""
 
+_MOVING_MPS = 0.1
+"""Root mean square of the true velocity of a joint from which on it moves."""
+
 _MASK = (160, 120)
 _MASK_STEP = 5
 
@@ -113,8 +116,13 @@ class ClipScore:
         Mean distance of each joint.
     aligned_m : float64 array, shape (J,)
         The same from the pelvis.
+    quiet : bool
+        True if no joint moves along the line of sight; then all joints count as moving.
     velocity : Pair
-        Of all joints and frames along the line of sight, each (n · J,).
+        Of all frames and the joints that move, along the line of sight, each (n,).
+    spread : float
+        Of these joints' velocities within a frame, fitted over true (root mean square over frames);
+        NaN of quiet clips.
     vertex_velocity_mps : float
         RMS over all vertices and frames of the velocity along the line of sight: for
         who stands still, all of it is false.
@@ -127,7 +135,7 @@ class ClipScore:
         Mean intersection over union of the fitted and the true silhouette.
     sigma : Pair or None
         ``fitted`` holds standard deviations that the fit gave for the velocities of
-        joints, ``truth`` their actual errors.
+        joints, ``truth`` their actual errors, each (n, J); NaN where a joint does not move.
     seconds_per_frame, processor_s_per_frame : float or None
         That the fit took by the clock, and on all cores together.
     unseen : Pair
@@ -146,7 +154,9 @@ class ClipScore:
     strokes: tuple[StrokeScore, ...]
     distance_m: Floats
     aligned_m: Floats
+    quiet: bool
     velocity: Pair
+    spread: float
     vertex_velocity_mps: float
     map_l1: float
     edge: Floats
@@ -235,6 +245,10 @@ def score_clip(
         )
     errors = np.stack([velocity[1] - velocity[0], apart])  # (2, T, J)
     everywhere = np.broadcast_to(measured[:, None], apart.shape)
+    moving = np.sqrt((velocity[0][measured] ** 2).mean(axis=0)) >= _MOVING_MPS
+    quiet = not moving.any()
+    moving |= quiet
+    within = [one[measured][:, moving].var(axis=1).mean() for one in velocity]
     pixels = truth.camera.project(joints[0])
     size = truth.camera.width, truth.camera.height
     out = ((pixels < 0) | (pixels > size)).any(axis=-1) & everywhere
@@ -247,14 +261,16 @@ def score_clip(
         strokes=tuple(strokes),
         distance_m=apart[measured].mean(axis=0),
         aligned_m=np.linalg.norm(aligned[1] - aligned[0], axis=-1)[measured].mean(axis=0),
-        velocity=Pair(velocity[1][measured].ravel(), velocity[0][measured].ravel()),
+        quiet=quiet,
+        velocity=Pair(*(one[measured][:, moving].ravel() for one in velocity[::-1])),
+        spread=np.nan if quiet else float(np.sqrt(within[1] / within[0])),
         vertex_velocity_mps=_vertex_velocity(pair[1], presence),
         map_l1=map_l1(maps[1], maps[0]),
         edge=np.array([rms(one[edge & measured]) for one in errors]),
         middle=np.array([rms(one[~edge & measured]) for one in errors]),
         overlap=_overlap(pair[0], pair[1], truth),
         unseen=Pair(*(_against_parents(one, out) for one in velocity[::-1])),
-        sigma=_sigma(pair[1], patches[1], errors[0], everywhere),
+        sigma=_sigma(pair[1], patches[1], errors[0], everywhere & moving),
         unseen_sigma=_sigma(pair[1], patches[1], errors[0], out),
         seconds_per_frame=None if seconds is None else seconds[0] / len(fitted.timebase),
         processor_s_per_frame=None if seconds is None else seconds[1] / len(fitted.timebase),
@@ -325,4 +341,5 @@ def _sigma(
     sigma = np.stack(
         [known.along_mps[:, known.vertex_limb[rows]].mean(axis=1) for rows in patches.rows], axis=1
     ).astype(np.float64)
-    return Pair(sigma[chosen], errors[chosen])
+    frames = chosen.any(axis=1)
+    return Pair(*(np.where(chosen, one, np.nan)[frames] for one in (sigma, errors)))

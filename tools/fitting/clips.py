@@ -40,6 +40,7 @@ from tools.fitting.captured import captured_transforms
 from tools.fitting.cast import PEOPLE, ROOMS
 from tools.fitting.motions import Action, duration_s, perform
 from tools.fitting.truth import FORMAT, VERSION, read_truth
+from tools.motion_capture.catalogue import Role
 
 FRAMES_PER_S = 30
 RESOLUTION: Resolution = "medium"
@@ -154,6 +155,20 @@ REAL_MOTION = (
     Clip(
         "arms-leaving", _captured("ui_m07_s09_e02", 0.0, 2.4, 0.0), "emil", "window", 1.3, 1.3, 52
     ),
+    Clip("towards-2", _captured("08_05", 0.0, 2.2, 0.0), "chen", "office", 4.4, 1.3, 53, 0.1),
+    Clip("towards-3", _captured("12_03", 0.0, 4.2, 10.0), "ada", "evening", 4.8, 1.0, 54),
+    Clip("away-2", _captured("08_07", 0.0, 2.2, 180.0), "femi", "studio", 3.6, 1.2, 55),
+    Clip("away-3", _captured("49_01", 0.0, 4.8, -170.0), "bo", "window", 4.2, 1.5, 56),
+    Clip("sit-front", _captured("ui_m05_s09_e08", 0.0, 2.2, 0.0), "emil", "evening", 3.0, 1.1, 57),
+    Clip("sit-back", _captured("ui_m05_s10_e02", 0.0, 2.4, 150.0), "dora", "office", 3.2, 1.2, 58),
+    Clip("reach-down", _captured("02_06", 13.0, 5.0, -10.0), "chen", "window", 3.2, 1.3, 59),
+    Clip("reach-up", _captured("ui_m10_s10_e02", 0.0, 1.6, 35.0), "femi", "office", 2.8, 1.1, 60),
+    Clip("kick-front", _captured("ui_m06_s09_e02", 0.0, 1.8, 0.0), "bo", "studio", 3.4, 1.2, 61),
+    Clip("kick-side", _captured("ui_m06_s10_e05", 0.0, 1.7, 60.0), "ada", "window", 3.6, 1.0, 62),
+    Clip("jump-2", _captured("49_02", 11.0, 5.0, -20.0), "dora", "studio", 4.0, 1.3, 63),
+    Clip("leap", _captured("49_04", 0.0, 2.0, -60.0), "chen", "evening", 4.8, 1.2, 64),
+    Clip("swordplay", _captured("02_08", 2.0, 6.0, 0.0), "emil", "office", 3.4, 1.2, 65),
+    Clip("wash", _captured("02_10", 12.0, 6.0, 30.0), "femi", "studio", 2.8, 1.3, 66),
 )
 """Clips with the motion of real people whom nothing was learnt from or tuned on; the cropped ones
 are cut off at the knees, and in one an arm leaves the picture and comes back."""
@@ -169,8 +184,19 @@ TUNING = (
     Clip("tune-8", _swipes(_HORIZONTAL, "slow"), "femi", "evening", 2.4, 1.2, 108, 0.1),
     Clip("tune-9", Action("walk", walk_m=2.6, walk_mps=0.95), "dora", "studio", 4.6, 1.2, 109),
     Clip("tune-10", Action("turn", turn_deg=(60.0, -75.0)), "ada", "window", 2.8, 1.1, 110),
+    Clip("tune-11", _captured("131_01", 1.0, 5.0, 0.0), "bo", "office", 4.4, 1.2, 111),
+    Clip("tune-12", _captured("131_03", 1.0, 5.0, -40.0), "chen", "studio", 4.2, 1.3, 112),
+    Clip("tune-13", _captured("17_10", 4.0, 5.0, 20.0), "dora", "evening", 3.2, 1.1, 113),
+    Clip("tune-14", _captured("32_01", 0.0, 2.8, 180.0), "emil", "studio", 3.8, 1.4, 114),
+    Clip("tune-15", _captured("indian_06", 4.0, 5.0, 0.0), "femi", "window", 3.4, 1.2, 115),
+    Clip("tune-16", _captured("indian_14", 4.0, 5.0, 120.0), "ada", "office", 3.8, 1.3, 116),
+    Clip("tune-17", _captured("ui_m05_s08_e02", 0.0, 2.2, 10.0), "bo", "evening", 3.2, 1.1, 117),
+    Clip("tune-18", _captured("ui_m04_s08_e02", 0.0, 2.2, 60.0), "chen", "window", 3.6, 1.2, 118),
+    Clip("tune-19", _captured("17_03", 0.0, 3.6, -90.0), "dora", "studio", 4.2, 1.0, 119),
+    Clip("tune-20", _captured("131_02", 3.0, 5.0, 170.0), "emil", "office", 4.0, 1.2, 120),
 )
-"""Other clips, by which the weights of the fit were chosen (``--clips tuning``)."""
+"""Other clips, by which the weights of the fit and its statements are chosen (``--clips tuning``);
+those with the motion of real people are of the persons whose errors calibrate."""
 
 
 ALL_CLIPS = (*CLIPS, *REAL_MOTION, *TUNING)
@@ -280,7 +306,8 @@ def scene(clip: Clip, space: ShapeSpace, motions: Path | None = None) -> Scene:
     camera = Camera(above_floor_m=clip.camera_m)
     if clip.action.kind == "captured":
         place = np.array([clip.across_m, clip.camera_m, clip.distance_m])
-        transforms = captured_transforms(space, shape, clip.action, place, motions)
+        role: Role = "calibrate" if clip in TUNING else "measure"
+        transforms = captured_transforms(space, shape, clip.action, place, motions, role)
         return Scene(shape, times_s, transforms, skeleton, (), camera)
     scale = arm_length_m(skeleton) / arm_length_m(space.base_skeleton)
     motion, spans = perform(skeleton, clip.action, times_s, clip.seed, scale)

@@ -27,6 +27,8 @@ _CLIPS = (
     ("joint_distance_m", "joints (m)"),
     ("velocity_rms_mps", "velocity error RMS (m/s)"),
     ("velocity_correlation", "correlation"),
+    ("spread_ratio", "spread"),
+    ("peak_kept", "peak kept"),
     ("map_l1", "map L1"),
 )
 _REAL = (

@@ -5,9 +5,11 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 
+from sd2core.body.landmark_models import DEFAULT_MODEL, LandmarkModel
 from sd2core.body.lifter import Lifter
 from sd2core.body.track import LANDMARKS
 from sd2core.cli.options import add_command, add_json, positive_int
@@ -19,6 +21,7 @@ from tools.motion_capture.bodies import load_motions
 from tools.train_lifter.data import load_takes, make_lifter_data
 from tools.train_lifter.deeds import Manner
 from tools.train_lifter.emulate import landmark_offsets
+from tools.train_lifter.fits import fit_law, repaired
 from tools.train_lifter.score import score
 from tools.train_lifter.swaps import score_sides
 from tools.train_lifter.takes import Take
@@ -70,6 +73,12 @@ def _add_commands(kinds: argparse._SubParsersAction) -> None:
     )
     data.add_argument("--processes", type=positive_int, default=2, metavar="P", help="(default: 2)")
     data.add_argument("--models", type=Path, metavar="FOLDER", help="the landmark models")
+    data.add_argument(
+        "--landmark-model",
+        choices=get_args(LandmarkModel),
+        default=DEFAULT_MODEL,
+        help="which of them looks (default: %(default)s)",
+    )
     train = add_command(
         kinds,
         "train",
@@ -88,6 +97,9 @@ def _add_commands(kinds: argparse._SubParsersAction) -> None:
         required=True,
         metavar="DATA",
         help="folders of takes that only calibrate: of people and motion not learnt from",
+    )
+    train.add_argument(
+        "--start", type=Path, metavar="FILE", help="a lifter to go on from (default: from nothing)"
     )
     sides = add_command(
         kinds,
@@ -149,6 +161,7 @@ def _data(options: argparse.Namespace) -> None:
             motions=options.motions,
             processes=options.processes,
             models=options.models,
+            landmark_model=options.landmark_model,
             progress=progress,
         )
     print(f"Made {made} takes in {options.out}")
@@ -156,14 +169,17 @@ def _data(options: argparse.Namespace) -> None:
 
 def _train(options: argparse.Namespace) -> None:
     check_output(options.out, ".npz")
-    takes = [take for folder in options.data for take in _takes(folder)]
+    takes = [repaired(take) for folder in options.data for take in _takes(folder)]
     kept = [take for folder in options.kept for take in _takes(folder)]
     motions = load_motions(options.motions, "learn") if options.motions else []
     from tools.train_lifter.training import Recipe, material, save_lifter, train  # needs torch
 
     with progress_bar("Training", unit="step") as progress:
         recipe = Recipe(steps=options.steps, seed=options.seed)
-        lifter = train(material(takes, kept, motions, recipe), recipe, progress)
+        start = None if options.start is None else Lifter.load(options.start)
+        lifter = train(material(takes, kept, motions, recipe), recipe, progress, start=start)
+    with progress_bar("Fitting", unit="take") as progress:
+        lifter = replace(lifter, fit_law=fit_law(kept, lifter, progress))
     save_lifter(lifter, options.out)
     print(f"Wrote {options.out}")
 

@@ -7,6 +7,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from functools import partial
 from pathlib import Path
 
+from sd2core.body.landmark_models import DEFAULT_MODEL, LandmarkModel, landmark_models
 from sd2core.processes import end_with_parent
 from sd2core.progress import Progress, silent
 from tools.motion_capture.bodies import BodyMotion, load_motions
@@ -27,6 +28,7 @@ def make_lifter_data(
     motions: Path | None = None,
     processes: int = 2,
     models: Path | None = None,
+    landmark_model: LandmarkModel = DEFAULT_MODEL,
     progress: Progress = silent,
 ) -> int:
     """Make the takes of a folder that are not there yet.
@@ -46,15 +48,15 @@ def make_lifter_data(
         ``held_out``, as the people who are kept for calibration.
     models : Path, optional
         Folder of the landmark models.
+    landmark_model : {"full", "heavy"}
+        Which of them looks.
 
     Returns
     -------
     int
         How many were made.
     """
-    from sd2core.body.landmark_models import landmark_models
-
-    landmark_models(models)
+    landmark_models(models, model=landmark_model)
     folder.mkdir(parents=True, exist_ok=True)
     missing = [n for n in range(takes) if not take_path(folder, n).exists()]
     job = partial(_make, folder, seed, held_out, manner)
@@ -64,7 +66,10 @@ def make_lifter_data(
     progress(done, takes)
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(
-        processes, mp_context=context, initializer=_start, initargs=(models, motions, held_out)
+        processes,
+        mp_context=context,
+        initializer=_start,
+        initargs=(models, landmark_model, motions, held_out),
     ) as pool:
         futures = [pool.submit(job, number) for number in missing]
         try:
@@ -88,13 +93,14 @@ def load_takes(folder: Path) -> list[Take]:
     return [Take.load(path) for path in sorted(folder.glob("take-*.npz"))]
 
 
-def _start(models: Path | None, motions: Path | None, held_out: bool) -> None:
+def _start(
+    models: Path | None, landmark_model: LandmarkModel, motions: Path | None, held_out: bool
+) -> None:
     end_with_parent()
     from sd2core.body.blazepose import PoseLandmarker
-    from sd2core.body.landmark_models import landmark_models
 
     global _maker, _motions
-    _maker = TakeMaker(PoseLandmarker(landmark_models(models).landmarker))
+    _maker = TakeMaker(PoseLandmarker(landmark_models(models, model=landmark_model).landmarker))
     if motions is not None:
         _motions = load_motions(motions, "calibrate" if held_out else "learn")
 

@@ -128,7 +128,7 @@ class Emulator:
         drawn = rng.integers(0, len(self._marks), _CANDIDATES)
         far = (((self._marks[drawn] - _marks(walk.places)) / self._spread) ** 2).sum(axis=1)
         donor = int(drawn[np.argmin(far)])
-        size = np.float32(rng.uniform(0.05, 0.8))
+        size = np.float32(rng.uniform(0.3, 1.0))
         start = 0
         part = slice(start, start + len(walk.places))
         depth = walk.places[..., 2]

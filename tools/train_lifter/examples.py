@@ -31,14 +31,14 @@ class Example(NamedTuple):
     ----------
     seen : Seen
         (T, ...).
-    depth : float32 array, shape (T, 33)
-        Z of the keypoints in statures.
+    places : float32 array, shape (T, 33, 3)
+        Keypoints in statures, in the camera frame.
     standing : float32 array, shape (T, 4)
         1 where a foot stands still, otherwise 0.
     """
 
     seen: Seen
-    depth: Singles
+    places: Singles
     standing: Singles
 
 
@@ -51,6 +51,8 @@ class Batch(NamedTuple):
     root : float32 array, shape (N, T)
         Logarithm of the centre's depth times the typical size.
     depth, velocity : float32 array, shape (N, T, 33)
+    across : float32 array, shape (N, T, 33, 2)
+        Keypoints beside the landmarks in the picture, in typical apparent sizes.
     size : float32 array, shape (N,)
         The typical apparent size.
     standing : float32 array, shape (N, T, 4)
@@ -61,6 +63,7 @@ class Batch(NamedTuple):
     root: Singles
     depth: Singles
     velocity: Singles
+    across: Singles
     size: Singles
     standing: Singles
 
@@ -76,14 +79,14 @@ def example(take: Take) -> Example:
         take.confidence,
     )
     places = take.keypoints_m / np.float32(take.stature_m)
-    return Example(seen, places[..., 2], _standing(places))
+    return Example(seen, places, _standing(places))
 
 
 def emulated(rng: np.random.Generator, emulator: Emulator, walk: Walk) -> Example:
     """Example from a motion without pictures."""
     seen = emulator.seen(rng, walk)
     seen = Seen(*(np.asarray(part, np.float32) for part in seen))
-    return Example(seen, walk.places[..., 2], _standing(walk.places))
+    return Example(seen, walk.places, _standing(walk.places))
 
 
 def _standing(places: Singles) -> Singles:
@@ -95,15 +98,18 @@ def _standing(places: Singles) -> Singles:
 def batch(examples: Sequence[Example]) -> Batch:
     """Whole examples of equal length, as they are."""
     seen = Seen(*(np.stack(parts) for parts in zip(*(e.seen for e in examples), strict=True)))
-    truth = np.stack([e.depth for e in examples])
+    places = np.stack([e.places for e in examples])
+    truth = places[..., 2]
     centre = truth[..., list(TORSO_CORNERS)].mean(axis=-1)
     size = typical_size(seen.slopes)
     root = np.log(centre * size[:, None])
+    across = (places[..., :2] / truth[..., None] - seen.slopes) / size[:, None, None, None]
     return Batch(
         features(seen),
         root.astype(np.float32),
         truth - centre[..., None],
         np.asarray(rate(truth, 1), np.float32),
+        across.astype(np.float32),
         size.astype(np.float32),
         np.stack([e.standing for e in examples]),
     )
@@ -111,24 +117,31 @@ def batch(examples: Sequence[Example]) -> Batch:
 
 def varied(rng: np.random.Generator, one: Example, length: int) -> Example:
     """A part of an example, perhaps mirrored, reversed, turned, with a gap."""
-    cut, seen, is_mirrored, is_reversed = another_view(rng, one.seen, length)
-    truth, standing = one.depth[cut], one.standing[cut]
-    if is_mirrored:
-        truth, standing = truth[:, list(MIRRORED)], standing[:, _OTHER_FEET]
-    if is_reversed:
-        truth, standing = truth[::-1], standing[::-1]
+    view = another_view(rng, one.seen, length)
+    seen, places, standing = view.seen, one.places[view.cut], one.standing[view.cut]
+    if view.is_mirrored:
+        places = places[:, list(MIRRORED)] * np.array([-1.0, 1.0, 1.0], np.float32)
+        standing = standing[:, _OTHER_FEET]
+    if view.is_reversed:
+        places, standing = places[::-1], standing[::-1]
+    places = np.concatenate([places[..., :2] @ view.turn, places[..., 2:]], axis=-1)
     if rng.random() < _GAP_SHARE:
         seen = _bridged(rng, seen)
-    return Example(seen, truth, standing)
+    return Example(seen, places, standing)
 
 
-def another_view(
-    rng: np.random.Generator, seen: Seen, length: int
-) -> tuple[slice, Seen, bool, bool]:
-    """A part of a stretch, perhaps its mirror image, perhaps played backwards, a little turned.
+class Variation(NamedTuple):
+    """A part of a stretch, perhaps its mirror image, perhaps played backwards, a little turned."""
 
-    Returns which part, what is seen of it, and whether it is mirrored and reversed.
-    """
+    seen: Seen
+    cut: slice
+    is_mirrored: bool
+    is_reversed: bool
+    turn: Singles  # (2, 2), of places in the picture, from the right
+
+
+def another_view(rng: np.random.Generator, seen: Seen, length: int) -> Variation:
+    """A random variation of a stretch."""
     start = int(rng.integers(0, len(seen.sure) - length + 1))
     cut = slice(start, start + length)
     view = Seen(*(np.array(part[cut]) for part in seen))
@@ -140,7 +153,7 @@ def another_view(
     world = np.asarray(view.world_m)
     turned = np.concatenate([world[..., :2] @ turn, world[..., 2:]], axis=-1)
     view = view._replace(slopes=np.asarray(view.slopes) @ turn, world_m=turned)
-    return cut, view, is_mirrored, is_reversed
+    return Variation(view, cut, is_mirrored, is_reversed, turn)
 
 
 def _bridged(rng: np.random.Generator, seen: Seen) -> Seen:

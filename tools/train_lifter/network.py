@@ -68,6 +68,27 @@ class TemporalNetwork(nn.Module):
         last = nn.functional.silu(_normed(state, self.last_gain))
         return cast(torch.Tensor, self.leave(last))
 
+    @classmethod
+    def going_on(cls, start: Network, dropout: float) -> TemporalNetwork:
+        """The network whose weights are those of one in NumPy."""
+        a = {
+            name: torch.from_numpy(array.astype(np.float32)) for name, array in start.arrays.items()
+        }
+        mean, spread = start.arrays["mean"], start.arrays["spread"]
+        width, outputs = a["leave"].shape
+        network = cls(mean, spread, width, start.dilations, dropout, outputs)
+        layers = {"enter": a["enter"].T, "leave": a["leave"].T} | {
+            f"flat.{n}": matrix.T for n, matrix in enumerate(a["flat"])
+        }
+        weights = {f"{name}.weight": matrix for name, matrix in layers.items()}
+        weights |= {f"wide.{n}.weight": w.permute(2, 1, 0) for n, w in enumerate(a["wide"])}
+        for name in ("wide", "flat"):
+            weights |= {f"{name}.{n}.bias": bias for n, bias in enumerate(a[f"{name}_bias"])}
+        weights |= {"enter.bias": a["enter_bias"], "leave.bias": a["leave_bias"]}
+        weights |= {name: a[name] for name in ("mean", "spread", "gain", "last_gain")}
+        network.load_state_dict(weights)
+        return network
+
     def exported(self) -> Network:
         """The same network in NumPy."""
         wide = [cast(nn.Conv1d, layer) for layer in self.wide]

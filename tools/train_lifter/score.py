@@ -13,6 +13,7 @@ from sd2core.body.lifter import Lifter, by_landmark, spread
 from sd2core.body.lifter_features import rate
 from sd2core.body.track import LANDMARKS, TORSO_CORNERS
 from tools.train_lifter.examples import Batch, Example, batch, example
+from tools.train_lifter.fits import repaired
 from tools.train_lifter.takes import Take
 
 Floats = NDArray[np.floating]
@@ -102,7 +103,7 @@ def score(lifter: Lifter, takes: Sequence[Take]) -> Score:
     errors, truths, depths, sigmas, inside, frames = [], [], [], [], [], []
     still, distances, squares = [], [], []
     for take in takes:
-        one = example(take)
+        one = example(repaired(take))
         right, said = batch([one]), by_landmark(lifter.outputs(one.seen))
         distances.append(_distance(lifter, right))
         squares.append(take.stature_m**2 * _squares(one, right, said, take.stature_m))

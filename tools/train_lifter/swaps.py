@@ -74,11 +74,11 @@ def known_of(take: Take) -> Known:
 
 def varied(rng: np.random.Generator, one: Known, frames: int) -> Known:
     """A part of a stretch, perhaps its mirror image, reversed and turned."""
-    cut, seen, _, is_reversed = another_view(rng, one.seen, frames)
-    wrong, weight = one.mirrored[cut], one.weight[cut]
-    if is_reversed:
+    view = another_view(rng, one.seen, frames)
+    wrong, weight = one.mirrored[view.cut], one.weight[view.cut]
+    if view.is_reversed:
         wrong, weight = wrong[::-1], weight[::-1]
-    return Known(seen, wrong, weight)
+    return Known(view.seen, wrong, weight)
 
 
 def spoilt(rng: np.random.Generator, one: Known) -> Known:

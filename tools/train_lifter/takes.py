@@ -5,16 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.body.blazepose import CLOSE_UP, PoseLandmarker, Roi
+from sd2core.body.blazepose import CLOSE_UP, Pose, PoseLandmarker, Roi
 from sd2core.body.camera import PinholeCamera
-from sd2core.body.rig import Keypoints, KeypointSpace, Rig
-from sd2core.body.rotations import Floats
+from sd2core.body.initial import Pose as BodyPose
+from sd2core.body.landmark_repair import on_cubics
+from sd2core.body.refining import fast_looks
+from sd2core.body.rig import JOINT, Keypoints, KeypointSpace, Rig
+from sd2core.body.rotations import Floats, from_vector
 from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.body.skinning import pose_vertices
 from sd2core.body.track import LANDMARKS
@@ -39,10 +43,17 @@ FRAMES = 96
 _HIPS = [LANDMARKS.index("hip.L"), LANDMARKS.index("hip.R")]
 _ROI_FOLLOWS = 0.25
 _WALKS_MPS = 0.4
+_PACE = 0.22
 _SLOWEST = 0.4
 """Pace below which a motion is too short for a take."""
 _FURNISHED = 0.25
 _LOST = 0.5
+_OTHER_ARMS = 0.2
+_ARMS = [
+    JOINT[f"{name}.{side}"]
+    for name in ("clavicle", "shoulder", "elbow", "pronation", "wrist")
+    for side in "LR"
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,14 +160,14 @@ class Stage:
     ) -> Scene:
         """A random body in a part of a real person's motion, seen from anywhere around.
 
-        The motion may be reversed, and up to a fifth faster or slower than it was; a short one is
-        drawn out.
+        The motion may be reversed, and up to a quarter faster or slower than it was; a short one
+        is drawn out. The arms may move as in another recording.
         """
         share = np.array([_weight(motion) for motion in motions])
         share /= share.sum()
         while True:
             motion = motions[int(rng.choice(len(motions), p=share))]
-            pace = float(np.exp(rng.uniform(-0.18, 0.18)))
+            pace = float(np.exp(rng.uniform(-_PACE, _PACE)))
             needed = math.ceil((frames - 1) * pace) + 1
             if len(motion) < needed:
                 pace, needed = (len(motion) - 1) / (frames - 1), len(motion)
@@ -169,6 +180,8 @@ class Stage:
             rig = Rig(whole, keypoints)
             own = self.space.skeleton(motion.shape)
             pose = motion.pose_on(whole, own, slice(start, start + needed))
+            if rng.random() < _OTHER_ARMS:
+                pose = _with_arms(rng, pose, motions[int(rng.choice(len(motions), p=share))])
             ticks = np.arange(frames, dtype=np.float64) * pace
             pose = resample_pose(pose, np.arange(needed, dtype=float), ticks)
             if rng.random() < 0.5:
@@ -188,6 +201,17 @@ def _scene(shape: BodyShape, keypoints: Keypoints, view: View, transforms: Float
         keypoints.positions(transforms),
         transforms[:, keypoints.bones, :, :3],
     )
+
+
+def _with_arms(rng: np.random.Generator, pose: BodyPose, other: BodyMotion) -> BodyPose:
+    """A pose whose arms move as in a part of another motion; as it is where that is too short."""
+    frames = len(pose.turns)
+    if len(other) < frames:
+        return pose
+    start = int(rng.integers(0, len(other) - frames + 1))
+    turns = pose.turns.copy()
+    turns[:, _ARMS] = from_vector(other.vectors[start : start + frames, _ARMS])
+    return BodyPose(turns, pose.translation_m)
 
 
 def _weight(motion: BodyMotion) -> float:
@@ -267,25 +291,57 @@ class TakeMaker:
         vertices: NDArray[np.float32],
         places_px: Floats,
     ) -> dict[str, NDArray[np.float32]]:
-        """Output of the network for every frame, the square following the person."""
+        """Landmarks of every frame as the second pass over a video gives them.
+
+        Every other frame is looked at, the square following the person, and those in between
+        where something moves fast; the others follow by cubics.
+        """
         roi = self._landmarker.on_crop(*_first(rng, painter, vertices[0], places_px[0])).next_roi
-        poses = []
-        for frame, surface in enumerate(vertices):
-            # As the tracker's second pass looks.
-            near = roi.scaled(CLOSE_UP)
-            pose = self._landmarker.on_both_sides(painter.crop(surface, near), near)
-            poses.append(pose)
-            if pose.confidence < _LOST:
+        frames = len(vertices)
+        looks = np.append(np.arange(0, frames - 1, 2), frames - 1)
+        poses: dict[int, Pose] = {}
+        for frame in looks:
+            poses[frame] = self._look(painter, vertices[frame], roi)
+            if poses[frame].confidence < _LOST:
                 roi = _around(places_px[frame])
             else:
-                roi = _towards(roi, pose.next_roi)
-        return {
-            "image_px": np.array([pose.image_px[:33] for pose in poses], np.float32),
-            "depth_px": np.array([pose.depth_px for pose in poses], np.float32),
-            "world_m": np.array([pose.world_m for pose in poses], np.float32),
-            "visibility": np.array([pose.visibility * pose.presence for pose in poses], np.float32),
-            "confidence": np.array([pose.confidence for pose in poses], np.float32),
-        }
+                roi = _towards(roi, poses[frame].next_roi)
+        times_s = np.arange(frames) / RATE_HZ
+        told = _told([poses[frame] for frame in looks])
+        sizes_px = np.array([poses[frame].roi.size_px for frame in looks]) / CLOSE_UP
+        fast = fast_looks(times_s[looks], told["image_px"], told["visibility"], sizes_px)
+        for before, after in pairwise(range(len(looks))):
+            if fast[before] or fast[after]:
+                for frame in range(looks[before] + 1, looks[after]):
+                    near = poses[looks[before]].next_roi
+                    poses[frame] = self._look(painter, vertices[frame], near)
+        known = sorted(poses)
+        between = np.setdiff1d(np.arange(frames), known)
+        found = {}
+        for name, values in _told([poses[frame] for frame in known]).items():
+            found[name] = np.full((frames, *values.shape[1:]), np.nan, np.float32)
+            found[name][known] = values
+            empty = np.isin(np.arange(frames), between)
+            found[name] = on_cubics(times_s, found[name], empty).astype(np.float32)
+        np.clip(found["visibility"], 0.0, 1.0, out=found["visibility"])
+        sure = found["confidence"]
+        sure[between] = np.minimum(sure[between - 1], sure[between + 1])
+        return found
+
+    def _look(self, painter: CropPainter, surface: NDArray[np.float32], roi: Roi) -> Pose:
+        near = roi.scaled(CLOSE_UP)
+        return self._landmarker.on_both_sides(painter.crop(surface, near), near)
+
+
+def _told(poses: Sequence[Pose]) -> dict[str, NDArray[np.float32]]:
+    """What is kept of some looks."""
+    return {
+        "image_px": np.array([pose.image_px[:33] for pose in poses], np.float32),
+        "depth_px": np.array([pose.depth_px for pose in poses], np.float32),
+        "world_m": np.array([pose.world_m for pose in poses], np.float32),
+        "visibility": np.array([pose.visibility * pose.presence for pose in poses], np.float32),
+        "confidence": np.array([pose.confidence for pose in poses], np.float32),
+    }
 
 
 def _first(

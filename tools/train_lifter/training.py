@@ -12,13 +12,16 @@ from numpy.typing import NDArray
 
 from sd2core.body.lifter import (
     FORMAT,
+    KINDS,
     LOG_SIGMA,
     OUTPUTS,
     POINTS,
+    SPREADS,
     STANDING,
     VERSION,
     Lifter,
     by_landmark,
+    spread,
     symmetric,
 )
 from sd2core.body.lifter_features import RATE_HZ
@@ -28,6 +31,7 @@ from sd2core.progress import Progress, silent
 from tools.motion_capture.bodies import BodyMotion
 from tools.train_lifter.emulate import Emulator, Walk, captured_walks, random_walks
 from tools.train_lifter.examples import Batch, Example, batch, emulated, example, varied
+from tools.train_lifter.fits import repaired
 from tools.train_lifter.network import TemporalNetwork, save_network, trained
 from tools.train_lifter.takes import Take
 
@@ -55,7 +59,7 @@ class Recipe:
         Of each example.
     rate : float
         Of learning, at its highest.
-    velocity, depth, root, change : float
+    velocity, depth, across, root, change : float
         Weights of the losses; ``change`` is that of the depths' differences over
         1, 2 and 4 frames.
     walks : int
@@ -66,16 +70,17 @@ class Recipe:
     dilations: tuple[int, ...] = (1, 2, 4, 8, 16, 4, 1)
     dropout: float = 0.1
     steps: int = 12000
-    emulated_share: float = 0.25
-    captured_share: float = 0.4
+    emulated_share: float = 0.15
+    captured_share: float = 0.35
     batch: int = 24
     frames: int = 80
     rate: float = 1.5e-3
     velocity: float = 1.0
     depth: float = 4.0
+    across: float = 4.0
     root: float = 2.0
     change: float = 0.3
-    walks: int = 1000
+    walks: int = 1500
     seed: int = 0
 
 
@@ -83,9 +88,9 @@ class Recipe:
 class Material:
     """What a lifter is trained and calibrated on."""
 
-    takes: Sequence[Take]
+    takes: Sequence[Take]  # repaired
     kept: Sequence[Take]
-    """Of other people, or other motion; they calibrate the spreads."""
+    """Of other people, or other motion, as they are; they calibrate the spreads."""
     emulator: Emulator | None = None
     walks: Sequence[Walk] = ()
     captured: Sequence[Walk] = ()
@@ -113,6 +118,7 @@ def train(
     recipe: Recipe,
     progress: Progress = silent,
     log: Callable[[str], None] | None = None,
+    start: Lifter | None = None,
 ) -> Lifter:
     """Train a lifter; deterministic for the same material, recipe, machine and threads.
 
@@ -120,15 +126,20 @@ def train(
     ----------
     log : callable, optional
         Told the losses now and then.
+    start : Lifter, optional
+        What to go on from, whose width counts; otherwise random weights.
     """
     torch.manual_seed(recipe.seed)
     rng = np.random.default_rng(recipe.seed)
     learnt = [example(take) for take in known.takes]
-    told = np.concatenate([batch([one]).told[0] for one in learnt[:200]])
-    spread = np.maximum(told.std(axis=0), 1e-3)
-    network = TemporalNetwork(
-        told.mean(axis=0), spread, recipe.width, recipe.dilations, recipe.dropout, OUTPUTS
-    )
+    if start is not None:
+        network = TemporalNetwork.going_on(start.network, recipe.dropout)
+    else:
+        told = np.concatenate([batch([one]).told[0] for one in learnt[:200]])
+        deviation = np.maximum(told.std(axis=0), 1e-3)
+        network = TemporalNetwork(
+            told.mean(axis=0), deviation, recipe.width, recipe.dilations, recipe.dropout, OUTPUTS
+        )
 
     def lost() -> tuple[torch.Tensor, dict[str, float]]:
         drawn = _drawn(rng, learnt, known, recipe)
@@ -137,13 +148,15 @@ def train(
     exported = trained(network, recipe.steps, recipe.rate, lost, progress, log)
     return Lifter(
         exported,
-        calibration(exported, [example(take) for take in known.kept]),
+        calibration(exported, [example(repaired(take)) for take in known.kept]),
+        np.zeros(2 + POINTS, np.float32),
         {
             "recipe": asdict(recipe),
             "takes": len(known.takes),
             "kept": len(known.kept),
             "walks": len(known.walks),
             "captured": len(known.captured),
+            "start": None if start is None else dict(start.provenance),
         },
     )
 
@@ -169,12 +182,13 @@ def losses(
 ) -> tuple[torch.Tensor, dict[str, float]]:
     """The loss and its parts; spreads learn from errors, but errors not from spreads."""
     weights = torch.from_numpy(landmark_weights())
-    rest = out[..., 2 : STANDING.start].unflatten(-1, (4, POINTS))
-    root, depth, velocity, size, standing = (torch.from_numpy(part) for part in truth[1:])
+    rest = out[..., 2 : STANDING.start].unflatten(-1, (KINDS, POINTS))
+    root, depth, velocity, across, size, standing = (torch.from_numpy(part) for part in truth[1:])
     root_error = out[..., 0] - root
     depth_error = rest[..., 0, :] - depth
     centre = torch.exp(out[..., :1].detach()) / size[:, None, None] * _rate(out[..., :1])
     velocity_error = rest[..., 2, :] + _rate(rest[..., 0, :]) + centre - velocity
+    across_error = rest[..., 4:6, :].transpose(-1, -2) - across
     change = sum(
         (_huber((depth_error[:, k:] - depth_error[:, :-k]) * 30.0 / k, 1.0) * weights).mean()
         for k in (1, 2, 4)
@@ -182,6 +196,7 @@ def losses(
     parts = {
         "velocity": recipe.velocity * (_huber(velocity_error, 0.6) * weights).mean(),
         "depth": recipe.depth * (_huber(depth_error, 0.15) * weights).mean(),
+        "across": recipe.across * (_huber(across_error, 0.1) * weights[:, None]).mean(),
         "root": recipe.root * _huber(root_error, 0.2).mean(),
         "change": recipe.change * change,
         "standing": _STANDING_WEIGHT
@@ -191,6 +206,7 @@ def losses(
             _likelihood(root_error, out[..., 1]).mean()
             + _likelihood(depth_error, rest[..., 1, :]).mean()
             + _likelihood(velocity_error, rest[..., 3, :]).mean()
+            + _likelihood(across_error, rest[..., 6, :, None]).mean()
         ),
     }
     total = torch.stack([torch.as_tensor(part) for part in parts.values()]).sum()
@@ -229,31 +245,33 @@ def calibration(network: Network, kept: Sequence[Example]) -> Singles:
     """Offsets of the logarithms of spreads with which 68 % of errors lie within."""
     ratios = []
     for one in kept:
-        truth = batch([one])
-        out = symmetric(network, one.seen)
-        error, log_sigma = errors(out, truth)
-        ratios.append(np.abs(error) / np.exp(np.clip(log_sigma, *LOG_SIGMA)))
-    share = np.quantile(np.concatenate(ratios), 0.68, axis=0)  # (1 + 33 + 33,)
+        truth, out = batch([one]), symmetric(network, one.seen)
+        rest = by_landmark(out)
+        error = [
+            (rest[:, 0] - truth.depth[0])[None],
+            (rest[:, 2] - truth.velocity[0])[None],
+            rest[:, 4:6].swapaxes(0, 1) - truth.across[0].transpose(2, 0, 1),
+        ]
+        root = np.abs(out[:, 0] - truth.root[0]) / spread(out[:, 1])
+        ratios.append(
+            [root, *(np.abs(e) / spread(rest[:, k]) for e, k in zip(error, SPREADS, strict=True))]
+        )
     added = np.zeros(OUTPUTS, np.float32)
-    logs = np.log(np.maximum(share, 1e-3))
-    added[1] = logs[0]
-    added[2 + POINTS : 2 + 2 * POINTS] = logs[1 : 1 + POINTS]
-    added[2 + 3 * POINTS : STANDING.start] = logs[1 + POINTS :]
+    roots, *others = zip(*ratios, strict=True)
+    added[1] = _covering(np.concatenate(roots))
+    for kind, own in zip(SPREADS, others, strict=True):
+        first = 2 + kind * POINTS
+        added[first : first + POINTS] = _covering(np.concatenate(own, axis=1).reshape(-1, POINTS))
     return added
 
 
-def errors(out: Singles, truth: Batch) -> tuple[Singles, Singles]:
-    """Errors of root, depths and velocities of one example, and their log spreads, (T, 67)."""
-    rest = by_landmark(out)
-    error = [out[:, :1] - truth.root[0][:, None], rest[:, 0] - truth.depth[0]]
-    error.append(rest[:, 2] - truth.velocity[0])
-    return (
-        np.concatenate(error, axis=1),
-        np.concatenate([out[:, 1:2], rest[:, 1], rest[:, 3]], axis=1),
-    )
+def _covering(ratios: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Logarithm of what 68 % of the rows of ratios (n, ...) are below."""
+    return np.asarray(np.log(np.maximum(np.quantile(ratios, 0.68, axis=0), 1e-3)))
 
 
 def save_lifter(lifter: Lifter, path: Path) -> None:
     """Write a lifter, its weights in half precision."""
     meta = {"format": FORMAT, "version": VERSION, "provenance": dict(lifter.provenance)}
-    save_network(lifter.network, path, meta, {"calibration": lifter.calibration})
+    more = {"calibration": lifter.calibration, "fit_law": lifter.fit_law}
+    save_network(lifter.network, path, meta, more)

@@ -88,22 +88,24 @@ def test_what_is_half_visible_beside_an_edge_was_not_seen() -> None:
     assert drawn_in[1] == 0.05 < trust_of(drawn_in[0])[0, wrist]
 
 
-def test_what_is_guessed_in_depth_is_guessed_across_the_view() -> None:
+def test_landmarks_are_where_the_lifter_says_and_as_sure_as_it_says() -> None:
     camera, wrist = PinholeCamera(640, 480, 600.0), LANDMARK["wrist.L"]
-
-    def across_m(depth_sigma: float) -> float:
-        ones, spread = np.ones((1, 33)), np.full((1, 33), 0.01)
-        spread[0, wrist] = depth_sigma
-        lifted = LiftedTrack(
-            Timebase(np.zeros(1)),
-            *(2.0 * ones[:, 0], 0.1 * ones[:, 0], 0.0 * ones, spread),
-            *(0.0 * ones, ones, ones[:, :4]),
-        )
-        evidence = evidence_of(track(320.0, 1.0), lifted, camera, 1.7)
-        return float(evidence.slopes_sd[0, wrist] * evidence.trunk_m[0])
-
-    plain_m, guessed_m = across_m(0.0), across_m(0.3)
-    np.testing.assert_allclose(guessed_m**2 - plain_m**2, (0.1 * 0.3 * 1.7) ** 2, rtol=1e-6)
+    ones = np.ones((1, 33))
+    across, across_sigma = np.zeros((1, 33, 2)), 0.004 * ones
+    across[0, wrist], across_sigma[0, wrist] = (0.02, -0.01), 0.04
+    lifted = LiftedTrack(
+        Timebase(np.zeros(1)),
+        *(2.0 * ones[:, 0], 0.1 * ones[:, 0], 0.0 * ones, 0.01 * ones),
+        *(0.0 * ones, ones, across, across_sigma, ones[:, :4]),
+    )
+    seen = track(320.0, 1.0)
+    evidence = evidence_of(seen, lifted, camera, 1.7)
+    plain = camera.slopes(seen.image_px.astype(np.float64))
+    np.testing.assert_allclose(evidence.slopes[0, wrist] - plain[0, wrist], [0.02, -0.01])
+    ratio = evidence.slopes_sd / evidence.slopes_sd[0, 0]
+    np.testing.assert_allclose(ratio[0, wrist], 10.0)
+    np.testing.assert_allclose(np.delete(ratio, wrist), 1.0)
+    np.testing.assert_allclose(evidence.depth_sd_m, 0.017)
 
 
 def fitted(residual_m: float, **share: float) -> FittedMotion:

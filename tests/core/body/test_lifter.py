@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.lifter import OUTPUTS, LiftedInParts, LiftedTrack, Lifter
@@ -155,6 +157,7 @@ def test_sides_and_directions_of_time_are_treated_alike(lifter: Lifter) -> None:
     mirror = lifted_by(lifter, _track(places[:, sides] * [-1.0, 1.0, 1.0]), CAMERA)
     np.testing.assert_allclose(mirror.velocity[:, sides], plain.velocity, atol=2e-3)
     np.testing.assert_allclose(mirror.centre_depth, plain.centre_depth, rtol=1e-3)
+    np.testing.assert_allclose(mirror.across[:, sides], plain.across * [-1.0, 1.0], atol=1e-4)
     backwards = lifted_by(lifter, _track(places[::-1]), CAMERA)
     np.testing.assert_allclose(-backwards.velocity[::-1], plain.velocity, atol=2e-3)
     np.testing.assert_allclose(backwards.depth_sigma[::-1], plain.depth_sigma, rtol=1e-2)
@@ -181,6 +184,41 @@ def test_the_frame_rate_does_not_matter(lifter: Lifter) -> None:
     inner = slice(5, -5)
     difference = twice.velocity[::2][inner] - plain.velocity[inner]
     assert np.sqrt(np.mean(difference**2)) < 0.25 * plain.velocity[inner].std()
+
+
+@given(
+    st.lists(st.floats(0.0, 2.0), min_size=2, max_size=2),
+    st.floats(0.0, 3.0),
+    st.floats(0.0, 8.0),
+    st.floats(-3.0, 1.0),
+)
+def test_deviations_of_a_fit_are_a_product_of_powers(
+    lifter: Lifter, powers: list[float], lifted_mps: float, speed_mps: float, factor: float
+) -> None:
+    law = replace(lifter, fit_law=np.array([*powers, *[factor] * 33]))
+    ones = np.ones((1, 33))
+    sigma = law.fit_sigma_mps(lifted_mps * ones, speed_mps * ones)
+    wanted = np.exp(factor) * (lifted_mps + 0.01) ** powers[0] * (speed_mps + 0.03) ** powers[1]
+    np.testing.assert_allclose(sigma, wanted, rtol=1e-9)
+
+
+def test_a_limb_that_is_not_seen_is_known_less_well(lifter: Lifter) -> None:
+    wrist = LANDMARKS.index("wrist.R")
+    places, _ = _moving(4, 2.0, still=False)
+    track = _track(places)
+    hidden = track.visibility.copy()
+    hidden[:, wrist] = 0.02
+    seen, unseen = (
+        lifted_by(lifter, replace(track, visibility=one), CAMERA)
+        for one in (track.visibility, hidden)
+    )
+    for name in ("velocity_sigma", "across_sigma"):
+        known, guessed = (np.median(getattr(one, name)[:, wrist]) for one in (seen, unseen))
+        assert guessed > 1.05 * known
+
+
+def test_who_moves_fast_is_known_less_well(lifter: Lifter) -> None:
+    assert (lifter.fit_law[:2] > 0.0).all()
 
 
 @pytest.mark.parametrize("frames", [1, 2, 3])

@@ -102,12 +102,24 @@ def test_velocities_of_examples_are_those_of_the_truth(takes: list[Take]) -> Non
 def test_varied_examples_keep_what_is_seen_and_true_together(takes: list[Take]) -> None:
     # A landmark model that is right: depth it says and truth stay the same through all changes.
     one = example(takes[2])
-    right = one._replace(seen=one.seen._replace(depth=one.depth.copy()))
+    right = one._replace(seen=one.seen._replace(depth=one.places[..., 2].copy()))
     rng = np.random.default_rng(2)
     for _ in range(12):
         other = varied(rng, right, 16)
         whole = other.seen.sure > 0
-        np.testing.assert_array_equal(np.asarray(other.seen.depth)[whole], other.depth[whole])
+        depth = np.asarray(other.seen.depth)
+        np.testing.assert_array_equal(depth[whole], other.places[whole][..., 2])
+
+
+def test_varied_examples_keep_places_where_they_are_in_the_picture(takes: list[Take]) -> None:
+    # Landmarks that lie on the keypoints stay there, mirrored, turned and reversed.
+    one = example(takes[2])
+    right = one._replace(seen=one.seen._replace(slopes=one.places[..., :2] / one.places[..., 2:]))
+    rng = np.random.default_rng(3)
+    for _ in range(12):
+        other = varied(rng, right, 16)
+        whole = other.seen.sure > 0
+        np.testing.assert_allclose(batch([other]).across[0][whole], 0.0, atol=1e-5)
 
 
 def test_emulated_people_look_like_the_takes(takes: list[Take]) -> None:
@@ -117,7 +129,7 @@ def test_emulated_people_look_like_the_takes(takes: list[Take]) -> None:
     cut = Walk(walks[0].places[:24], walks[0].apparent[:24])
     drawn = emulated(np.random.default_rng(1), emulator, cut)
     assert drawn.seen.slopes.shape == (24, 33, 2)
-    np.testing.assert_array_equal(drawn.depth, cut.places[..., 2])
+    np.testing.assert_array_equal(drawn.places, cut.places)
     assert np.isfinite(batch([drawn]).told).all()
 
 
