@@ -8,7 +8,7 @@ all five. Lengths along a surface hardly change with the pose, so one frame tell
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import permutations
 from typing import TYPE_CHECKING, NamedTuple
@@ -21,6 +21,7 @@ from sd2core.body.limbs import LIMBS, vertex_limbs
 from sd2core.body.model import Body, Resolution, own_resolution
 from sd2core.body.rotations import Floats
 from sd2core.errors import Sd2Error
+from sd2core.map_accuracy import body_error
 from sd2core.maps import DopplerMap
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.vertex_parts import PARTS, VertexParts
@@ -103,11 +104,17 @@ def synthetic_map(
     frames: tuple[int, int] | None = None,
     progress: Progress = silent,
 ) -> DopplerMap:
-    """Doppler map of a mesh; with ``limbs`` also its split, as :func:`known_parts` finds them."""
+    """Doppler map of a mesh that states its accuracy, as far as the mesh says that of the body.
+
+    With ``limbs`` also its split, as :func:`known_parts` finds them.
+    """
     if limbs:
         parts = known_parts(maker.mesh)
-        return maker.limb_maps(sensor, parts, frames=frames, progress=progress)
-    return maker.map(sensor, frames=frames, progress=progress)
+        made = maker.limb_maps(sensor, parts, frames=frames, progress=progress)
+    else:
+        made = maker.map(sensor, frames=frames, progress=progress)
+    error = body_error(maker, sensor, frames=frames)
+    return made if error is None else replace(made, meta=made.meta | {"body_error_l1": error})
 
 
 def parts_by_shape(points_m: Floats, faces: NDArray[np.int32]) -> NDArray[np.uint8] | None:
