@@ -80,6 +80,7 @@ class AccuracyModel(QObject):
         self._surveyed: _Surveyed | None = None
         self._clicked: PlanResult | None = None
         self._clicked_elsewhere = False
+        self._body: tuple[float | None, bool] = (None, False)
 
     # --- what is known --------------------------------------------------------------------
 
@@ -99,13 +100,21 @@ class AccuracyModel(QObject):
                 cost.all_cores_ms.median,
                 "clicked",
                 self._clicked_elsewhere,
+                *self._body,
             )
-        return _in_use(self.choice)
+        return self._of_choice(self.choice)
 
     @property
     def while_dragging(self) -> InUse | None:
         """The plan while the sensor moves; None until it is known."""
-        return _in_use(self._dragging)
+        return self._of_choice(self._dragging)
+
+    def _of_choice(self, choice: Choice | None) -> InUse | None:
+        if choice is None:
+            return None
+        body, pending = self._body
+        figures = choice.errors.l1, choice.cost_ms
+        return InUse(choice.plan, *figures, body=body, pending=pending)
 
     @property
     def choosing(self) -> bool:
@@ -176,6 +185,20 @@ class AccuracyModel(QObject):
         if tolerance != self.tolerance or self._clicked is not None:
             self.tolerance = self._settings.tolerance = tolerance
             self.choose_by_tolerance()
+
+    def set_body(self, error: float | None) -> None:
+        """Take the body's share of the map's error, as it is for the sensor where it is."""
+        self._assign_body(error, False)
+
+    def await_body(self) -> None:
+        """Keep the body's share as that of another place until it is found for this one."""
+        self._assign_body(self._body[0], True)
+
+    def _assign_body(self, error: float | None, pending: bool) -> None:
+        if self._body != (error, pending):
+            self._body = error, pending
+            self.plan_changed.emit()
+            self.changed.emit()
 
     def choose_by_tolerance(self) -> None:
         """Choose by the tolerance again."""
@@ -276,7 +299,3 @@ class AccuracyModel(QObject):
         if self.in_use != before:
             self.plan_changed.emit()
         self.changed.emit()
-
-
-def _in_use(choice: Choice | None) -> InUse | None:
-    return None if choice is None else InUse(choice.plan, choice.errors.l1, choice.cost_ms)

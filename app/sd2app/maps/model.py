@@ -33,6 +33,7 @@ from sd2app.session.tasks import ListedRunner
 from sd2core.doppler.options import PRESETS
 from sd2core.doppler.synthesizer import FrameScattering, Synthesizer
 from sd2core.errors import Sd2Error
+from sd2core.map_accuracy import body_error
 from sd2core.maps import DopplerMap
 from sd2core.sensor import Vector, VirtualSensor
 
@@ -84,6 +85,7 @@ class SynthesisModel(QObject):
         session.sensor.changed.connect(self._follow)
         session.sensor.dragging_changed.connect(self._follow)
         session.span.changed.connect(self._reorder)
+        session.document.changed.connect(self._recount)
         session.playback.frame_changed.connect(self._follow_clock)
         accuracy.plan_changed.connect(self._take_plan)
         accuracy.decided.connect(self._go_on)
@@ -157,7 +159,8 @@ class SynthesisModel(QObject):
         self._forget()
         self._set_moving(False)
         self._track.set_map(None)
-        mesh, options = self._session.document.mesh, PRESETS["paper"]
+        mesh = self._session.document.mesh
+        options = replace(PRESETS["paper"], count=self._session.document.count)
         if mesh is not None and mesh.faces is None:
             options = replace(options, visibility="none")
         self._accuracy.take_over(mesh, options)
@@ -173,6 +176,20 @@ class SynthesisModel(QObject):
         self._shown_map.begin(options, mesh)
         self._compiler.start()
         self._announce()
+        self._follow()
+
+    def _recount(self) -> None:
+        """Count another way, at the same 0 dB; what was made before stays until it is replaced."""
+        count, synthesizers = self._session.document.count, self._synthesizers
+        if synthesizers is None or synthesizers.options.count == count:
+            return
+        self._stop()
+        mesh, options = synthesizers.mesh, replace(synthesizers.options, count=count)
+        self._synthesizers = SynthesizerCache(mesh, options, self._accuracy.library)
+        self._synthesizers.limbs = synthesizers.limbs
+        self._prefetcher.forget()
+        self._shown_map.mark_stale()
+        self._accuracy.take_over(mesh, options)
         self._follow()
 
     def made_by(self) -> tuple[Callable[[], Synthesizer], VirtualSensor] | None:
@@ -216,6 +233,8 @@ class SynthesisModel(QObject):
         in_use = self._accuracy.in_use
         if in_use is not None:
             made = replace(made, meta=made.meta | in_use.plan.provenance(in_use.error))
+        if (error := body_error(maker, self._sensor)) is not None:
+            made = replace(made, meta=made.meta | {"body_error_l1": error})
         return replace(made, uncertainty=self._track.uncertainty)
 
     def close(self) -> None:

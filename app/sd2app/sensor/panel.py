@@ -134,12 +134,18 @@ class SensorPanel(QWidget):
         )
         field.setText("drawn, not applied")
         self._beyond_name = QLabel(self)
-        return _form_of(
+        self._count = Choice(
+            "Expected: each vertex is spread as badly as its velocity is known; plain: in one bin",
+            self, {name: name for name in ("expected", "plain")}, self._session.edits.choose_count,
+        )  # fmt: skip
+        self._readouts = form = _form_of(
             ("Range to torso", self._torso),
             ("Visible", self._visible),
             (self._beyond_name, self._beyond),
             ("Field of view", field),
+            ("Counting", self._count),
         )
+        return form
 
     def _capture_part(self, find: QWidget) -> QWidget:
         edits = self._session.edits
@@ -246,6 +252,9 @@ class SensorPanel(QWidget):
     def _refresh_capture(self) -> None:
         self._refresh_placement()
         document = self._session.document
+        self._count.show_value(document.count)
+        stated = document.mesh is not None and document.mesh.uncertainty is not None
+        self._readouts.setRowVisible(self._count, stated)
         capture, recording, radar_map = document.capture, document.recording, document.radar_map
         self._capture.setVisible(capture is not None)
         if capture is None or recording is None:
