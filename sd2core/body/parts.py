@@ -21,7 +21,6 @@ from sd2core.body.limbs import LIMBS, vertex_limbs
 from sd2core.body.model import Body, Resolution, own_resolution
 from sd2core.body.rotations import Floats
 from sd2core.errors import Sd2Error
-from sd2core.map_accuracy import body_error
 from sd2core.maps import DopplerMap
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.vertex_parts import PARTS, VertexParts
@@ -108,6 +107,8 @@ def synthetic_map(
 
     With ``limbs`` also its split, as :func:`known_parts` finds them.
     """
+    from sd2core.doppler.body_error import body_error
+
     if limbs:
         parts = known_parts(maker.mesh)
         made = maker.limb_maps(sensor, parts, frames=frames, progress=progress)

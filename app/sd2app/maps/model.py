@@ -30,10 +30,10 @@ from sd2app.maps.readout import FrameReader, Readout
 from sd2app.maps.warm_up import CompilerModel, MaskPrefetcher
 from sd2app.session.session import Session
 from sd2app.session.tasks import ListedRunner
+from sd2core.doppler.body_error import body_error
 from sd2core.doppler.options import PRESETS
 from sd2core.doppler.synthesizer import FrameScattering, Synthesizer
 from sd2core.errors import Sd2Error
-from sd2core.map_accuracy import body_error
 from sd2core.maps import DopplerMap
 from sd2core.sensor import Vector, VirtualSensor
 

@@ -9,7 +9,7 @@ from sd2app.background.latest import BackgroundModel, Emit
 from sd2app.maps.model import SynthesisModel
 from sd2app.session.session import Session
 from sd2app.session.tasks import ListedRunner
-from sd2core.map_accuracy import body_error
+from sd2core.doppler.body_error import body_error
 from sd2core.maps import CellUncertainty, DopplerMap
 
 _SHOWN = "uncertain_cells"
