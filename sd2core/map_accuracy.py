@@ -28,8 +28,6 @@ class MapAccuracy:
     >>> from sd2core.map_accuracy import MapAccuracy
     >>> print(MapAccuracy(body=0.37, arithmetic=0.075))
     ±38 %: body 37, arithmetic 7.5
-    >>> print(MapAccuracy(arithmetic=0.031))
-    ±3.1 %
     """
 
     body: float | None = None

@@ -80,7 +80,7 @@ class AccuracyModel(QObject):
         self._surveyed: _Surveyed | None = None
         self._clicked: PlanResult | None = None
         self._clicked_elsewhere = False
-        self._body: tuple[float | None, bool] = (None, False)
+        self._body: tuple[float | None, bool] = (None, False)  # its share, and if it is pending
 
     # --- what is known --------------------------------------------------------------------
 
@@ -112,9 +112,7 @@ class AccuracyModel(QObject):
     def _of_choice(self, choice: Choice | None) -> InUse | None:
         if choice is None:
             return None
-        body, pending = self._body
-        figures = choice.errors.l1, choice.cost_ms
-        return InUse(choice.plan, *figures, body=body, pending=pending)
+        return InUse(choice.plan, choice.errors.l1, choice.cost_ms, "chosen", False, *self._body)
 
     @property
     def choosing(self) -> bool:
@@ -186,15 +184,12 @@ class AccuracyModel(QObject):
             self.tolerance = self._settings.tolerance = tolerance
             self.choose_by_tolerance()
 
-    def set_body(self, error: float | None) -> None:
-        """Take the body's share of the map's error, as it is for the sensor where it is."""
-        self._assign_body(error, False)
-
     def await_body(self) -> None:
         """Keep the body's share as that of another place until it is found for this one."""
-        self._assign_body(self._body[0], True)
+        self.set_body(self._body[0], pending=True)
 
-    def _assign_body(self, error: float | None, pending: bool) -> None:
+    def set_body(self, error: float | None, *, pending: bool = False) -> None:
+        """Take the body's share of the map's error."""
         if self._body != (error, pending):
             self._body = error, pending
             self.plan_changed.emit()

@@ -6,15 +6,16 @@ import pytest
 from fake_accuracy import FACING, result_of
 
 from sd2app.accuracy.text import InUse, chosen_sentence, point_text, short
-from sd2app.widgets.text import milliseconds, percent, seconds
+from sd2app.widgets.text import milliseconds, seconds
 from sd2core.accuracy.plans import AccuracyPlan
+from sd2core.map_accuracy import percent
 
 
 @pytest.mark.parametrize(
     ("share", "text"),
     [
         (0.0, "0 %"),
-        (1e-6, "<0.01 %"),
+        (1e-6, "<0.001 %"),
         (0.0004, "0.04 %"),
         (0.0078, "0.78 %"),
         (0.05, "5 %"),
