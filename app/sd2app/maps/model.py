@@ -30,7 +30,7 @@ from sd2app.maps.readout import FrameReader, Readout
 from sd2app.maps.warm_up import CompilerModel, MaskPrefetcher
 from sd2app.session.session import Session
 from sd2app.session.tasks import ListedRunner
-from sd2core.doppler.body_error import body_error
+from sd2core.body.parts import synthetic_map
 from sd2core.doppler.options import PRESETS
 from sd2core.doppler.synthesizer import FrameScattering, Synthesizer
 from sd2core.errors import Sd2Error
@@ -227,14 +227,11 @@ class SynthesisModel(QObject):
         """
         if self._synthesizers is None or not self.complete:
             raise Sd2Error("The synthetic map is not complete yet", "a final map", "Wait for it")
-        maker = self._synthesizers.of(self._plan)
-        parts = self._synthesizers.parts_of(maker)
-        made = maker.map(self._sensor) if parts is None else maker.limb_maps(self._sensor, parts)
+        maker, limbs = self._synthesizers.of(self._plan), self._synthesizers.limbs and self.split
+        made = synthetic_map(maker, self._sensor, limbs=limbs)
         in_use = self._accuracy.in_use
         if in_use is not None:
             made = replace(made, meta=made.meta | in_use.plan.provenance(in_use.error))
-        if (error := body_error(maker, self._sensor)) is not None:
-            made = replace(made, meta=made.meta | {"body_error_l1": error})
         return replace(made, uncertainty=self._track.uncertainty)
 
     def close(self) -> None:
