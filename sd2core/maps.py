@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
 from sd2core.files.numpy_files import open_npz_file
-from sd2core.map_accuracy import MapAccuracy
 from sd2core.mesh.presence import Presence, checked
+from sd2core.numerics.map_accuracy import MapAccuracy
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 

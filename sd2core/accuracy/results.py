@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.accuracy.plans import AccuracyPlan, Family
-from sd2core.map_accuracy import percent
+from sd2core.numerics.map_accuracy import percent
 from sd2core.sensor import VelocityAxis
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from sd2core.datasets.reading import Dataset, open_dataset
 from sd2core.datasets.source import KINDS
 from sd2core.datasets.splitting import RULE, borrowed, split_people
 from sd2core.files.atomic import atomic_write_text
-from sd2core.map_accuracy import MapAccuracy
+from sd2core.numerics.map_accuracy import MapAccuracy
 
 CARD_FORMAT = "sd2-dataset-card"
 _ROWS = 8192

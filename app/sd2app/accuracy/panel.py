@@ -17,7 +17,7 @@ from sd2app.widgets.layouts import STRETCH, column_of, pane, row_of
 from sd2app.widgets.panel import Fold, outlined, rule, say, sentence, show_words, title
 from sd2app.widgets.progress_bar import ProgressBar
 from sd2app.widgets.text import milliseconds, number
-from sd2core.map_accuracy import percent
+from sd2core.numerics.map_accuracy import percent
 
 if TYPE_CHECKING:
     from sd2core.accuracy.results import Reason

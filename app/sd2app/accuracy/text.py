@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 from sd2app.accuracy.measurements import cheapest_within, serves_at_rest
 from sd2app.widgets.text import milliseconds, seconds
-from sd2core.map_accuracy import MapAccuracy, percent
+from sd2core.numerics.map_accuracy import MapAccuracy, percent
 
 if TYPE_CHECKING:
     from sd2core.accuracy.plans import AccuracyPlan

@@ -8,7 +8,7 @@ from fake_accuracy import FACING, result_of
 from sd2app.accuracy.text import InUse, chosen_sentence, point_text, short
 from sd2app.widgets.text import milliseconds, seconds
 from sd2core.accuracy.plans import AccuracyPlan
-from sd2core.map_accuracy import percent
+from sd2core.numerics.map_accuracy import percent
 
 
 @pytest.mark.parametrize(

@@ -12,9 +12,9 @@ from doppler_scenes import CAMERA, wobbling
 from sd2core.body.parts import synthetic_map
 from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.doppler.body_error import body_error
-from sd2core.map_accuracy import MapAccuracy
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
+from sd2core.numerics.map_accuracy import MapAccuracy
 
 
 def ball(frames: int, sigma_mps: float) -> MeshSequence:

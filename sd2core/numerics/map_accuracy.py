@@ -25,7 +25,7 @@ class MapAccuracy:
 
     Examples
     --------
-    >>> from sd2core.map_accuracy import MapAccuracy
+    >>> from sd2core.numerics.map_accuracy import MapAccuracy
     >>> print(MapAccuracy(body=0.37, arithmetic=0.075))
     ±38 %: body 37, arithmetic 7.5
     """
