@@ -15,6 +15,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
 from sd2core.files.numpy_files import open_npz_file
 from sd2core.mesh.presence import Presence, checked
+from sd2core.numerics.map_accuracy import MapAccuracy
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 
@@ -183,6 +184,11 @@ class DopplerMap:
                 return 0.5 * (low + high)
             case _:
                 return None
+
+    @property
+    def accuracy(self) -> MapAccuracy:
+        """How far the map may be from the truth, as far as its provenance says."""
+        return MapAccuracy.of(self.meta)
 
     @property
     def times_s(self) -> NDArray[np.float64]:

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from sd2core.accuracy.plans import AccuracyPlan
-from sd2core.accuracy.results import Reason, percent
+from sd2core.accuracy.results import Reason
 from sd2core.accuracy.trial import Trial
 from sd2core.doppler.options import Visibility
+from sd2core.numerics.map_accuracy import percent
 from sd2core.progress import Progress, silent
 
 

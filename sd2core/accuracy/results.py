@@ -9,29 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.accuracy.plans import AccuracyPlan, Family
+from sd2core.numerics.map_accuracy import percent
 from sd2core.sensor import VelocityAxis
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-
-_LEAST_PERCENT = 1e-3
-
-
-def percent(share: float) -> str:
-    """A share with two figures; whole above 10 %, and not more than a map can tell below.
-
-    It is infinite where an empty map changes.
-    """
-    value = 100 * share
-    if value == 0:
-        return "0 %"
-    if value == float("inf"):
-        return "∞ %"
-    if value < _LEAST_PERCENT:
-        return f"<{_LEAST_PERCENT:g} %"
-    return f"{value:.0f} %" if value >= 9.95 else f"{value:.2g} %"
 
 
 @dataclass(frozen=True)

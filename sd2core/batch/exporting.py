@@ -220,7 +220,8 @@ def _stretch_of(
             maps.append(stretch.between(low - row["start"], high - row["start"]))
     whole = joined(maps)
     # One number per frame: of the first stretch only, and of no use to who learns.
-    kept = {k: v for k, v in whole.meta.items() if k not in ("visible_share", "beyond_share")}
+    left_out = ["visible_share", "beyond_share", *(["body_error_l1"] if len(maps) > 1 else [])]
+    kept = {k: v for k, v in whole.meta.items() if k not in left_out}
     return replace(whole, meta=kept)
 
 

@@ -129,9 +129,7 @@ def kept_mesh(wanted: MeshInput) -> MeshSequence:
     if _kept.mesh is None or _kept.mesh_of != wanted:
         # Before another one is opened, so that there are never two.
         _kept.mesh, _kept.body, _kept.synthesizer, _kept.made_for = None, None, None, ()
-        opened = open_mesh(Path(wanted.path), wanted.faces, wanted.reading or {})
-        # How well velocities are known is not asked here, and grows with the clip.
-        _kept.mesh = replace(opened, uncertainty=None)
+        _kept.mesh = open_mesh(Path(wanted.path), wanted.faces, wanted.reading or {})
         _kept.mesh_of = wanted
     return _kept.mesh
 

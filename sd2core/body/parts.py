@@ -8,7 +8,7 @@ all five. Lengths along a surface hardly change with the pose, so one frame tell
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import permutations
 from typing import TYPE_CHECKING, NamedTuple
@@ -103,11 +103,19 @@ def synthetic_map(
     frames: tuple[int, int] | None = None,
     progress: Progress = silent,
 ) -> DopplerMap:
-    """Doppler map of a mesh; with ``limbs`` also its split, as :func:`known_parts` finds them."""
+    """Doppler map of a mesh that states its accuracy, as far as the mesh says that of the body.
+
+    With ``limbs`` also its split, as :func:`known_parts` finds them.
+    """
+    from sd2core.doppler.body_error import body_error
+
     if limbs:
         parts = known_parts(maker.mesh)
-        return maker.limb_maps(sensor, parts, frames=frames, progress=progress)
-    return maker.map(sensor, frames=frames, progress=progress)
+        made = maker.limb_maps(sensor, parts, frames=frames, progress=progress)
+    else:
+        made = maker.map(sensor, frames=frames, progress=progress)
+    error = body_error(maker, sensor, frames=frames)
+    return made if error is None else replace(made, meta=made.meta | {"body_error_l1": error})
 
 
 def parts_by_shape(points_m: Floats, faces: NDArray[np.int32]) -> NDArray[np.uint8] | None:

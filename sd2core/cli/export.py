@@ -12,11 +12,13 @@ from typing import TYPE_CHECKING, Any
 from sd2core.cli.options import (
     add_axis,
     add_command,
+    add_count,
     add_json_and_progress,
     add_limbs,
     add_output,
     add_people_kept_out,
     bin_list,
+    given,
     name_list,
     positive_float,
     positive_int,
@@ -179,6 +181,7 @@ def _add_making(parser: argparse.ArgumentParser) -> None:
         metavar="FILE|NAME",
         help="the denoiser (default: that of each recording, or the bundled one)",
     )
+    add_count(group)
     add_axis(group)
     group.add_argument(
         "--null-bins",
@@ -260,10 +263,10 @@ def _making(options: argparse.Namespace) -> Making:
     from sd2core.io.radar import named_radar
     from sd2core.placements.placements import read_placements
 
-    nulled = {} if options.null_bins is None else {"null_bins": options.null_bins}
+    chosen = given(options, ("null_bins", "count"))
     return Making(
         kinds=_dataset_options(options).kinds,
-        synthesis=chosen_options("paper", options.bins, options.v_max, nulled),
+        synthesis=chosen_options("paper", options.bins, options.v_max, chosen),
         tolerance=options.tolerance,
         placements=options.placements
         if options.placements in (None, "planned")

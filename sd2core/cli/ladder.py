@@ -194,7 +194,7 @@ def _measured(
 
 
 def _print_choice(choice: Choice) -> None:
-    from sd2core.accuracy.results import percent
+    from sd2core.numerics.map_accuracy import percent
 
     print(choice.summary)
     errors = choice.errors
@@ -210,7 +210,7 @@ def _print_choice(choice: Choice) -> None:
 
 
 def _print_measurement(measurement: Measurement) -> None:
-    from sd2core.accuracy.results import percent
+    from sd2core.numerics.map_accuracy import percent
 
     print()
     print(

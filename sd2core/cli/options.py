@@ -180,12 +180,13 @@ def add_placements_used(parser: argparse._ActionsContainer, what: str, usual: st
     )
 
 
-def add_count(parser: argparse.ArgumentParser) -> None:
+def add_count(parser: argparse._ActionsContainer) -> None:
     """Add ``--count``."""
     parser.add_argument(
         "--count",
-        choices=("plain", "expected"),
-        help="count a vertex in one bin, or spread as its mesh's uncertainty says (default: plain)",
+        choices=("expected", "plain"),
+        help="count a vertex as badly known as its mesh says its velocity to be, or in one bin"
+        " (default: expected)",
     )
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from sd2core.cli.options import (
     add_axis,
     add_command,
+    add_count,
     add_json,
     add_limbs,
     add_output,
@@ -54,6 +55,7 @@ def _add_recordings(kinds: argparse._SubParsersAction) -> None:
         "recordings", type=Path, nargs="+", metavar="RECORDING", help="with a mesh and a radar"
     )
     _add_pairs(parser, "14,15,16 of 32, else none")
+    add_count(parser)
     parser.add_argument(
         "--subjects",
         type=lambda text: tuple(text.split(",")),
@@ -160,8 +162,7 @@ def _recordings(options: argparse.Namespace) -> None:
     if axis != synthesis.axis:
         # What is nulled by default are bins of the paper's axis.
         synthesis = replace(synthesis, axis=axis, null_bins=())
-    if options.null_bins is not None:
-        synthesis = replace(synthesis, null_bins=options.null_bins)
+    synthesis = replace(synthesis, **given(options, ("null_bins", "count")))
     with progress_bar("Making pairs", "step") as progress:
         made = make_recording_pairs(
             options.recordings,

@@ -146,12 +146,12 @@ def _replaced(
 def synthesize_alike(
     meshes: Sequence[MeshSequence], sensor: VirtualSensor, progress: Progress = silent
 ) -> tuple[DopplerMap, ...]:
-    """Count maps of all meshes by the paper's preset.
+    """Count maps of all meshes by the paper's preset, plainly: a stated doubt is no movement.
 
     Hidden vertices are left out where every mesh has faces; otherwise all vertices of
     all meshes count, so that none is compared with another kind of map.
     """
-    options = PRESETS["paper"]
+    options = replace(PRESETS["paper"], count="plain")
     if any(mesh.faces is None for mesh in meshes):
         options = replace(options, visibility="none")
     total = sum(mesh.frame_count for mesh in meshes)

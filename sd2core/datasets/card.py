@@ -15,6 +15,7 @@ from sd2core.datasets.reading import Dataset, open_dataset
 from sd2core.datasets.source import KINDS
 from sd2core.datasets.splitting import RULE, borrowed, split_people
 from sd2core.files.atomic import atomic_write_text
+from sd2core.numerics.map_accuracy import MapAccuracy
 
 CARD_FORMAT = "sd2-dataset-card"
 _ROWS = 8192
@@ -83,6 +84,7 @@ def describe_dataset(dataset: Dataset) -> dict[str, Any]:
         "resampled_segments": int(column["resampled"].sum()),
         "sources_without_segments": sources.empty,
         "simulated_recordings": sources.simulated,
+        "accuracy": sources.accuracy,
         "how": sources.how(),
         **imu,
     }  # fmt: skip
@@ -110,6 +112,7 @@ class _Sources:
         self.frames_without_person = 0
         self._views: Counter[int] = Counter()
         self._cutoffs_hz: list[float] = []
+        self._accuracies: list[MapAccuracy] = []
         self._how: dict[str, Counter[str]] = {kind: Counter() for kind in KINDS}
 
     def add(self, entry: dict[str, Any]) -> None:
@@ -127,6 +130,8 @@ class _Sources:
             self._cutoffs_hz.append(made["cutoff_hz"])
         for kind, made in provenance["maps"].items():
             self._how[kind][made_text(kind, made, provenance)] += 1
+            if kind == "synthetic" and "body_error_l1" in made:
+                self._accuracies.append(MapAccuracy.of(provenance | made))
 
     @property
     def recordings(self) -> int:
@@ -142,6 +147,12 @@ class _Sources:
     def imu_cutoff_hz(self) -> list[float]:
         """Lowest and highest cut-off of inertial sensors."""
         return [min(self._cutoffs_hz), max(self._cutoffs_hz)]
+
+    @property
+    def accuracy(self) -> str:
+        """Accuracy of the median source with fitted bodies; empty without any."""
+        known = sorted(self._accuracies, key=lambda one: one.total or 0.0)
+        return str(known[len(known) // 2]) if known else ""
 
     def how(self) -> dict[str, dict[str, int]]:
         """Count the sources of each kind by how their maps were made."""
@@ -162,10 +173,11 @@ def made_text(kind: str, made: dict[str, Any], provenance: dict[str, Any]) -> st
         if "pairs" in provenance:
             return f"from the pairs {provenance['pairs']}"
         plan = provenance.get("plan") or made.get("plan")
+        count = f"{made['count']}, " if "body_error_l1" in made else ""
         if plan is not None:
-            return f"counted from a mesh by the plan {plan['text']}"
+            return f"counted from a mesh: {count}by the plan {plan['text']}"
         return (
-            f"counted from a mesh: visibility {options.get('visibility', 'not stated')},"
+            f"counted from a mesh: {count}visibility {options.get('visibility', 'not stated')},"
             f" weight {options.get('weight', 'not stated')}"
         )
     if kind == "denoised":
@@ -245,6 +257,11 @@ def limits(card: dict[str, Any]) -> list[str]:
         found.append(
             "There are too few subjects to keep one for a test: nothing measured on it says how a"
             " model does on other people."
+        )
+    if card["accuracy"]:
+        found.append(
+            "Bodies were fitted to videos: in the median source the synthetic map is off the truth"
+            f" by {card['accuracy']} (relative L1)."
         )
     missing = [kind for kind, count in card["segments_of_kind"].items() if count < card["segments"]]
     if missing:

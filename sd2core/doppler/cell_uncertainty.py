@@ -37,8 +37,10 @@ _REACH = 4.0
 
 _STEP_BINS = 0.25
 _FEWEST_STEPS, _MOST_STEPS = 16, 256
-_FRAMES = 128
-"""Frames computed together."""
+_FRAMES = 32
+"""Frames computed together. Their products of matrices are too small for NumPy to divide among
+threads of its own, which would wait for those of the pieces: a hundred times as long on busy cores.
+"""
 
 
 def cell_uncertainty(

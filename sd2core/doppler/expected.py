@@ -32,9 +32,6 @@ from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
 from sd2core.numerics.compiled import kernels_ready
 from sd2core.sensor import VelocityAxis
 
-SIGMA_FACTOR = 1.0
-"""Factor on the deviations that a mesh states; still to be calibrated on filmed clips."""
-
 _FRAMES = 16
 """Frames counted together: their fine histograms stay in the second-level cache."""
 

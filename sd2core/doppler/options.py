@@ -46,10 +46,10 @@ class SynthesisOptions:
         plate seen square on gives 1). With a range law of 4 the last is the
         constant-gamma law of rough surfaces. It relies on faces that are
         oriented outwards, as the facing test does.
-    count : {"plain", "expected"}
-        A vertex counts in the bin of its velocity, or is spread over the bins as badly as the
-        mesh says that velocity to be known, as a normal distribution; of a mesh that says
-        nothing both are the same map. ``expected`` takes central differences.
+    count : {"expected", "plain"}
+        A vertex is spread over the bins as badly as the mesh says its velocity to be known, as a
+        normal distribution, or counts in the bin of that velocity; of a mesh that says nothing
+        both are the same map. Vid2Doppler's velocities always count plainly.
     axis : VelocityAxis
         Up to 254 bins.
     null_bins : tuple of int
@@ -105,7 +105,7 @@ class SynthesisOptions:
     velocity_sigma_bins: float = 1.0
     time_sigma_s: float = 1.0 / 30.0
     null_after_smoothing: bool = True
-    count: Count = "plain"
+    count: Count = "expected"
 
     def __post_init__(self) -> None:
         for name, allowed in (
@@ -155,11 +155,9 @@ class SynthesisOptions:
                 f"The oversampling is {self.oversampling} with vid2doppler's velocities",
                 "1: that tool works on the video's frames",
             )
-        if self.velocity == "vid2doppler" and self.count == "expected":
-            raise Sd2Error(
-                "count is 'expected' with vid2doppler's velocities",
-                "plain: that tool counts each vertex in one bin",
-            )
+        if self.velocity == "vid2doppler":
+            # The default stands for any mesh; that tool counts each vertex in one bin.
+            object.__setattr__(self, "count", "plain")
 
 
 PRESETS: dict[str, SynthesisOptions] = {
@@ -170,6 +168,7 @@ PRESETS: dict[str, SynthesisOptions] = {
     "vid2doppler": SynthesisOptions(
         range_exponent=0.0,
         velocity="vid2doppler",
+        count="plain",
         velocity_sigma_bins=5.0,
         time_sigma_s=0.0,
         # That tool blurs over its own notch.
@@ -197,6 +196,11 @@ def chosen_options(
     is given. Raises Sd2Error for values that are not allowed.
     """
     base = PRESETS[preset]
+    if base.velocity == "vid2doppler" and given.get("count") == "expected":
+        raise Sd2Error(
+            "count is 'expected' with vid2doppler's velocities",
+            "plain: that tool counts each vertex in one bin",
+        )
     axis = VelocityAxis(bins or base.axis.bins, v_max_mps or base.axis.v_max_mps)
     values = dict(given)
     if axis != base.axis and "null_bins" not in values:

@@ -234,7 +234,8 @@ class Synthesizer:
         -------
         DopplerMap
             Of kind ``synthetic``. Its meta names sensor, options, source and
-            version, the quality of the visibility, how many frames share a mask,
+            version, how vertices were counted (``count``), the quality of the
+            visibility, how many frames share a mask,
             per frame ``visible_share`` and ``beyond_share``, and in ``notes``
             where single precision limits what the map says and how much of it
             is empty. ``present`` is False in frames without a person, and in one
@@ -312,6 +313,7 @@ class Synthesizer:
             meta={
                 "sensor": asdict(sensor),
                 "options": asdict(options),
+                "count": "expected" if self.prepared.spreads else "plain",
                 "visibility": stretch.quality,
                 "mask_stride": 1 if unshared else options.mask_stride,
                 "source": self.mesh.source,

@@ -239,7 +239,7 @@ def uncertainty() -> Figure:
     course.set_title("Velocity of the limb that swipes", fontsize=9, loc="left")
     course.legend(fontsize=7)
 
-    maps = sd2.Synthesizer(fitted)
+    maps = sd2.Synthesizer(fitted, replace(sd2.PRESETS["paper"], count="plain"))
     doppler = maps.map(sd2.VirtualSensor())
     frame = stretch.start + int(np.abs(mean_mps).argmax())
     known = maps.uncertainty(sd2.VirtualSensor(), frames=(frame, frame + 1))

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from sd2core.doppler import Synthesizer
+from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.figures.strip import plot_strip
 from sd2core.figures.strip_source import StripOptions, StripSource
 from sd2core.figures.surface import Frame, find_visible_triangles, project_vertices
@@ -34,7 +35,7 @@ def draw_bodies(mesh_figure: Path, range_figure: Path) -> dict[str, float]:
         strip = plot_strip(source, FRAMES, StripOptions(as_dots=True, v_max_mps=1.5))
         save_figure(strip, mesh_figure, pixels_per_inch=_PIXELS_PER_INCH)
     _draw_ranges(mesh, source, range_figure)
-    maps = Synthesizer(mesh)
+    maps = Synthesizer(mesh, replace(PRESETS["paper"], count="plain"))
     near, far = (maps.map(_sensor(range_m)).values.sum() for range_m in (NEAR_M, FAR_M))
     shares = {"share": 100 * float(far / near), "law": 100 * (NEAR_M / FAR_M) ** 4}
     return {"frame": FRAME, "near": NEAR_M, "far": FAR_M, **shares}

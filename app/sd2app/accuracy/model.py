@@ -80,6 +80,7 @@ class AccuracyModel(QObject):
         self._surveyed: _Surveyed | None = None
         self._clicked: PlanResult | None = None
         self._clicked_elsewhere = False
+        self._body: tuple[float | None, bool] = (None, False)  # its share, and if it is pending
 
     # --- what is known --------------------------------------------------------------------
 
@@ -99,13 +100,19 @@ class AccuracyModel(QObject):
                 cost.all_cores_ms.median,
                 "clicked",
                 self._clicked_elsewhere,
+                *self._body,
             )
-        return _in_use(self.choice)
+        return self._of_choice(self.choice)
 
     @property
     def while_dragging(self) -> InUse | None:
         """The plan while the sensor moves; None until it is known."""
-        return _in_use(self._dragging)
+        return self._of_choice(self._dragging)
+
+    def _of_choice(self, choice: Choice | None) -> InUse | None:
+        if choice is None:
+            return None
+        return InUse(choice.plan, choice.errors.l1, choice.cost_ms, "chosen", False, *self._body)
 
     @property
     def choosing(self) -> bool:
@@ -176,6 +183,17 @@ class AccuracyModel(QObject):
         if tolerance != self.tolerance or self._clicked is not None:
             self.tolerance = self._settings.tolerance = tolerance
             self.choose_by_tolerance()
+
+    def await_body(self) -> None:
+        """Keep the body's share as that of another place until it is found for this one."""
+        self.set_body(self._body[0], pending=True)
+
+    def set_body(self, error: float | None, *, pending: bool = False) -> None:
+        """Take the body's share of the map's error."""
+        if self._body != (error, pending):
+            self._body = error, pending
+            self.plan_changed.emit()
+            self.changed.emit()
 
     def choose_by_tolerance(self) -> None:
         """Choose by the tolerance again."""
@@ -276,7 +294,3 @@ class AccuracyModel(QObject):
         if self.in_use != before:
             self.plan_changed.emit()
         self.changed.emit()
-
-
-def _in_use(choice: Choice | None) -> InUse | None:
-    return None if choice is None else InUse(choice.plan, choice.errors.l1, choice.cost_ms)

@@ -16,7 +16,8 @@ from sd2app.widgets.inputs import Choice, NumberBox
 from sd2app.widgets.layouts import STRETCH, column_of, pane, row_of
 from sd2app.widgets.panel import Fold, outlined, rule, say, sentence, show_words, title
 from sd2app.widgets.progress_bar import ProgressBar
-from sd2app.widgets.text import milliseconds, number, percent
+from sd2app.widgets.text import milliseconds, number
+from sd2core.numerics.map_accuracy import percent
 
 if TYPE_CHECKING:
     from sd2core.accuracy.results import Reason

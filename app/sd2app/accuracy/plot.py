@@ -14,7 +14,7 @@ from sd2app.accuracy.text import point_text
 from sd2app.session.display import DisplayModel
 from sd2app.widgets.chart import Chart, ChartView, Curve, Mark, Scale
 from sd2app.widgets.plot import tick_text
-from sd2app.widgets.text import percent
+from sd2core.numerics.map_accuracy import percent
 
 if TYPE_CHECKING:
     from sd2core.accuracy.results import Measurement, PlanResult

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from sd2app.accuracy.measurements import cheapest_within, serves_at_rest
-from sd2app.widgets.text import milliseconds, percent, seconds
+from sd2app.widgets.text import milliseconds, seconds
+from sd2core.numerics.map_accuracy import MapAccuracy, percent
 
 if TYPE_CHECKING:
     from sd2core.accuracy.plans import AccuracyPlan
@@ -24,16 +25,23 @@ class InUse:
     cost_ms: float  # per frame, on all cores
     origin: Origin = "chosen"  # by tolerance or budget, or a point of the plot
     elsewhere: bool = False  # measured with the sensor at another place
+    body: float | None = None  # likewise, of a fitted body; None: its mesh states none
+    pending: bool = False  # the body's is of another place, until it is found for this one
+
+    @property
+    def accuracy(self) -> str:
+        """How far the map may be from the truth."""
+        return f"{MapAccuracy(self.body, self.error)}{'…' if self.pending else ''}"
 
     @property
     def brief(self) -> str:
-        """Error and plan in few words; the error is read where there is no room for all."""
-        return f"{deviation(self.error)} · {short(self.plan)}"
+        """Accuracy and plan in few words; it is read where there is no room for all."""
+        return f"{self.accuracy} · {short(self.plan)}"
 
     @property
     def figures(self) -> str:
-        """Error and cost."""
-        figures = f"{deviation(self.error)} · {milliseconds(self.cost_ms)}/frame"
+        """Accuracy and cost."""
+        figures = f"{self.accuracy} · {milliseconds(self.cost_ms)}/frame"
         return f"{figures} (measured elsewhere)" if self.elsewhere else figures
 
     def __str__(self) -> str:
@@ -43,9 +51,10 @@ class InUse:
 def chosen_sentence(in_use: InUse, frames: int) -> str:
     """One sentence of the plan in use: its error, and its cost per frame and for the clip."""
     way = "Clicked" if in_use.origin == "clicked" else "Chosen"
+    body = "" if in_use.body is None else f" (with the body {in_use.accuracy})"
     return (
-        f"{way}: {short(in_use.plan)}, whose map is {percent(in_use.error)} off the reference and"
-        f" costs {milliseconds(in_use.cost_ms)} per frame,"
+        f"{way}: {short(in_use.plan)}, whose map is {percent(in_use.error)} off the reference{body}"
+        f" and costs {milliseconds(in_use.cost_ms)} per frame,"
         f" {seconds(1e-3 * in_use.cost_ms * frames)} for the clip."
     )
 
@@ -60,11 +69,6 @@ def legend(measurement: Measurement, tolerance: float, *, in_use: bool) -> str:
         if not all(map(serves_at_rest, measurement.results)):
             signs.append("○ only while dragging")
     return "   ".join(sign.replace(" ", "\N{NO-BREAK SPACE}") for sign in signs)
-
-
-def deviation(error: float) -> str:
-    """Relative error of a map."""
-    return percent(error) if 0 < error < 1e-4 else f"±{percent(error)}"
 
 
 def short(plan: AccuracyPlan) -> str:

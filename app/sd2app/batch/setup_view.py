@@ -33,7 +33,7 @@ from sd2app.widgets.panel import (
     side_by_side,
     title,
 )
-from sd2app.widgets.text import percent
+from sd2core.numerics.map_accuracy import percent
 
 _SUBJECT_TEXT = {
     "recording": "each recording is a person of its own",

@@ -30,6 +30,7 @@ from sd2app.maps.readout import FrameReader, Readout
 from sd2app.maps.warm_up import CompilerModel, MaskPrefetcher
 from sd2app.session.session import Session
 from sd2app.session.tasks import ListedRunner
+from sd2core.body.parts import synthetic_map
 from sd2core.doppler.options import PRESETS
 from sd2core.doppler.synthesizer import FrameScattering, Synthesizer
 from sd2core.errors import Sd2Error
@@ -84,6 +85,7 @@ class SynthesisModel(QObject):
         session.sensor.changed.connect(self._follow)
         session.sensor.dragging_changed.connect(self._follow)
         session.span.changed.connect(self._reorder)
+        session.document.changed.connect(self._recount)
         session.playback.frame_changed.connect(self._follow_clock)
         accuracy.plan_changed.connect(self._take_plan)
         accuracy.decided.connect(self._go_on)
@@ -157,7 +159,8 @@ class SynthesisModel(QObject):
         self._forget()
         self._set_moving(False)
         self._track.set_map(None)
-        mesh, options = self._session.document.mesh, PRESETS["paper"]
+        mesh = self._session.document.mesh
+        options = replace(PRESETS["paper"], count=self._session.document.count)
         if mesh is not None and mesh.faces is None:
             options = replace(options, visibility="none")
         self._accuracy.take_over(mesh, options)
@@ -173,6 +176,20 @@ class SynthesisModel(QObject):
         self._shown_map.begin(options, mesh)
         self._compiler.start()
         self._announce()
+        self._follow()
+
+    def _recount(self) -> None:
+        """Count another way, at the same 0 dB; what was made before stays until it is replaced."""
+        count, synthesizers = self._session.document.count, self._synthesizers
+        if synthesizers is None or synthesizers.options.count == count:
+            return
+        self._stop()
+        mesh, options = synthesizers.mesh, replace(synthesizers.options, count=count)
+        self._synthesizers = SynthesizerCache(mesh, options, self._accuracy.library)
+        self._synthesizers.limbs = synthesizers.limbs
+        self._prefetcher.forget()
+        self._shown_map.mark_stale()
+        self._accuracy.take_over(mesh, options)
         self._follow()
 
     def made_by(self) -> tuple[Callable[[], Synthesizer], VirtualSensor] | None:
@@ -210,9 +227,8 @@ class SynthesisModel(QObject):
         """
         if self._synthesizers is None or not self.complete:
             raise Sd2Error("The synthetic map is not complete yet", "a final map", "Wait for it")
-        maker = self._synthesizers.of(self._plan)
-        parts = self._synthesizers.parts_of(maker)
-        made = maker.map(self._sensor) if parts is None else maker.limb_maps(self._sensor, parts)
+        maker, limbs = self._synthesizers.of(self._plan), self._synthesizers.limbs and self.split
+        made = synthetic_map(maker, self._sensor, limbs=limbs)
         in_use = self._accuracy.in_use
         if in_use is not None:
             made = replace(made, meta=made.meta | in_use.plan.provenance(in_use.error))

@@ -1,24 +1,26 @@
-"""Standard deviation of the cells of the synthetic map, computed once the map is complete."""
+"""How well the synthetic map is known, in all and by cell, found once the map is complete."""
 
 from __future__ import annotations
 
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.accuracy.model import AccuracyModel
-from sd2app.background.latest import BackgroundModel
+from sd2app.background.latest import BackgroundModel, Emit
 from sd2app.maps.model import SynthesisModel
 from sd2app.session.session import Session
 from sd2app.session.tasks import ListedRunner
+from sd2core.doppler.body_error import body_error
 from sd2core.maps import CellUncertainty, DopplerMap
 
 _SHOWN = "uncertain_cells"
 
 
 class UncertaintyModel(BackgroundModel):
-    """Follows the synthetic map while uncertain cells are shown; the choice is remembered.
+    """Follows the synthetic map of a mesh that states its uncertainty.
 
-    Another map has no uncertainty until its own is known: while the sensor moves none
-    is shown.
+    The body's share of the accuracy is found for every finished map, and stays as pending while
+    the sensor moves. The cells' uncertainty is found while it is shown, which is remembered;
+    another map has none until its own is known.
     """
 
     changed = Signal()
@@ -31,7 +33,7 @@ class UncertaintyModel(BackgroundModel):
         self._session, self._synthesis, self._accuracy = session, synthesis, accuracy
         self._track = session.maps.synthetic
         self.shown = session.settings.flag(_SHOWN, False)  # the user wants uncertain cells marked
-        self._of: DopplerMap | None = None
+        self._of: DopplerMap | None = None  # what the body's share is of
         self._runner = ListedRunner("uncertainty", session.jobs, self, self._take)
         self._runner.failed.connect(lambda error: self.failed.emit(str(error)))
         self._runner.cancelled.connect(lambda: self.set_shown(False))
@@ -60,30 +62,42 @@ class UncertaintyModel(BackgroundModel):
         self.shown = shown
         self._session.settings.set_value(_SHOWN, shown)
         if not shown:
+            if self.busy:
+                self._of = None
             self._runner.cancel()
             self._track.set_uncertainty(None)
         self._follow()
         self.changed.emit()
 
     def _follow(self) -> None:
-        """Compute for a finished map; stop if that map is gone."""
+        """Compute for a finished map, the body's share first; stop if that map is gone."""
         made = self._track.map
-        if self.busy and made is not self._of:
+        if self.why_not:
             self._runner.cancel()
-        if not self.shown or self.why_not or self.busy or self._accuracy.choosing:
             return
+        if made is not self._of:
+            self._runner.cancel()
+            self._accuracy.await_body()
         worker = self._synthesis.made_by()
-        if worker is None or made is None or self._track.uncertainty is not None:
+        if worker is None or made is None or self.busy or self._accuracy.choosing:
             return
         synthesizer, sensor = worker
-        self._of = made
-        self._runner.submit(
-            lambda emit: synthesizer().uncertainty(
-                sensor, progress=lambda done, total: emit((done, total))
-            ),
-            "Finding how well the map is known",
-        )
 
-    def _take(self, found: CellUncertainty) -> None:
-        if self._track.map is self._of and self.shown:
+        def of_body(emit: Emit) -> float | None:
+            return body_error(synthesizer(), sensor, progress=lambda *_: emit(None))
+
+        def of_cells(emit: Emit) -> CellUncertainty:
+            return synthesizer().uncertainty(sensor, progress=lambda *now: emit(now))
+
+        if made is not self._of:
+            self._of = made
+            self._runner.submit(of_body)
+        elif self.shown and self._track.uncertainty is None:
+            self._runner.submit(of_cells, "Finding how well the map is known")
+
+    def _take(self, found: CellUncertainty | float | None) -> None:
+        if isinstance(found, CellUncertainty):
             self._track.set_uncertainty(found)
+        else:
+            self._accuracy.set_body(found)
+            self._follow()

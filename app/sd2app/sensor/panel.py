@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QComboBox, QFormLayout, QGridLayout, QLabel, QWidg
 
 from sd2app.maps.model import SynthesisModel
 from sd2app.session.session import Session
-from sd2app.widgets.inputs import Choice, NumberBox
+from sd2app.widgets.inputs import CheckBox, Choice, NumberBox
 from sd2app.widgets.layouts import STRETCH, column_of, form_of, pane, row_of
 from sd2app.widgets.panel import outlined, rule, sentence, show_words, title
 from sd2core.radar_config import RadarConfig, range_in_words
@@ -134,12 +134,19 @@ class SensorPanel(QWidget):
         )
         field.setText("drawn, not applied")
         self._beyond_name = QLabel(self)
-        return _form_of(
+        self._expected = CheckBox(
+            "expected map", self,
+            lambda on: self._session.edits.choose_count("expected" if on else "plain"),
+            "Spread each vertex as badly as its velocity is known; otherwise it counts in one bin",
+        )  # fmt: skip
+        self._readouts = form = _form_of(
             ("Range to torso", self._torso),
             ("Visible", self._visible),
             (self._beyond_name, self._beyond),
             ("Field of view", field),
+            ("Counting", self._expected),
         )
+        return form
 
     def _capture_part(self, find: QWidget) -> QWidget:
         edits = self._session.edits
@@ -246,6 +253,9 @@ class SensorPanel(QWidget):
     def _refresh_capture(self) -> None:
         self._refresh_placement()
         document = self._session.document
+        self._expected.show_checked(document.count == "expected")
+        stated = document.mesh is not None and document.mesh.uncertainty is not None
+        self._readouts.setRowVisible(self._expected, stated)
         capture, recording, radar_map = document.capture, document.recording, document.radar_map
         self._capture.setVisible(capture is not None)
         if capture is None or recording is None:

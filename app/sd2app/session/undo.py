@@ -16,6 +16,7 @@ from sd2core.placements.placements import Placements
 from sd2core.sensor import Vector, VirtualSensor, aimed_at
 
 if TYPE_CHECKING:
+    from sd2core.doppler.options import Count
     from sd2core.radar_config import Clutter
     from sd2core.recording.recording import Recording
 
@@ -166,6 +167,14 @@ class Edits:
     def end_offset_drag(self) -> None:
         """End the drag; it becomes one step in the history."""
         self._push_change(_ALIGNED[next(iter(self._before))], self._before)
+
+    # --- synthesis ------------------------------------------------------------------------
+
+    def choose_count(self, count: Count) -> None:
+        """Count the vertices of synthetic maps another way."""
+        before = self._document.count
+        self._document.set_count(count)
+        self._push("Choose counting", self._document.set_count, before, count)
 
     # --- processing of the capture --------------------------------------------------------
 

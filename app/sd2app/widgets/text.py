@@ -52,13 +52,6 @@ def number(value: float) -> str:
     return f"{value:.0f}" if abs(value) >= 10 else f"{value:.2g}" if abs(value) >= 1e-3 else "0"
 
 
-def percent(share: float) -> str:
-    """A share in per cent; tiny ones as less than a bound."""
-    if 0 < share < 1e-4:
-        return "<0.01 %"
-    return f"{number(100 * share)} %"
-
-
 def milliseconds(value_ms: float) -> str:
     """A cost with its unit."""
     return f"{number(value_ms)} ms" if value_ms >= 1e-3 or value_ms == 0 else "<0.001 ms"

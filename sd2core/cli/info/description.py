@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from statistics import fmean
 from typing import TYPE_CHECKING, Any
@@ -22,9 +22,6 @@ if TYPE_CHECKING:
     from sd2core.recording.recording import Recording
     from sd2core.sensor import VelocityAxis
     from sd2core.timebase import Timebase
-
-FAINT = 0.01
-"""Share of a map's largest value below which values are not judged."""
 
 
 @dataclass
@@ -293,7 +290,9 @@ def describe_map(path: Path, doppler: DopplerMap) -> Description:
         "unseen_bins": list(doppler.unseen_bins),
         **_clock_data(doppler.timebase),
         "frames_without_person": _absent(doppler.present),
-        "uncertainty": None if doppler.uncertainty is None else _deviation(doppler),
+        "accuracy": None
+        if (accuracy := doppler.accuracy).total is None
+        else {**asdict(accuracy), "total": accuracy.total},
         "limbs": None if doppler.limbs is None else list(doppler.limbs.parts),
         "provenance": doppler.meta,
     }
@@ -305,10 +304,7 @@ def describe_map(path: Path, doppler: DopplerMap) -> Description:
         "no person": _gaps(doppler.present, doppler.timebase),
         "unit": doppler.unit,
         "nulled bins": bins_in_words(doppler.axis, doppler.null_bins),
-        "known to": ""
-        if doppler.uncertainty is None
-        else f"±{_deviation(doppler):.0%} of a value (root mean square; the median of the cells"
-        " that are not faint)",
+        "accuracy": str(accuracy) and f"{accuracy} (relative L1)",
         "unseen bins": bins_in_words(doppler.axis, doppler.unseen_bins),
         "limbs": "" if doppler.limbs is None else ", ".join(doppler.limbs.parts),
         **_synthesis_facts(doppler.meta),
@@ -347,9 +343,9 @@ def _synthesis_facts(provenance: dict[str, Any]) -> dict[str, str]:
     shared = "" if stride == 1 else f", computed for one frame in {stride}"
     plan = provenance.get("plan")
     return {
-        "plan": ""
-        if plan is None
-        else f"{plan['text']}, error {100 * provenance['plan_error_l1']:.2g} % of the map (L1)",
+        "plan": "" if plan is None else plan["text"],
+        # Both are the same map of a mesh that says nothing.
+        "count": provenance["count"] if "body_error_l1" in provenance else "",
         "sensor": f"at x {x:g}, y {y:g}, z {z:g} m",
         "visibility": f"{provenance['visibility']}: {fmean(visible):.1%} visible on average"
         + shared,
@@ -398,18 +394,6 @@ def _known_to(mesh: MeshSequence) -> str:
         f"{words} ±{typical[best]:.2f} m/s ({known.limbs[best]})"
         f" to ±{typical[worst]:.2f} m/s ({known.limbs[worst]})"
     )
-
-
-def _deviation(doppler: DopplerMap) -> float:
-    """Relative standard deviation of a map's values: the median of cells that are not faint."""
-    import numpy as np
-
-    assert doppler.uncertainty is not None
-    counted = doppler.values > FAINT * doppler.values.max(initial=0.0)
-    if not counted.any():
-        return 0.0
-    deviation = doppler.uncertainty.deviation(doppler.values)
-    return float(np.median(deviation[counted] / doppler.values[counted]))
 
 
 def _absent(present: NDArray[np.bool_] | None) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -31,7 +31,7 @@ FITTED: Resolution = "medium"
 TRUE: Resolution = "low"
 """Echoes of a rough surface depend little on how finely it is cut (decision 26)."""
 
-OPTIONS = PRESETS["paper"]
+OPTIONS = replace(PRESETS["paper"], count="plain")
 
 _TAKE = 0  # subjects have 1 in this place of the seed
 _MOTION, _SETTING, _FIT, _RADAR = range(4)

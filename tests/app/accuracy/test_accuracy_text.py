@@ -5,16 +5,17 @@ from dataclasses import replace
 import pytest
 from fake_accuracy import FACING, result_of
 
-from sd2app.accuracy.text import InUse, deviation, point_text, short
-from sd2app.widgets.text import milliseconds, percent, seconds
+from sd2app.accuracy.text import InUse, chosen_sentence, point_text, short
+from sd2app.widgets.text import milliseconds, seconds
 from sd2core.accuracy.plans import AccuracyPlan
+from sd2core.numerics.map_accuracy import percent
 
 
 @pytest.mark.parametrize(
     ("share", "text"),
     [
         (0.0, "0 %"),
-        (1e-6, "<0.01 %"),
+        (1e-6, "<0.001 %"),
         (0.0004, "0.04 %"),
         (0.0078, "0.78 %"),
         (0.05, "5 %"),
@@ -27,9 +28,14 @@ def test_shares_have_two_digits_and_no_exponent(share, text):
     assert percent(share) == text
 
 
-def test_a_map_is_off_either_way_unless_hardly_at_all():
-    assert deviation(0.008) == "±0.8 %"
-    assert deviation(1e-6) == "<0.01 %"
+def test_the_accuracy_holds_the_body_where_it_is_known():
+    assert InUse(FACING, 0.031, 0.6).brief == "±3.1 % · visibility facing"
+    known = InUse(FACING, 0.031, 0.6, body=0.37)
+    assert known.accuracy == "±37 %: body 37, arithmetic 3.1"
+    assert known.figures == "±37 %: body 37, arithmetic 3.1 · 0.6 ms/frame"
+    assert replace(known, pending=True).brief.startswith("±37 %: body 37, arithmetic 3.1… · ")
+    words = chosen_sentence(known, 100)
+    assert "3.1 % off the reference (with the body ±37 %: body 37, arithmetic 3.1) and" in words
 
 
 @pytest.mark.parametrize(

@@ -16,10 +16,10 @@ from sd2core.accuracy.plans import (
     visibility_plans,
     wave_plans,
 )
-from sd2core.accuracy.results import percent
 from sd2core.doppler import PRESETS
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.options import WaveOptions
+from sd2core.numerics.map_accuracy import percent
 
 ALL = [*counting_plans(), *compared_plans(), *wave_plans(), reference_plan("fmcw")]
 

@@ -162,5 +162,8 @@ def test_nothing_to_do_is_refused() -> None:
 
 
 def test_the_count_of_a_plan_arrives() -> None:
-    assert Synthesise(count="expected", tolerance=0.05).options().count == "expected"
-    assert Synthesise().options().count == "plain"
+    assert Synthesise(count="plain", tolerance=0.05).options().count == "plain"
+    assert Synthesise().options().count == "expected"
+    assert Synthesise(preset="vid2doppler").options().count == "plain"
+    with pytest.raises(ValueError, match="vid2doppler"):
+        Synthesise(preset="vid2doppler", count="expected")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import math
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -74,14 +76,24 @@ def test_synth_adds_how_well_values_are_known(sd2: Sd2, fitted: Path, tmp_path: 
     assert DopplerMap.load(out).uncertainty is None
     said = sd2("synth", fitted, "--out", out, "--uncertainty")
     assert said.code == 0
-    assert "known to" in said.out
     known = DopplerMap.load(out).uncertainty
     assert known is not None
     assert known.sd.max() > 0
-    assert json.loads(sd2("info", out, "--json").out)["uncertainty"] > 0.1
-    chosen = sd2("synth", fitted, "--out", out, "--uncertainty", "--tolerance", "20%")
-    assert chosen.code == 0
-    assert DopplerMap.load(out).uncertainty is not None
+
+
+def test_synth_and_info_state_one_accuracy(sd2: Sd2, fitted: Path, tmp_path: Path) -> None:
+    out = tmp_path / "map.npz"
+    for wish in ((), ("--tolerance", "20%")):
+        said = sd2("synth", fitted, "--out", out, *wish)
+        assert said.code == 0
+        accuracy = DopplerMap.load(out).accuracy
+        assert accuracy.total == math.hypot(accuracy.body, accuracy.arithmetic or 0.0)
+        assert (accuracy.arithmetic is not None) == bool(wish)
+        line = f"{accuracy} (relative L1)"
+        assert line in said.out
+        assert line in sd2("info", out).out
+        told = json.loads(sd2("info", out, "--json").out)["accuracy"]
+        assert told == {**asdict(accuracy), "total": accuracy.total}
 
 
 def test_info_says_how_well_velocities_are_known(sd2: Sd2, fitted: Path) -> None:
@@ -105,18 +117,28 @@ def test_a_radar_signal_has_none(sd2: Sd2, fitted: Path, tmp_path: Path) -> None
 
 def test_synth_spreads_what_is_not_known(sd2: Sd2, fitted: Path, tmp_path: Path) -> None:
     plain, out = tmp_path / "plain.npz", tmp_path / "map.npz"
-    assert sd2("synth", fitted, "--out", plain, "--count", "plain").code == 0
-    assert sd2("synth", fitted, "--out", out, "--count", "expected", "--uncertainty").code == 0
+    assert "plain" in sd2("synth", fitted, "--out", plain, "--count", "plain").out
+    said = sd2("synth", fitted, "--out", out, "--uncertainty")
+    assert " expected\n" in said.out
     spread = DopplerMap.load(out)
-    assert spread.meta["options"]["count"] == "expected"
+    assert spread.meta["count"] == "expected"
     assert np.abs(spread.values - DopplerMap.load(plain).values).max() > 0.01
     assert spread.uncertainty is not None
     assert np.abs(spread.uncertainty.expected - spread.values).max() < 1e-3
-    chosen = sd2("synth", fitted, "--out", out, "--count", "expected", "--tolerance", "5%")
+    chosen = sd2("synth", fitted, "--out", out, "--count", "plain", "--tolerance", "5%")
     assert chosen.code == 0, chosen.err
-    assert DopplerMap.load(out).meta["options"]["count"] == "expected"
-    said = sd2("ladder", fitted, "--count", "expected", "--quick", "--tolerance", "5%")
+    assert DopplerMap.load(out).meta["count"] == "plain"
+    said = sd2("ladder", fitted, "--count", "plain", "--quick", "--tolerance", "5%")
     assert said.code == 0, said.err
     said = sd2("ladder", fitted, "--count", "expected", "--method", "fmcw")
     assert said.code == 1
     assert "--count is given with --method fmcw" in said.err
+
+
+def test_vid2doppler_counts_plainly(sd2: Sd2, fitted: Path, tmp_path: Path) -> None:
+    out = tmp_path / "map.npz"
+    assert sd2("synth", fitted, "--out", out, "--preset", "vid2doppler").code == 0
+    assert DopplerMap.load(out).meta["count"] == "plain"
+    said = sd2("synth", fitted, "--out", out, "--preset", "vid2doppler", "--count", "expected")
+    assert said.code == 1
+    assert "that tool counts each vertex in one bin" in said.err

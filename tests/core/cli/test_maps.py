@@ -34,7 +34,7 @@ def test_every_option_arrives() -> None:
     chosen = options_of(
         *("--depth-resolution", "128", "--mask-stride", "3"),
         *("--visibility", "facing", "--weight", "projected", "--beyond", "wrap"),
-        *("--count", "expected"),
+        *("--count", "plain"),
         *("--bins", "64", "--v-max", "3", "--null-bins", "1,2"),
         *("--range-exponent", "2", "--reference-range-m", "1.5", "--range-law", "frame"),
         *("--trajectory-smoothing-s", "0.1", "--oversampling", "4"),
@@ -46,7 +46,7 @@ def test_every_option_arrives() -> None:
         "depth_resolution": 128,
         "mask_stride": 3,
         "weight": "projected",
-        "count": "expected",
+        "count": "plain",
         "beyond": "wrap",
         "axis": VelocityAxis(64, 3.0),
         "null_bins": (1, 2),

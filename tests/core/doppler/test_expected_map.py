@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer, expected
+from sd2core.doppler.options import chosen_options
 from sd2core.doppler.reference import reference_stretch
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
@@ -24,8 +25,8 @@ from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 
 FRAMES = 24
-EXPECTED = replace(RAW, count="expected", visibility="none")
-PAPER = replace(PRESETS["paper"], count="expected")
+EXPECTED = replace(RAW, visibility="none")
+PAPER = PRESETS["paper"]
 ASIDE = sensor_at(0.4, 0.1, 0.2)
 BIN_MPS = RAW.axis.bin_width_mps
 
@@ -138,7 +139,7 @@ def test_a_mesh_that_says_nothing_has_the_plain_map_bit_for_bit() -> None:
         spread = Synthesizer(mesh, options).map(ASIDE)
         plain = Synthesizer(mesh, replace(options, count="plain")).map(ASIDE)
         np.testing.assert_array_equal(spread.values, plain.values)
-        assert spread.meta["options"]["count"] == "expected"
+        assert spread.meta["count"] == "plain"
 
 
 @pytest.mark.parametrize("visibility", ["none", "facing", "depth", "exact", "frozen"])
@@ -230,7 +231,13 @@ def test_it_stops_when_it_is_no_longer_wanted() -> None:
 
 
 def test_vid2doppler_counts_in_one_bin() -> None:
+    assert PRESETS["vid2doppler"].count == "plain"
+    options = SynthesisOptions(velocity="vid2doppler")
+    found = Synthesizer(scene(), options).map(ASIDE)
+    plain = Synthesizer(replace(scene(), uncertainty=None), options).map(ASIDE)
+    np.testing.assert_array_equal(found.values, plain.values)
+    assert found.meta["count"] == found.meta["options"]["count"] == "plain"
     with pytest.raises(Sd2Error, match="vid2doppler"):
-        replace(PRESETS["vid2doppler"], count="expected")
+        chosen_options("vid2doppler", None, None, {"count": "expected"})
     with pytest.raises(Sd2Error, match="count is 'mean'"):
         replace(PRESETS["paper"], count="mean")

@@ -13,6 +13,7 @@ from window_models import models_of
 from sd2app.maps.heatmap import HeatmapView
 from sd2app.maps.level_bar import LevelBar
 from sd2app.maps.readout import reading_lines
+from sd2app.sensor.panel import SensorPanel
 from sd2core.io.mesh import load_mesh, save_mesh
 from sd2core.maps import DopplerMap
 from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
@@ -122,3 +123,33 @@ def test_closing_while_it_is_found_is_safe(fitted, qtbot):
     assert models_of(fitted).uncertainty.busy
     models_of(fitted).document.undo_stack.clear()
     fitted.close()
+
+
+def test_counting_is_chosen_by_hand_and_the_title_states_one_accuracy(fitted, qtbot, tmp_path):
+    c, (panel,) = models_of(fitted), fitted.findChildren(SensorPanel)
+    fitted.bring_up("Sensor", "Sensor")
+    expected = c.synthetic.map.values.copy()
+    accuracy = c.trade.in_use.accuracy
+    assert accuracy.startswith("±")
+    assert ": body " in accuracy
+    assert c.synthetic.status.startswith(f"{accuracy} · ")
+    c.synthesis.export(tmp_path / "map.npz")
+    assert str(DopplerMap.load(tmp_path / "map.npz").accuracy) == accuracy
+
+    box = panel._expected
+    qtbot.mouseClick(box, Qt.MouseButton.LeftButton, pos=QPoint(8, box.height() // 2))
+    assert c.document.count == "plain"
+    wait(fitted, qtbot)
+    plain = c.synthetic.map.values.copy()
+    assert np.abs(plain - expected).sum() > 0.1 * plain.sum()
+    assert c.synthesis.whole_map().meta["count"] == "plain"
+    qtbot.keyClick(fitted, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    assert c.document.count == "expected"
+    assert box.isChecked()
+    wait(fitted, qtbot)
+    np.testing.assert_array_equal(c.synthetic.map.values, expected)
+
+
+def test_a_mesh_that_says_nothing_offers_no_counting(window):
+    (panel,) = window.findChildren(SensorPanel)
+    assert not panel._readouts.isRowVisible(panel._expected)

@@ -1,0 +1,53 @@
+"""How far a map is from the true body's, as badly as the mesh says its velocities to be known."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.special import erf
+
+from sd2core.doppler.synthesizer import Synthesizer
+from sd2core.progress import Progress, silent
+from sd2core.sensor import VirtualSensor
+
+BODY_FACTOR = 1.0
+"""Factor on the body's share, by which the figure covers the true error of most fitted clips."""
+
+_STRETCHES, _FRAMES = 16, 16
+"""Of a long clip so many stretches of so many frames are looked at."""
+
+
+def body_error(
+    maker: Synthesizer,
+    sensor: VirtualSensor,
+    *,
+    frames: tuple[int, int] | None = None,
+    progress: Progress = silent,
+) -> float | None:
+    """Expected relative L1 between a synthesizer's map and the true body's, after smoothing.
+
+    Each cell deviates normally, as :meth:`~sd2core.Synthesizer.uncertainty` says; the expected
+    absolute deviations are added up and divided by the sum of the expected map. Of more than 256
+    frames 16 stretches of 16 are looked at. None if the mesh does not say how badly its velocities
+    are known, or says that they are exact.
+    """
+    if maker.mesh.uncertainty is None:
+        return None
+    start, stop = frames or (0, maker.mesh.frame_count)
+    spans = [(start, stop)]
+    if stop - start > _STRETCHES * _FRAMES:
+        firsts = np.linspace(start, stop - _FRAMES, _STRETCHES).astype(int).tolist()
+        spans = [(first, first + _FRAMES) for first in firsts]
+    off = expected = doubt = 0.0
+    for number, span in enumerate(spans):
+        known = maker.uncertainty(sensor, frames=span)
+        values = maker.stretch(sensor, *span, shares=False).values
+        sd = known.sd.astype(np.float64)
+        missed = (known.expected - values) / np.where(sd > 0, sd, 1.0)
+        normal = math.sqrt(2 / math.pi) * np.exp(-0.5 * missed**2)
+        off += float((sd * (normal + missed * erf(missed / math.sqrt(2)))).sum())
+        expected += float(known.expected.sum(dtype=np.float64))
+        doubt += float(sd.sum())
+        progress(number + 1, len(spans))
+    return BODY_FACTOR * off / expected if doubt > 0 and expected > 0 else None

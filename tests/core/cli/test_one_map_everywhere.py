@@ -1,0 +1,70 @@
+"""A fitted mesh has one map, whichever command makes it, and one that is counted plainly."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cli_outcome import Sd2
+from swinging_recordings import FRAMES, recording
+
+from sd2core.batch.folder import BatchFolder
+from sd2core.datasets.reading import open_dataset
+from sd2core.io.mesh import load_mesh, save_mesh
+from sd2core.maps import DopplerMap
+from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
+from sd2core.pairs.store import read_pairs
+
+PLAN = """
+out = "made"
+[recordings]
+files = ["anna.sd2"]
+[synthesise]
+"""
+
+
+@pytest.fixture
+def fitted(tmp_path: Path) -> Path:
+    """A recording of which the mesh says that its velocity is known to ±0.2 m/s."""
+    folder = recording(tmp_path / "anna.sd2").folder
+    mesh, sigma = load_mesh(folder / "mesh.npz"), np.full((FRAMES, 1), 0.2)
+    known = VelocityUncertainty(("all",), np.zeros(mesh.vertex_count, int), sigma, sigma)
+    save_mesh(replace(mesh, uncertainty=known), folder / "mesh.npz")
+    return folder
+
+
+@pytest.mark.parametrize("count", [None, "plain"])
+def test_every_command_makes_the_same_map(
+    sd2: Sd2, fitted: Path, tmp_path: Path, count: str | None
+) -> None:
+    wish = () if count is None else ("--count", count)
+    assert sd2("synth", fitted, "--out", tmp_path / "map.npz", *wish).code == 0
+    made = DopplerMap.load(tmp_path / "map.npz")
+    assert made.meta["count"] == (count or "expected")
+
+    said = sd2("pairs", "recordings", fitted, "--out", tmp_path / "pairs.zarr", *wish)
+    assert said.code == 0, said.err
+    pairs = read_pairs(tmp_path / "pairs.zarr")
+    np.testing.assert_array_equal(pairs.takes[0].synthetic, made.values.T)
+    assert pairs.provenance["synthesis"]["count"] == made.meta["count"]
+
+    cut = "--segment-frames", FRAMES, "--overlap-frames", 0, "--kinds", "synthetic"
+    said = sd2("export", fitted, "--out", tmp_path / "set.zarr", *cut, *wish)
+    assert said.code == 0, said.err
+    with open_dataset(tmp_path / "set.zarr") as dataset:
+        np.testing.assert_array_equal(dataset["synthetic"][0].T, made.values)
+    card = (tmp_path / "set.card.md").read_text("utf-8")
+    assert f"counted from a mesh: {made.meta['count']}, visibility exact" in card
+    assert f"off the truth by {made.accuracy} (relative L1)" in card
+
+    words = "" if count is None else f'count = "{count}"\n'
+    (tmp_path / "plan.toml").write_text(PLAN + words)
+    said = sd2("batch", tmp_path / "plan.toml", "--workers", 1)
+    assert said.code == 0, said.err
+    row = json.loads(BatchFolder(tmp_path / "made").results.read_text())
+    batched = DopplerMap.load(tmp_path / "made" / row["synthetic"])
+    np.testing.assert_array_equal(batched.values, made.values)
+    assert batched.accuracy == made.accuracy
