@@ -31,7 +31,7 @@ ENVIRONMENT = "SD2_MODELS"
 """Names the folder of the models, where they are not in the user's cache."""
 
 LandmarkModel = Literal["full", "heavy"]
-DEFAULT_MODEL: LandmarkModel = "full"
+DEFAULT_MODEL: LandmarkModel = "heavy"
 
 DETECTOR = "pose_detection.tflite"
 LANDMARKERS: dict[LandmarkModel, str] = {

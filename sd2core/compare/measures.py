@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sd2core.doppler import PRESETS, Synthesizer
+from sd2core.doppler.options import Count
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import Presence
@@ -144,14 +145,17 @@ def _replaced(
 
 
 def synthesize_alike(
-    meshes: Sequence[MeshSequence], sensor: VirtualSensor, progress: Progress = silent
+    meshes: Sequence[MeshSequence],
+    sensor: VirtualSensor,
+    progress: Progress = silent,
+    count: Count = "plain",
 ) -> tuple[DopplerMap, ...]:
-    """Count maps of all meshes by the paper's preset, plainly: a stated doubt is no movement.
+    """Count maps of all meshes by the paper's preset, plainly unless asked otherwise.
 
     Hidden vertices are left out where every mesh has faces; otherwise all vertices of
     all meshes count, so that none is compared with another kind of map.
     """
-    options = replace(PRESETS["paper"], count="plain")
+    options = replace(PRESETS["paper"], count=count)
     if any(mesh.faces is None for mesh in meshes):
         options = replace(options, visibility="none")
     total = sum(mesh.frame_count for mesh in meshes)

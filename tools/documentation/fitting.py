@@ -1,4 +1,4 @@
-"""Makes ``fitting.md`` and its pictures: ``make fitting``, about ten minutes.
+"""Makes ``fitting.md`` and its pictures: ``make fitting``, about fifteen minutes.
 
 Every figure is measured when this runs. Clips and fits stay in ``build/fitting`` (or the
 folder that is named); what is there is not made again, and its time is not known. The
@@ -52,16 +52,19 @@ make fitting
 ```
 
 on {machine}: videos of simulated people, sixteen with made motions and, where the motion capture is
-there, twenty-two that move as recorded people did; nothing in the program was trained with these
-motions and persons. The fit is given the camera's focal length and the person's height. The motion
-in real videos is not known: there a body can only be held against the picture.
+there, thirty-six that move as recorded people did; nothing in the program was trained with these
+motions and persons, nor tuned on them. The fit is given the camera's focal length and the person's
+height. The motion in real videos is not known: there a body can only be held against the picture.
 
 ![Frames of eight of the clips](images/fit-truth.png)
 
 **Line-of-sight velocity** is that of a limb towards the camera. **Map L1** is the sum of the
 absolute differences between the synthetic Doppler maps of the fitted and of the true mesh over the
-sum of the true one. **Peak kept** is the hand's largest fitted speed along the line of sight over
-the true one. **Ends** are the first and last five frames, over those between. **Bold**: missed.
+sum of the true one: of the expected map of the fit, the **plain** one, and what the fit's map
+**states**. **Spread** is that of the joints' velocities within a frame, fitted over true, **peak
+kept** the largest fitted speed along the line of sight over the true one. Of a clip those joints
+count that move (0.1 m/s or more); of motions of real people clips count in which one does. **Ends**
+are the first and last five frames, over those between. **Bold**: missed.
 
 {tables}
 The clip {compared}, true and fitted:

@@ -21,6 +21,8 @@ from sd2core.compare.measures import (
     rms,
     synthesize_alike,
 )
+from sd2core.doppler.body_error import body_error
+from sd2core.doppler.synthesizer import Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.mesh.presence import Presence
 from sd2core.mesh.sequence import MeshSequence
@@ -126,8 +128,10 @@ class ClipScore:
     vertex_velocity_mps : float
         RMS over all vertices and frames of the velocity along the line of sight: for
         who stands still, all of it is false.
-    map_l1 : float
-        Of the whole clip.
+    map_l1, plain_l1 : float
+        Of the whole clip: of the fit's expected map, and of the plain one.
+    stated_l1 : float or None
+        What the fit's map states of it.
     edge, middle : float64 array, shape (2,)
         RMS error of the first and last frames, and of those between: velocity along
         the line of sight (m/s), then place (m), of all joints.
@@ -159,6 +163,8 @@ class ClipScore:
     spread: float
     vertex_velocity_mps: float
     map_l1: float
+    plain_l1: float
+    stated_l1: float | None
     edge: Floats
     middle: Floats
     overlap: float
@@ -214,7 +220,8 @@ def score_clip(
     ]
     velocity = [line_of_sight_velocity(one, times_s, presence=presence) for one in joints]
     tempo = [speed_mps(one, times_s) for one in joints]
-    maps = synthesize_alike(pair, VirtualSensor(), progress)
+    maps = synthesize_alike(pair, VirtualSensor(), progress, "expected")
+    plain = synthesize_alike(pair, VirtualSensor())
     measured = presence.measured
     apart = np.linalg.norm(joints[1] - joints[0], axis=-1)
     root = JOINTS.index("pelvis")
@@ -266,6 +273,8 @@ def score_clip(
         spread=np.nan if quiet else float(np.sqrt(within[1] / within[0])),
         vertex_velocity_mps=_vertex_velocity(pair[1], presence),
         map_l1=map_l1(maps[1], maps[0]),
+        plain_l1=map_l1(plain[1], plain[0]),
+        stated_l1=body_error(Synthesizer(pair[1]), VirtualSensor()),
         edge=np.array([rms(one[edge & measured]) for one in errors]),
         middle=np.array([rms(one[~edge & measured]) for one in errors]),
         overlap=_overlap(pair[0], pair[1], truth),

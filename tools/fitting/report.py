@@ -130,6 +130,11 @@ def reach_table(scores: Sequence[ClipScore], real: Sequence[RealScore] = ()) -> 
     )
     rows += _edge_rows(scores)
     rows += _walk_rows(scores) + _captured_rows(scores) + _coverage_rows(scores)
+    stated = [one for one in scores if one.stated_l1 is not None and not one.quiet]
+    if stated:
+        within = [one.map_l1 <= (one.stated_l1 or 0.0) for one in stated]
+        what = "clips whose map is as near to the truth as it states"
+        rows.append(Row(what, _mean(within), "", (">=", 0.6), 0.8, f"{len(stated)} clips"))
     rows += _unseen_rows(scores)
     taken = [one.seconds_per_frame for one in scores if one.seconds_per_frame is not None]
     worked = [one.processor_s_per_frame for one in scores if one.processor_s_per_frame is not None]
@@ -196,6 +201,8 @@ def clip_table(scores: Sequence[ClipScore]) -> list[dict[str, Any]]:
             "peak_kept": one.velocity.peak_kept,
             "vertex_velocity_rms_mps": one.vertex_velocity_mps,
             "map_l1": one.map_l1,
+            "plain_l1": one.plain_l1,
+            "stated_l1": one.stated_l1,
             "edge_velocity_ratio": _ratio(one.edge[0], one.middle[0]),
             "edge_place_ratio": _ratio(one.edge[1], one.middle[1]),
             "silhouette_overlap": one.overlap,

@@ -30,6 +30,8 @@ _CLIPS = (
     ("spread_ratio", "spread"),
     ("peak_kept", "peak kept"),
     ("map_l1", "map L1"),
+    ("plain_l1", "plain"),
+    ("stated_l1", "stated"),
 )
 _REAL = (
     ("name", "video"),
