@@ -89,7 +89,7 @@ def _add_commands(kinds: argparse._SubParsersAction) -> None:
             " --out lifter.npz"
         ),
     )
-    _add_learning(train, steps=12000)
+    _add_learning(train, steps=9000)
     train.add_argument(
         "--kept",
         type=Path,

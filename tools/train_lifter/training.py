@@ -69,12 +69,12 @@ class Recipe:
     width: int = 192
     dilations: tuple[int, ...] = (1, 2, 4, 8, 16, 4, 1)
     dropout: float = 0.1
-    steps: int = 12000
+    steps: int = 9000
     emulated_share: float = 0.15
     captured_share: float = 0.35
     batch: int = 24
     frames: int = 80
-    rate: float = 1.5e-3
+    rate: float = 1.0e-3
     velocity: float = 1.0
     depth: float = 4.0
     across: float = 4.0
