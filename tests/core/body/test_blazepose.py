@@ -28,7 +28,7 @@ def picture() -> NDArray[np.uint8]:
 
 @pytest.fixture(scope="module")
 def landmarker(models: LandmarkModels) -> PoseLandmarker:
-    return PoseLandmarker(models.landmarker)
+    return PoseLandmarker(models.follower)
 
 
 @pytest.fixture(scope="module")

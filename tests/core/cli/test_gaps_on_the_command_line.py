@@ -124,7 +124,6 @@ def test_synth_spreads_what_is_not_known(sd2: Sd2, fitted: Path, tmp_path: Path)
     assert spread.meta["count"] == "expected"
     assert np.abs(spread.values - DopplerMap.load(plain).values).max() > 0.01
     assert spread.uncertainty is not None
-    assert np.abs(spread.uncertainty.expected - spread.values).max() < 1e-3
     chosen = sd2("synth", fitted, "--out", out, "--count", "plain", "--tolerance", "5%")
     assert chosen.code == 0, chosen.err
     assert DopplerMap.load(out).meta["count"] == "plain"
