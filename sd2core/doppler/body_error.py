@@ -15,7 +15,7 @@ BODY_FACTOR = 1.17
 """Factor on the body's share; with it the figure covered the true error of seven in ten calibrating
 clips (docs/decisions/0071)."""
 
-_STRETCHES, _FRAMES = 16, 16
+_STRETCHES, _FRAMES = 8, 8
 """Of a long clip so many stretches of so many frames are looked at."""
 
 
@@ -29,8 +29,8 @@ def body_error(
     """Expected relative L1 between a synthesizer's map and the true body's, after smoothing.
 
     Each cell deviates normally, as :meth:`~sd2core.Synthesizer.uncertainty` says; the expected
-    absolute deviations are added up and divided by the sum of the expected map. Of more than 256
-    frames 16 stretches of 16 are looked at. None if the mesh does not say how badly its velocities
+    absolute deviations are added up and divided by the sum of the expected map. Of more than 64
+    frames eight stretches of eight are looked at, which tells it to a tenth. None if the mesh does not say how badly its velocities
     are known, or says that they are exact.
     """
     if maker.mesh.uncertainty is None:

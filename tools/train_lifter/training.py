@@ -41,6 +41,7 @@ _WEIGHTS = dict.fromkeys(("shoulder", "hip", "elbow", "knee", "wrist", "ankle"),
     dict.fromkeys(("pinky", "index", "thumb", "heel", "foot_index"), 1.5)
 )
 _FACE_WEIGHT = 0.5
+_BODY = [row for row, name in enumerate(LANDMARKS) if name.split(".")[0] in _WEIGHTS]
 _SPREADS_WEIGHT = 0.05
 _STANDING_WEIGHT = 0.05
 
@@ -59,7 +60,7 @@ class Recipe:
         Of each example.
     rate : float
         Of learning, at its highest.
-    velocity, depth, across, root, change : float
+    velocity, spread, depth, across, root, change : float
         Weights of the losses; ``change`` is that of the depths' differences over
         1, 2 and 4 frames.
     walks : int
@@ -76,6 +77,7 @@ class Recipe:
     frames: int = 80
     rate: float = 1.0e-3
     velocity: float = 1.0
+    spread: float = 1.5
     depth: float = 4.0
     across: float = 4.0
     root: float = 2.0
@@ -189,12 +191,14 @@ def losses(
     centre = torch.exp(out[..., :1].detach()) / size[:, None, None] * _rate(out[..., :1])
     velocity_error = rest[..., 2, :] + _rate(rest[..., 0, :]) + centre - velocity
     across_error = rest[..., 4:6, :].transpose(-1, -2) - across
+    said, true = (_deviation(one) for one in (velocity + velocity_error, velocity))
     change = sum(
         (_huber((depth_error[:, k:] - depth_error[:, :-k]) * 30.0 / k, 1.0) * weights).mean()
         for k in (1, 2, 4)
     )
     parts = {
         "velocity": recipe.velocity * (_huber(velocity_error, 0.6) * weights).mean(),
+        "spread": recipe.spread * _huber(said - true, 0.3).mean(),
         "depth": recipe.depth * (_huber(depth_error, 0.15) * weights).mean(),
         "across": recipe.across * (_huber(across_error, 0.1) * weights[:, None]).mean(),
         "root": recipe.root * _huber(root_error, 0.2).mean(),
@@ -224,6 +228,14 @@ def _rate(values: torch.Tensor) -> torch.Tensor:
     inner = (values[:, 2:] - values[:, :-2]) / 2.0
     ends = values[:, 1:2] - values[:, :1], values[:, -1:] - values[:, -2:-1]
     return RATE_HZ * torch.cat([ends[0], inner, ends[1]], dim=1)
+
+
+def _deviation(velocities: torch.Tensor) -> torch.Tensor:
+    """Standard deviation of the landmarks' velocities within each frame, (N, T).
+
+    A mean of what is possible moves too little, and so would the Doppler map of it.
+    """
+    return torch.sqrt(velocities[..., _BODY].var(dim=-1) + 1e-4)
 
 
 def _huber(error: torch.Tensor, knee: float) -> torch.Tensor:

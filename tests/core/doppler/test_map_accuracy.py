@@ -67,7 +67,7 @@ def test_of_a_long_clip_some_stretches_tell_about_the_same() -> None:
     found = body_error(maker, CAMERA, progress=lambda *now: told.append(now))
     whole = np.abs(drawn - values).mean(axis=0).sum() / known.expected.sum()
     assert found == pytest.approx(BODY_FACTOR * whole, rel=0.05)
-    assert told[-1] == (16, 16)
+    assert told[-1] == (8, 8)
 
 
 def test_what_is_exactly_known_or_not_stated_is_no_error_of_the_body() -> None:
