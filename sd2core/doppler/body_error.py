@@ -30,8 +30,8 @@ def body_error(
 
     Each cell deviates normally, as :meth:`~sd2core.Synthesizer.uncertainty` says; the expected
     absolute deviations are added up and divided by the sum of the expected map. Of more than 64
-    frames eight stretches of eight are looked at, which tells it to a tenth. None if the mesh does not say how badly its velocities
-    are known, or says that they are exact.
+    frames eight stretches of eight are looked at, which tells it to a tenth. None if the mesh does
+    not say how badly its velocities are known, or says that they are exact.
     """
     if maker.mesh.uncertainty is None:
         return None

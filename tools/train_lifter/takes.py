@@ -149,6 +149,8 @@ class Stage:
             deed = replace(deed, elbows_rest=deed.elbows_rest or elbows_rest)
             motion = random_motion(rng, skeleton, shape.stature_m, times, deed)
             transforms = skeleton.transforms(*motion)
+            if not np.isfinite(transforms).all():
+                continue  # an arm that does not reach so far
             keypoints = self._keypoints.of(shape)
             view = random_view(rng, keypoints.positions(transforms))
             if view is None:
