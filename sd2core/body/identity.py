@@ -9,20 +9,28 @@ from numpy.typing import NDArray
 
 from sd2core.body.blazepose import Pose
 from sd2core.body.roi import CROP_PX, Floats, Pixels, Roi, apart_px, roi_numbers
-from sd2core.body.track import LANDMARKS
+from sd2core.body.track import LANDMARK
 
 Signature = NDArray[np.float32]
-"""Histograms of colour of torso and thighs, shape (2, 512); each adds up to 1, or is 0."""
+"""Histograms of colour of parts of the body, shape (6, 512); each adds up to 1, or is 0: unseen."""
 
-ALIKE = 0.85
-"""Similarity from which on looks may be the same person's (docs/decisions/0048)."""
+ALIKE, THE_SAME = 0.85, 0.9
+"""Similarities from which on a part may be, and is, the same person's (docs/decisions/0048)."""
 
 _SMALL_PX = 64
 _BINS = 8
-_SHOULDERS, _HIPS, _KNEES = (
-    [LANDMARKS.index(f"{name}.L"), LANDMARKS.index(f"{name}.R")]
-    for name in ("shoulder", "hip", "knee")
+_VISIBLE = 0.5
+_FEWEST = 4
+"""Parts that have to be alike, unless fewer are known."""
+_BARS = (
+    (("ear.L", "ear.R"), ("ear.R", "ear.L"), 3.5),
+    (("shoulder.L", "hip.L"), ("shoulder.R", "hip.R"), 2.5),
+    (("shoulder.L", "elbow.L"), ("shoulder.R", "elbow.R"), 1.3),
+    (("elbow.L", "wrist.L"), ("elbow.R", "wrist.R"), 1.3),
+    (("hip.L", "knee.L"), ("hip.R", "knee.R"), 2.0),
+    (("knee.L", "ankle.L"), ("knee.R", "ankle.R"), 1.5),
 )
+"""Head with the hair, torso, upper arms, forearms, thighs, shins: lines and how wide, in pixels."""
 _MOST_LOOKS = 6
 _ANOTHER_LOOK = 0.93
 
@@ -42,25 +50,49 @@ def signature(crop: Pixels, pose: Pose) -> Signature:
     size = (_SMALL_PX, _SMALL_PX)
     small = cv2.cvtColor(cv2.resize(crop, size, interpolation=cv2.INTER_AREA), cv2.COLOR_RGB2LAB)
     person = cv2.resize(pose.mask, size, interpolation=cv2.INTER_AREA) > 0.5
-    heights = _in_crop(pose)[:, 1] * (_SMALL_PX / CROP_PX)
-    top, middle, end = (float(heights[rows].mean()) for rows in (_SHOULDERS, _HIPS, _KNEES))
-    rows = np.arange(_SMALL_PX)[:, None]
     cells = (small // (256 // _BINS)).astype(np.intp)
     numbers = (cells[..., 0] * _BINS + cells[..., 1]) * _BINS + cells[..., 2]
-    return np.stack(
-        [
-            _histogram(numbers[person & (rows >= upper) & (rows < lower)])
-            for upper, lower in ((top, middle), (middle, end))
-        ]
-    )
+    points = _in_crop(pose) * (_SMALL_PX / CROP_PX)
+    seen = pose.visibility * pose.presence > _VISIBLE
+    return np.stack([_histogram(numbers[person & _part(points, seen, *bar)]) for bar in _BARS])
+
+
+def _part(
+    points: Floats,
+    seen: NDArray[np.bool_],
+    left: tuple[str, str],
+    right: tuple[str, str],
+    wide_px: float,
+) -> NDArray[np.bool_]:
+    """Pixels near the lines between landmarks of either side that are seen."""
+    pixels = np.stack(np.mgrid[:_SMALL_PX, :_SMALL_PX][::-1], axis=-1) + 0.5
+    near = np.zeros((_SMALL_PX, _SMALL_PX), bool)
+    for start, end in ([LANDMARK[name] for name in side] for side in (left, right)):
+        if seen[start] and seen[end]:
+            line = points[end] - points[start]
+            along = (pixels - points[start]) @ line / max(float(line @ line), 1e-6)
+            nearest = points[start] + np.clip(along, 0.0, 1.0)[..., None] * line
+            near |= np.hypot(*np.moveaxis(pixels - nearest, -1, 0)) < wide_px
+    return near
 
 
 def similarity(one: Signature, two: Signature) -> float:
-    """Similarity of colours, from 0 (nothing in common) to 1 (the same)."""
-    both = (one.any(axis=1)) & (two.any(axis=1))
-    if not both.any():
-        return 0.0
-    return float(np.sqrt(one[both] * two[both]).sum(axis=1).mean())
+    """Similarity of colours, from 0 (nothing in common) to 1 (the same), mean over the parts."""
+    parts = _similarities(one, two)
+    return float(parts.mean()) if len(parts) else 0.0
+
+
+def alike(known: Signature, looks: Signature, least: float = ALIKE) -> bool:
+    """True if looks are like those of a known person in every part that is seen."""
+    parts = _similarities(known, looks)
+    enough = len(parts) >= min(_FEWEST, int(known.any(axis=1).sum()))
+    return bool(enough and len(parts) and parts.min() >= least)
+
+
+def _similarities(one: Signature, two: Signature) -> Floats:
+    """Similarity of each part that both show."""
+    both = one.any(axis=1) & two.any(axis=1)
+    return np.sqrt(one[both] * two[both]).sum(axis=1, dtype=np.float64)
 
 
 def _histogram(numbers: NDArray[np.intp]) -> NDArray[np.float32]:
@@ -91,9 +123,16 @@ class Looks:
         """Similarity to the look that is most alike."""
         return max(similarity(looks, each) for each in (self.recent, *self.kept))
 
+    def may_be(self, looks: Signature, least: float = ALIKE) -> bool:
+        """True if the person has looked like this, in every part."""
+        return any(alike(each, looks, least) for each in (self.recent, *self.kept))
+
     def learn(self, looks: Signature) -> None:
         """Take in how the person looks now; what lasts for a second is kept."""
-        self.recent = self.recent + np.float32(0.05) * (looks - self.recent)
+        # What is not seen now looks as it did; what was never seen is taken as it is.
+        share = np.where(self.recent.any(axis=1), np.float32(0.05), np.float32(1.0))
+        share *= looks.any(axis=1)
+        self.recent = self.recent + share[:, None] * (looks - self.recent)
         if max((similarity(self.recent, each) for each in self.kept), default=0.0) < _ANOTHER_LOOK:
             self.kept = [*self.kept, self.recent][-_MOST_LOOKS:]
 

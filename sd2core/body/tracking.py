@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 from sd2core.body.blazepose import Detection, Pose, PoseDetector, PoseLandmarker
 from sd2core.body.identity import (
     ALIKE,
+    THE_SAME,
     Bystander,
     Looks,
     Signature,
     Trail,
+    alike,
     signature,
     similarity,
 )
@@ -26,7 +28,9 @@ _SEARCH_STEP_S = 1.0 / 10.0
 """Time between frames that are searched; the path in between is smooth."""
 _LOOK_ROUND_S = 1.0 / 3.0
 _GONE_S = 1.0
-"""Time after which it is not known where another person has gone."""
+"""Time after which it is not known where a person has gone."""
+_SURE_S = 0.5
+"""Time for which somebody has to look like the person who had gone to be taken for them."""
 _JUST_NOW_S = 0.25
 """Who was seen elsewhere so long ago or less is not here."""
 _LONG_S = 3.0
@@ -60,11 +64,15 @@ class PersonTracker:
     own: Looks | None = None
     others: list[Bystander] = field(default_factory=list)
     looked_round_s: float = -np.inf
+    hopeful: Trail | None = None
+    """Of one who may be the person that had gone."""
+    hopeful_s: float = -np.inf
+    """Time since when they may be."""
 
     def begin(self, roi: Roi, time_s: float) -> None:
         """Start at a square with the person, whose colours are still to be learnt."""
         self.trail, self.lost, self.unclear = Trail(roi, time_s), False, False
-        self.looked_round_s = -np.inf
+        self.looked_round_s, self.hopeful = -np.inf, None
         for other in self.others:
             other.trail = replace(other.trail, time_s=-np.inf)
 
@@ -83,11 +91,10 @@ class PersonTracker:
                 people = self._people(picture, self.trail.predicted(time_s))
             pose, looks = self._search(picture, people, time_s)
         if pose is None or looks is None:
-            self.lost = True
+            self.lost, self.hopeful = True, None
             return None
-        # After so long a gap, and elsewhere, nothing but their looks tells who it is.
-        gone = self.lost and time_s - self.trail.time_s > _GONE_S
-        self.unclear = gone and not self.trail.goes_on(pose.next_roi, time_s)
+        if self.lost and self._doubtful(time_s) and not self._sure(pose, looks, time_s):
+            return None
         self._accept(pose, looks, time_s)
         if time_s - self.looked_round_s >= _LOOK_ROUND_S:
             self.looked_round_s = time_s
@@ -95,6 +102,29 @@ class PersonTracker:
                 people = self._people(picture, pose.next_roi)
             self._look_round(picture, people, pose, time_s)
         return pose
+
+    def _doubtful(self, time_s: float) -> bool:
+        """True if one look does not tell who is where the person was lost."""
+        assert self.trail is not None
+        lost_s = self.trail.time_s
+        about = (each for each in self.others if lost_s - each.trail.time_s < _GONE_S)
+        return time_s - lost_s > _GONE_S or any(self._is_like(each) for each in about)
+
+    def _sure(self, pose: Pose, looks: Signature, time_s: float) -> bool:
+        """True if somebody has looked the same as the person who had gone for long enough.
+
+        At a glance others in like clothes do too, the more so while they come into the picture.
+        """
+        assert self.own is not None
+        known, roi = self.hopeful, pose.next_roi
+        if not self.own.may_be(looks, THE_SAME):
+            self.hopeful = None
+        elif known is None or not known.reaches(roi, time_s):
+            self.hopeful, self.hopeful_s = Trail(roi, time_s), time_s
+        else:
+            self.hopeful = known.followed(roi, time_s)
+        self.unclear = self.hopeful is None or time_s - self.hopeful_s < _SURE_S
+        return not self.unclear
 
     def _look(self, picture: Pixels, roi: Roi) -> Pose | None:
         pose = self.landmarker.in_picture(picture, roi)
@@ -109,18 +139,25 @@ class PersonTracker:
         if self.own is None:
             return looks
         mine, theirs = self._likeness(looks)
-        twins = [each for each in self.others if self.own.likeness(each.looks) >= ALIKE]
+        near = [each for each in self.others if time_s - each.trail.time_s < _GONE_S]
+        least = THE_SAME if any(self._is_like(each) for each in near) else ALIKE
+        twins = [each for each in self.others if self.own.may_be(each.looks, THE_SAME)]
         # Who comes back from behind the edge of the picture was seen in part, and in a wrong size.
         any_size = not followed and not twins
         if (
             self.trail.reaches(roi, time_s, any_size=any_size)
-            and theirs <= mine + 0.05
-            and (followed or mine >= ALIKE)
+            and theirs <= mine + (0.0 if near else 0.05)
+            and ((followed and not near) or self.own.may_be(looks, least))
             and not any(self._may_be(twin, roi, time_s, followed) for twin in twins)
         ):
             return looks
         self.unclear = True
         return None
+
+    def _is_like(self, other: Bystander) -> bool:
+        """True if another person may be taken for the one that is followed."""
+        assert self.own is not None
+        return self.own.likeness(other.looks) >= ALIKE
 
     def _may_be(self, twin: Bystander, roi: Roi, time_s: float, followed: bool) -> bool:
         """True if a square may show another person who looks like the one that is followed."""
@@ -213,7 +250,7 @@ class PersonTracker:
                 continue
             looks = signature(other.roi.cut(picture), other)
             known = max(self.others, key=lambda each: similarity(looks, each.looks), default=None)
-            if known is None or similarity(looks, known.looks) <= ALIKE:
+            if known is None or not alike(known.looks, looks):
                 known = Bystander(looks, Trail(other.next_roi, time_s))
                 self.others = [*self.others, known][-_MAX_CANDIDATES:]
             elif known.trail.time_s < time_s:
@@ -227,7 +264,8 @@ class PersonTracker:
         trails = [each.trail.numbers() for each in self.others]
         return {
             "trail": self.trail.numbers(),
-            "clock": np.array([self.looked_round_s, float(self.lost)]),
+            "clock": np.array([self.looked_round_s, float(self.lost), self.hopeful_s]),
+            "hopeful": np.array([] if self.hopeful is None else self.hopeful.numbers()),
             "own": np.array([self.own.recent, *self.own.kept]),
             "others": np.array(looks, np.float32).reshape(-1, *self.own.recent.shape),
             "trails": np.array(trails, np.float64).reshape(-1, 7),
@@ -236,8 +274,10 @@ class PersonTracker:
     def restore(self, state: dict[str, NDArray[np.generic]]) -> None:
         """Go on from :meth:`state`."""
         self.trail = Trail.of(np.asarray(state["trail"], np.float64))
-        looked_round_s, lost = (float(value) for value in state["clock"])
-        self.looked_round_s, self.lost = looked_round_s, bool(lost)
+        looked_round_s, lost, hopeful_s = (float(value) for value in state["clock"])
+        self.looked_round_s, self.lost, self.hopeful_s = looked_round_s, bool(lost), hopeful_s
+        hopeful = np.asarray(state["hopeful"], np.float64)
+        self.hopeful = Trail.of(hopeful) if len(hopeful) else None
         recent, *kept = np.asarray(state["own"], np.float32)
         self.own = Looks(recent, kept)
         self.others = [
