@@ -5,23 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
-from filmed_people import Picture, film
+from filmed_people import Picture
 from numpy.typing import NDArray
 
 from sd2core.body.model import Body
 from sd2core.body.rig import KeypointSpace
-from sd2core.body.rotations import about
 from sd2core.body.shape import ShapeSpace
 from sd2core.body.skinning import pose_vertices
 from sd2core.simulate.gait import Path as Way
 from sd2core.simulate.gait import gait
 from sd2core.simulate.limbs import arm_length_m
 from tools.build_sample.clothing import Clothes, srgb
-from tools.build_sample.render import Camera, Renderer, Studio, _tone
-from tools.fitting.cast import PEOPLE, ROOMS, Person
+from tools.build_sample.render import Camera, Renderer, _tone
+from tools.fitting.cast import ROOMS, Person
 
 FRAMES_PER_S = 10
 CAMERA = Camera(320, 240, 260.0, above_floor_m=1.1)
@@ -93,9 +91,7 @@ def pictures(actors: Sequence[Actor]) -> Iterator[Picture]:
     layers = sorted(actors, key=lambda each: -each.away_m)
     for frame in range(len(actors[0].vertices_m)):
         seen = [each.vertices_m[frame] for each in layers]
-        shadows = [
-            each.drawer._light_buffer(part) for each, part in zip(layers, seen, strict=True)
-        ]
+        shadows = [each.drawer._light_buffer(part) for each, part in zip(layers, seen, strict=True)]
         picture = layers[0].drawer._background(np.maximum.reduce(shadows))
         for each, part, shadow in zip(layers, seen, shadows, strict=True):
             colours, coverage = each.drawer._person(part, shadow)

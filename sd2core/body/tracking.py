@@ -21,20 +21,20 @@ from sd2core.body.identity import (
     similarity,
 )
 from sd2core.body.person_selection import FOUND, Start
-from sd2core.body.roi import Floats, Pixels, Roi, Sightings, apart_px, roi_numbers
+from sd2core.body.roi import PLACES, Floats, Pixels, Roi, Sightings, apart_px, roi_numbers
 from sd2core.io.video import VideoReader
 
 _SEARCH_STEP_S = 1.0 / 10.0
 """Time between frames that are searched; the path in between is smooth."""
-_LOOK_ROUND_S = 1.0 / 3.0
+_LOOK_ROUND_S = 0.15
 _GONE_S = 1.0
 """Time after which it is not known where a person has gone."""
-_SURE_S = 0.5
-"""Time for which somebody has to look like the person who had gone to be taken for them."""
+_SURE_S = 1.0
+"""Time for which somebody has to look the same as the person who had gone to be taken for them."""
 _JUST_NOW_S = 0.25
 """Who was seen elsewhere so long ago or less is not here."""
-_LONG_S = 3.0
-"""Who was not seen anywhere for so long may have left."""
+_SEEN = 0.75
+"""Score from which on a detection is a person, not a shadow."""
 _MAX_CANDIDATES = 4
 _SMALL = 0.6
 """Share of the picture below which a person is searched for around their place too."""
@@ -62,17 +62,17 @@ class PersonTracker:
     unclear: bool = False
     """True if whom the last picture shows may be another person."""
     own: Looks | None = None
+    people: list[Detection] | None = None
+    """Who was detected in the last picture, None if nobody was looked for."""
     others: list[Bystander] = field(default_factory=list)
     looked_round_s: float = -np.inf
-    hopeful: Trail | None = None
-    """Of one who may be the person that had gone."""
-    hopeful_s: float = -np.inf
-    """Time since when they may be."""
+    hopes: list[tuple[Trail, Pose]] = field(default_factory=list)
+    """Looks at one who may be the person that had gone; they count once that is sure."""
 
     def begin(self, roi: Roi, time_s: float) -> None:
         """Start at a square with the person, whose colours are still to be learnt."""
         self.trail, self.lost, self.unclear = Trail(roi, time_s), False, False
-        self.looked_round_s, self.hopeful = -np.inf, None
+        self.looked_round_s, self.hopes = -np.inf, []
         for other in self.others:
             other.trail = replace(other.trail, time_s=-np.inf)
 
@@ -80,28 +80,35 @@ class PersonTracker:
         """Find the person in the next picture."""
         assert self.trail is not None
         self.unclear = False
-        people = self._watched(picture, time_s)
+        self.people = self._watched(picture, time_s)
         pose = looks = None
         if not self.lost:
             pose = self._look(picture, self.trail.predicted(time_s))
         if pose is not None:
             looks = None if _jumped(pose) else self._recognised(picture, pose, time_s)
-        if looks is None:
-            if people is None:
-                people = self._people(picture, self.trail.predicted(time_s))
+        followed = looks is not None
+        if not followed:
+            people = self._seen(picture, self.trail.predicted(time_s))
             pose, looks = self._search(picture, people, time_s)
         if pose is None or looks is None:
-            self.lost, self.hopeful = True, None
+            self.lost, self.hopes = True, []
             return None
-        if self.lost and self._doubtful(time_s) and not self._sure(pose, looks, time_s):
+        if followed or not self._doubtful(time_s):
+            self.hopes = []
+        elif not self._sure(pose, looks, time_s):
+            self.lost = True
             return None
         self._accept(pose, looks, time_s)
         if time_s - self.looked_round_s >= _LOOK_ROUND_S:
             self.looked_round_s = time_s
-            if people is None:
-                people = self._people(picture, pose.next_roi)
-            self._look_round(picture, people, pose, time_s)
+            self._look_round(picture, self._seen(picture, pose.next_roi), pose, time_s)
         return pose
+
+    def _seen(self, picture: Pixels, near: Roi) -> list[Detection]:
+        """People in the picture, detected only once."""
+        if self.people is None:
+            self.people = self._people(picture, near)
+        return self.people
 
     def _doubtful(self, time_s: float) -> bool:
         """True if one look does not tell who is where the person was lost."""
@@ -115,16 +122,16 @@ class PersonTracker:
 
         At a glance others in like clothes do too, the more so while they come into the picture.
         """
+        assert self.trail is not None
         assert self.own is not None
-        known, roi = self.hopeful, pose.next_roi
-        if not self.own.may_be(looks, THE_SAME):
-            self.hopeful = None
-        elif known is None or not known.reaches(roi, time_s):
-            self.hopeful, self.hopeful_s = Trail(roi, time_s), time_s
-        else:
-            self.hopeful = known.followed(roi, time_s)
-        self.unclear = self.hopeful is None or time_s - self.hopeful_s < _SURE_S
-        return not self.unclear
+        roi = pose.next_roi
+        if self.hopes and not self.hopes[-1][0].is_near(roi, time_s):
+            self.hopes = []
+        same = self.own.may_be(looks, THE_SAME)
+        self.hopes = [*self.hopes, (Trail(roi, time_s), pose)] if same else []
+        sure = same and time_s - self.hopes[0][0].time_s > _SURE_S - 1e-9
+        self.unclear = not sure or not self.trail.goes_on(roi, time_s)
+        return sure
 
     def _look(self, picture: Pixels, roi: Roi) -> Pose | None:
         pose = self.landmarker.in_picture(picture, roi)
@@ -147,6 +154,7 @@ class PersonTracker:
         if (
             self.trail.reaches(roi, time_s, any_size=any_size)
             and theirs <= mine + (0.0 if near else 0.05)
+            and (not near or not followed or self.trail.goes_on(roi, time_s))
             and ((followed and not near) or self.own.may_be(looks, least))
             and not any(self._may_be(twin, roi, time_s, followed) for twin in twins)
         ):
@@ -171,7 +179,7 @@ class PersonTracker:
         about = self.trail.time_s - twin.trail.time_s < _GONE_S
         if followed or not about or unseen_s < _JUST_NOW_S:
             return False
-        return unseen_s < _LONG_S or not self.trail.goes_on(roi, time_s)
+        return not self.trail.goes_on(roi, time_s)
 
     def _likeness(self, looks: Signature) -> tuple[float, float]:
         assert self.own is not None
@@ -256,6 +264,22 @@ class PersonTracker:
             elif known.trail.time_s < time_s:
                 known.trail = known.trail.followed(other.next_roi, time_s)
 
+    def beside(self, pose: Pose | None) -> NDArray[np.bool_]:
+        """True for each of :data:`PLACES` where others are in the last picture."""
+        # Who may turn out to be the person is not yet somebody else.
+        known = pose or (self.hopes[-1][1] if self.hopes else None)
+        here = None if known is None else known.next_roi
+        places = np.zeros(len(PLACES), bool)
+        for each in self.people or []:
+            there = each.roi
+            if each.score < _SEEN or (
+                here is not None and apart_px(there, here) < _BESIDE * here.size_px
+            ):
+                continue
+            alone = pose is None or here is None
+            places[2 if alone else int(there.centre_x_px > here.centre_x_px)] = True
+        return places
+
     def state(self) -> dict[str, NDArray[np.generic]]:
         """State that the next step depends on, as arrays."""
         assert self.trail is not None
@@ -264,8 +288,7 @@ class PersonTracker:
         trails = [each.trail.numbers() for each in self.others]
         return {
             "trail": self.trail.numbers(),
-            "clock": np.array([self.looked_round_s, float(self.lost), self.hopeful_s]),
-            "hopeful": np.array([] if self.hopeful is None else self.hopeful.numbers()),
+            "clock": np.array([self.looked_round_s, float(self.lost)]),
             "own": np.array([self.own.recent, *self.own.kept]),
             "others": np.array(looks, np.float32).reshape(-1, *self.own.recent.shape),
             "trails": np.array(trails, np.float64).reshape(-1, 7),
@@ -274,10 +297,8 @@ class PersonTracker:
     def restore(self, state: dict[str, NDArray[np.generic]]) -> None:
         """Go on from :meth:`state`."""
         self.trail = Trail.of(np.asarray(state["trail"], np.float64))
-        looked_round_s, lost, hopeful_s = (float(value) for value in state["clock"])
-        self.looked_round_s, self.lost, self.hopeful_s = looked_round_s, bool(lost), hopeful_s
-        hopeful = np.asarray(state["hopeful"], np.float64)
-        self.hopeful = Trail.of(hopeful) if len(hopeful) else None
+        looked_round_s, lost = (float(value) for value in state["clock"])
+        self.looked_round_s, self.lost = looked_round_s, bool(lost)
         recent, *kept = np.asarray(state["own"], np.float32)
         self.own = Looks(recent, kept)
         self.others = [
@@ -314,12 +335,18 @@ class Search:
         self._rois = np.full((len(self._order), 4), np.nan)
         self._confidence = np.zeros(len(self._order))
         self._unclear = np.zeros(len(self._order), bool)
+        self._others = np.zeros((len(self._order), len(PLACES)), bool)
         self._done = 0
 
     @property
     def done(self) -> tuple[int, int]:
         """Number of frames searched, and of all to be searched."""
         return self._done, len(self._order)
+
+    @property
+    def settled(self) -> bool:
+        """True unless it is still in doubt who was seen last."""
+        return not (self._follower.lost and self._follower.hopes)
 
     def run(self, seen: Seen) -> Sightings:
         """Search the frames that are left."""
@@ -332,16 +359,20 @@ class Search:
                 self._follower.begin(self._start.roi, 0.0)
             # The second half runs backwards in time.
             pose = self._follower.step(picture, abs(float(times[frame] - times[first])))
-            if pose is not None:
-                self._rois[number] = roi_numbers(pose.next_roi)
-                self._confidence[number] = pose.confidence
             self._unclear[number] = self._follower.unclear
+            self._others[number] = self._follower.beside(pose)
+            if pose is not None:
+                # With the looks that were in doubt until now.
+                looks = [each for _, each in self._follower.hopes] or [pose]
+                rows = slice(number + 1 - len(looks), number + 1)
+                self._rois[rows] = [roi_numbers(each.next_roi) for each in looks]
+                self._confidence[rows] = [each.confidence for each in looks]
+                self._unclear[rows] = self._follower.unclear
             self._done += 1
             seen(frame, pose)
         rank = np.argsort(self._order, kind="stable")
-        return Sightings(
-            self._order[rank], self._rois[rank], self._confidence[rank], self._unclear[rank]
-        )
+        found = self._order, self._rois, self._confidence, self._unclear, self._others
+        return Sightings(*(each[rank] for each in found))
 
     def _pictures(self) -> Iterator[Pixels]:
         """Pictures still to be searched, in that order."""
@@ -362,6 +393,7 @@ class Search:
             "rois": self._rois[: self._done],
             "confidence": self._confidence[: self._done],
             "unclear": self._unclear[: self._done],
+            "beside": self._others[: self._done],
         }
 
     def restore(self, state: dict[str, NDArray[np.generic]]) -> None:
@@ -371,6 +403,7 @@ class Search:
         self._rois[: self._done] = state["rois"]
         self._confidence[: self._done] = state["confidence"]
         self._unclear[: self._done] = state["unclear"]
+        self._others[: self._done] = state["beside"]
 
 
 def looked_at(times_s: Floats, step_s: float) -> NDArray[np.intp]:
