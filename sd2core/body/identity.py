@@ -22,15 +22,15 @@ _BINS = 8
 _VISIBLE = 0.5
 _FEWEST = 4
 """Parts that have to be alike, unless fewer are known."""
-_BARS = (
-    (("ear.L", "ear.R"), ("ear.R", "ear.L"), 3.5),
-    (("shoulder.L", "hip.L"), ("shoulder.R", "hip.R"), 2.5),
-    (("shoulder.L", "elbow.L"), ("shoulder.R", "elbow.R"), 1.3),
-    (("elbow.L", "wrist.L"), ("elbow.R", "wrist.R"), 1.3),
-    (("hip.L", "knee.L"), ("hip.R", "knee.R"), 2.0),
-    (("knee.L", "ankle.L"), ("knee.R", "ankle.R"), 1.5),
+_PARTS = (
+    (7, (("ear.L", "ear.R"),)),
+    (5, (("shoulder.L", "hip.L"), ("shoulder.R", "hip.R"))),
+    (3, (("shoulder.L", "elbow.L"), ("shoulder.R", "elbow.R"))),
+    (3, (("elbow.L", "wrist.L"), ("elbow.R", "wrist.R"))),
+    (4, (("hip.L", "knee.L"), ("hip.R", "knee.R"))),
+    (3, (("knee.L", "ankle.L"), ("knee.R", "ankle.R"))),
 )
-"""Head with the hair, torso, upper arms, forearms, thighs, shins: lines and how wide, in pixels."""
+"""Head with the hair, torso, upper arms, forearms, thighs, shins: lines, and how wide in pixels."""
 _MOST_LOOKS = 6
 _ANOTHER_LOOK = 0.93
 
@@ -52,28 +52,16 @@ def signature(crop: Pixels, pose: Pose) -> Signature:
     person = cv2.resize(pose.mask, size, interpolation=cv2.INTER_AREA) > 0.5
     cells = (small // (256 // _BINS)).astype(np.intp)
     numbers = (cells[..., 0] * _BINS + cells[..., 1]) * _BINS + cells[..., 2]
-    points = _in_crop(pose) * (_SMALL_PX / CROP_PX)
+    points = np.rint(_in_crop(pose) * (_SMALL_PX / CROP_PX) - 0.5).astype(int).tolist()
     seen = pose.visibility * pose.presence > _VISIBLE
-    return np.stack([_histogram(numbers[person & _part(points, seen, *bar)]) for bar in _BARS])
-
-
-def _part(
-    points: Floats,
-    seen: NDArray[np.bool_],
-    left: tuple[str, str],
-    right: tuple[str, str],
-    wide_px: float,
-) -> NDArray[np.bool_]:
-    """Pixels near the lines between landmarks of either side that are seen."""
-    pixels = np.stack(np.mgrid[:_SMALL_PX, :_SMALL_PX][::-1], axis=-1) + 0.5
-    near = np.zeros((_SMALL_PX, _SMALL_PX), bool)
-    for start, end in ([LANDMARK[name] for name in side] for side in (left, right)):
-        if seen[start] and seen[end]:
-            line = points[end] - points[start]
-            along = (pixels - points[start]) @ line / max(float(line @ line), 1e-6)
-            nearest = points[start] + np.clip(along, 0.0, 1.0)[..., None] * line
-            near |= np.hypot(*np.moveaxis(pixels - nearest, -1, 0)) < wide_px
-    return near
+    histograms = []
+    for wide_px, lines in _PARTS:
+        part = np.zeros(size, np.uint8)
+        for start, end in ((LANDMARK[one], LANDMARK[two]) for one, two in lines):
+            if seen[start] and seen[end]:
+                cv2.line(part, points[start], points[end], 1, wide_px)
+        histograms.append(_histogram(numbers[person & (part > 0)]))
+    return np.stack(histograms)
 
 
 def similarity(one: Signature, two: Signature) -> float:

@@ -111,11 +111,11 @@ class PersonTracker:
         return self.people
 
     def _doubtful(self, time_s: float) -> bool:
-        """True if one look does not tell who is where the person was lost."""
+        """True if one look does not tell whether somebody is the person who was lost."""
         assert self.trail is not None
         lost_s = self.trail.time_s
-        about = (each for each in self.others if lost_s - each.trail.time_s < _GONE_S)
-        return time_s - lost_s > _GONE_S or any(self._is_like(each) for each in about)
+        last_s = max((each.trail.time_s for each in self.others), default=-np.inf)
+        return time_s - lost_s > _GONE_S or lost_s - last_s < _GONE_S
 
     def _sure(self, pose: Pose, looks: Signature, time_s: float) -> bool:
         """True if somebody has looked the same as the person who had gone for long enough.
@@ -147,10 +147,10 @@ class PersonTracker:
             return looks
         mine, theirs = self._likeness(looks)
         near = [each for each in self.others if time_s - each.trail.time_s < _GONE_S]
-        least = THE_SAME if any(self._is_like(each) for each in near) else ALIKE
+        least = THE_SAME if near else ALIKE
         twins = [each for each in self.others if self.own.may_be(each.looks, THE_SAME)]
         # Who comes back from behind the edge of the picture was seen in part, and in a wrong size.
-        any_size = not followed and not twins
+        any_size = not followed and not twins and not near
         if (
             self.trail.reaches(roi, time_s, any_size=any_size)
             and theirs <= mine + (0.0 if near else 0.05)
@@ -161,11 +161,6 @@ class PersonTracker:
             return looks
         self.unclear = True
         return None
-
-    def _is_like(self, other: Bystander) -> bool:
-        """True if another person may be taken for the one that is followed."""
-        assert self.own is not None
-        return self.own.likeness(other.looks) >= ALIKE
 
     def _may_be(self, twin: Bystander, roi: Roi, time_s: float, followed: bool) -> bool:
         """True if a square may show another person who looks like the one that is followed."""
