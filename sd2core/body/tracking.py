@@ -244,12 +244,10 @@ class PersonTracker:
     ) -> None:
         """Learn the colours of others while they stand apart."""
         for found in people[: _MAX_CANDIDATES + 1]:
-            if apart_px(found.roi, pose.next_roi) < _BESIDE * pose.next_roi.size_px:
+            if _beside(found.roi, pose.next_roi):
                 continue
             other = self._look(picture, found.roi)
-            if other is None or apart_px(other.next_roi, pose.next_roi) < (
-                _BESIDE * pose.roi.size_px
-            ):
+            if other is None or _beside(other.next_roi, pose.next_roi):
                 continue
             looks = signature(other.roi.cut(picture), other)
             known = max(self.others, key=lambda each: similarity(looks, each.looks), default=None)
@@ -263,16 +261,14 @@ class PersonTracker:
         """True for each of :data:`PLACES` where others are in the last picture."""
         # Who may turn out to be the person is not yet somebody else.
         known = pose or (self.hopes[-1][1] if self.hopes else None)
-        here = None if known is None else known.next_roi
         places = np.zeros(len(PLACES), bool)
         for each in self.people or []:
-            there = each.roi
-            if each.score < _SEEN or (
-                here is not None and apart_px(there, here) < _BESIDE * here.size_px
-            ):
+            if each.score < _SEEN or (known and _beside(each.roi, known.next_roi)):
                 continue
-            alone = pose is None or here is None
-            places[2 if alone else int(there.centre_x_px > here.centre_x_px)] = True
+            if pose is None:
+                places[2] = True
+            else:
+                places[int(each.roi.centre_x_px > pose.next_roi.centre_x_px)] = True
         return places
 
     def state(self) -> dict[str, NDArray[np.generic]]:
@@ -304,6 +300,11 @@ class PersonTracker:
                 strict=True,
             )
         ]
+
+
+def _beside(one: Roi, two: Roi) -> bool:
+    """True if two squares are so near that they may show the same person."""
+    return apart_px(one, two) < _BESIDE * two.size_px
 
 
 def _jumped(pose: Pose) -> bool:
@@ -366,8 +367,13 @@ class Search:
             self._done += 1
             seen(frame, pose)
         rank = np.argsort(self._order, kind="stable")
-        found = self._order, self._rois, self._confidence, self._unclear, self._others
-        return Sightings(*(each[rank] for each in found))
+        return Sightings(
+            self._order[rank],
+            self._rois[rank],
+            self._confidence[rank],
+            self._unclear[rank],
+            self._others[rank],
+        )
 
     def _pictures(self) -> Iterator[Pixels]:
         """Pictures still to be searched, in that order."""
