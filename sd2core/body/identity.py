@@ -19,18 +19,25 @@ ALIKE, THE_SAME = 0.85, 0.9
 
 _SMALL_PX = 64
 _BINS = 8
+_STEPS, _GREY = (32, 8, 8), (0, 4, 4)
+"""Width of a bin of lightness and of both colours, and the bins of grey."""
 _VISIBLE = 0.5
 _FEWEST = 4
 """Parts that have to be alike, unless fewer are known."""
 _PARTS = (
-    (7, (("ear.L", "ear.R"),)),
+    (5, (("ear.L", "ear.R"),)),
     (5, (("shoulder.L", "hip.L"), ("shoulder.R", "hip.R"))),
     (3, (("shoulder.L", "elbow.L"), ("shoulder.R", "elbow.R"))),
     (3, (("elbow.L", "wrist.L"), ("elbow.R", "wrist.R"))),
     (4, (("hip.L", "knee.L"), ("hip.R", "knee.R"))),
     (3, (("knee.L", "ankle.L"), ("knee.R", "ankle.R"))),
 )
-"""Head with the hair, torso, upper arms, forearms, thighs, shins: lines, and how wide in pixels."""
+"""Crown of the head, torso, upper arms, forearms, thighs, shins: lines, and how wide in pixels."""
+_EARS, _SHOULDERS = (
+    [LANDMARK[f"{name}.L"], LANDMARK[f"{name}.R"]] for name in ("ear", "shoulder")
+)
+_CROWN = 0.4
+"""Height of the crown above the ears, as a share of theirs above the shoulders."""
 _MOST_LOOKS = 6
 _ANOTHER_LOOK = 0.93
 
@@ -50,9 +57,12 @@ def signature(crop: Pixels, pose: Pose) -> Signature:
     size = (_SMALL_PX, _SMALL_PX)
     small = cv2.cvtColor(cv2.resize(crop, size, interpolation=cv2.INTER_AREA), cv2.COLOR_RGB2LAB)
     person = cv2.resize(pose.mask, size, interpolation=cv2.INTER_AREA) > 0.5
-    cells = (small // (256 // _BINS)).astype(np.intp)
+    # Skin, hair and cloth are all within a few steps of grey.
+    cells = np.clip((small.astype(np.intp) - (0, 128, 128)) // _STEPS + _GREY, 0, _BINS - 1)
     numbers = (cells[..., 0] * _BINS + cells[..., 1]) * _BINS + cells[..., 2]
-    points = np.rint(_in_crop(pose) * (_SMALL_PX / CROP_PX) - 0.5).astype(int).tolist()
+    places = _in_crop(pose) * (_SMALL_PX / CROP_PX) - 0.5
+    places[_EARS] += _CROWN * (places[_EARS].mean(axis=0) - places[_SHOULDERS].mean(axis=0))
+    points = np.rint(places).astype(int).tolist()
     seen = pose.visibility * pose.presence > _VISIBLE
     histograms = []
     for wide_px, lines in _PARTS:

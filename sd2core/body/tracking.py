@@ -31,6 +31,8 @@ _GONE_S = 1.0
 """Time after which it is not known where a person has gone."""
 _SURE_S = 1.0
 """Time for which somebody has to look the same as the person who had gone to be taken for them."""
+_REPLACED_S = 3.0
+"""Time with somebody else after which the person is not known by their looks alone."""
 _JUST_NOW_S = 0.25
 """Who was seen elsewhere so long ago or less is not here."""
 _SEEN = 0.75
@@ -66,13 +68,15 @@ class PersonTracker:
     """Who was detected in the last picture, None if nobody was looked for."""
     others: list[Bystander] = field(default_factory=list)
     looked_round_s: float = -np.inf
+    stranger_s: float = np.inf
+    """Since when somebody else has been in view instead of the person; -inf: for too long."""
     hopes: list[tuple[Trail, Pose]] = field(default_factory=list)
     """Looks at one who may be the person that had gone; they count once that is sure."""
 
     def begin(self, roi: Roi, time_s: float) -> None:
         """Start at a square with the person, whose colours are still to be learnt."""
         self.trail, self.lost, self.unclear = Trail(roi, time_s), False, False
-        self.looked_round_s, self.hopes = -np.inf, []
+        self.looked_round_s, self.stranger_s, self.hopes = -np.inf, np.inf, []
         for other in self.others:
             other.trail = replace(other.trail, time_s=-np.inf)
 
@@ -92,6 +96,7 @@ class PersonTracker:
             pose, looks = self._search(picture, people, time_s)
         if pose is None or looks is None:
             self.lost, self.hopes = True, []
+            self._meet(time_s)
             return None
         if followed or not self._doubtful(time_s):
             self.hopes = []
@@ -103,6 +108,15 @@ class PersonTracker:
             self.looked_round_s = time_s
             self._look_round(picture, self._seen(picture, pose.next_roi), pose, time_s)
         return pose
+
+    def _meet(self, time_s: float) -> None:
+        """Somebody else, or nobody, is in view instead of the person."""
+        if time_s - self.stranger_s > _REPLACED_S:
+            self.stranger_s = -np.inf
+        elif self.beside(None).any():
+            self.stranger_s = min(self.stranger_s, time_s)
+        else:
+            self.stranger_s = np.inf
 
     def _seen(self, picture: Pixels, near: Roi) -> list[Detection]:
         """People in the picture, detected only once."""
@@ -125,7 +139,8 @@ class PersonTracker:
         assert self.trail is not None
         assert self.own is not None
         roi = pose.next_roi
-        if self.hopes and not self.hopes[-1][0].is_near(roi, time_s):
+        near = self.hopes and self.hopes[-1][0].is_near(roi, time_s)
+        if not near or self.stranger_s == -np.inf:  # others have come: who is alike may be one
             self.hopes = []
         same = self.own.may_be(looks, THE_SAME)
         self.hopes = [*self.hopes, (Trail(roi, time_s), pose)] if same else []
@@ -214,7 +229,7 @@ class PersonTracker:
     def _accept(self, pose: Pose, looks: Signature, time_s: float) -> None:
         assert self.trail is not None
         self.trail = self.trail.followed(pose.next_roi, time_s, steady=not self.lost)
-        self.lost = False
+        self.lost, self.stranger_s = False, np.inf
         if self.own is None:
             self.own = Looks(looks)
             return
@@ -262,6 +277,7 @@ class PersonTracker:
         # Who may turn out to be the person is not yet somebody else.
         known = pose or (self.hopes[-1][1] if self.hopes else None)
         places = np.zeros(len(PLACES), bool)
+        places[3] = pose is None and known is not None
         for each in self.people or []:
             if each.score < _SEEN or (known and _beside(each.roi, known.next_roi)):
                 continue
@@ -279,7 +295,7 @@ class PersonTracker:
         trails = [each.trail.numbers() for each in self.others]
         return {
             "trail": self.trail.numbers(),
-            "clock": np.array([self.looked_round_s, float(self.lost)]),
+            "clock": np.array([self.looked_round_s, self.stranger_s, float(self.lost)]),
             "own": np.array([self.own.recent, *self.own.kept]),
             "others": np.array(looks, np.float32).reshape(-1, *self.own.recent.shape),
             "trails": np.array(trails, np.float64).reshape(-1, 7),
@@ -288,8 +304,8 @@ class PersonTracker:
     def restore(self, state: dict[str, NDArray[np.generic]]) -> None:
         """Go on from :meth:`state`."""
         self.trail = Trail.of(np.asarray(state["trail"], np.float64))
-        looked_round_s, lost = (float(value) for value in state["clock"])
-        self.looked_round_s, self.lost = looked_round_s, bool(lost)
+        self.looked_round_s, self.stranger_s, lost = (float(value) for value in state["clock"])
+        self.lost = bool(lost)
         recent, *kept = np.asarray(state["own"], np.float32)
         self.own = Looks(recent, kept)
         self.others = [
@@ -364,6 +380,7 @@ class Search:
                 self._rois[rows] = [roi_numbers(each.next_roi) for each in looks]
                 self._confidence[rows] = [each.confidence for each in looks]
                 self._unclear[rows] = self._follower.unclear
+                self._others[rows, 3] = False
             self._done += 1
             seen(frame, pose)
         rank = np.argsort(self._order, kind="stable")

@@ -51,7 +51,7 @@ class TestPath:
         ).astype(float)
         rois[5:8] = np.nan
         rows = roi_path(
-            Sightings(frames, rois, np.ones(11), np.zeros(11, bool), np.zeros((11, 3), bool)),
+            Sightings(frames, rois, np.ones(11), np.zeros(11, bool), np.zeros((11, 4), bool)),
             np.arange(21) / 30.0,
         )
         path = [roi_of(row) for row in rows]
@@ -71,7 +71,7 @@ class TestPath:
         rois[:, 3] = np.remainder(angles + np.pi, 2 * np.pi) - np.pi
         path = roi_path(
             Sightings(
-                np.arange(21), rois, np.ones(21), np.zeros(21, bool), np.zeros((21, 3), bool)
+                np.arange(21), rois, np.ones(21), np.zeros(21, bool), np.zeros((21, 4), bool)
             ),
             np.arange(21) / 15.0,
         )
