@@ -29,8 +29,8 @@ _SEARCH_STEP_S = 1.0 / 10.0
 _LOOK_ROUND_S = 0.15
 _GONE_S = 1.0
 """Time after which it is not known where a person has gone."""
-_SURE_S = 1.0
-"""Time for which somebody has to look the same as the person who had gone to be taken for them."""
+_SURE_S, _SURE_HERE_S = 1.0, 0.25
+"""Time for which who is taken for the person has to look the same, elsewhere and where they were."""
 _REPLACED_S = 3.0
 """Time with somebody else after which the person is not known by their looks alone."""
 _JUST_NOW_S = 0.25
@@ -144,8 +144,10 @@ class PersonTracker:
             self.hopes = []
         same = self.own.may_be(looks, THE_SAME)
         self.hopes = [*self.hopes, (Trail(roi, time_s), pose)] if same else []
-        sure = same and time_s - self.hopes[0][0].time_s > _SURE_S - 1e-9
-        self.unclear = not sure or not self.trail.goes_on(roi, time_s)
+        here = self.trail.goes_on(roi, time_s)
+        least_s = _SURE_HERE_S if here else _SURE_S
+        sure = same and time_s - self.hopes[0][0].time_s > least_s - 1e-9
+        self.unclear = not (sure and here)
         return sure
 
     def _look(self, picture: Pixels, roi: Roi) -> Pose | None:
@@ -162,13 +164,13 @@ class PersonTracker:
             return looks
         mine, theirs = self._likeness(looks)
         near = [each for each in self.others if time_s - each.trail.time_s < _GONE_S]
-        least = THE_SAME if near else ALIKE
+        least = THE_SAME if near and not followed else ALIKE
         twins = [each for each in self.others if self.own.may_be(each.looks, THE_SAME)]
         # Who comes back from behind the edge of the picture was seen in part, and in a wrong size.
         any_size = not followed and not twins and not near
         if (
             self.trail.reaches(roi, time_s, any_size=any_size)
-            and theirs <= mine + (0.0 if near else 0.05)
+            and theirs <= mine + 0.05
             and (not near or not followed or self.trail.goes_on(roi, time_s))
             and ((followed and not near) or self.own.may_be(looks, least))
             and not any(self._may_be(twin, roi, time_s, followed) for twin in twins)
