@@ -33,9 +33,7 @@ _PARTS = (
     (3, (("knee.L", "ankle.L"), ("knee.R", "ankle.R"))),
 )
 """Crown of the head, torso, upper arms, forearms, thighs, shins: lines, and how wide in pixels."""
-_EARS, _SHOULDERS = (
-    [LANDMARK[f"{name}.L"], LANDMARK[f"{name}.R"]] for name in ("ear", "shoulder")
-)
+_EARS, _SHOULDERS = ([LANDMARK[f"{name}.L"], LANDMARK[f"{name}.R"]] for name in ("ear", "shoulder"))
 _CROWN = 0.4
 """Height of the crown above the ears, as a share of theirs above the shoulders."""
 _MOST_LOOKS = 6

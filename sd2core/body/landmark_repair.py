@@ -32,7 +32,7 @@ _ROUNDS = 5
 _BRIDGED_VISIBILITY = 0.25
 _NAMED = 4
 """Stretches that a note names at most."""
-_ONE_STRETCH_S, _SHORT_S = 1.0, 0.3
+_ONE_STRETCH_S, _SHORT_S = 1.0, 0.5
 """Gap that a stretch with somebody else may have, and how long it is at least."""
 
 
@@ -280,7 +280,7 @@ class _Tally:
 
 def who_else(sightings: Sightings, times_s: Floats) -> tuple[str, ...]:
     """Sentence on who was seen besides the person, and when; none where nobody was."""
-    named = []
+    named, advice = [], ""
     for place, seen in zip(PLACES, sightings.others.T, strict=True):
         times = times_s[sightings.frames[seen]]
         stretches = np.split(times, np.flatnonzero(np.diff(times) > _ONE_STRETCH_S) + 1)
@@ -292,7 +292,13 @@ def who_else(sightings: Sightings, times_s: Floats) -> tuple[str, ...]:
         ]
         if spans:
             named.append(f"{place} from {_first(spans)}")
-    return (f"Others were seen: {'; '.join(named)}.",) if named else ()
+            if place == PLACES[-1]:
+                frames = sightings.frames[seen]
+                advice = (
+                    " If it is the person, fit them too:"
+                    f" --person-box X,Y,WIDTH,HEIGHT --person-frame {frames[len(frames) // 2]}"
+                )
+    return (f"Others were seen: {'; '.join(named)}.{advice}",) if named else ()
 
 
 def _which(frames: NDArray[np.bool_]) -> str:

@@ -17,9 +17,10 @@ from sd2core.body.landmark_files import (
 from sd2core.body.landmark_models import LandmarkModels
 from sd2core.body.landmark_repair import who_else
 from sd2core.body.person_selection import Rectangle, Start, find_person_in, find_prominent_person
+from sd2core.body.person_tracker import PersonTracker
 from sd2core.body.refining import Refiner
 from sd2core.body.roi import Roi, Sightings, roi_numbers, roi_of, roi_path
-from sd2core.body.tracking import PersonTracker, Search
+from sd2core.body.tracking import Search
 from sd2core.errors import Sd2Error
 from sd2core.io.video import VideoReader
 from sd2core.numerics.compiled import worker_count

@@ -89,12 +89,7 @@ def _sampled(picture: Pixels, matrix: Floats, crop_px: int) -> Pixels:
     return crop
 
 
-PLACES = (
-    "left of the person",
-    "right of the person",
-    "without the person",
-    "alike, perhaps the person,",
-)
+PLACES = ("left of the person", "right of the person", "without the person", "like the person")
 """Where others are, as the picture shows them."""
 
 

@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sd2core.body.identity import similarity
 from sd2core.body.roi import Sightings, roi_of, roi_path, smooth_over_time
-from sd2core.body.tracking import similarity
 
 
 class TestSmoothing:
