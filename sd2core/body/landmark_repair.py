@@ -32,7 +32,7 @@ _ROUNDS = 5
 _BRIDGED_VISIBILITY = 0.25
 _NAMED = 4
 """Stretches that a note names at most."""
-_ONE_STRETCH_S, _SHORT_S = 1.0, 0.5
+_ONE_STRETCH_S, _SHORT_S = 1.0, 0.3
 """Gap that a stretch with somebody else may have, and how long it is at least."""
 
 

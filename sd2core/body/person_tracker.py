@@ -271,13 +271,15 @@ class PersonTracker:
         known = pose or (self.hopes[-1][1] if self.hopes else None)
         places = np.zeros(len(PLACES), bool)
         places[3] = pose is None and known is not None
-        for each in self.people or []:
-            if each.score < _SEEN or (known and _beside(each.roi, known.next_roi)):
-                continue
-            if pose is None:
-                places[2] = True
-            else:
-                places[int(each.roi.centre_x_px > pose.next_roi.centre_x_px)] = True
+        seen = [each.roi for each in self.people or [] if each.score >= _SEEN]
+        if pose is not None and self.trail is not None:
+            # Others who are known are hardly overlooked.
+            now_s = self.trail.time_s
+            seen += [each.trail.roi for each in self.others if each.trail.time_s == now_s]
+        for roi in seen:
+            if known is None or not _beside(roi, known.next_roi):
+                right = int(pose is not None and roi.centre_x_px > pose.next_roi.centre_x_px)
+                places[2 if pose is None else right] = True
         return places
 
     def state(self) -> dict[str, NDArray[np.generic]]:
