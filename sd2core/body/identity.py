@@ -9,20 +9,33 @@ from numpy.typing import NDArray
 
 from sd2core.body.blazepose import Pose
 from sd2core.body.roi import CROP_PX, Floats, Pixels, Roi, apart_px, roi_numbers
-from sd2core.body.track import LANDMARKS
+from sd2core.body.track import LANDMARK
 
 Signature = NDArray[np.float32]
-"""Histograms of colour of torso and thighs, shape (2, 512); each adds up to 1, or is 0."""
+"""Histograms of colour of parts of the body, shape (6, 512); each adds up to 1, or is 0: unseen."""
 
-ALIKE = 0.85
-"""Similarity from which on looks may be the same person's (docs/decisions/0048)."""
+ALIKE, THE_SAME = 0.85, 0.9
+"""Similarities from which on a part may be, and is, the same person's (docs/decisions/0048)."""
 
 _SMALL_PX = 64
 _BINS = 8
-_SHOULDERS, _HIPS, _KNEES = (
-    [LANDMARKS.index(f"{name}.L"), LANDMARKS.index(f"{name}.R")]
-    for name in ("shoulder", "hip", "knee")
+_STEPS, _GREY = (32, 8, 8), (0, 4, 4)
+"""Width of a bin of lightness and of both colours, and the bins of grey."""
+_VISIBLE = 0.5
+_FEWEST = 4
+"""Parts that have to be alike, unless fewer are known."""
+_PARTS = (
+    (5, (("ear.L", "ear.R"),)),
+    (5, (("shoulder.L", "hip.L"), ("shoulder.R", "hip.R"))),
+    (3, (("shoulder.L", "elbow.L"), ("shoulder.R", "elbow.R"))),
+    (3, (("elbow.L", "wrist.L"), ("elbow.R", "wrist.R"))),
+    (4, (("hip.L", "knee.L"), ("hip.R", "knee.R"))),
+    (3, (("knee.L", "ankle.L"), ("knee.R", "ankle.R"))),
 )
+"""Crown of the head, torso, upper arms, forearms, thighs, shins: lines, and how wide in pixels."""
+_EARS, _SHOULDERS = ([LANDMARK[f"{name}.L"], LANDMARK[f"{name}.R"]] for name in ("ear", "shoulder"))
+_CROWN = 0.4
+"""Height of the crown above the ears, as a share of theirs above the shoulders."""
 _MOST_LOOKS = 6
 _ANOTHER_LOOK = 0.93
 
@@ -42,25 +55,40 @@ def signature(crop: Pixels, pose: Pose) -> Signature:
     size = (_SMALL_PX, _SMALL_PX)
     small = cv2.cvtColor(cv2.resize(crop, size, interpolation=cv2.INTER_AREA), cv2.COLOR_RGB2LAB)
     person = cv2.resize(pose.mask, size, interpolation=cv2.INTER_AREA) > 0.5
-    heights = _in_crop(pose)[:, 1] * (_SMALL_PX / CROP_PX)
-    top, middle, end = (float(heights[rows].mean()) for rows in (_SHOULDERS, _HIPS, _KNEES))
-    rows = np.arange(_SMALL_PX)[:, None]
-    cells = (small // (256 // _BINS)).astype(np.intp)
+    # Skin, hair and cloth are all within a few steps of grey.
+    cells = np.clip((small.astype(np.intp) - (0, 128, 128)) // _STEPS + _GREY, 0, _BINS - 1)
     numbers = (cells[..., 0] * _BINS + cells[..., 1]) * _BINS + cells[..., 2]
-    return np.stack(
-        [
-            _histogram(numbers[person & (rows >= upper) & (rows < lower)])
-            for upper, lower in ((top, middle), (middle, end))
-        ]
-    )
+    places = _in_crop(pose) * (_SMALL_PX / CROP_PX) - 0.5
+    places[_EARS] += _CROWN * (places[_EARS].mean(axis=0) - places[_SHOULDERS].mean(axis=0))
+    points = np.rint(places).astype(int).tolist()
+    seen = pose.visibility * pose.presence > _VISIBLE
+    histograms = []
+    for wide_px, lines in _PARTS:
+        part = np.zeros(size, np.uint8)
+        for start, end in ((LANDMARK[one], LANDMARK[two]) for one, two in lines):
+            if seen[start] and seen[end]:
+                cv2.line(part, points[start], points[end], 1, wide_px)
+        histograms.append(_histogram(numbers[person & (part > 0)]))
+    return np.stack(histograms)
 
 
 def similarity(one: Signature, two: Signature) -> float:
-    """Similarity of colours, from 0 (nothing in common) to 1 (the same)."""
-    both = (one.any(axis=1)) & (two.any(axis=1))
-    if not both.any():
-        return 0.0
-    return float(np.sqrt(one[both] * two[both]).sum(axis=1).mean())
+    """Similarity of colours, from 0 (nothing in common) to 1 (the same), mean over the parts."""
+    parts = _similarities(one, two)
+    return float(parts.mean()) if len(parts) else 0.0
+
+
+def alike(known: Signature, looks: Signature, least: float = ALIKE) -> bool:
+    """True if looks are like those of a known person in every part that is seen."""
+    parts = _similarities(known, looks)
+    enough = len(parts) >= min(_FEWEST, int(known.any(axis=1).sum()))
+    return bool(enough and len(parts) and parts.min() >= least)
+
+
+def _similarities(one: Signature, two: Signature) -> Floats:
+    """Similarity of each part that both show."""
+    both = one.any(axis=1) & two.any(axis=1)
+    return np.sqrt(one[both] * two[both]).sum(axis=1, dtype=np.float64)
 
 
 def _histogram(numbers: NDArray[np.intp]) -> NDArray[np.float32]:
@@ -91,9 +119,16 @@ class Looks:
         """Similarity to the look that is most alike."""
         return max(similarity(looks, each) for each in (self.recent, *self.kept))
 
+    def may_be(self, looks: Signature, least: float = ALIKE) -> bool:
+        """True if the person has looked like this, in every part."""
+        return any(alike(each, looks, least) for each in (self.recent, *self.kept))
+
     def learn(self, looks: Signature) -> None:
         """Take in how the person looks now; what lasts for a second is kept."""
-        self.recent = self.recent + np.float32(0.05) * (looks - self.recent)
+        # What is not seen now looks as it did; what was never seen is taken as it is.
+        share = np.where(self.recent.any(axis=1), np.float32(0.05), np.float32(1.0))
+        share *= looks.any(axis=1)
+        self.recent = self.recent + share[:, None] * (looks - self.recent)
         if max((similarity(self.recent, each) for each in self.kept), default=0.0) < _ANOTHER_LOOK:
             self.kept = [*self.kept, self.recent][-_MOST_LOOKS:]
 

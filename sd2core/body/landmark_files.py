@@ -27,7 +27,7 @@ from sd2core.timebase import Timebase
 
 FORMAT = "sd2-landmarks"
 VERSION = 1
-_SEARCH_VERSION = 3
+_SEARCH_VERSION = 4
 
 _ARRAYS = (*PER_FRAME, "silhouette_frames", "silhouettes")
 _PLACES = ("image_px", "depth_px", "world_m", "visibility")
@@ -192,6 +192,7 @@ class TrackInParts:
         refined: RefinedStretches,
         max_gap_s: float,
         unclear: NDArray[np.bool_] | None = None,
+        notes: tuple[str, ...] = (),
     ) -> None:
         self.timebase, self.width, self.height = timebase, width, height
         self.silhouette_frames, self.silhouettes = refined.silhouettes()
@@ -209,9 +210,10 @@ class TrackInParts:
             self.present[frames], self.bridged[frames] = found.present, found.bridged
             written = frames.stop
 
-        self.notes = repair_landmarks(
+        repairs = repair_landmarks(
             refined.found, timebase.times_s, refined.confidence > 0.0, max_gap_s, write, unclear
         )
+        self.notes = (*repairs, *notes)
 
     def __len__(self) -> int:
         return len(self.timebase)

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.raw_track import SCALE_S, RawTrack, pixels_per_metre, place_m
+from sd2core.body.roi import PLACES, Sightings
 from sd2core.body.sides import Read, find_side_swaps, swap_sides
 from sd2core.body.track import LANDMARKS, parts, with_margin
 from sd2core.mesh.presence import runs
@@ -31,6 +32,8 @@ _ROUNDS = 5
 _BRIDGED_VISIBILITY = 0.25
 _NAMED = 4
 """Stretches that a note names at most."""
+_ONE_STRETCH_S, _SHORT_S = 1.0, 0.3
+"""Gap that a stretch with somebody else may have, and how long it is at least."""
 
 
 # -- Outliers ------------------------------------------------------------------------------------
@@ -275,11 +278,39 @@ class _Tally:
         return tuple(notes)
 
 
+def who_else(sightings: Sightings, times_s: Floats) -> tuple[str, ...]:
+    """Sentence on who was seen besides the person, and when; none where nobody was."""
+    named, advice = [], ""
+    for place, seen in zip(PLACES, sightings.others.T, strict=True):
+        times = times_s[sightings.frames[seen]]
+        stretches = np.split(times, np.flatnonzero(np.diff(times) > _ONE_STRETCH_S) + 1)
+        # What is shorter may be a slip of the detector.
+        spans = [
+            f"{each[0]:.1f} to {each[-1]:.1f} s"
+            for each in stretches
+            if len(each) and np.ptp(each) >= _SHORT_S
+        ]
+        if spans:
+            named.append(f"{place} from {_first(spans)}")
+            if place == PLACES[-1]:
+                frames = sightings.frames[seen]
+                advice = (
+                    " If it is the person, fit them too:"
+                    f" --person-box X,Y,WIDTH,HEIGHT --person-frame {frames[len(frames) // 2]}"
+                )
+    return (f"Others were seen: {'; '.join(named)}.{advice}",) if named else ()
+
+
 def _which(frames: NDArray[np.bool_]) -> str:
     """Number of the frames, and which they are."""
     spans = [f"{a} to {b - 1}" if b > a + 1 else f"{a}" for a, b in runs(frames)]
+    return f"{_count(int(frames.sum()))} ({_first(spans)})"
+
+
+def _first(spans: list[str]) -> str:
+    """The first stretches, and how many more there are."""
     more = [f"{len(spans) - _NAMED} more"] if len(spans) > _NAMED else []
-    return f"{_count(int(frames.sum()))} ({', '.join(spans[:_NAMED] + more)})"
+    return ", ".join(spans[:_NAMED] + more)
 
 
 def _count(number: int, what: str = "frame") -> str:

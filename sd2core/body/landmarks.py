@@ -15,10 +15,12 @@ from sd2core.body.landmark_files import (
     TrackInParts,
 )
 from sd2core.body.landmark_models import LandmarkModels
+from sd2core.body.landmark_repair import who_else
 from sd2core.body.person_selection import Rectangle, Start, find_person_in, find_prominent_person
+from sd2core.body.person_tracker import PersonTracker
 from sd2core.body.refining import Refiner
 from sd2core.body.roi import Roi, Sightings, roi_numbers, roi_of, roi_path
-from sd2core.body.tracking import PersonTracker, Search
+from sd2core.body.tracking import Search
 from sd2core.errors import Sd2Error
 from sd2core.io.video import VideoReader
 from sd2core.numerics.compiled import worker_count
@@ -112,6 +114,7 @@ def find_landmarks(
         refined,
         max_gap_s,
         sightings.unclear_frames(len(video)),
+        who_else(sightings, video.timebase.times_s),
     )
 
 
@@ -147,7 +150,7 @@ def _found(
     def seen(frame: int, pose: Pose | None) -> None:
         done, total = search.done
         _show(frame, pose, on_frame)
-        if done % _SAVE_EVERY == 0 and done < total:
+        if done % _SAVE_EVERY == 0 and done < total and search.settled:
             store.write("search.npz", search.state())
         progress(round(done * len(video) / total), len(video))
 

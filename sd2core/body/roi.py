@@ -89,6 +89,10 @@ def _sampled(picture: Pixels, matrix: Floats, crop_px: int) -> Pixels:
     return crop
 
 
+PLACES = ("left of the person", "right of the person", "without the person", "like the person")
+"""Where others are, as the picture shows them."""
+
+
 @dataclass(frozen=True, eq=False)
 class Sightings:
     """Frames in which the person was searched for."""
@@ -97,6 +101,7 @@ class Sightings:
     rois: Floats  # (N, 4) centre x and y, size, angle of the square; NaN where not found
     confidence: Floats  # (N,)
     unclear: NDArray[np.bool_]  # (N,) whoever is seen may be another person
+    others: NDArray[np.bool_]  # (N, 4) somebody else is seen in each of PLACES
 
     def unclear_frames(self, frames: int) -> NDArray[np.bool_]:
         """Frames (T,) of a video whose nearest sighting is not clear."""

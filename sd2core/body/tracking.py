@@ -1,260 +1,25 @@
-"""First pass over a video: one person followed from picture to picture."""
+"""First pass over a video: the person is searched for ten times a second."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.body.blazepose import Detection, Pose, PoseDetector, PoseLandmarker
-from sd2core.body.identity import (
-    ALIKE,
-    Bystander,
-    Looks,
-    Signature,
-    Trail,
-    signature,
-    similarity,
-)
-from sd2core.body.person_selection import FOUND, Start
-from sd2core.body.roi import Floats, Pixels, Roi, Sightings, apart_px, roi_numbers
+from sd2core.body.blazepose import Pose
+from sd2core.body.person_selection import Start
+from sd2core.body.person_tracker import PersonTracker
+from sd2core.body.roi import PLACES, Floats, Pixels, Sightings, roi_numbers
 from sd2core.io.video import VideoReader
 
 _SEARCH_STEP_S = 1.0 / 10.0
 """Time between frames that are searched; the path in between is smooth."""
-_LOOK_ROUND_S = 1.0 / 3.0
-_GONE_S = 1.0
-"""Time after which it is not known where another person has gone."""
-_JUST_NOW_S = 0.25
-"""Who was seen elsewhere so long ago or less is not here."""
-_LONG_S = 3.0
-"""Who was not seen anywhere for so long may have left."""
-_MAX_CANDIDATES = 4
-_SMALL = 0.6
-"""Share of the picture below which a person is searched for around their place too."""
-_BESIDE = 0.2
-"""Distance in squares within which two may be taken for one another."""
-_SAME_OTHER = 0.5
-"""Difference in place and size up to which a detection is taken for another person who is known."""
-_TELLING = 0.08
-"""Difference of sizes, as logarithms, that tells people apart."""
 _BLOCK_BYTES = 192 * 2**20
 
 
 Seen = Callable[[int, Pose | None], None]
 """``seen(frame, pose)``, None where the person was not found; may raise ``Cancelled``."""
-
-
-@dataclass(eq=False)
-class PersonTracker:
-    """Follows one person from picture to picture; times only ever increase."""
-
-    detector: PoseDetector
-    landmarker: PoseLandmarker
-    trail: Trail | None = None
-    lost: bool = False
-    unclear: bool = False
-    """True if whom the last picture shows may be another person."""
-    own: Looks | None = None
-    others: list[Bystander] = field(default_factory=list)
-    looked_round_s: float = -np.inf
-
-    def begin(self, roi: Roi, time_s: float) -> None:
-        """Start at a square with the person, whose colours are still to be learnt."""
-        self.trail, self.lost, self.unclear = Trail(roi, time_s), False, False
-        self.looked_round_s = -np.inf
-        for other in self.others:
-            other.trail = replace(other.trail, time_s=-np.inf)
-
-    def step(self, picture: Pixels, time_s: float) -> Pose | None:
-        """Find the person in the next picture."""
-        assert self.trail is not None
-        self.unclear = False
-        people = self._watched(picture, time_s)
-        pose = looks = None
-        if not self.lost:
-            pose = self._look(picture, self.trail.predicted(time_s))
-        if pose is not None:
-            looks = None if _jumped(pose) else self._recognised(picture, pose, time_s)
-        if looks is None:
-            if people is None:
-                people = self._people(picture, self.trail.predicted(time_s))
-            pose, looks = self._search(picture, people, time_s)
-        if pose is None or looks is None:
-            self.lost = True
-            return None
-        # After so long a gap, and elsewhere, nothing but their looks tells who it is.
-        gone = self.lost and time_s - self.trail.time_s > _GONE_S
-        self.unclear = gone and not self.trail.goes_on(pose.next_roi, time_s)
-        self._accept(pose, looks, time_s)
-        if time_s - self.looked_round_s >= _LOOK_ROUND_S:
-            self.looked_round_s = time_s
-            if people is None:
-                people = self._people(picture, pose.next_roi)
-            self._look_round(picture, people, pose, time_s)
-        return pose
-
-    def _look(self, picture: Pixels, roi: Roi) -> Pose | None:
-        pose = self.landmarker.in_picture(picture, roi)
-        return pose if pose.confidence >= FOUND else None
-
-    def _recognised(
-        self, picture: Pixels, pose: Pose, time_s: float, *, followed: bool = True
-    ) -> Signature | None:
-        """Looks of the person, if this is them; who is followed may change their looks."""
-        assert self.trail is not None
-        roi, looks = pose.next_roi, signature(pose.roi.cut(picture), pose)
-        if self.own is None:
-            return looks
-        mine, theirs = self._likeness(looks)
-        twins = [each for each in self.others if self.own.likeness(each.looks) >= ALIKE]
-        # Who comes back from behind the edge of the picture was seen in part, and in a wrong size.
-        any_size = not followed and not twins
-        if (
-            self.trail.reaches(roi, time_s, any_size=any_size)
-            and theirs <= mine + 0.05
-            and (followed or mine >= ALIKE)
-            and not any(self._may_be(twin, roi, time_s, followed) for twin in twins)
-        ):
-            return looks
-        self.unclear = True
-        return None
-
-    def _may_be(self, twin: Bystander, roi: Roi, time_s: float, followed: bool) -> bool:
-        """True if a square may show another person who looks like the one that is followed."""
-        assert self.trail is not None
-        if self.trail.growth(roi) + _TELLING < twin.trail.growth(roi):
-            return False
-        unseen_s = time_s - twin.trail.time_s
-        if unseen_s < _GONE_S and twin.trail.away(roi, time_s) < _BESIDE:
-            return True
-        # Who was about when the person was lost, and is not seen elsewhere now, may be here.
-        about = self.trail.time_s - twin.trail.time_s < _GONE_S
-        if followed or not about or unseen_s < _JUST_NOW_S:
-            return False
-        return unseen_s < _LONG_S or not self.trail.goes_on(roi, time_s)
-
-    def _likeness(self, looks: Signature) -> tuple[float, float]:
-        assert self.own is not None
-        theirs = max((similarity(looks, other.looks) for other in self.others), default=0.0)
-        return self.own.likeness(looks), theirs
-
-    def _search(
-        self, picture: Pixels, people: list[Detection], time_s: float
-    ) -> tuple[Pose | None, Signature | None]:
-        """Look for the person among all who are seen."""
-        assert self.trail is not None
-        best: tuple[Pose | None, Signature | None] = None, None
-        best_rank = -np.inf
-        for found in people[:_MAX_CANDIDATES]:
-            if not self.trail.is_near(found.roi, time_s):
-                self.unclear = True
-                continue
-            pose = self._look(picture, found.roi)
-            if pose is None:
-                continue
-            looks = self._recognised(picture, pose, time_s, followed=False)
-            if looks is None:
-                continue
-            mine = 1.0 if self.own is None else self.own.likeness(looks)
-            rank = mine - 0.3 * min(self.trail.unlike(pose.next_roi, time_s), 2.0)
-            if rank > best_rank:
-                best, best_rank = (pose, looks), rank
-        return best
-
-    def _people(self, picture: Pixels, near: Roi) -> list[Detection]:
-        """People in the picture; if the person is small, also those around a place."""
-        if near.size_px > _SMALL * max(picture.shape[:2]):
-            return self.detector.people(picture)
-        around = Roi(near.centre_x_px, near.centre_y_px, 1.5 * near.size_px)
-        return self.detector.look(picture, around)[0] + self.detector.people(picture)
-
-    def _accept(self, pose: Pose, looks: Signature, time_s: float) -> None:
-        assert self.trail is not None
-        self.trail = self.trail.followed(pose.next_roi, time_s, steady=not self.lost)
-        self.lost = False
-        if self.own is None:
-            self.own = Looks(looks)
-            return
-        mine, theirs = self._likeness(looks)
-        # While another person covers them, the colours are not the person's own.
-        if mine > theirs + 0.1:
-            self.own.learn(looks)
-
-    def _watched(self, picture: Pixels, time_s: float) -> list[Detection] | None:
-        """People in the picture, if others may be near; these are followed."""
-        assert self.trail is not None
-        since_s = min((time_s - each.trail.time_s for each in self.others), default=np.inf)
-        if since_s > _GONE_S and not self.lost:
-            return None
-        people = self._people(picture, self.trail.predicted(time_s))
-        if not people:
-            return people
-        for other in self.others:
-            unlike = [other.trail.unlike(each.roi, time_s) for each in people]
-            roi = people[int(np.argmin(unlike))].roi
-            if min(unlike) < min(_SAME_OTHER, self.trail.unlike(roi, time_s)):
-                other.trail = other.trail.followed(roi, time_s)
-        return people
-
-    def _look_round(
-        self, picture: Pixels, people: list[Detection], pose: Pose, time_s: float
-    ) -> None:
-        """Learn the colours of others while they stand apart."""
-        for found in people[: _MAX_CANDIDATES + 1]:
-            if apart_px(found.roi, pose.next_roi) < _BESIDE * pose.next_roi.size_px:
-                continue
-            other = self._look(picture, found.roi)
-            if other is None or apart_px(other.next_roi, pose.next_roi) < (
-                _BESIDE * pose.roi.size_px
-            ):
-                continue
-            looks = signature(other.roi.cut(picture), other)
-            known = max(self.others, key=lambda each: similarity(looks, each.looks), default=None)
-            if known is None or similarity(looks, known.looks) <= ALIKE:
-                known = Bystander(looks, Trail(other.next_roi, time_s))
-                self.others = [*self.others, known][-_MAX_CANDIDATES:]
-            elif known.trail.time_s < time_s:
-                known.trail = known.trail.followed(other.next_roi, time_s)
-
-    def state(self) -> dict[str, NDArray[np.generic]]:
-        """State that the next step depends on, as arrays."""
-        assert self.trail is not None
-        assert self.own is not None
-        looks = [each.looks for each in self.others]
-        trails = [each.trail.numbers() for each in self.others]
-        return {
-            "trail": self.trail.numbers(),
-            "clock": np.array([self.looked_round_s, float(self.lost)]),
-            "own": np.array([self.own.recent, *self.own.kept]),
-            "others": np.array(looks, np.float32).reshape(-1, *self.own.recent.shape),
-            "trails": np.array(trails, np.float64).reshape(-1, 7),
-        }
-
-    def restore(self, state: dict[str, NDArray[np.generic]]) -> None:
-        """Go on from :meth:`state`."""
-        self.trail = Trail.of(np.asarray(state["trail"], np.float64))
-        looked_round_s, lost = (float(value) for value in state["clock"])
-        self.looked_round_s, self.lost = looked_round_s, bool(lost)
-        recent, *kept = np.asarray(state["own"], np.float32)
-        self.own = Looks(recent, kept)
-        self.others = [
-            Bystander(looks, Trail.of(numbers))
-            for looks, numbers in zip(
-                np.asarray(state["others"], np.float32),
-                np.asarray(state["trails"], np.float64),
-                strict=True,
-            )
-        ]
-
-
-def _jumped(pose: Pose) -> bool:
-    """True if another person in the square, or none, was taken for the person."""
-    ratio = pose.next_roi.size_px / pose.roi.size_px
-    away_px = apart_px(pose.roi, pose.next_roi)
-    return away_px > 0.35 * pose.roi.size_px or not 0.4 < ratio < 2.0
 
 
 class Search:
@@ -274,12 +39,18 @@ class Search:
         self._rois = np.full((len(self._order), 4), np.nan)
         self._confidence = np.zeros(len(self._order))
         self._unclear = np.zeros(len(self._order), bool)
+        self._others = np.zeros((len(self._order), len(PLACES)), bool)
         self._done = 0
 
     @property
     def done(self) -> tuple[int, int]:
         """Number of frames searched, and of all to be searched."""
         return self._done, len(self._order)
+
+    @property
+    def settled(self) -> bool:
+        """True unless it is still in doubt who was seen last."""
+        return not (self._follower.lost and self._follower.hopes)
 
     def run(self, seen: Seen) -> Sightings:
         """Search the frames that are left."""
@@ -292,15 +63,25 @@ class Search:
                 self._follower.begin(self._start.roi, 0.0)
             # The second half runs backwards in time.
             pose = self._follower.step(picture, abs(float(times[frame] - times[first])))
-            if pose is not None:
-                self._rois[number] = roi_numbers(pose.next_roi)
-                self._confidence[number] = pose.confidence
             self._unclear[number] = self._follower.unclear
+            self._others[number] = self._follower.beside(pose)
+            if pose is not None:
+                # With the looks that were in doubt until now.
+                looks = [each for _, each in self._follower.hopes] or [pose]
+                rows = slice(number + 1 - len(looks), number + 1)
+                self._rois[rows] = [roi_numbers(each.next_roi) for each in looks]
+                self._confidence[rows] = [each.confidence for each in looks]
+                self._unclear[rows] = self._follower.unclear
+                self._others[rows, 3] = False
             self._done += 1
             seen(frame, pose)
         rank = np.argsort(self._order, kind="stable")
         return Sightings(
-            self._order[rank], self._rois[rank], self._confidence[rank], self._unclear[rank]
+            self._order[rank],
+            self._rois[rank],
+            self._confidence[rank],
+            self._unclear[rank],
+            self._others[rank],
         )
 
     def _pictures(self) -> Iterator[Pixels]:
@@ -322,6 +103,7 @@ class Search:
             "rois": self._rois[: self._done],
             "confidence": self._confidence[: self._done],
             "unclear": self._unclear[: self._done],
+            "beside": self._others[: self._done],
         }
 
     def restore(self, state: dict[str, NDArray[np.generic]]) -> None:
@@ -331,6 +113,7 @@ class Search:
         self._rois[: self._done] = state["rois"]
         self._confidence[: self._done] = state["confidence"]
         self._unclear[: self._done] = state["unclear"]
+        self._others[: self._done] = state["beside"]
 
 
 def looked_at(times_s: Floats, step_s: float) -> NDArray[np.intp]:

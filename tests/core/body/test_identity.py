@@ -10,7 +10,7 @@ from filmed_people import CAMERA, Picture, empty_room, film, person_at
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sd2core.body.identity import ALIKE, Looks, Signature, Trail, similarity
+from sd2core.body.identity import ALIKE, Looks, Signature, Trail, alike, similarity
 from sd2core.body.landmark_models import LandmarkModels
 from sd2core.body.landmarks import find_landmarks
 from sd2core.body.person_selection import Rectangle
@@ -25,7 +25,7 @@ FRAMES = 40
 
 def looks_of(seed: int) -> Signature:
     """Clothes of three colours; other seeds, other colours."""
-    signature = np.zeros((2, 512), np.float32)
+    signature = np.zeros((6, 512), np.float32)
     for part in signature:
         part[np.random.default_rng(seed).choice(512, 3, replace=False)] = 1.0 / 3.0
     return signature
@@ -98,7 +98,33 @@ class TestLooks:
         assert person.likeness(looks_of(2)) < ALIKE
 
     def test_no_colours_are_like_none(self) -> None:
-        assert similarity(np.zeros((2, 512), np.float32), looks_of(1)) == 0.0
+        assert similarity(np.zeros((6, 512), np.float32), looks_of(1)) == 0.0
+
+    @pytest.mark.parametrize("part", range(6))
+    def test_one_part_of_other_colours_tells_people_apart(self, part: int) -> None:
+        other = looks_of(1)
+        other[part] = looks_of(2)[part]
+        assert similarity(looks_of(1), other) > 0.8
+        assert not alike(looks_of(1), other)
+
+    def test_what_is_hidden_is_not_compared_but_too_little_tells_nothing(self) -> None:
+        half, less = looks_of(1), looks_of(1)
+        half[4:] = 0.0
+        less[3:] = 0.0
+        assert alike(looks_of(1), half)
+        assert not alike(looks_of(1), less)
+        # Of one who was never seen whole, what was seen is enough.
+        assert alike(less, looks_of(1))
+
+    def test_what_is_seen_later_is_learnt_and_what_is_hidden_kept(self) -> None:
+        upper = looks_of(1)
+        upper[4:] = 0.0
+        person = Looks(upper)
+        person.learn(looks_of(1))
+        for _ in range(60):
+            person.learn(upper)
+        assert alike(person.recent, looks_of(1))
+        assert not alike(person.recent, looks_of(2))
 
 
 def between(start: float, end: float, first_s: float, last_s: float) -> np.ndarray:
@@ -163,13 +189,13 @@ def test_who_passes_does_not_take_over(
 ) -> None:
     own, other, nearer = MEETINGS[meeting]
     track = followed(filmed(tmp_path / "two.mp4", meeting, red=red), models, own)
-    # Landmarks may lie between two people in the frame in which one begins to cover the other.
-    assert len(taken_over(track, own, other)) <= 1
+    assert len(taken_over(track, own, other)) == 0
     # Each is some 60 columns wide, the nearer one more.
     covered = (np.abs(own - other) < 30 * (1.0 + nearer)) & (nearer > 1.0)
     # A person who is nearly out of the picture may be lost before they are.
     seen = (np.abs(own) < 100) & ~covered
-    assert track.present[seen].mean() > 0.9
+    # In the same clothes it takes longer until it is clear who comes out of a crossing.
+    assert track.present[seen].mean() > (0.9 if red or meeting != "crosses" else 0.75)
 
 
 @pytest.mark.slow

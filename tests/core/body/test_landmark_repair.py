@@ -14,8 +14,10 @@ from sd2core.body.landmark_repair import (
     find_spikes,
     repair_landmarks,
     replace_outliers,
+    who_else,
 )
 from sd2core.body.raw_track import RawTrack, pixels_per_metre
+from sd2core.body.roi import PLACES, Sightings
 from sd2core.body.sides import swap_sides
 from sd2core.body.track import LANDMARKS
 
@@ -225,6 +227,25 @@ def test_what_was_done_is_said() -> None:
         "Interpolated, in gaps of up to 0.5 s without the person: 3 frames.",
     )
     np.testing.assert_allclose(mended.image_px, true.image_px, atol=5.0)
+
+
+def test_who_else_was_seen_is_said() -> None:
+    frames = np.arange(0, 80, 2)
+    others = np.zeros((40, len(PLACES)), bool)
+    others[:10, 0] = True
+    others[20:23, 1] = True  # too short
+    others[20:30, 3] = True
+
+    def said(others: NDArray[np.bool_]) -> tuple[str, ...]:
+        nowhere, nothing = np.full((40, 4), np.nan), np.zeros(40)
+        seen = Sightings(frames, nowhere, nothing, np.zeros(40, bool), others)
+        return who_else(seen, np.arange(80) / 20.0)
+
+    assert said(others) == (
+        "Others were seen: left of the person from 0.0 to 0.9 s; like the person from 2.0 to 2.9 s."
+        " If it is the person, fit them too: --person-box X,Y,WIDTH,HEIGHT --person-frame 50",
+    )
+    assert said(np.zeros_like(others)) == ()
 
 
 def test_pixels_of_a_metre() -> None:

@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sd2core.body.identity import similarity
 from sd2core.body.roi import Sightings, roi_of, roi_path, smooth_over_time
-from sd2core.body.tracking import similarity
 
 
 class TestSmoothing:
@@ -51,7 +51,8 @@ class TestPath:
         ).astype(float)
         rois[5:8] = np.nan
         rows = roi_path(
-            Sightings(frames, rois, np.ones(11), np.zeros(11, bool)), np.arange(21) / 30.0
+            Sightings(frames, rois, np.ones(11), np.zeros(11, bool), np.zeros((11, 4), bool)),
+            np.arange(21) / 30.0,
         )
         path = [roi_of(row) for row in rows]
         there = [k for k, roi in enumerate(path) if roi is not None]
@@ -69,7 +70,10 @@ class TestPath:
         rois = np.stack([np.full(21, 9.0), np.full(21, 9.0), np.full(21, 5.0), angles], axis=1)
         rois[:, 3] = np.remainder(angles + np.pi, 2 * np.pi) - np.pi
         path = roi_path(
-            Sightings(np.arange(21), rois, np.ones(21), np.zeros(21, bool)), np.arange(21) / 15.0
+            Sightings(
+                np.arange(21), rois, np.ones(21), np.zeros(21, bool), np.zeros((21, 4), bool)
+            ),
+            np.arange(21) / 15.0,
         )
         np.testing.assert_allclose(np.remainder(path[:, 3], 2 * np.pi), angles, atol=1e-9)
 
