@@ -11,7 +11,7 @@ from sd2core.doppler.synthesizer import Synthesizer
 from sd2core.progress import Progress, silent
 from sd2core.sensor import VirtualSensor
 
-BODY_FACTOR = 1.17
+BODY_FACTOR = 1.33
 """Factor on the body's share; with it the figure covered the true error of seven in ten calibrating
 clips (docs/decisions/0071)."""
 
