@@ -86,7 +86,9 @@ def open_stream(path: Path) -> tuple[Any, Any]:
             "a complete video file such as .mp4, .mkv, .mov, .avi or .webm",
             "When it came from a copy or an aborted recording, copy or record it again",
         ) from error
-    streams = [s for s in container.streams.video if not _is_cover_art(s)]
+    # An attached picture is the cover.
+    video = container.streams.video
+    streams = [s for s in video if "attached_pic" not in str(s.disposition).lower()]
     if not streams:
         container.close()
         raise Sd2Error(
@@ -349,10 +351,6 @@ def _note_on_end(times_s: NDArray[np.float64], claimed_s: float) -> list[str]:
         f"The file claims to last {claimed_s:.1f} s; its last frame that decodes is at"
         f" {times_s[-1]:.1f} s."
     ]
-
-
-def _is_cover_art(stream: Any) -> bool:
-    return "attached_pic" in str(stream.disposition).lower()
 
 
 def _nothing_decodes(path: Path) -> Sd2Error:
