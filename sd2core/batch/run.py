@@ -267,18 +267,15 @@ class _Run:
             "dataset": str(dataset) if dataset is not None and dataset.exists() else None,
             "error": told,
         }
-        self._keep_pace()
-        self._write_report(facts)
-        self._folder.set_state(outcome)  # type: ignore[arg-type]
-        self._lines.say("end", **facts)
-        return facts
-
-    def _keep_pace(self) -> None:
-        """Keep the pace of each step; that of other machines is of no use here."""
+        # The pace of other machines is of no use here.
         if self._driver is not None and self._scheduler is None:
             tally = self._driver.tally
             for step in self._graph.steps:
                 keep_pace(pace_kind(self._graph.plan, step), tally.seconds[step], tally.work[step])
+        self._write_report(facts)
+        self._folder.set_state(outcome)  # type: ignore[arg-type]
+        self._lines.say("end", **facts)
+        return facts
 
     def _write_report(self, facts: dict[str, Any]) -> None:
         """Write all facts, then one failure after the other, as there may be many."""

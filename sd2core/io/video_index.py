@@ -156,7 +156,9 @@ def build_index(path: Path, progress: Progress = silent) -> FrameIndex:
     counted, late = False, 0
     notes = []
     if keys is None:
-        shown = _decode_all(path, packets.count, progress)
+        container, stream = open_stream(path)
+        with container:
+            shown = _shown_times(decoded_frames(container, stream), packets.count, progress)
         if not shown:
             raise _nothing_decodes(path)
         keys, late = _keys_from_all(shown) if packets.usable else (None, 0)
@@ -275,12 +277,6 @@ def _keys_from_all(shown: list[Any]) -> tuple[NDArray[np.int64] | None, int]:
         return None, 0
     keys, places = np.unique(timed, return_inverse=True)
     return keys, int((np.maximum.accumulate(places) - places).max())
-
-
-def _decode_all(path: Path, packets: int, progress: Progress) -> list[Any]:
-    container, stream = open_stream(path)
-    with container:
-        return _shown_times(decoded_frames(container, stream), packets, progress)
 
 
 def _shown_times(frames: Iterator[Any], expected: int, progress: Progress) -> list[Any]:
