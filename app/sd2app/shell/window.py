@@ -68,7 +68,7 @@ class MainWindow(QMainWindow):
         super().__init__()
         self._settings = settings
         self._parts = parts or Parts()
-        self.ready = False  # true once all of it is there
+        self.ready = False  # true once the views stand and a recording can be shown
         self._tabbed: QWidget | None = None  # control that Tab has reached last
         self.setWindowTitle("SD² Studio")
         self.setAcceptDrops(True)
