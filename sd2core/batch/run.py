@@ -78,7 +78,11 @@ def run_batch(
             control.take_signals()
             folder.set_state("running", started_unix_s=time.time())
             atomic_write_text(folder.plan, plan_text(plan, folder.path))
-            _clear(folder)
+            # Leftovers of killed processes.
+            begun = folder.path / BEGUN
+            shutil.rmtree(begun, ignore_errors=True)
+            begun.mkdir()
+            remove_old_leftovers(folder.path)
             if pool is None:
                 pool = (
                     local_pool(folder, processes)
@@ -298,14 +302,6 @@ class _Run:
 def _if_there(out: str | Path, root: Path) -> str | None:
     path = Path(out)
     return path.relative_to(root).as_posix() if path.exists() else None
-
-
-def _clear(folder: BatchFolder) -> None:
-    """Remove leftovers of killed processes."""
-    begun = folder.path / BEGUN
-    shutil.rmtree(begun, ignore_errors=True)
-    begun.mkdir()
-    remove_old_leftovers(folder.path)
 
 
 def remove_old_leftovers(folder: Path, old_s: float = _OLD_S) -> None:
