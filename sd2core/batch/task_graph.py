@@ -209,13 +209,9 @@ class TaskGraph:
         stretches = tuple(stretches_of(mesh.frames))
         sensors = self.plan.sensors(own, mesh.target_m)
         choosing = self._choosing(mesh, list(sensors.values()))
-        arguments = {"section": self.plan.synthesise, "choosing": choosing}
         for placement, sensor in sensors.items():
             where = (origin, mesh, placement, sensor)
-            synthesis = tuple(
-                self._map_task("synthesise", "synthetic", where, one, self._scene, arguments)
-                for one in stretches
-            )
+            synthesis = tuple(self._synthesis_task(where, one, choosing) for one in stretches)
             denoising = None if self._model is None else self._denoising_task(synthesis)
             simulated = () if self._simulation is None else stretches
             simulation = tuple(self._simulation_task(where, one) for one in simulated)
@@ -231,6 +227,10 @@ class TaskGraph:
         about = {"places": [asdict(one) for one in places], "frames": frames}
         key = key_of("synthesise", {"mesh": mesh.identity, **self._scene, **about})
         return Choosing(self.folder.result("plans", key, ".json"), places, frames)
+
+    def _synthesis_task(self, where: _View, stretch: Stretch, choosing: Choosing | None) -> Task:
+        arguments = {"section": self.plan.synthesise, "choosing": choosing}
+        return self._map_task("synthesise", "synthetic", where, stretch, self._scene, arguments)
 
     def _simulation_task(self, where: _View, stretch: Stretch) -> Task:
         assert self._simulation is not None
