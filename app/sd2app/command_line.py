@@ -141,7 +141,8 @@ def _demo(options: argparse.Namespace) -> int:
 
 def _show(paths: Sequence[Path], screenshot: Path | None) -> int:
     if screenshot is not None:
-        _check_screenshot(screenshot)
+        if screenshot.suffix.lower() != ".png":
+            raise Sd2Error(f"The screenshot is to be {screenshot}", "a name that ends in .png")
         os.environ["QT_QPA_PLATFORM"] = "offscreen"
     elif not has_display(sys.platform, os.environ):
         raise Sd2Error(
@@ -167,11 +168,6 @@ def has_display(platform: str, environment: Mapping[str, str]) -> bool:
         return True
     names = ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM")
     return any(environment.get(name) for name in names)
-
-
-def _check_screenshot(path: Path) -> None:
-    if path.suffix.lower() != ".png":
-        raise Sd2Error(f"The screenshot is to be {path}", "a name that ends in .png")
 
 
 if __name__ == "__main__":

@@ -286,17 +286,13 @@ class Trial:
     def _beside(self, distance_m: float) -> VirtualSensor:
         """The sensor moved across its line of sight to the body, level."""
         place = np.asarray(self.sensor.position_m)
-        ray = self._middle_m() - place
+        body = self._sampled(1.0).frame(self.sample.runs[0].start).astype(np.float64)
+        ray = body.mean(axis=0) - place
         right = np.cross((0.0, 1.0, 0.0), ray)
         length = float(np.linalg.norm(right))
         right = right / length if length > 0 else np.array([1.0, 0.0, 0.0])
         x, y, z = (place + distance_m * right).tolist()
         return replace(self.sensor, position_m=(x, y, z))
-
-    def _middle_m(self) -> NDArray[np.float64]:
-        points = self._sampled(1.0).frame(self.sample.runs[0].start).astype(np.float64)
-        middle: NDArray[np.float64] = points.mean(axis=0)
-        return middle
 
 
 def _spans(runs: Sequence[Run]) -> list[tuple[int, int]]:

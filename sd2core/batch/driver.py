@@ -190,7 +190,9 @@ class Driver:
         for task, outcome in zip(ending.tasks, outcomes, strict=True):
             alike = self.running.pop(task.key)
             for _ in range(outcome.deaths if outcome else 0):
-                self._on_note(f"A worker died during {task_text(task)}")
+                place = f" from place {task.placement}" if task.placement else ""
+                words = f"{task.step} of {task.origin.name}{place}"
+                self._on_note(f"A worker died during {words}")
             if outcome is None:
                 self._resubmissions[task.key] += 1
                 self._ready.extend((task, *alike))
@@ -249,12 +251,6 @@ class Driver:
                 return None
             seconds += left * self.tally.seconds[step] / self.tally.done[step]
         return seconds / workers if workers else None
-
-
-def task_text(task: Task) -> str:
-    """Return such as ``synthesise of walk.sd2 from place 3``."""
-    place = f" from place {task.placement}" if task.placement else ""
-    return f"{task.step} of {task.origin.name}{place}"
 
 
 def event_of(task: Task, folder: Path) -> dict[str, Any]:

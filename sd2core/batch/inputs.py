@@ -207,7 +207,8 @@ class _Look:
         if faces is not None:
             identity.append(self._digest(faces))
         key = key_of("inspect", {"mesh": identity}) if self._folder is not None else ""
-        if is_large_npz(path):
+        is_npz = path.suffix.lower() == ".npz" and path.is_file()
+        if is_npz and _bytes_in_memory(path) > LARGEST_IN_MEMORY_BYTES:
             if self._folder is None:
                 # The place of the body needs the whole file; it is not asked for before streaming.
                 return MeshInput(str(path), "", *npz_vertices(path), 30.0, (0.0, 0.0, 0.0))
@@ -288,12 +289,6 @@ def _bytes_in_memory(path: Path) -> int:
     if path.is_dir():
         return sum(one.stat().st_size for one in path.iterdir())
     return path.stat().st_size
-
-
-def is_large_npz(path: Path) -> bool:
-    """Tell if a mesh is an ``.npz`` too large for memory, to be unpacked first."""
-    is_npz = path.suffix.lower() == ".npz" and path.is_file()
-    return is_npz and _bytes_in_memory(path) > LARGEST_IN_MEMORY_BYTES
 
 
 def mesh_input_of(

@@ -78,7 +78,11 @@ def run_batch(
             control.take_signals()
             folder.set_state("running", started_unix_s=time.time())
             atomic_write_text(folder.plan, plan_text(plan, folder.path))
-            _clear(folder)
+            # Leftovers of killed processes.
+            begun = folder.path / BEGUN
+            shutil.rmtree(begun, ignore_errors=True)
+            begun.mkdir()
+            remove_old_leftovers(folder.path)
             if pool is None:
                 pool = (
                     local_pool(folder, processes)
@@ -267,18 +271,15 @@ class _Run:
             "dataset": str(dataset) if dataset is not None and dataset.exists() else None,
             "error": told,
         }
-        self._keep_pace()
-        self._write_report(facts)
-        self._folder.set_state(outcome)  # type: ignore[arg-type]
-        self._lines.say("end", **facts)
-        return facts
-
-    def _keep_pace(self) -> None:
-        """Keep the pace of each step; that of other machines is of no use here."""
+        # The pace of other machines is of no use here.
         if self._driver is not None and self._scheduler is None:
             tally = self._driver.tally
             for step in self._graph.steps:
                 keep_pace(pace_kind(self._graph.plan, step), tally.seconds[step], tally.work[step])
+        self._write_report(facts)
+        self._folder.set_state(outcome)  # type: ignore[arg-type]
+        self._lines.say("end", **facts)
+        return facts
 
     def _write_report(self, facts: dict[str, Any]) -> None:
         """Write all facts, then one failure after the other, as there may be many."""
@@ -301,14 +302,6 @@ class _Run:
 def _if_there(out: str | Path, root: Path) -> str | None:
     path = Path(out)
     return path.relative_to(root).as_posix() if path.exists() else None
-
-
-def _clear(folder: BatchFolder) -> None:
-    """Remove leftovers of killed processes."""
-    begun = folder.path / BEGUN
-    shutil.rmtree(begun, ignore_errors=True)
-    begun.mkdir()
-    remove_old_leftovers(folder.path)
 
 
 def remove_old_leftovers(folder: Path, old_s: float = _OLD_S) -> None:

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sd2core.cli.options import add_command, add_json_and_progress, positive_int
+from sd2core.cli.options import add_command, add_json_and_progress, add_value, positive_int
 from sd2core.cli.output import (
     counted,
     duration,
@@ -57,11 +57,8 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     )
     parser.add_argument("plan", type=Path, nargs="?", metavar="PLAN.toml", help="plan of the batch")
     where = parser.add_mutually_exclusive_group()
-    where.add_argument(
-        "--workers",
-        type=positive_int,
-        metavar="N",
-        help="processes on this machine (default: one per core)",
+    add_value(
+        where, "--workers", positive_int, "N", "processes on this machine (default: one per core)"
     )
     where.add_argument(
         "--scheduler", metavar="ADDRESS", help="use the workers of this dask-scheduler"
@@ -70,14 +67,9 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     what.add_argument(
         "--dry-run", action="store_true", help="print tasks, time and bytes, and do nothing"
     )
-    what.add_argument(
-        "--status", type=Path, metavar="FOLDER", help="print the state of the batch in this folder"
-    )
-    what.add_argument(
-        "--stop",
-        type=Path,
-        metavar="FOLDER",
-        help="stop the batch in this folder; the same command resumes it",
+    add_value(what, "--status", Path, "FOLDER", "print the state of the batch in this folder")
+    add_value(
+        what, "--stop", Path, "FOLDER", "stop the batch in this folder; the same command resumes it"
     )
     add_json_and_progress(parser)
 

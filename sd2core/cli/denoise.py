@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from sd2core.cli.options import add_command, add_json, add_map_output
+from sd2core.cli.options import add_command, add_json, add_map_output, add_value
 from sd2core.cli.output import progress_bar
 from sd2core.errors import Sd2Error
 
@@ -28,7 +28,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             "  sd2 denoise map.npz --out denoised.npz --model runs/first/best.safetensors"
         ),
     )
-    parser.add_argument("map", type=Path, metavar="MAP", help="a map from `sd2 synth`")
+    add_value(parser, "map", Path, "MAP", "a map from `sd2 synth`")
     add_map_output(parser)
     parser.add_argument(
         "--model",

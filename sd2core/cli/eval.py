@@ -11,6 +11,7 @@ from sd2core.cli.options import (
     add_figure_output,
     add_json,
     add_placements_used,
+    add_value,
 )
 from sd2core.cli.output import print_json, progress_bar
 from sd2core.errors import Sd2Error
@@ -52,7 +53,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         "--data", type=Path, nargs="+", required=True, metavar="PAIRS", help="stores of pairs"
     )
     add_judging(parser, "those that the first model's run kept for the test, or all", "the errors")
-    parser.add_argument("--markdown", type=Path, metavar="FILE.md", help="write the tables")
+    add_value(parser, "--markdown", Path, "FILE.md", "write the tables")
 
 
 def add_judging(parser: argparse.ArgumentParser, usual_subjects: str, drawn: str) -> None:

@@ -17,6 +17,7 @@ from sd2core.cli.options import (
     add_limbs,
     add_output,
     add_people_kept_out,
+    add_value,
     bin_list,
     given,
     name_list,
@@ -94,20 +95,8 @@ def _add_content(parser: argparse.ArgumentParser) -> None:
         help="also keep what inertial sensors there would feel at every frame, e.g."
         " left-wrist,right-wrist; places as for `sd2 imu`",
     )
-    group.add_argument(
-        "--segment-frames",
-        type=positive_int,
-        default=72,
-        metavar="N",
-        help="length of a segment (default: 72)",
-    )
-    group.add_argument(
-        "--overlap-frames",
-        type=int,
-        default=10,
-        metavar="N",
-        help="frames that neighbours share (default: 10)",
-    )
+    add_value(group, "--segment-frames", positive_int, "N", "length of a segment", 72)
+    add_value(group, "--overlap-frames", int, "N", "frames that neighbours share", 10)
     group.add_argument(
         "--rate",
         type=positive_float,

@@ -13,6 +13,7 @@ from sd2core.cli.options import (
     add_command,
     add_json_and_progress,
     add_output,
+    add_value,
     not_negative_float,
     positive_float,
 )
@@ -64,7 +65,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             "  sd2 fit walk.mp4 --out walk.npz --field-of-view 68 --resolution low"
         ),
     )
-    parser.add_argument("video", type=Path, metavar="VIDEO", help="any video that FFmpeg reads")
+    add_value(parser, "video", Path, "VIDEO", "any video that FFmpeg reads")
     add_output(parser, "FILE", "the mesh to write (.zarr or .npz)")
     parser.add_argument(
         "--person-box",
@@ -116,12 +117,8 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         help="the network that finds the landmarks; full takes half the time and is a little less"
         " good (default: heavy)",
     )
-    parser.add_argument(
-        "--models", type=Path, metavar="FOLDER", help="a folder with the landmark models"
-    )
-    parser.add_argument(
-        "--landmarks", type=Path, metavar="FILE", help="keep the landmarks as well (.npz)"
-    )
+    add_value(parser, "--models", Path, "FOLDER", "a folder with the landmark models")
+    add_value(parser, "--landmarks", Path, "FILE", "keep the landmarks as well (.npz)")
     parser.add_argument(
         "--restart",
         action="store_true",

@@ -11,6 +11,7 @@ from sd2core.cli.options import (
     add_json,
     add_mesh_reading,
     add_output,
+    add_value,
     finite_float,
     flag,
     given,
@@ -40,7 +41,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         ),
     )
     add_output(parser, "NAME.sd2", "the recording to make")
-    parser.add_argument("--video", type=Path, metavar="FILE", help="video of the person")
+    add_value(parser, "--video", Path, "FILE", "video of the person")
     parser.add_argument(
         "--mesh",
         type=Path,
@@ -49,9 +50,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         " output of VIBE, WHAM or 4D-Humans)",
     )
     add_mesh_reading(parser)
-    parser.add_argument(
-        "--radar", type=Path, metavar="CAPTURE", help="radar capture of the same scene"
-    )
+    add_value(parser, "--radar", Path, "CAPTURE", "radar capture of the same scene")
     parser.add_argument(
         "--radar-offset-s",
         type=finite_float,
@@ -60,9 +59,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         help="time in the video, in seconds, of the first radar frame (default: 0)",
     )
     add_channel(parser)
-    parser.add_argument(
-        "--imu", type=Path, metavar="FILE", help="samples of an inertial sensor (.csv, .sto, .npz)"
-    )
+    add_value(parser, "--imu", Path, "FILE", "samples of an inertial sensor (.csv, .sto, .npz)")
     parser.add_argument(
         "--imu-offset-s",
         type=finite_float,
@@ -88,10 +85,8 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         ),
         examples="  sd2 relink walk.sd2 /media/disk/experiments",
     )
-    parser.add_argument("recording", type=Path, metavar="RECORDING", help="a recording (.sd2)")
-    parser.add_argument(
-        "folder", type=Path, metavar="FOLDER", help="where to look, and in all folders below"
-    )
+    add_value(parser, "recording", Path, "RECORDING", "a recording (.sd2)")
+    add_value(parser, "folder", Path, "FOLDER", "where to look, and in all folders below")
     add_json(parser)
 
 

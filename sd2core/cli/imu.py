@@ -12,6 +12,7 @@ from sd2core.cli.options import (
     add_json,
     add_mesh_reading,
     add_output,
+    add_value,
     not_negative_float,
     positive_float,
     vector,
@@ -46,18 +47,12 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             "  sd2 imu walk.sd2 --at right-foot --acc-noise 0.002 --acc-range 20 --out foot.npz"
         ),
     )
-    parser.add_argument("mesh", type=Path, metavar="MESH", help="a mesh, or a recording")
+    add_value(parser, "mesh", Path, "MESH", "a mesh, or a recording")
     parser.add_argument(
         "--at", required=True, metavar="PLACE|VERTEX", help="where on the body, or which vertex"
     )
     add_output(parser, "FILE", "the samples to write (.csv, .sto or .npz)")
-    parser.add_argument(
-        "--rate",
-        type=positive_float,
-        default=100.0,
-        metavar="HZ",
-        help="samples per second (default: 100)",
-    )
+    add_value(parser, "--rate", positive_float, "HZ", "samples per second", 100.0)
     parser.add_argument(
         "--cutoff",
         type=positive_float,
@@ -105,9 +100,7 @@ def _add_errors(parser: argparse.ArgumentParser) -> None:
             metavar="LARGEST",
             help=f"its range, plus and minus, in {unit}; what is beyond is clipped",
         )
-    group.add_argument(
-        "--seed", type=int, default=0, metavar="N", help="seed of the noise (default: 0)"
-    )
+    add_value(group, "--seed", int, "N", "seed of the noise", 0)
 
 
 def _imu(options: argparse.Namespace) -> None:

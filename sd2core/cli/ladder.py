@@ -14,6 +14,7 @@ from sd2core.cli.options import (
     add_mesh_and_sensor,
     add_mesh_reading,
     add_method,
+    add_value,
     given,
     positive_float,
     positive_int,
@@ -66,12 +67,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--quick", action="store_true", help="only say what the scene requires, without the table"
     )
-    parser.add_argument(
-        "--repeats",
-        type=positive_int,
-        metavar="N",
-        help="how often every plan is timed (default: 5)",
-    )
+    add_value(parser, "--repeats", positive_int, "N", "how often every plan is timed (default: 5)")
     parser.add_argument(
         "--fresh", action="store_true", help="measure again what was measured before"
     )

@@ -16,6 +16,7 @@ from sd2core.cli.options import (
     add_command,
     add_json,
     add_output,
+    add_value,
     positive_float,
 )
 from sd2core.cli.output import counted, print_event, print_facts
@@ -65,11 +66,8 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         help="listen to a DCA1000 on this address of this computer (default: 127.0.0.1, which"
         " only programs on this computer reach; port 4098)",
     )
-    source.add_argument(
-        "--replay",
-        type=Path,
-        metavar="CAPTURE",
-        help="a capture, or the one of a recording, at its own rate",
+    add_value(
+        source, "--replay", Path, "CAPTURE", "a capture, or the one of a recording, at its own rate"
     )
     parser.add_argument(
         "--setup",
@@ -78,12 +76,8 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         help="the .cfg or .json that the radar runs with (with --dca1000)",
     )
     add_output(parser, "NAME.sd2", "the recording to write")
-    parser.add_argument(
-        "--classifier", type=Path, metavar="FILE", help="a classifier of `sd2 classify train`"
-    )
-    parser.add_argument(
-        "--seconds", type=positive_float, metavar="S", help="stop after so long (default: never)"
-    )
+    add_value(parser, "--classifier", Path, "FILE", "a classifier of `sd2 classify train`")
+    add_value(parser, "--seconds", positive_float, "S", "stop after so long (default: never)")
     add_json(parser)
     parser.add_argument(
         "--columns",

@@ -33,6 +33,20 @@ def add_command(
     return parser
 
 
+def add_value(
+    parser: argparse._ActionsContainer,
+    name: str,
+    kind: Callable[[str], Any],
+    metavar: str,
+    text: str,
+    default: float | None = None,
+) -> None:
+    """Add an option or an argument with a value; a default is said after the text."""
+    if default is not None:
+        text = f"{text} (default: {default:g})"
+    parser.add_argument(name, type=kind, metavar=metavar, default=default, help=text)
+
+
 def add_json(parser: argparse._ActionsContainer) -> None:
     """Add ``--json``."""
     parser.add_argument(
@@ -53,23 +67,15 @@ def add_json_and_progress(parser: argparse.ArgumentParser) -> None:
 
 def add_axis(parser: argparse._ActionsContainer) -> None:
     """Add the velocity axis."""
-    parser.add_argument(
-        "--bins",
-        type=positive_int,
-        metavar="N",
-        help="velocity bins (default: 32)",
-    )
-    parser.add_argument(
-        "--v-max",
-        type=positive_float,
-        metavar="MPS",
-        help="end of the velocity axis in m/s (default: 2)",
+    add_value(parser, "--bins", positive_int, "N", "velocity bins (default: 32)")
+    add_value(
+        parser, "--v-max", positive_float, "MPS", "end of the velocity axis in m/s (default: 2)"
     )
 
 
 def add_mesh_and_sensor(parser: argparse.ArgumentParser) -> None:
     """Add what is looked at, and from where."""
-    parser.add_argument("mesh", type=Path, metavar="MESH", help="a mesh, or a recording")
+    add_value(parser, "mesh", Path, "MESH", "a mesh, or a recording")
     add_sensor(parser)
 
 
@@ -82,9 +88,7 @@ def add_output(
 
 def add_figure_output(parser: argparse._ActionsContainer, drawn: str) -> None:
     """Add ``--figure``."""
-    parser.add_argument(
-        "--figure", type=Path, metavar="FILE", help=f"draw {drawn}, as .png, .svg or .pdf"
-    )
+    add_value(parser, "--figure", Path, "FILE", f"draw {drawn}, as .png, .svg or .pdf")
 
 
 def add_map_output(parser: argparse.ArgumentParser, *, required: bool = True) -> None:
@@ -111,11 +115,8 @@ def add_mesh_reading(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="triangles (.npy or .obj) for a mesh that has none of its own",
     )
-    group.add_argument(
-        "--fps",
-        type=positive_float,
-        metavar="FPS",
-        help="frames per second of a mesh that does not say",
+    add_value(
+        group, "--fps", positive_float, "FPS", "frames per second of a mesh that does not say"
     )
     group.add_argument(
         "--scale",
@@ -155,9 +156,7 @@ def add_channel(parser: argparse._ActionsContainer) -> None:
         metavar="N",
         help="take this receiver, counted from 1 (default: the mean power of all)",
     )
-    parser.add_argument(
-        "--transmitter", type=positive_int, metavar="N", help="take this transmitter, likewise"
-    )
+    add_value(parser, "--transmitter", positive_int, "N", "take this transmitter, likewise")
 
 
 def add_method(parser: argparse._ActionsContainer, text: str) -> None:
@@ -253,7 +252,7 @@ def add_limbs(parser: argparse._ActionsContainer) -> None:
 def add_people_kept_out(group: argparse._ActionsContainer, validation: str, test: str) -> None:
     """Add ``--validation-subjects`` and ``--test-subjects``; the texts say who else it is."""
     for part, help_text in (("validation", validation), ("test", test)):
-        group.add_argument(f"--{part}-subjects", type=name_list, metavar="LIST", help=help_text)
+        add_value(group, f"--{part}-subjects", name_list, "LIST", help_text)
 
 
 def bin_list(text: str) -> tuple[int, ...]:

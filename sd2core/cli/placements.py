@@ -12,6 +12,7 @@ from sd2core.cli.options import (
     add_json,
     add_mesh_reading,
     add_output,
+    add_value,
     flag,
     given,
     positive_int,
@@ -57,7 +58,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             "  sd2 placements walk.sd2 --placements grid.json --json"
         ),
     )
-    parser.add_argument("mesh", type=Path, metavar="MESH", help="a mesh, or a recording")
+    add_value(parser, "mesh", Path, "MESH", "a mesh, or a recording")
     parser.add_argument(
         "--ranges", metavar="LIST", help="distances in metres; with --cloud from:to, as 1:4"
     )
@@ -67,18 +68,9 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--elevations", metavar="LIST", help="degrees; with --cloud from:to (default: 0)"
     )
-    parser.add_argument(
-        "--cloud", type=positive_int, metavar="N", help="so many random places instead of a grid"
-    )
-    parser.add_argument(
-        "--seed", type=int, metavar="N", help="seed of the random places (default: 0)"
-    )
-    parser.add_argument(
-        "--placements",
-        type=Path,
-        metavar="FILE",
-        help="read the places from a file of --out",
-    )
+    add_value(parser, "--cloud", positive_int, "N", "so many random places instead of a grid")
+    add_value(parser, "--seed", int, "N", "seed of the random places (default: 0)")
+    add_value(parser, "--placements", Path, "FILE", "read the places from a file of --out")
     add_output(parser, "FILE.json", "the plan to write", required=False)
     add_wish(parser, "2%%")
     add_mesh_reading(parser)

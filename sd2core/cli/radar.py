@@ -84,7 +84,9 @@ def _radar(options: argparse.Namespace) -> None:
     if options.file is not None:
         if str(options.capture) != "describe":
             raise Sd2Error(f"Two files are given, {options.capture} and {options.file}", "one")
-        _refuse(_of_maps(options), "to describe a file", "without describe")
+        out = ["--out"] if options.out is not None else []
+        of_maps = [*out, *_of_processing(options), *_of_channels(options)]
+        _refuse(of_maps, "to describe a file", "without describe")
         describe(options)
         return
     refuse_description(options)
@@ -163,12 +165,6 @@ def _write_recorded(recorded: RecordedMap, offset_s: float, options: argparse.Na
     doppler = recorded.doppler.shifted(offset_s)
     doppler.save(options.out)
     show(describe_map(options.out, doppler), as_json=options.json)
-
-
-def _of_maps(options: argparse.Namespace) -> list[str]:
-    """Options about a map that are given."""
-    out = ["--out"] if options.out is not None else []
-    return [*out, *_of_processing(options), *_of_channels(options)]
 
 
 def _of_processing(options: argparse.Namespace) -> list[str]:

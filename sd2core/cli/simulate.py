@@ -15,6 +15,7 @@ from sd2core.cli.options import (
     add_mesh_and_sensor,
     add_mesh_reading,
     add_output,
+    add_value,
     finite_float,
     position,
     positive_float,
@@ -145,13 +146,7 @@ def _add_radar(kinds: argparse._SubParsersAction) -> None:
         help="gain and noise of a 60 GHz radar on one chip, so that what is farther away is weaker"
         " (default: a gain that suits the strongest echo)",
     )
-    parser.add_argument(
-        "--seed",
-        type=int,
-        default=0,
-        metavar="N",
-        help="seed of noise and random phases (default: 0)",
-    )
+    add_value(parser, "--seed", int, "N", "seed of noise and random phases", 0)
     add_mesh_reading(parser)
     add_json(parser)
 
@@ -287,20 +282,8 @@ def _add_campaign(kinds: argparse._SubParsersAction) -> None:
         ),
     )
     add_output(parser, "FILE.zarr", "the pairs to write")
-    parser.add_argument(
-        "--people",
-        type=positive_int,
-        default=6,
-        metavar="N",
-        help="number of people (default: 6)",
-    )
-    parser.add_argument(
-        "--minutes",
-        type=positive_float,
-        default=90.0,
-        metavar="MIN",
-        help="minutes of all people together (default: 90)",
-    )
+    add_value(parser, "--people", positive_int, "N", "number of people", 6)
+    add_value(parser, "--minutes", positive_float, "MIN", "minutes of all people together", 90.0)
     parser.add_argument(
         "--protocol",
         choices=("paper", "varied"),
@@ -312,9 +295,7 @@ def _add_campaign(kinds: argparse._SubParsersAction) -> None:
         choices=("to-and-fro", "random"),
         help="of the paper's swipes: one kind in a take, or all four (default: to-and-fro)",
     )
-    parser.add_argument(
-        "--seed", type=_seed, default=0, metavar="N", help="seed of all random numbers (default: 0)"
-    )
+    add_value(parser, "--seed", _seed, "N", "seed of all random numbers", 0)
     parser.add_argument(
         "--sensors",
         type=positive_int,
@@ -323,20 +304,8 @@ def _add_campaign(kinds: argparse._SubParsersAction) -> None:
         help="sensors that see each take: its own, beside the camera, and N - 1 at other ranges"
         " and angles (default: 1)",
     )
-    parser.add_argument(
-        "--take-seconds",
-        type=positive_float,
-        default=15.0,
-        metavar="S",
-        help="length of a take, in seconds (default: 15)",
-    )
-    parser.add_argument(
-        "--workers",
-        type=positive_int,
-        default=2,
-        metavar="N",
-        help="worker processes (default: 2)",
-    )
+    add_value(parser, "--take-seconds", positive_float, "S", "length of a take, in seconds", 15.0)
+    add_value(parser, "--workers", positive_int, "N", "worker processes", 2)
     add_limbs(parser)
     parser.add_argument(
         "--fit-errors",

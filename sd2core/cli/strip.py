@@ -12,6 +12,7 @@ from sd2core.cli.options import (
     add_mesh_reading,
     add_output,
     add_sensor,
+    add_value,
     positive_float,
     positive_int,
 )
@@ -75,23 +76,13 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         default="velocity",
         help="what the colour of the mesh means (default: velocity)",
     )
-    parser.add_argument(
-        "--v-max",
-        type=positive_float,
-        default=2.0,
-        metavar="MPS",
-        help="velocity in m/s at which the colours end (default: 2)",
+    add_value(
+        parser, "--v-max", positive_float, "MPS", "velocity in m/s at which the colours end", 2.0
     )
     parser.add_argument(
         "--whole", action="store_true", help="show the whole picture, not what is around the body"
     )
-    parser.add_argument(
-        "--columns",
-        type=positive_int,
-        default=10,
-        metavar="N",
-        help="pictures side by side; more go below (default: 10)",
-    )
+    add_value(parser, "--columns", positive_int, "N", "pictures side by side; more go below", 10)
     add_sensor(parser)
     add_mesh_reading(parser)
 

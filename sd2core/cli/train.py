@@ -15,6 +15,7 @@ from sd2core.cli.options import (
     add_json,
     add_output,
     add_people_kept_out,
+    add_value,
     flag,
     given,
     positive_float,
@@ -96,9 +97,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         help="a file with settings, or one or several stores of pairs, which are mixed",
     )
     add_output(parser, "RUN", "the folder of the run; new", required=False)
-    parser.add_argument(
-        "--resume", type=Path, metavar="RUN", help="go on with a run that was stopped or killed"
-    )
+    add_value(parser, "--resume", Path, "RUN", "go on with a run that was stopped or killed")
     parser.add_argument(
         "--show-settings", action="store_true", help="print all settings as TOML and train nothing"
     )
@@ -130,24 +129,15 @@ def _add_learning(parser: argparse.ArgumentParser) -> None:
         metavar="NAME=VALUE",
         help="an option of the model, e.g. channels=64; may be given several times",
     )
-    group.add_argument(
-        "--epochs", type=positive_int, metavar="N", help="passes over all segments (default: 500)"
-    )
+    add_value(group, "--epochs", positive_int, "N", "passes over all segments (default: 500)")
     group.add_argument(
         "--minutes",
         type=positive_float,
         metavar="MIN",
         help="train for so long instead; the learning rate follows the clock",
     )
-    group.add_argument(
-        "--batch-size", type=positive_int, metavar="N", help="segments of a batch (default: 64)"
-    )
-    group.add_argument(
-        "--learning-rate",
-        type=positive_float,
-        metavar="RATE",
-        help="at its highest (default: 0.003)",
-    )
+    add_value(group, "--batch-size", positive_int, "N", "segments of a batch (default: 64)")
+    add_value(group, "--learning-rate", positive_float, "RATE", "at its highest (default: 0.003)")
     group.add_argument(
         "--ssm-learning-rate",
         type=positive_float,
@@ -173,9 +163,7 @@ def _add_learning(parser: argparse.ArgumentParser) -> None:
         help="what makes an epoch the best: error of the map, or of the peak velocity"
         " (default: rmse)",
     )
-    group.add_argument(
-        "--seed", type=int, metavar="N", help="seed of all random numbers (default: 0)"
-    )
+    add_value(group, "--seed", int, "N", "seed of all random numbers (default: 0)")
 
 
 def _add_data(parser: argparse.ArgumentParser) -> None:
@@ -187,12 +175,8 @@ def _add_data(parser: argparse.ArgumentParser) -> None:
         " takes",
         "kept out for `sd2 eval`, or none (default: as many)",
     )
-    group.add_argument(
-        "--segment-frames", type=positive_int, metavar="N", help="length of a segment (default: 72)"
-    )
-    group.add_argument(
-        "--overlap-frames", type=int, metavar="N", help="frames that neighbours share (default: 10)"
-    )
+    add_value(group, "--segment-frames", positive_int, "N", "length of a segment (default: 72)")
+    add_value(group, "--overlap-frames", int, "N", "frames that neighbours share (default: 10)")
     group.add_argument(
         "--segments",
         choices=("shifted", "fixed"),
@@ -220,16 +204,14 @@ def _add_machine(parser: argparse.ArgumentParser) -> None:
         choices=("auto", "cpu", "cuda"),
         help="where to compute (default: a GPU where there is one)",
     )
-    group.add_argument(
-        "--devices", type=positive_int, metavar="N", help="number of GPUs (default: 1)"
-    )
+    add_value(group, "--devices", positive_int, "N", "number of GPUs (default: 1)")
     group.add_argument(
         "--precision",
         choices=("auto", "32", "bf16"),
         help="of matrix products (default: bf16 on GPUs that have it, else 32)",
     )
-    group.add_argument("--threads", type=positive_int, metavar="N", help="of the CPU")
-    group.add_argument("--nice", type=int, metavar="N", help="lower the priority, 0 to 19")
+    add_value(group, "--threads", positive_int, "N", "of the CPU")
+    add_value(group, "--nice", int, "N", "lower the priority, 0 to 19")
     group.add_argument(
         "--background",
         action="store_true",

@@ -68,7 +68,7 @@ class CutSource:
     def described(self, span: Span) -> dict[str, Any]:
         """Return the content of ``span.json``; the same for the same source and span."""
         first, stop = self.frames_of(span)
-        frames = span.frames(self.timebase)
+        frames, video = span.frames(self.timebase), self.video
         return {
             "format": FORMAT,
             "version": VERSION,
@@ -82,7 +82,7 @@ class CutSource:
             "sensor_position_m": list(self.sensor_position_m),
             "files": self.files(),
             "sources": {
-                "video": _file_words(self.video),
+                "video": video and {"name": video.name, "bytes": video.stat().st_size},
                 "mesh": None if self.mesh is None else self.mesh.source,
                 "maps": {
                     name: {"kind": one.kind, "unit": one.unit, "provenance": one.meta}
@@ -96,9 +96,3 @@ def folder_name(span: Span) -> str:
     """Return a name that sorts by time and is unique: ``00001.600s left-to-right 7``."""
     slug = re.sub(r"[^\w.-]+", "-", span.label)[:_LONGEST_SLUG].strip("-.") or "label"
     return f"{span.start_s:09.3f}s_{slug}_{span.id}"
-
-
-def _file_words(path: Path | None) -> dict[str, Any] | None:
-    if path is None:
-        return None
-    return {"name": path.name, "bytes": path.stat().st_size}

@@ -318,17 +318,16 @@ def _summary(card: dict[str, Any]) -> str:
     )
 
 
+_KINDS = {
+    "simulated": "Maps called *simulated* come from a radar that was computed.",
+    "denoised": "Maps called *denoised* are a model's estimate, not a measurement.",
+    "synthetic": "Maps called *synthetic* are counted from a mesh, not measured.",
+    "real": "Maps called *real* were measured by a radar.",
+}
+
+
 def _simulated(card: dict[str, Any]) -> str:
-    said = []
-    for kind in card["segments_of_kind"]:
-        if kind == "simulated":
-            said.append("Maps called *simulated* come from a radar that was computed.")
-        if kind == "denoised":
-            said.append("Maps called *denoised* are a model's estimate, not a measurement.")
-        if kind == "synthetic":
-            said.append("Maps called *synthetic* are counted from a mesh, not measured.")
-        if kind == "real":
-            said.append("Maps called *real* were measured by a radar.")
+    said = [_KINDS[kind] for kind in card["segments_of_kind"] if kind in _KINDS]
     if card["simulated_recordings"]:
         count, of = card["simulated_recordings"], card["recordings"]
         who = f"{count:,} of {of:,} recordings {'is' if count == 1 else 'are'}"

@@ -35,7 +35,10 @@ def clips_of_dataset(dataset: Dataset, kind: MapKind) -> ClipSet:
     recordings = [one["recording"] for one in dataset.sources()]
     clips = []
     resampled = dataset["resampled"][:][rows]
-    first_frame = _first_frames(dataset, rows, resampled)
+    # Only differences within a source have a meaning. A camera's frames come at times of its own,
+    # which are no whole numbers of frames; only what was resampled has just its times.
+    frames, times_s = dataset["start_frame"][:][rows], dataset["start_s"][:][rows]
+    first_frame = np.where(resampled, times_s * header.frame_rate_hz, frames.astype(np.float64))
     for run, starts in _runs(2 * source + resampled, first_frame, header.length):
         energies = _joined(dataset[kind][rows[run]], starts)
         label = _joined(dataset["label"][rows[run]], starts)
@@ -58,19 +61,6 @@ def clips_of_dataset(dataset: Dataset, kind: MapKind) -> ClipSet:
         tuple(clips),
         {"dataset": header.title, "kind": kind, "made": header.provenance},
     )
-
-
-def _first_frames(
-    dataset: Dataset, rows: NDArray[np.integer], resampled: NDArray[np.bool_]
-) -> NDArray[np.float64]:
-    """Return the first frames of segments; only differences within a source have a meaning.
-
-    A camera's frames come at times of its own, which are no whole numbers of frames; only
-    what was resampled has just its times.
-    """
-    frames = dataset["start_frame"][:][rows].astype(np.float64)
-    times_s = dataset["start_s"][:][rows]
-    return np.where(resampled, times_s * dataset.header.frame_rate_hz, frames)
 
 
 def _runs(

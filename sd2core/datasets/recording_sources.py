@@ -238,7 +238,9 @@ class _Opened:
         if key.placement == 0 and self.recording.radar is not None and {
             "simulated", "real"
         } & {*wanted}:  # fmt: skip
-            radar = self._of_radar()
+            if self._radar is None:
+                self._radar = radar_map(self.recording, self._making.synthesis.axis)
+            radar = self._radar
             there = self._mesh.timebase if self._mesh is not None else radar.timebase
             maps[radar.kind] = on_clock(radar, there)
         if self._simulates:
@@ -345,11 +347,6 @@ class _Opened:
                 self._mesh, [self._sensor(place) for place in places], self._making
             )
         return synthetic_map(self._synthesizer, sensor, limbs=limbs, progress=progress)
-
-    def _of_radar(self) -> DopplerMap:
-        if self._radar is None:
-            self._radar = radar_map(self.recording, self._making.synthesis.axis)
-        return self._radar
 
     def _label(self, times_s: NDArray[np.float64]) -> NDArray[np.int16]:
         return label_per_frame(self._spans, self._names, times_s)

@@ -177,7 +177,10 @@ class SegmentDataset(TorchDataset[Item]):
         return np.stack(found)
 
     def _chunk(self, name: str, chunk: int) -> NDArray:
-        dataset = self._dataset()
+        # Opened once per process: a file is not shared with a fork.
+        if self._open is None or self._open[0] != os.getpid():
+            self._open = (os.getpid(), open_dataset(self.path))
+        dataset = self._open[1]
         key = (name, chunk)
         if key not in self._kept:
             start = chunk * CHUNK_SEGMENTS
@@ -186,12 +189,6 @@ class SegmentDataset(TorchDataset[Item]):
                 self._kept.popitem(last=False)
         self._kept.move_to_end(key)
         return self._kept[key]
-
-    def _dataset(self) -> Dataset:
-        """Return the data set, opened once per process: a file is not shared with a fork."""
-        if self._open is None or self._open[0] != os.getpid():
-            self._open = (os.getpid(), open_dataset(self.path))
-        return self._open[1]
 
 
 def _kind_of(array: str) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -75,7 +76,10 @@ def plot_strip(
                 spine.set_visible(False)
             _draw_picture(axes, options.rows[row], source, frame, body, box, options)
             if row == 0:
-                _write_time(axes, source.clock.time_of(frame), frame)
+                time = f"{source.clock.time_of(frame):.2f} s"
+                over = partial(axes.text, y=1.02, transform=axes.transAxes)
+                over(0, s=time, fontsize=7, color=_INK)
+                over(1, s=str(frame), fontsize=6, color=_MUTED, ha="right")
             if column % options.columns == 0:
                 _write_row(axes, options.rows[row], source.simulated)
     if options.colour == "velocity" and "mesh" in options.rows:
@@ -138,11 +142,6 @@ class _Layout:
             width / self.width_in,
             height / self.height_in,
         )
-
-
-def _write_time(axes: Axes, time_s: float, frame: int) -> None:
-    axes.text(0, 1.02, f"{time_s:.2f} s", transform=axes.transAxes, fontsize=7, color=_INK)
-    axes.text(1, 1.02, str(frame), transform=axes.transAxes, fontsize=6, color=_MUTED, ha="right")
 
 
 def _write_row(axes: Axes, row: Row, simulated: bool) -> None:

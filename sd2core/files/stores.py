@@ -134,7 +134,8 @@ class StoredArray:
         sizes = zip(self.shape[1:], self.chunks[1:], strict=True)
         across = [range(-(-size // chunk)) for size, chunk in sizes]
         found: list[Damage] = []
-        with _chunk_files(self.path) as files:
+        kind = _PackedChunkFiles if self.path.is_file() else _ChunkFiles
+        with kind(self.path) as files:
             for number in range(rows.start // step, -(-rows.stop // step)):
                 progress(number * step - rows.start, len(rows))
                 start, stop = number * step, min((number + 1) * step, self.shape[0])
@@ -220,10 +221,6 @@ class _PackedChunkFiles(_ChunkFiles):
     def read(self, key: str, most: int = -1) -> bytes:
         with self._archive.open(key) as file:
             return file.read(most)
-
-
-def _chunk_files(path: Path) -> _ChunkFiles:
-    return _PackedChunkFiles(path) if path.is_file() else _ChunkFiles(path)
 
 
 @functools.cache

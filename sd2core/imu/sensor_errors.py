@@ -71,6 +71,8 @@ class SensorErrors:
         """Signals of a sensor with these errors: bias and noise, then the range."""
         noise = np.random.default_rng(self.seed).standard_normal((2, len(signals.times_s), 3))
         scale = math.sqrt(signals.rate_hz / 2)
+        usual = asdict(SensorErrors())
+        stated = {name: value for name, value in asdict(self).items() if value != usual[name]}
 
         def spoilt(values: Floats, bias: Vector, drawn: Floats, most: float) -> Floats:
             return np.clip(values + np.asarray(bias) + drawn, -most, most)
@@ -89,10 +91,5 @@ class SensorErrors:
                 self.turn_rate_noise * scale * noise[1],
                 self.turn_rate_range_radps,
             ),
-            meta=signals.meta | {"errors": self._stated()},
+            meta=signals.meta | {"errors": stated},
         )
-
-    def _stated(self) -> dict[str, object]:
-        """Those that are there, as JSON can hold them."""
-        usual = asdict(SensorErrors())
-        return {name: value for name, value in asdict(self).items() if value != usual[name]}

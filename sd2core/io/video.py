@@ -152,7 +152,8 @@ class VideoReader:
         if frame in self._cache:
             self._cache.move_to_end(frame)
             return self._cache[frame][0]
-        entry = self._entry_before(frame)
+        key = self._index.keys[frame]
+        entry = max(int(np.searchsorted(self._index.entry_keys, key, side="right")) - 1, 0)
         if not self._is_ahead(frame, entry):
             self._begin(entry)
         back = 1
@@ -169,10 +170,6 @@ class VideoReader:
             entry = max(entry - back, 0)
             back *= 2
             self._begin(entry)
-
-    def _entry_before(self, frame: int) -> int:
-        key = self._index.keys[frame]
-        return max(int(np.searchsorted(self._index.entry_keys, key, side="right")) - 1, 0)
 
     def _is_ahead(self, frame: int, entry: int) -> bool:
         """True if decoding on reaches ``frame`` sooner than a seek."""

@@ -86,7 +86,9 @@ def open_stream(path: Path) -> tuple[Any, Any]:
             "a complete video file such as .mp4, .mkv, .mov, .avi or .webm",
             "When it came from a copy or an aborted recording, copy or record it again",
         ) from error
-    streams = [s for s in container.streams.video if not _is_cover_art(s)]
+    # An attached picture is the cover.
+    video = container.streams.video
+    streams = [s for s in video if "attached_pic" not in str(s.disposition).lower()]
     if not streams:
         container.close()
         raise Sd2Error(
@@ -154,7 +156,9 @@ def build_index(path: Path, progress: Progress = silent) -> FrameIndex:
     counted, late = False, 0
     notes = []
     if keys is None:
-        shown = _decode_all(path, packets.count, progress)
+        container, stream = open_stream(path)
+        with container:
+            shown = _shown_times(decoded_frames(container, stream), packets.count, progress)
         if not shown:
             raise _nothing_decodes(path)
         keys, late = _keys_from_all(shown) if packets.usable else (None, 0)
@@ -275,12 +279,6 @@ def _keys_from_all(shown: list[Any]) -> tuple[NDArray[np.int64] | None, int]:
     return keys, int((np.maximum.accumulate(places) - places).max())
 
 
-def _decode_all(path: Path, packets: int, progress: Progress) -> list[Any]:
-    container, stream = open_stream(path)
-    with container:
-        return _shown_times(decoded_frames(container, stream), packets, progress)
-
-
 def _shown_times(frames: Iterator[Any], expected: int, progress: Progress) -> list[Any]:
     """Presentation times of decoded frames; None for those without."""
     shown = []
@@ -349,10 +347,6 @@ def _note_on_end(times_s: NDArray[np.float64], claimed_s: float) -> list[str]:
         f"The file claims to last {claimed_s:.1f} s; its last frame that decodes is at"
         f" {times_s[-1]:.1f} s."
     ]
-
-
-def _is_cover_art(stream: Any) -> bool:
-    return "attached_pic" in str(stream.disposition).lower()
 
 
 def _nothing_decodes(path: Path) -> Sd2Error:

@@ -95,7 +95,8 @@ class BodyExtent:
         for number, sensor in enumerate(sensors):
             progress(number, len(sensors))
             position = np.asarray(sensor.position_m)
-            inside[number] = self._holds(sensor)
+            within = (self.low_m < position) & (position < self.high_m)  # (frames, 3)
+            inside[number] = within.all(axis=1).any()
             corner = np.maximum(np.abs(self.low_m - position), np.abs(self.high_m - position))
             farthest_m[number] = np.linalg.norm(corner, axis=1).max()
             sight_m = self.points_m - position.astype(np.float32)
@@ -105,8 +106,3 @@ class BodyExtent:
             fastest_mps[number] = np.partition(radial_mps, rank, axis=1)[:, rank].max()
         progress(len(sensors), len(sensors))
         return SensorCoverage(inside, farthest_m, fastest_mps)
-
-    def _holds(self, sensor: VirtualSensor) -> bool:
-        position = np.asarray(sensor.position_m)
-        within = (self.low_m < position) & (position < self.high_m)  # (frames, 3)
-        return bool(within.all(axis=1).any())

@@ -63,10 +63,11 @@ class Divergence:
     @property
     def changes(self) -> list[str]:
         """What was saved elsewhere and is not the same here, in words; empty without any."""
-        return [
-            *filter(None, [self._changed_labels()]),
-            *(f"another {words}" for words in _named(self._changed())),
-        ]
+        settings = [f"another {words}" for words in _named(self._changed())]
+        if self.theirs.labels == self.mine.labels:
+            return settings
+        labels = str(compare(self.base.labels, self.theirs.labels))
+        return [labels, *settings] if labels else settings
 
     def merged(self) -> Merge:
         """Settings and labels with the changes of both sides; see :func:`.merging.merge`.
@@ -89,11 +90,6 @@ class Divergence:
         """Settings that were changed elsewhere, to something else than here."""
         base, mine, theirs = (one.settings for one in (self.base, self.mine, self.theirs))
         return [name for name in mine if theirs[name] not in (base[name], mine[name])]
-
-    def _changed_labels(self) -> str:
-        if self.theirs.labels == self.mine.labels:
-            return ""
-        return str(compare(self.base.labels, self.theirs.labels))
 
 
 def digests_of(paths: Iterable[Path]) -> dict[str, str]:

@@ -400,7 +400,8 @@ class Recording:
                 f"the folder that holds {FILE_NAME}",
                 "Bring it back, or save the recording in another folder",
             )
-        if digests_of(self._own_files()) == self._digests:
+        own_files = [self.folder / FILE_NAME, self.folder / LABELS_NAME]
+        if digests_of(own_files) == self._digests:
             return
         theirs = open_recording(self.folder)
         found = self.divergence(theirs)
@@ -412,9 +413,6 @@ class Recording:
     def _is_gone(self) -> bool:
         """True if it was in its folder, and is not any more."""
         return self._base is not None and not (self.folder / FILE_NAME).is_file()
-
-    def _own_files(self) -> list[Path]:
-        return [self.folder / FILE_NAME, self.folder / LABELS_NAME]
 
     def _note_written(self, name: str) -> None:
         self._digests = {**self._digests, **digests_of([self.folder / name])}

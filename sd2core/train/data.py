@@ -135,7 +135,7 @@ def read_mixed(paths: Sequence[Path]) -> PairSet:
         replace(
             take,
             subject=take.subject if names.count(take.subject) == 1 else f"{origin}:{take.subject}",
-            label=_relabelled(take.label, one.labels, labels),
+            label=np.array([labels.index(name) for name in one.labels], np.int8)[take.label],
         )
         for origin, one in zip(origins, sets, strict=True)
         for take in one.takes
@@ -332,13 +332,6 @@ class Order:
 
 def _axis_words(pairs: PairSet) -> str:
     return f"{pairs.axis.bins} bins over ±{pairs.axis.v_max_mps:g} m/s"
-
-
-def _relabelled(
-    label: NDArray[np.int8], labels: tuple[str, ...], of_all: tuple[str, ...]
-) -> NDArray[np.int8]:
-    table = np.array([of_all.index(name) for name in labels], np.int8)
-    return table[label]
 
 
 def _by_take(takes: tuple[Take, ...]) -> tuple[tuple[Take, ...], tuple[Take, ...]]:

@@ -75,12 +75,13 @@ def carry_out(
             parts=max(1, len(parts)),
         )
         about = _About(config, data, scaling, command, machine_words(device, precision, threads))
+        learnt = config.training
         callbacks = TrainingCallbacks(
             config,
             folder,
             writer,
             control,
-            order_of(config, data),
+            Order(len(data.training), learnt.batch_size, learnt.seed, config.data.range_factor),
             Exam.of(data.validation, scaling, data.pairs.axis, data.pairs.null_bins),
             checkpoint.position if checkpoint is not None else Position(),
             {"data_digest": digest, "threads": threads},
@@ -108,22 +109,11 @@ def carry_out(
             use_distributed_sampler=False,
         )
         position = callbacks.position
-        steps = Steps(
-            callbacks.order, data.training, position.epoch, position.step, local_rank(), ranks
-        )
+        # Lightning starts the other processes with a number.
+        rank = int(os.environ.get("LOCAL_RANK", "0"))
+        steps = Steps(callbacks.order, data.training, position.epoch, position.step, rank, ranks)
         trainer.fit(module, steps)
     return callbacks.outcome, callbacks.position
-
-
-def order_of(config: TrainConfig, data: TrainingData) -> Order:
-    """Order in which a run learns its segments."""
-    training = config.training
-    return Order(len(data.training), training.batch_size, training.seed, config.data.range_factor)
-
-
-def local_rank() -> int:
-    """Number of this process among several; Lightning starts the others with a number."""
-    return int(os.environ.get("LOCAL_RANK", "0"))
 
 
 def _network(config: TrainConfig, data: TrainingData, checkpoint: Checkpoint | None) -> Denoiser:

@@ -60,7 +60,10 @@ def begin(
     folder = TrainingFolder(out)
     if _is_other_rank():
         return _beside(folder, config, command, resume=False)
-    _clear_failed(folder)
+    # A run that failed before it had learnt anything makes way for the next attempt.
+    learnt = folder.last.exists() or folder.best.exists()
+    if folder.exists and folder.state() == "failed" and not learnt:
+        folder.discard()
     folder.make()
     # Held before it is described, or it would look like one whose process is gone.
     lock = folder.lock()
@@ -213,13 +216,6 @@ def _note_failure(folder: TrainingFolder, writer: ProgressWriter, error: BaseExc
         remedy = f"Please report it, with {folder.log.name}"
         said = {"found": found, "expected": "", "remedy": remedy}
     _say_end(folder, writer, "failed", {}, said)
-
-
-def _clear_failed(folder: TrainingFolder) -> None:
-    """A run that failed before it had learnt anything makes way for the next attempt."""
-    learnt = folder.last.exists() or folder.best.exists()
-    if folder.exists and folder.state() == "failed" and not learnt:
-        folder.discard()
 
 
 def _is_other_rank() -> bool:

@@ -38,8 +38,8 @@ _PASSING = (
     "._body",  # what places were last drawn about, and their markers
     *("scene.markers.points", "scene.markers._colours", "scene.markers._colour_array"),
     # Tables that are filled when they are next on screen.
-    *("spans.table._model._rows", "spans.table._model._row_of"),
-    *("_label_set._model._rows", "_label_set._model._counts", "_label_set._model._alike"),
+    *("spans.table._model.rows", "spans.table._model._row_of"),
+    *("_label_set._model.rows", "_label_set._model._counts", "_label_set._model._alike"),
     "_label_set._model.label_set",
 )
 """Ends of names of what says nothing of what is shown or will be."""

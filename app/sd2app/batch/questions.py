@@ -133,15 +133,11 @@ class BatchQuestions(QObject):
             if placements is None:
                 self.said.emit("The open recording plans no placements: Edit → Placements… does.")
             setup.set_placements(placements, _PLAN_HERE)
-        else:
-            self._ask_placements()
+        elif path := ask_file(self._over, "Placements", _PLACEMENTS):
+            read = self._attempt(lambda: read_placements(path))
+            if read is not None:
+                setup.set_placements(read, path.name)
         self._batch.changed.emit()  # the choice goes back where nothing was chosen
-
-    def _ask_placements(self) -> None:
-        if path := ask_file(self._over, "Placements", _PLACEMENTS):
-            placements = self._attempt(lambda: read_placements(path))
-            if placements is not None:
-                self._batch.setup.set_placements(placements, path.name)
 
     def _follow_plan(self) -> None:
         """Follow the plan of the open recording, if that was chosen."""

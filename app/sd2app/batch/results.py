@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -49,11 +48,6 @@ class BatchResults(RecordTableModel[Result]):
         # There may be none, or the disk is away.
         self._runner.failed.connect(lambda error: self.forget())
 
-    @property
-    def rows(self) -> Sequence[Result]:
-        """Results of the last run that reached its end."""
-        return self._rows
-
     def read(self, folder: BatchFolder) -> None:
         """Read the results of a batch."""
         self._runner.submit(lambda emit: (_rows(folder.results), _card(folder)))
@@ -69,7 +63,7 @@ class BatchResults(RecordTableModel[Result]):
 
     def _take(self, found: tuple[list[Result], str]) -> None:
         self.beginResetModel()
-        self._rows, self.card = found
+        self.rows, self.card = found
         self.endResetModel()
         self.changed.emit()
 

@@ -156,19 +156,15 @@ class ExportDialog(QDialog):
         self._length.show_value(choice.length)
         self._overlap.show_value(choice.overlap)
         self._format.show_value(choice.ending)
+        model = self._model
+        there = {self._sensors: model.places > 0, self._inertial: bool(model.imu_places)}
         for field in (
             self._this, self._other, self._sensors, self._inertial, self._length, self._overlap,
             self._format, self._people, *self._boxes.values(),
         ):  # fmt: skip
-            field.setEnabled(self._may(field))
+            field.setEnabled(not model.under_way and there.get(field, True))
         self._show_counts()
         self._show_writing()
-
-    def _may(self, field: QWidget) -> bool:
-        """True if a field can be changed now."""
-        model = self._model
-        there = {self._sensors: model.places > 0, self._inertial: bool(model.imu_places)}
-        return not model.under_way and there.get(field, True)
 
     def _show_counts(self) -> None:
         model, forecast = self._model, self._model.forecast

@@ -151,10 +151,6 @@ class LabelAutosave(QObject):
 
     # --- every edit -----------------------------------------------------------------------
 
-    def keep(self, name: str, before: Labels, after: Labels) -> None:
-        """Write an edit of labels to disk before it is shown; report a failure."""
-        self._write(name, before, after)
-
     def _keep_others(self, step: int) -> None:
         """Write an edit of anything else to disk, once it is in the history."""
         recording, stack = self._document.recording, self._document.undo_stack
@@ -166,11 +162,12 @@ class LabelAutosave(QObject):
         if others != self._others:
             self._others = others
             name = f"Undo {stack.redoText().lower()}" if back else stack.undoText()
-            self._write(name, self._labels.labels, self._labels.labels, others)
+            self.keep(name, self._labels.labels, self._labels.labels, others)
 
-    def _write(
+    def keep(
         self, name: str, before: Labels, after: Labels, others: dict[str, Any] | None = None
     ) -> None:
+        """Write an edit to disk before it is shown; report a failure."""
         place = self._place
         try:
             if place is None or not place.take():

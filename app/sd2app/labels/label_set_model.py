@@ -51,7 +51,7 @@ class LabelSetModel(RecordTableModel[Label]):
         super().__init__(HEADINGS, parent)
         self._labels, self._apply, self._keys = edits.labels, edits.apply, keys
         self.label_set = self._labels.labels.label_set  # in its order
-        self._rows = self.label_set.labels
+        self.rows = self.label_set.labels
         self._counts: Counter[str] = Counter()
         self._alike: list[Alike] = []
         self._labels.changed.connect(self._follow)
@@ -126,7 +126,7 @@ class LabelSetModel(RecordTableModel[Label]):
         if resized:
             self.beginResetModel()
         self.label_set = labels.label_set
-        self._rows = self.label_set.labels
+        self.rows = self.label_set.labels
         self._counts = Counter(span.label for span in labels.spans)
         self._alike = alike(self.label_set.labels)
         if resized:

@@ -221,7 +221,9 @@ def _paint_spans(
     columns = _columns_in(painter, plot, scale, model)
     arrays = model.arrays
     image = _tinted(columns, arrays.colours, _NARROW_TINTS)
-    marked = _marked(columns, palette)
+    # A line per lane that marks selected spans.
+    lines = np.where(columns.selected, QColor(palette.text).rgb(), 0)
+    marked = image_of(lines.astype(np.uint32))
     line = 0
     for row, lanes in zip(rows, arrays.lanes_of_track, strict=True):
         for lane in range(lanes):
@@ -330,8 +332,3 @@ def _coloured(
 ) -> QImage:
     table = np.array([QColor(colour).rgb() & 0xFFFFFF for colour in colours], np.uint32)
     return image_of(table[columns.tone] | (alphas.astype(np.uint32) << np.uint32(24)))
-
-
-def _marked(columns: SpanColumns, palette: Palette) -> QImage:
-    """A line per lane that marks selected spans."""
-    return image_of(np.where(columns.selected, QColor(palette.text).rgb(), 0).astype(np.uint32))

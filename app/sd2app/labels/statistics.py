@@ -47,13 +47,13 @@ class StatisticsTableModel(RecordTableModel[tuple[str, ...]]):
 
     def text(self, separator: str) -> str:
         """Return the table as CSV, or with a tab to paste into a sheet."""
-        return statistics_text(self._rows, separator)
+        return statistics_text(self.rows, separator)
 
     def _refresh(self) -> None:
         base = self._playback.timebase
         self.beginResetModel()
         found = label_statistics(self._labels.labels, (base.start_s, base.end_s))
-        self._rows = statistics_rows(found)
+        self.rows = statistics_rows(found)
         self.endResetModel()
 
     def _text(self, record: tuple[str, ...], column: int) -> str:

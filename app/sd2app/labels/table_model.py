@@ -187,15 +187,10 @@ class SpanTableModel(RecordTableModel[Span]):
         self._row_of: dict[int, int] | None = None
         self._filter = SpanFilter()
         self._by, self._falling = COLUMNS[0], False
-        self._following = False
+        self.following = False  # rows change because the labels have, not by the user's choice
         self._labels.changed.connect(self._follow)
 
     # --- what is shown --------------------------------------------------------------------
-
-    @property
-    def following(self) -> bool:
-        """True while rows change because the labels have, not by the user's choice."""
-        return self._following
 
     @property
     def total(self) -> int:
@@ -205,18 +200,18 @@ class SpanTableModel(RecordTableModel[Span]):
     @property
     def spans(self) -> Sequence[Span]:
         """Spans shown, from top to bottom."""
-        return self._rows
+        return self.rows
 
     @property
     def words(self) -> str:
         """Number of spans, and of those shown."""
         whole = f"{self.total:,} span{'s' * (self.total != 1)}"
-        return whole if len(self._rows) == self.total else f"{len(self._rows):,} of {whole}"
+        return whole if len(self.rows) == self.total else f"{len(self.rows):,} of {whole}"
 
     def row_of(self, span_id: int) -> int | None:
         """Return the row of a span, or None."""
         if self._row_of is None:
-            self._row_of = {span.id: row for row, span in enumerate(self._rows)}
+            self._row_of = {span.id: row for row, span in enumerate(self.rows)}
         return self._row_of.get(span_id)
 
     def choices(self, listed: str) -> list[str]:
@@ -247,16 +242,16 @@ class SpanTableModel(RecordTableModel[Span]):
         rows = self._filter.keeps(self._labels.labels.spans)
         if self._by.id != "start" or self._falling:
             rows.sort(key=self._by.order, reverse=self._falling)
-        self._following = True
+        self.following = True
         try:
             self._show(rows)
         finally:
-            self._following = False
+            self.following = False
 
     def _show(self, rows: list[Span]) -> None:
         there = {span.id: span for span in rows}
-        self._replace([there.get(span.id, span) for span in self._rows])
-        before = self._rows
+        self._replace([there.get(span.id, span) for span in self.rows])
+        before = self.rows
         if len(rows) == len(before) and all(span.id in there for span in before):
             if _alike(rows, before, range(len(rows))) < len(rows):
                 self._reorder(rows)
@@ -276,7 +271,7 @@ class SpanTableModel(RecordTableModel[Span]):
     def _reorder(self, rows: list[Span]) -> None:
         self.layoutAboutToBeChanged.emit()
         held = self.persistentIndexList()
-        ids = [self._rows[index.row()].id for index in held]
+        ids = [self.rows[index.row()].id for index in held]
         self._assign(rows)
         moved = [
             self.index(self.row_of(one) or 0, index.column())
@@ -287,7 +282,7 @@ class SpanTableModel(RecordTableModel[Span]):
 
     def _replace(self, rows: list[Span]) -> None:
         """Other spans in the same rows: report the rows that look different."""
-        changed = [row for row, span in enumerate(rows) if span is not self._rows[row]]
+        changed = [row for row, span in enumerate(rows) if span is not self.rows[row]]
         self._assign(rows)
         if not changed:
             # Perhaps the colours of the label set, which are in the cells too.
@@ -297,7 +292,7 @@ class SpanTableModel(RecordTableModel[Span]):
             self.dataChanged.emit(self.index(changed[0], 0), last)
 
     def _assign(self, rows: Sequence[Span]) -> None:
-        self._rows, self._row_of = rows, None
+        self.rows, self._row_of = rows, None
 
     # --- cells ----------------------------------------------------------------------------
 
@@ -316,7 +311,7 @@ class SpanTableModel(RecordTableModel[Span]):
 
     def setData(self, index: Index, value: Any, role: int = Qt.ItemDataRole.EditRole) -> bool:
         """Make the edit typed; False, with the cell unchanged, where it was refused."""
-        column, span, text = COLUMNS[index.column()], self._rows[index.row()], str(value)
+        column, span, text = COLUMNS[index.column()], self.rows[index.row()], str(value)
         if column.typed is None or text == self.data(index):
             return False
         spans = [span]

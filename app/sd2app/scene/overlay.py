@@ -127,7 +127,10 @@ class Overlay(Canvas):
         self._legend = QRectF()
         self._paint_legend(painter)
         names = self._paint_names(painter)
-        self._paint_metres(painter, [*names, self._legend], self._body_box())
+        # Behind the virtual camera there is no body.
+        box = self._scene.body_box_px
+        body = QRectF() if box is None else QRectF(QPointF(*box[:2]), QPointF(*box[2:]))
+        self._paint_metres(painter, [*names, self._legend], body)
         self._paint_axes(painter)
         position_m, marker = self._scene.sensor.position_m, self._navigator.marker
         if self._navigator.holds_sensor:
@@ -188,11 +191,6 @@ class Overlay(Canvas):
                 boxes.append((text, box))
                 taken.append(box.adjusted(-6.0, -3.0, 6.0, 3.0))
         return boxes
-
-    def _body_box(self) -> QRectF:
-        """Rectangle of the body in the picture; empty when it is behind the virtual camera."""
-        box = self._scene.body_box_px
-        return QRectF() if box is None else QRectF(QPointF(*box[:2]), QPointF(*box[2:]))
 
     def _paint_axes(self, painter: QPainter) -> None:
         right, down, forward = self._scene.pose.axes

@@ -165,8 +165,8 @@ class SceneView(QWidget):
             self.overlay.show_reading(place, self._words_at(place) if at_body else "")
         elif kind == QEvent.Type.MouseButtonRelease:
             self.navigator.release(*place, event.button())
-            if not self._clicked_at(place):
-                return
+            if math.dist(place, self._pressed_px) >= _CLICK_PX:
+                return  # a drag
             if event.button() == Qt.MouseButton.LeftButton:
                 self.inertial_hand.click(*place)
             elif event.button() == Qt.MouseButton.RightButton:
@@ -178,10 +178,6 @@ class SceneView(QWidget):
             # Also the second press of a double click: a hurried hand takes the sensor.
             self._pressed_px = place
             self.navigator.press(*place, event.button(), event.modifiers())
-
-    def _clicked_at(self, place: tuple[float, float]) -> bool:
-        """True if the button was released where it was pressed, without a drag."""
-        return math.dist(place, self._pressed_px) < _CLICK_PX
 
     def _words_at(self, place: tuple[float, float]) -> str:
         """What is under the pointer, or what a click would place there, in words."""

@@ -16,13 +16,8 @@ class TimeWindow(QObject):
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._extent = (0.0, 1.0)
+        self.extent_s = (0.0, 1.0)  # start and end of everything there is
         self._span = (0.0, 1.0)
-
-    @property
-    def extent_s(self) -> tuple[float, float]:
-        """Start and end of everything there is."""
-        return self._extent
 
     @property
     def start_s(self) -> float:
@@ -41,8 +36,8 @@ class TimeWindow(QObject):
 
     def set_extent(self, start_s: float, end_s: float) -> None:
         """Take over another recording and show all of it."""
-        self._extent = (start_s, max(end_s, start_s + _SHORTEST_S))
-        self._span = self._extent
+        self.extent_s = (start_s, max(end_s, start_s + _SHORTEST_S))
+        self._span = self.extent_s
         self.changed.emit()
 
     def extend(self, end_s: float, room_s: float = 0.0) -> None:
@@ -50,13 +45,13 @@ class TimeWindow(QObject):
 
         All of a short recording stays in view; ``room_s`` is the least length of the extent.
         """
-        first, last = self._extent
-        shows_all, at_end = self._span == self._extent, self.end_s >= last
-        self._extent = (first, max(end_s, first + max(_SHORTEST_S, room_s)))
+        first, last = self.extent_s
+        shows_all, at_end = self._span == self.extent_s, self.end_s >= last
+        self.extent_s = (first, max(end_s, first + max(_SHORTEST_S, room_s)))
         duration = self.duration_s
         if shows_all and duration < GROWING_S:
-            duration = min(self._extent[1] - first, max(GROWING_S, duration))
-        start = self._extent[1] - duration if at_end else self.start_s
+            duration = min(self.extent_s[1] - first, max(GROWING_S, duration))
+        start = self.extent_s[1] - duration if at_end else self.start_s
         self._span = self._held(start, start + duration)
         self.changed.emit()
 
@@ -68,7 +63,7 @@ class TimeWindow(QObject):
             self.changed.emit()
 
     def _held(self, start_s: float, end_s: float) -> tuple[float, float]:
-        first, last = self._extent
+        first, last = self.extent_s
         duration = min(max(end_s - start_s, _SHORTEST_S), last - first)
         start = min(max(start_s, first), last - duration)
         return start, start + duration
@@ -76,7 +71,7 @@ class TimeWindow(QObject):
     def zoom(self, factor: float, anchor_s: float) -> None:
         """Scale the window by ``factor`` (< 1 shows less), keeping ``anchor_s`` in place."""
         duration = min(
-            max(self.duration_s * factor, _SHORTEST_S), self._extent[1] - self._extent[0]
+            max(self.duration_s * factor, _SHORTEST_S), self.extent_s[1] - self.extent_s[0]
         )
         share = (anchor_s - self.start_s) / self.duration_s
         start = anchor_s - share * duration
@@ -88,7 +83,7 @@ class TimeWindow(QObject):
 
     def fit(self) -> None:
         """Show everything."""
-        self.set_span(*self._extent)
+        self.set_span(*self.extent_s)
 
     def reveal(self, time_s: float) -> None:
         """Scroll by a page when ``time_s`` has left the window."""

@@ -68,7 +68,7 @@ class MainWindow(QMainWindow):
         super().__init__()
         self._settings = settings
         self._parts = parts or Parts()
-        self._ready = False
+        self.ready = False  # true once the views stand and a recording can be shown
         self._tabbed: QWidget | None = None  # control that Tab has reached last
         self.setWindowTitle("SD² Studio")
         self.setAcceptDrops(True)
@@ -78,11 +78,6 @@ class MainWindow(QMainWindow):
         self._build_skeleton()
         if (geometry := settings.layout("window")) is not None:
             self.restoreGeometry(geometry)
-
-    @property
-    def ready(self) -> bool:
-        """True once the views stand and a recording can be shown."""
-        return self._ready
 
     @property
     def settled(self) -> bool:
@@ -175,7 +170,7 @@ class MainWindow(QMainWindow):
             if (state := self._settings.layout(name)) is not None:
                 getattr(self, f"_{name}").restoreState(state)
         self._loading.follow(s)
-        self._ready = True
+        self.ready = True
         for feature in self.features:
             feature.look_for_unfinished()
         # VTK last, imported in a thread: everything else is usable while it loads.
@@ -200,7 +195,7 @@ class MainWindow(QMainWindow):
         fill(self._panels["scene"], self._scene_comes)
 
     def _add_scene(self) -> None:
-        if self._ready:
+        if self.ready:
             replace_content(self._scene_comes, self.features.scene.make_view())
 
     def _connect(self) -> None:
@@ -313,7 +308,7 @@ class MainWindow(QMainWindow):
 
     def focusNextPrevChild(self, forward: bool) -> bool:
         """Go through all controls with Tab, from top left to bottom right."""
-        controls = controls_of(self._regions) if self._ready else []
+        controls = controls_of(self._regions) if self.ready else []
         if not controls:
             return False
         focus, step = self.focusWidget(), 1 if forward else -1
@@ -325,7 +320,7 @@ class MainWindow(QMainWindow):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Show all maps again with Escape, wherever the keyboard is."""
-        if self._ready and self.maps.ends_enlarging(event):
+        if self.ready and self.maps.ends_enlarging(event):
             self.maps.arrangement.enlarge(None)
         else:
             super().keyPressEvent(event)
@@ -340,7 +335,7 @@ class MainWindow(QMainWindow):
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
         """Say what a drop of these files would do."""
         paths = [Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()]
-        if self._ready and paths:
+        if self.ready and paths:
             used = [feature.drop_of(paths[0]) for feature in self.features if len(paths) == 1]
             own = [drop for drop in used if drop is not None][:1]
             self._drops.offer(paths, own or self.features.files.drops_of(paths))
@@ -365,7 +360,7 @@ class MainWindow(QMainWindow):
 
     def closeEvent(self, event: QCloseEvent) -> None:
         """Ask, remember the layout, stop every thread, release VTK."""
-        if not self._ready:
+        if not self.ready:
             event.accept()
             return
         features = self.features
@@ -376,7 +371,7 @@ class MainWindow(QMainWindow):
         self._widths.remember()
         for name in ("top", "bottom", "rows"):
             self._settings.set_layout(name, getattr(self, f"_{name}").saveState())
-        self._ready = False
+        self.ready = False
         self._importer.close()
         self.session.playback.pause()
         features.close()

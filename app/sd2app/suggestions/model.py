@@ -203,8 +203,9 @@ class SuggestionsModel(BackgroundModel):
 
     def _receive(self, found: Found) -> None:
         self._if_none = found.if_none
-        if self._made is not None and self._nothing_since(*self._made):
-            self._stack.undo()
+        labels, step = self._made or (None, 0)
+        if labels is self._labels.labels and step == self._stack.index():
+            self._stack.undo()  # nothing was edited since
         # What was rejected and brought back by an undo is not rejected any more.
         here = {(span.start_s, span.end_s) for span in self.pending}
         declined = tuple(one for one in self._declined if (one.start_s, one.end_s) not in here)
@@ -215,9 +216,6 @@ class SuggestionsModel(BackgroundModel):
         self._made = (after, self._stack.index()) if after is not before else None
         self._go_on(self._playback.time_s)
         self.changed.emit()
-
-    def _nothing_since(self, labels: Labels, step: int) -> bool:
-        return labels is self._labels.labels and step == self._stack.index()
 
     def _fail(self, error: Exception) -> None:
         self._problem = str(error)

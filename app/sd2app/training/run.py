@@ -109,17 +109,14 @@ class TrainingHistory(LearningHistory):
         self.minutes = minutes if minutes > 0 else 0.0
         self.parameters, self.segments = parameters, segments
         # What was done after the checkpoint is done again.
-        self._go_back(done if event.get("resumed") else 0)
-        self.begun, self.paused = True, False
-        self.outcome, self.error = None, ""
-
-    def _go_back(self, steps: int) -> None:
-        at = steps / self.steps_per_epoch if self.steps_per_epoch else 0.0
+        self.steps_done = done if event.get("resumed") else 0
+        at = self.steps_done / self.steps_per_epoch if self.steps_per_epoch else 0.0
         self.step_points = [point for point in self.step_points if point.at <= at]
         self.epoch_points = [point for point in self.epoch_points if point.epoch <= at]
-        self.steps_done = steps
         self.epoch = math.ceil(at)
         self.left_s = None
+        self.begun, self.paused = True, False
+        self.outcome, self.error = None, ""
 
     def _stepped(self, event: dict[str, Any]) -> None:
         # Counted from the start of the run.

@@ -51,7 +51,11 @@ class TrainingSetupView(TrainingForm):
         )
         self._menu.aboutToShow.connect(self._fill_menu)
         self.column.addWidget(self._making_part())
-        self._add_model()
+        names = {name: words[0] for name, words in MODEL_WORDS.items()}
+        kind = self.choice("model", "Kind of model", names)
+        self._about = sentence("")
+        self.column.addLayout(row_of(title("Model"), (kind, 1), spacing_px=8))
+        self.column.addWidget(self._about)
         self._add_settings()
         self.add_start(training.start, lambda: training.command)
         training.changed.connect(self._refresh)
@@ -65,13 +69,6 @@ class TrainingSetupView(TrainingForm):
         self._making_cancel = outlined("Cancel", "Make no pairs", maker.cancel, self)
         self._making = pane(row_of((self._making_text, 1), bar, self._making_cancel))
         return self._making
-
-    def _add_model(self) -> None:
-        names = {name: words[0] for name, words in MODEL_WORDS.items()}
-        kind = self.choice("model", "Kind of model", names)
-        self._about = sentence("")
-        self.column.addLayout(row_of(title("Model"), (kind, 1), spacing_px=8))
-        self.column.addWidget(self._about)
 
     def _add_settings(self) -> None:
         # Labels to the left; several boxes share what room there is.

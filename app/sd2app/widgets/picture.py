@@ -20,11 +20,6 @@ MenuPart = Callable[[QMenu, QPointF], None]
 _KINDS = "Picture (*.png);;Drawing (*.svg)"
 
 
-def copy_picture(widget: QWidget) -> None:
-    """Put a picture of a widget on the clipboard."""
-    QGuiApplication.clipboard().setPixmap(widget.grab())
-
-
 def copy_drawing(widget: QWidget) -> None:
     """Put a drawing of a widget on the clipboard, as SVG."""
     svg, clipboard = _drawing(widget), QGuiApplication.clipboard()
@@ -81,7 +76,8 @@ def picture_menu(widget: QWidget, parts: Sequence[MenuPart], place: QPointF) -> 
     for part in parts:
         part(menu, place)
         menu.addSeparator()
-    menu.addAction("&Copy picture", lambda: copy_picture(widget))
+    clipboard = QGuiApplication.clipboard()
+    menu.addAction("&Copy picture", lambda: clipboard.setPixmap(widget.grab()))
     menu.addAction("Copy as S&VG", lambda: copy_drawing(widget))
     menu.addAction("&Save picture…", lambda: save_picture(widget, _file_name(widget)))
     return menu

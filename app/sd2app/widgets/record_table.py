@@ -28,13 +28,13 @@ class Heading(NamedTuple):
 class RecordTableModel(QAbstractTableModel, Generic[Record]):
     """Rows of records, kept up to date only while a view shows them.
 
-    A subclass assigns ``_rows``, usually in :meth:`_refresh`, and gives the cells' texts.
+    A subclass assigns ``rows``, usually in :meth:`_refresh`, and gives the cells' texts.
     """
 
     def __init__(self, headings: Sequence[Heading], parent: QObject | None = None) -> None:
         super().__init__(parent)
         self.headings = tuple(headings)
-        self._rows: Sequence[Record] = ()
+        self.rows: Sequence[Record] = ()
         self._watched = False
 
     def set_watched(self, watched: bool) -> None:
@@ -67,7 +67,7 @@ class RecordTableModel(QAbstractTableModel, Generic[Record]):
 
     def rowCount(self, parent: Index = NO_PARENT) -> int:
         """Return the number of records."""
-        return 0 if parent.isValid() else len(self._rows)
+        return 0 if parent.isValid() else len(self.rows)
 
     def columnCount(self, parent: Index = NO_PARENT) -> int:
         """Return the number of columns, hidden ones included."""
@@ -98,7 +98,7 @@ class RecordTableModel(QAbstractTableModel, Generic[Record]):
         """Return text, icon, tip or alignment of a cell."""
         if not index.isValid():
             return None
-        record, column = self._rows[index.row()], index.column()
+        record, column = self.rows[index.row()], index.column()
         if role == Qt.ItemDataRole.DisplayRole:
             return self._text(record, column)
         if role == Qt.ItemDataRole.EditRole:

@@ -16,6 +16,7 @@ from sd2core.cli.options import (
     add_command,
     add_json_and_progress,
     add_output,
+    add_value,
     positive_int,
     share,
 )
@@ -53,12 +54,7 @@ def add_table(kinds: argparse._SubParsersAction) -> None:
     )
     add_sources(parser)
     add_output(parser, "FOLDER", "the tables, figures and models to write")
-    parser.add_argument(
-        "--seeds",
-        type=positive_int,
-        metavar="N",
-        help="number of repetitions (default: 5; quick: 2)",
-    )
+    add_value(parser, "--seeds", positive_int, "N", "number of repetitions (default: 5; quick: 2)")
     parser.add_argument(
         "--shares",
         type=_shares,
@@ -78,7 +74,7 @@ def add_table(kinds: argparse._SubParsersAction) -> None:
         help="judge other movements of the people trained on, instead of other people",
     )
     add_network(parser)
-    parser.add_argument("--steps", type=positive_int, metavar="N", help="batches per training")
+    add_value(parser, "--steps", positive_int, "N", "batches per training")
     add_json_and_progress(parser)
 
 

@@ -24,6 +24,7 @@ from sd2core.cli.options import (
     add_output,
     add_people_kept_out,
     add_placements_used,
+    add_value,
     given,
     not_negative_float,
     positive_float,
@@ -66,19 +67,12 @@ def add_train(kinds: argparse._SubParsersAction) -> None:
         f"kept out for validation, separated by commas, or none {otherwise}",
         f"kept out for a test, or none {otherwise}",
     )
-    parser.add_argument("--steps", type=positive_int, metavar="N", help="number of training steps")
-    parser.add_argument(
-        "--patience",
-        type=positive_int,
-        metavar="N",
-        help="end after so many validations without improvement",
+    add_value(parser, "--steps", positive_int, "N", "number of training steps")
+    add_value(
+        parser, "--patience", positive_int, "N", "end after so many validations without improvement"
     )
-    parser.add_argument(
-        "--learning-rate", type=positive_float, metavar="RATE", help="peak learning rate"
-    )
-    parser.add_argument(
-        "--seed", type=int, default=0, metavar="N", help="seed of all random numbers (default: 0)"
-    )
+    add_value(parser, "--learning-rate", positive_float, "RATE", "peak learning rate")
+    add_value(parser, "--seed", int, "N", "seed of all random numbers", 0)
     add_json_and_progress(parser)
 
 

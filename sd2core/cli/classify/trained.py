@@ -16,7 +16,7 @@ from sd2core.cli.labels.suggest import (
     spans_data,
     write_found,
 )
-from sd2core.cli.options import add_command, add_json, not_negative_float
+from sd2core.cli.options import add_command, add_json, add_value, not_negative_float
 from sd2core.cli.output import counted, print_json, print_rows, progress_bar
 from sd2core.cli.recording_maps import MAP_NAMES
 from sd2core.errors import Sd2Error
@@ -165,12 +165,8 @@ def add_apply(kinds: argparse._SubParsersAction) -> None:
         metavar="FILE.npz",
         help="write `probabilities` (frames, classes), `times_s` and `classes`",
     )
-    parser.add_argument(
-        "--min-duration-s",
-        type=not_negative_float,
-        default=0.2,
-        metavar="S",
-        help="shorter spans are left out (default: 0.2)",
+    add_value(
+        parser, "--min-duration-s", not_negative_float, "S", "shorter spans are left out", 0.2
     )
     parser.add_argument(
         "--merge-gap-s",

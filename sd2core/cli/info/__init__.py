@@ -16,7 +16,7 @@ from sd2core.cli.info.description import (
     describe_video,
     show,
 )
-from sd2core.cli.options import add_command, add_json, add_mesh_reading
+from sd2core.cli.options import add_command, add_json, add_mesh_reading, add_value
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
@@ -28,7 +28,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         handler=_info,
         examples="  sd2 info walk.sd2\n  sd2 info walk.npz --json\n  sd2 info walk.zarr --verify",
     )
-    parser.add_argument("path", type=Path, metavar="PATH", help="what to describe")
+    add_value(parser, "path", Path, "PATH", "what to describe")
     parser.add_argument(
         "--verify",
         action="store_true",

@@ -12,6 +12,7 @@ from sd2core.cli.labels.suggest import spans_data
 from sd2core.cli.options import (
     add_command,
     add_json,
+    add_value,
     share,
 )
 from sd2core.cli.output import counted, print_json, print_rows
@@ -36,14 +37,10 @@ def add_agree(kinds: argparse._SubParsersAction) -> None:
             "  sd2 labels agree walk.sd2 ben.eaf --min-iou 0.3 --track Gestures"
         ),
     )
-    parser.add_argument("a", type=Path, metavar="A", help="labels of one person")
-    parser.add_argument("b", type=Path, metavar="B", help="labels of the other")
-    parser.add_argument(
-        "--min-iou",
-        type=share,
-        default=0.5,
-        metavar="SHARE",
-        help="intersection over union that a match must reach (default: 0.5)",
+    add_value(parser, "a", Path, "A", "labels of one person")
+    add_value(parser, "b", Path, "B", "labels of the other")
+    add_value(
+        parser, "--min-iou", share, "SHARE", "intersection over union that a match must reach", 0.5
     )
     parser.add_argument("--track", metavar="NAME", help="compare this track only")
     add_clock(parser)

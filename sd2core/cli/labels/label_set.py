@@ -19,6 +19,7 @@ from sd2core.cli.options import (
     add_command,
     add_json,
     add_output,
+    add_value,
 )
 from sd2core.cli.output import counted, print_json, print_rows
 from sd2core.errors import Sd2Error
@@ -49,7 +50,7 @@ def add_set(kinds: argparse._SubParsersAction) -> None:
         ),
     )
     add_labels(parser)
-    parser.add_argument("--export", type=Path, metavar="FILE.json", help="write the set by itself")
+    add_value(parser, "--export", Path, "FILE.json", "write the set by itself")
     parser.add_argument(
         "--use", metavar="FILE.json", help=f"another set; {_USUAL!r} is the program's own"
     )

@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sd2core.cli.options import positive_float
+from sd2core.cli.options import add_value, positive_float
 from sd2core.errors import Sd2Error
 from sd2core.files.digests import cached_digest
 
@@ -24,17 +24,15 @@ def add_clock(parser: argparse.ArgumentParser) -> None:
     """Add the options that give the times of frames."""
     group = parser.add_argument_group("frame times", "one of these; a recording brings its own")
     choice = group.add_mutually_exclusive_group()
-    choice.add_argument("--recording", type=Path, metavar="RECORDING", help="those of a recording")
-    choice.add_argument("--video", type=Path, metavar="FILE", help="those of a video")
-    choice.add_argument("--mesh", type=Path, metavar="FILE", help="those of a mesh")
-    choice.add_argument(
-        "--fps", type=positive_float, metavar="FPS", help="so many per second from 0 s on"
-    )
+    add_value(choice, "--recording", Path, "RECORDING", "those of a recording")
+    add_value(choice, "--video", Path, "FILE", "those of a video")
+    add_value(choice, "--mesh", Path, "FILE", "those of a mesh")
+    add_value(choice, "--fps", positive_float, "FPS", "so many per second from 0 s on")
 
 
 def add_labels(parser: argparse.ArgumentParser) -> None:
     """Add a file with labels, how to read it, and the times of frames; see :func:`read_named`."""
-    parser.add_argument("file", type=Path, metavar="FILE", help="the file with labels")
+    add_value(parser, "file", Path, "FILE", "the file with labels")
     parser.add_argument("--format", metavar="NAME", help=f"the format of FILE: {_FORMATS}")
     parser.add_argument(
         "--observation", metavar="NAME", help="which one of a BORIS project with several"

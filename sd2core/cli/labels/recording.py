@@ -12,6 +12,7 @@ from sd2core.cli.options import (
     add_command,
     add_json,
     add_output,
+    add_value,
     not_negative_float,
 )
 from sd2core.cli.output import counted, print_json, progress_bar
@@ -46,12 +47,8 @@ def add_figure(kinds: argparse._SubParsersAction) -> None:
     )
     add_labelled_recording(parser)
     add_output(parser, "FILE", "the figure to write (.png, .svg or .pdf)")
-    parser.add_argument(
-        "--from-s", type=not_negative_float, metavar="S", help="start of the figure, in seconds"
-    )
-    parser.add_argument(
-        "--to-s", type=not_negative_float, metavar="S", help="end of the figure, in seconds"
-    )
+    add_value(parser, "--from-s", not_negative_float, "S", "start of the figure, in seconds")
+    add_value(parser, "--to-s", not_negative_float, "S", "end of the figure, in seconds")
 
 
 def _figure(options: argparse.Namespace) -> None:

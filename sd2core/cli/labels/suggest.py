@@ -18,6 +18,7 @@ from sd2core.cli.options import (
     add_command,
     add_json,
     add_output,
+    add_value,
     flag,
     given,
     not_negative_float,
@@ -65,7 +66,7 @@ def add_suggest(kinds: argparse._SubParsersAction) -> None:
     )
     add_searched_map(parser, ("synthetic", "radar"))
     for name, (metavar, text) in _HELP.items():
-        parser.add_argument(flag(name), type=not_negative_float, metavar=metavar, help=text)
+        add_value(parser, flag(name), not_negative_float, metavar, text)
     parser.add_argument(
         "--label", default="gesture", metavar="LABEL", help="label of the spans (default: gesture)"
     )
@@ -74,9 +75,7 @@ def add_suggest(kinds: argparse._SubParsersAction) -> None:
 
 def add_searched_map(parser: argparse.ArgumentParser, kinds: tuple[MapName, ...]) -> None:
     """Add the map in which spans are looked for, and the file for them."""
-    parser.add_argument(
-        "map", type=Path, metavar="MAP", help="a map, a recording, or the .h5 of a K60168A"
-    )
+    add_value(parser, "map", Path, "MAP", "a map, a recording, or the .h5 of a K60168A")
     parser.add_argument(
         "--of",
         choices=kinds,

@@ -142,10 +142,11 @@ def _read(file: h5py.File, path: Path) -> RadarCapture:
             f"{path}: result/frame has shape {frames.shape}",
             f"(frames, {shape[2]} sweeps, {shape[3]} points), as session_config says",
         )
+    others = (("session", sessions), ("group", groups), ("sensor", entries))
     notes = [
         "Assumed: the phase grows with the distance, as in the exploration tool; walk towards the"
         " sensor to check.",
-        *_left_out(sessions, groups, entries),
+        *(f"The first of {count} {name}s is taken." for name, count in others if count > 1),
     ]
     if len(sensor.subsweeps) > 1:
         notes.append(
@@ -195,11 +196,6 @@ def _read(file: h5py.File, path: Path) -> RadarCapture:
         meta={"format": "Acconeer A121", "sensor": sensor_id, **sensor.model_dump()},
         full_scale_known=False,
     )
-
-
-def _left_out(sessions: int, groups: int, entries: int) -> list[str]:
-    others = (("session", sessions), ("group", groups), ("sensor", entries))
-    return [f"The first of {count} {name}s is taken." for name, count in others if count > 1]
 
 
 def _sweep_s(sensor: _Sensor, found: _Metadata, path: Path, notes: list[str]) -> float:

@@ -170,14 +170,10 @@ def read_mars(folder: Path | str, part: str) -> MarsPart:
                 point_intensity=points[inside, 2],
             )
         )
-    return MarsPart(_subject(folder), part, tuple(stretches), str(folder))
-
-
-def _subject(folder: Path) -> str:
-    """The person's number where the folder's name ends in one."""
+    # The person's number, where the folder's name ends in one.
     name = folder.resolve().name
     number = re.search(r"(\d+)$", name)
-    return number[1] if number else name
+    return MarsPart(number[1] if number else name, part, tuple(stretches), str(folder))
 
 
 def _joints(path: Path) -> NDArray[np.float64]:

@@ -53,7 +53,9 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
     """
     now = datetime.now().isoformat(timespec="seconds")
     lanes = lanes_of(labels, edges_s)
-    behaviours = _behaviours(labels)
+    known = {one.name for one in labels.label_set.labels}
+    others = dict.fromkeys(span.label for span in labels.spans if span.label not in known)
+    behaviours = [*labels.label_set.labels, *(Label(name, _GREY) for name in others)]
     categories = sorted({one.gesture_class for one in behaviours if one.gesture_class})
     project = {
         "time_format": "s",
@@ -263,13 +265,6 @@ def _label_set(kept: Any, behaviours: list[dict[str, Any]]) -> LabelSet:
         except Sd2Error:  # BORIS' colours may be names, or absent
             labels[name] = Label(name, "#999999", key, category)
     return LabelSet(str(kept.get("name", "")) if ours else "BORIS", tuple(labels.values()))
-
-
-def _behaviours(labels: Labels) -> list[Label]:
-    """The label set, and after it what else is used."""
-    known = {one.name for one in labels.label_set.labels}
-    others = dict.fromkeys(span.label for span in labels.spans if span.label not in known)
-    return [*labels.label_set.labels, *(Label(name, _GREY) for name in others)]
 
 
 def _observation(

@@ -49,7 +49,10 @@ def read(path: Path, timebase: Timebase | None = None, observation: str | None =
     """
     document = _document(path)
     slots = _slots(path, document)
-    shift_s = _time_origin_s(document)
+    # Time in the linked video of ELAN's zero.
+    media = document.find("HEADER/MEDIA_DESCRIPTOR")
+    origin = "" if media is None else media.get("TIME_ORIGIN", "")
+    shift_s = int(origin) / 1000 if re.fullmatch(r"-?\d{1,18}", origin) else 0.0
     below = _dependents(document)
     rows: list[Row] = []
     tracks: list[str] = []
@@ -116,13 +119,6 @@ def _slots(path: Path, document: Element) -> dict[str, int]:
             )
         found[slot.get("TIME_SLOT_ID", "")] = value
     return found
-
-
-def _time_origin_s(document: Element) -> float:
-    """Time in the linked video of ELAN's zero."""
-    media = document.find("HEADER/MEDIA_DESCRIPTOR")
-    text = "" if media is None else media.get("TIME_ORIGIN", "")
-    return int(text) / 1000 if re.fullmatch(r"-?\d{1,18}", text) else 0.0
 
 
 def _dependents(document: Element) -> dict[str, list[tuple[str, str, str]]]:

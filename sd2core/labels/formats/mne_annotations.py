@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from urllib.parse import quote, unquote
 
@@ -76,7 +77,8 @@ def read(path: Path, timebase: Timebase | None = None, observation: str | None =
     """
     lines = [line.removesuffix("\r") for line in read_text(path, _EXPECTED).split("\n")]
     heading = [line for line in lines if line.startswith("#")]
-    decode = unquote_exactly if _ENCODED in heading else str
+    # Lone surrogates are decoded as well.
+    decode = partial(unquote, errors="surrogatepass") if _ENCODED in heading else str
     columns = _columns(path, heading)
     table = TableRows()
     for number, line in enumerate(lines, start=1):
@@ -98,11 +100,6 @@ def read(path: Path, timebase: Timebase | None = None, observation: str | None =
         confidence = _number(path, number, "confidence", known) if known else None
         table.add(number, (start_s, end_s), cell["description"], confidence, cell)
     return assemble(path, table.rows, tracks=table.tracks.items(), timebase=timebase)
-
-
-def unquote_exactly(text: str) -> str:
-    """Undo the encoding, also of lone surrogates."""
-    return unquote(text, errors="surrogatepass")
 
 
 def _columns(path: Path, heading: list[str]) -> list[str] | None:

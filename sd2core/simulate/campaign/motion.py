@@ -254,13 +254,9 @@ def _gesturing(
     lean = subject.sway_deg * wander(rng, times_s, 0.5, 2)
     x, _, z = np.eye(3)
     rotations[:, 0] = product(about(x, lean[:, 0]), about(z, 0.6 * lean[:, 1]))
-    return Motion(rotations, about_the_floor(skeleton, rotations[:, 0]))
-
-
-def about_the_floor(skeleton: Skeleton, turns: Floats) -> Floats:
-    """Translations that make turns of the root turns about the floor's origin."""
-    root = np.broadcast_to(skeleton.heads_m[0], (len(turns), 3))
-    return np.asarray(applied(turns, root) - root)
+    # The root turns about the floor's origin.
+    root = np.broadcast_to(skeleton.heads_m[0], (len(rotations), 3))
+    return Motion(rotations, np.asarray(applied(rotations[:, 0], root) - root))
 
 
 def _moving(

@@ -48,7 +48,10 @@ def footwork(
     elif mode == "shift":
         place = rng.uniform(0.02, 0.08) * wander(rng, times_s, 0.5, 2)
         heading = rng.uniform(0.0, 10.0) * wander(rng, times_s, 0.4, 1)[:, 0]
-    busy = _busy(times_s, place, heading)
+    # Need for steps, 0 to 1, smooth.
+    speed = np.linalg.norm(np.gradient(place, times_s, axis=0), axis=1)
+    turning = np.abs(np.gradient(heading, times_s)) / 90.0
+    busy = smooth_share((speed / 0.35 + turning - 0.15) / 0.85, np.ones(()))
     place = place + sway * wander(rng, times_s, 0.6, 2)
     apart = rng.uniform(0.045, 0.11)
     feet, feet_heading, stride = _feet(times_s, place, heading, busy, apart)
@@ -81,13 +84,6 @@ def _walk(rng: np.random.Generator, times_s: Floats) -> tuple[Floats, Floats]:
     along = np.stack([-np.sin(angle), -np.cos(angle)], axis=1)
     place = np.cumsum(backwards * speed[:, None] * along, axis=0) * step_s
     return heading, place - place[len(place) // 2]
-
-
-def _busy(times_s: Floats, place: Floats, heading_deg: Floats) -> Floats:
-    """Need for steps, 0 to 1, smooth, (T,)."""
-    speed = np.linalg.norm(np.gradient(place, times_s, axis=0), axis=1)
-    turning = np.abs(np.gradient(heading_deg, times_s)) / 90.0
-    return smooth_share((speed / 0.35 + turning - 0.15) / 0.85, np.ones(()))
 
 
 def _feet(

@@ -45,13 +45,8 @@ class KeyListModel(RecordTableModel[KeyRow]):
         super().__init__(_HEADINGS)
         self._bindings, self._labels, self._mouse, self._apply = bindings, labels, mouse, apply
         self._search = ""
-        self._rows = self._listed()
+        self.rows = self._listed()
         bindings.changed.connect(self._refresh)
-
-    @property
-    def rows(self) -> Sequence[KeyRow]:
-        """Rows that are listed."""
-        return self._rows
 
     def set_search(self, text: str) -> None:
         """List rows with all these words in menu, name, tip or keys."""
@@ -62,16 +57,16 @@ class KeyListModel(RecordTableModel[KeyRow]):
 
     def can_change(self, row: int) -> bool:
         """True if keys do it, not the mouse."""
-        return not self._rows[row].mouse
+        return not self.rows[row].mouse
 
     def is_usual(self, row: int) -> bool:
         """True if there is nothing to reset."""
-        action = self._rows[row].action
+        action = self.rows[row].action
         return not action or self._bindings.is_usual(action)
 
     def change(self, row: int, key: str, *, besides: bool = False) -> None:
         """Give a row another key, or one besides those it has; Sd2Error if it cannot have it."""
-        at = self._rows[row]
+        at = self.rows[row]
         if at.action:
             kept = self._bindings.keys_of(at.action) if besides else ()
             self._bindings.bind(at.action, (*kept, key))
@@ -81,7 +76,7 @@ class KeyListModel(RecordTableModel[KeyRow]):
 
     def clear(self, row: int) -> None:
         """Take all keys of a row away."""
-        at = self._rows[row]
+        at = self.rows[row]
         if at.action:
             self._bindings.bind(at.action, ())
         elif at.label:
@@ -89,19 +84,19 @@ class KeyListModel(RecordTableModel[KeyRow]):
 
     def reset(self, row: int) -> None:
         """Give a row its usual keys back; errors are those of :meth:`change`."""
-        if action := self._rows[row].action:
+        if action := self.rows[row].action:
             self._bindings.reset(action)
 
     # --- the list -------------------------------------------------------------------------
 
     def _refresh(self) -> None:
         rows = self._listed()
-        if rows == self._rows:
+        if rows == self.rows:
             last = self.index(len(rows) - 1, KEYS)
             self.dataChanged.emit(self.index(0, 0), last)
             return
         self.beginResetModel()
-        self._rows = rows
+        self.rows = rows
         self.endResetModel()
 
     def _listed(self) -> list[KeyRow]:
