@@ -7,13 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sd2core.cli.options import (
-    add_command,
-    add_figure_output,
-    add_json,
-    add_mesh_reading,
-    position,
-)
+from sd2core.cli.options import add_command, add_figure_output, add_json, add_mesh_reading, position
 from sd2core.cli.output import print_json, print_rows, progress_bar
 from sd2core.errors import Sd2Error
 

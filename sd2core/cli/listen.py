@@ -12,13 +12,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sd2core.cli.options import (
-    add_command,
-    add_json,
-    add_output,
-    add_value,
-    positive_float,
-)
+from sd2core.cli.options import add_command, add_json, add_output, add_value, positive_float
 from sd2core.cli.output import counted, print_event, print_facts
 from sd2core.errors import Sd2Error
 from sd2core.runs.control import stop_signals

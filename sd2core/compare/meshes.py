@@ -10,14 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.model import own_resolution
-from sd2core.compare.joints import (
-    GROUPS,
-    JOINTS,
-    JointPatches,
-    carry_patches,
-    own_patches,
-    rows_of,
-)
+from sd2core.compare.joints import GROUPS, JOINTS, JointPatches, carry_patches, own_patches, rows_of
 from sd2core.compare.measures import (
     common_times,
     correlation,

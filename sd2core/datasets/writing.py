@@ -14,13 +14,7 @@ import numpy as np
 from sd2core.datasets.card import write_card
 from sd2core.datasets.cutting import cut_source
 from sd2core.datasets.formats import refuse_large_npz, write_packed
-from sd2core.datasets.index import (
-    Names,
-    check_fits,
-    entry_of,
-    header_of,
-    refuse_other_settings,
-)
+from sd2core.datasets.index import Names, check_fits, entry_of, header_of, refuse_other_settings
 from sd2core.datasets.layout import SPLITS, FileFormat, Header, format_of
 from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.reading import open_dataset

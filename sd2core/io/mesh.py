@@ -11,13 +11,7 @@ from numpy.typing import NDArray
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import is_pattern
 from sd2core.io.fitted import fitted_doubts
-from sd2core.io.mesh_arrays import (
-    RawMesh,
-    read_npz,
-    read_zarr,
-    write_npz,
-    write_zarr,
-)
+from sd2core.io.mesh_arrays import RawMesh, read_npz, read_zarr, write_npz, write_zarr
 from sd2core.io.mesh_checks import check_mesh, mark_empty_frames, uncertainty_of
 from sd2core.io.mesh_files import SURFACE_SUFFIXES, read_faces, read_mesh_files
 from sd2core.io.mesh_models import read_model_output

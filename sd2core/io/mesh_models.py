@@ -16,13 +16,7 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.files.limits import check_size
-from sd2core.io.mesh_arrays import (
-    FACE_NAMES,
-    RATE_NAMES,
-    TIME_NAMES,
-    VERTEX_NAMES,
-    RawMesh,
-)
+from sd2core.io.mesh_arrays import FACE_NAMES, RATE_NAMES, TIME_NAMES, VERTEX_NAMES, RawMesh
 from sd2core.io.pickles import read_pickle
 
 _AT_ROOT_M = 0.6

@@ -14,12 +14,7 @@ import numpy as np
 from sd2core.errors import Sd2Error
 from sd2core.files.numpy_files import open_npz_file, open_zip, read_array_header
 from sd2core.files.stores import create_array, create_group
-from sd2core.io.mesh_arrays import (
-    SMALL_NAMES,
-    VERTEX_NAMES,
-    create_vertices,
-    frames_per_chunk,
-)
+from sd2core.io.mesh_arrays import SMALL_NAMES, VERTEX_NAMES, create_vertices, frames_per_chunk
 
 _EXPECTED = "a complete .npz file that holds plain numbers"
 Header = tuple[tuple[int, ...], bool, np.dtype[Any]]

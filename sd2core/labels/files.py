@@ -19,13 +19,7 @@ from sd2core.files.atomic import atomic_write_text
 from sd2core.files.paths import located_path, plain_path, stored_path
 from sd2core.files.recording_json import Span as InlineSpan
 from sd2core.files.texts import EXPECTED_JSON, errors_in, first_fault, parse_json, read_text
-from sd2core.labels.entries import (
-    Entry,
-    LabelsEntry,
-    LabelSetEntry,
-    label_set_entry,
-    labels_entry,
-)
+from sd2core.labels.entries import Entry, LabelsEntry, LabelSetEntry, label_set_entry, labels_entry
 from sd2core.labels.label_set import LONGEST_NAME, LabelSet
 from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.timebase import Timebase

@@ -8,13 +8,7 @@ from typing import Any, ClassVar
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QPainter
-from PySide6.QtWidgets import (
-    QDialog,
-    QLabel,
-    QLayout,
-    QLineEdit,
-    QWidget,
-)
+from PySide6.QtWidgets import QDialog, QLabel, QLayout, QLineEdit, QWidget
 
 from sd2app.figures.model import DrawnFigure
 from sd2app.manual.help import with_help

@@ -5,13 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from PySide6.QtCore import QSignalBlocker, Qt
-from PySide6.QtWidgets import (
-    QDialog,
-    QLabel,
-    QSlider,
-    QToolButton,
-    QWidget,
-)
+from PySide6.QtWidgets import QDialog, QLabel, QSlider, QToolButton, QWidget
 
 from sd2app.fit.person_picker import PersonPicker
 from sd2app.fit.setup import ANGLES_DEG, DEFAULT_STATURE_M, STATURES_M, FitSetupModel

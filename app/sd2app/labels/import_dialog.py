@@ -6,11 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from PySide6.QtWidgets import (
-    QDialog,
-    QLabel,
-    QWidget,
-)
+from PySide6.QtWidgets import QDialog, QLabel, QWidget
 
 from sd2app.background.latest import Emit, LatestRunner
 from sd2app.feature import Shell

@@ -13,14 +13,7 @@ from sd2app.session.playback import PlaybackModel
 from sd2app.session.session import Session
 from sd2app.widgets.canvas import TimePlot
 from sd2app.widgets.layouts import Part, row_of
-from sd2app.widgets.time_axis import (
-    GUTTER_PX,
-    MARGIN_PX,
-    TimeScale,
-    clock_text,
-    tick_step,
-    ticks,
-)
+from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, TimeScale, clock_text, tick_step, ticks
 
 _BUTTONS = ("first_frame", "previous_frame", "play", "next_frame", "last_frame", "loop")
 

@@ -13,13 +13,7 @@ from sd2app.widgets.text import counted, duration_text
 from sd2core.errors import Sd2Error
 from sd2core.pairs.summary import PairFacts, pair_facts
 from sd2core.runs.pace import known_pace_s
-from sd2core.train.config import (
-    DataConfig,
-    MachineConfig,
-    ModelConfig,
-    TrainConfig,
-    TrainingConfig,
-)
+from sd2core.train.config import DataConfig, MachineConfig, ModelConfig, TrainConfig, TrainingConfig
 from sd2core.train.data import Split, split_subjects
 
 MODELS = ("s4", "s4d", "gru", "unet", "swin", "s4-serial")

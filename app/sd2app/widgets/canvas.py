@@ -9,14 +9,7 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, SignalInstance
-from PySide6.QtGui import (
-    QContextMenuEvent,
-    QImage,
-    QPainter,
-    QPaintEvent,
-    QPixmap,
-    QWheelEvent,
-)
+from PySide6.QtGui import QContextMenuEvent, QImage, QPainter, QPaintEvent, QPixmap, QWheelEvent
 from PySide6.QtWidgets import QWidget
 
 from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, ShownTime, TimeScale

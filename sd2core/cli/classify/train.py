@@ -11,13 +11,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Literal
 
 from sd2core.classify.defaults import DELAY_S, MODELS, WIDTH
-from sd2core.cli.classify.data import (
-    DATA_HELP,
-    add_data,
-    asked_maps,
-    clips_of,
-    split_of,
-)
+from sd2core.cli.classify.data import DATA_HELP, add_data, asked_maps, clips_of, split_of
 from sd2core.cli.options import (
     add_command,
     add_json_and_progress,

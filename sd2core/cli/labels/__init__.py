@@ -19,11 +19,7 @@ from sd2core.cli.labels.reading import (
 from sd2core.cli.labels.recording import add_cut, add_figure
 from sd2core.cli.labels.recover import add_recover
 from sd2core.cli.labels.suggest import add_suggest
-from sd2core.cli.options import (
-    add_command,
-    add_json,
-    add_output,
-)
+from sd2core.cli.options import add_command, add_json, add_output
 from sd2core.cli.output import counted, print_json, print_rows
 
 if TYPE_CHECKING:

@@ -9,12 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.labels.reading import add_clock, clock_of, labels_at, needed, with_rate
 from sd2core.cli.labels.suggest import spans_data
-from sd2core.cli.options import (
-    add_command,
-    add_json,
-    add_value,
-    share,
-)
+from sd2core.cli.options import add_command, add_json, add_value, share
 from sd2core.cli.output import counted, print_json, print_rows
 
 if TYPE_CHECKING:

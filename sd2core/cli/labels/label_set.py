@@ -15,12 +15,7 @@ from sd2core.cli.labels.reading import (
     read_named,
     write,
 )
-from sd2core.cli.options import (
-    add_command,
-    add_json,
-    add_output,
-    add_value,
-)
+from sd2core.cli.options import add_command, add_json, add_output, add_value
 from sd2core.cli.output import counted, print_json, print_rows
 from sd2core.errors import Sd2Error
 

@@ -9,11 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.labels.reading import add_replace, check_label_output
-from sd2core.cli.options import (
-    add_command,
-    add_json,
-    add_output,
-)
+from sd2core.cli.options import add_command, add_json, add_output
 from sd2core.cli.output import counted, print_json, print_rows
 from sd2core.errors import Sd2Error
 

@@ -17,13 +17,7 @@ from urllib.parse import quote, unquote
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.texts import read_text
-from sd2core.labels.formats.losses import (
-    ASPECTS,
-    LabelFormat,
-    Loss,
-    counted,
-    losses_by_format,
-)
+from sd2core.labels.formats.losses import ASPECTS, LabelFormat, Loss, counted, losses_by_format
 from sd2core.labels.formats.numbers import positional
 from sd2core.labels.formats.rows import TableRows, assemble
 from sd2core.labels.spans import Labels, Span
