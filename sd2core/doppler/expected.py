@@ -32,6 +32,10 @@ from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
 from sd2core.numerics.compiled import kernels_ready
 from sd2core.sensor import VelocityAxis
 
+SIGMA_FACTOR = 0.5
+"""Factor on the deviations that a mesh states: with it maps of calibrating clips came nearest to
+the true ones (docs/decisions/0071). What covers two errors of three spreads most too far."""
+
 _FRAMES = 16
 """Frames counted together: their fine histograms stay in the second-level cache."""
 

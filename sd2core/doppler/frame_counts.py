@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.doppler import histogram, vid2doppler
-from sd2core.doppler.expected import count_expected, sigma_bins
+from sd2core.doppler.expected import SIGMA_FACTOR, count_expected, sigma_bins
 from sd2core.doppler.histogram import Counts, Scatterers, counting_of
 from sd2core.doppler.masks import Position, Quality, Visibility, VisibilityMasks
 from sd2core.doppler.moving import MovingVertices, count_moving, visible_counts
@@ -68,7 +68,7 @@ class FrameCounts:
         frames = block.frames.rows(rows)
         known = self.mesh.uncertainty
         if self.prepared.spreads and known is not None:
-            sigma = self.sigma_bins(block, rows, position_m)
+            sigma = SIGMA_FACTOR * self.sigma_bins(block, rows, position_m)
             limb = known.vertex_limb
             count_expected(frames, place, self.counting, scatterers, sigma, limb, into)
         elif self.options.velocity == "vid2doppler":

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.doppler import vid2doppler
-from sd2core.doppler.expected import sigma_bins, spread_over_bins
+from sd2core.doppler.expected import SIGMA_FACTOR, sigma_bins, spread_over_bins
 from sd2core.doppler.histogram import counting_of
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.mesh.sequence import MeshSequence
@@ -97,7 +97,7 @@ def _sigma_bins(
     members = np.maximum(np.bincount(limb, minlength=limbs), 1)
     limbs_m = np.stack([np.bincount(limb, line, limbs) / members for line in points], axis=-1)
     found = sigma_bins(known, sensor.position_m, limbs_m[None], frame, options.axis)
-    return found[0, limb]
+    return SIGMA_FACTOR * found[0, limb]
 
 
 def at_frames(
