@@ -21,12 +21,10 @@ from sd2core.files.atomic import atomic_write_text
 from tools.documentation.places import DOCS, REPOSITORY
 
 _HOURS = "hours of training, due with the next denoisers"
-_BODY_NEXT = "half an hour of rendering and fits, due with the next lifter"
 OLD = {
     "accuracy-and-speed.md": "needs an idle machine; how the plain map is counted was rearranged",
     "performance.md": "needs an idle machine for an hour",
     "scale.md": "needs an idle machine; batches changed in what they check",
-    "fitting.md": _BODY_NEXT,
     "denoiser.md": _HOURS,
     "denoiser-comparison.md": _HOURS,
     "range-synthesis.md": _HOURS,

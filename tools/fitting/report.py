@@ -346,7 +346,7 @@ def _joint_rows(known: Sequence[Pair]) -> list[Row]:
     return [
         Row("1σ of a joint's velocity covers: least", cover[least], "", (">=", 0.5), 0.8, least),
         Row("1σ of a joint's velocity covers: most", cover[most], "", (">=", 0.5), 0.8, most),
-        Row("correlation of log σ with log |error|", same, "", (">=", 0.5)),
+        Row("correlation of the logarithms of σ and error", same, "", (">=", 0.5)),
     ]
 
 
