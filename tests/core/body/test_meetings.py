@@ -111,7 +111,7 @@ PEOPLE_ONE_BY_ONE = ((65, 194), (230, 445), (505, 695), (752, 868), (922, 1200),
 """Frames in which each of six people is in the picture, give or take five."""
 
 
-@pytest.mark.parametrize("who", [0, 1, 3])
+@pytest.mark.parametrize("who", [0, 1, 2, 3, 4, 5])
 def test_of_six_real_people_one_is_followed(
     shared_data: Path, models: LandmarkModels, who: int
 ) -> None:
