@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from sd2core.body.fit import speed_mps
 from sd2core.body.fitted import BodyFit
 from sd2core.body.landmark_repair import repair_landmarks
+from sd2core.body.landmarks import DEFAULT_MAX_GAP_S
 from sd2core.body.lifter import LiftedInParts, Lifter, fit_law_terms
 from sd2core.body.lifter_features import RATE_HZ
+from sd2core.body.person_selection import FOUND
 from sd2core.body.raw_track import RawTrack
 from sd2core.body.track import LandmarkTrack
 from sd2core.compare.measures import line_of_sight_velocity
@@ -25,8 +27,6 @@ from tools.train_lifter.takes import Take
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 
-_FOUND = 0.5
-_MAX_GAP_S = 0.5
 _LEAST_MPS = 0.01
 _WITHIN = 0.68
 
@@ -44,7 +44,7 @@ class FittedTake(NamedTuple):
 def track_of(take: Take) -> LandmarkTrack:
     """Landmarks of a take, repaired as those of a video are."""
     frames = len(take.confidence)
-    present = take.confidence >= _FOUND
+    present = take.confidence >= FOUND
     raw = RawTrack(
         times_s=np.arange(frames) / RATE_HZ,
         present=present,
@@ -56,7 +56,7 @@ def track_of(take: Take) -> LandmarkTrack:
         visibility=np.where(present[:, None], take.visibility, 0.0).astype(np.float32),
     )
     repaired: list[RawTrack] = []
-    notes = repair_landmarks(raw.part, raw.times_s, present, _MAX_GAP_S, repaired.append)
+    notes = repair_landmarks(raw.part, raw.times_s, present, DEFAULT_MAX_GAP_S, repaired.append)
     (done,) = repaired
     arrays = {name: value for name, value in vars(done).items() if name != "times_s"}
     return LandmarkTrack(

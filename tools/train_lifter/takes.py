@@ -318,15 +318,15 @@ class TakeMaker:
                     near = poses[looks[before]].next_roi
                     poses[frame] = self._look(painter, vertices[frame], near)
         known = sorted(poses)
-        between = np.setdiff1d(np.arange(frames), known)
+        empty = np.ones(frames, bool)
+        empty[known] = False
         found = {}
         for name, values in _told([poses[frame] for frame in known]).items():
-            found[name] = np.full((frames, *values.shape[1:]), np.nan, np.float32)
-            found[name][known] = values
-            empty = np.isin(np.arange(frames), between)
-            found[name] = on_cubics(times_s, found[name], empty).astype(np.float32)
+            whole = np.full((frames, *values.shape[1:]), np.nan, np.float32)
+            whole[known] = values
+            found[name] = on_cubics(times_s, whole, empty).astype(np.float32)
         np.clip(found["visibility"], 0.0, 1.0, out=found["visibility"])
-        sure = found["confidence"]
+        sure, between = found["confidence"], np.flatnonzero(empty)
         sure[between] = np.minimum(sure[between - 1], sure[between + 1])
         return found
 
