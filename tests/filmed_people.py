@@ -98,7 +98,7 @@ def film(
         container.metadata.update(metadata or {})
         stream = container.add_stream("libx264", rate=rate)
         stream.pix_fmt = "yuv420p"
-        stream.options = {"preset": "veryfast", "crf": "18", "threads": "1"}
+        stream.options = {"preset": "veryfast", "crf": "18", "x264-params": "mbtree=0"}
         if rotation is not None:
             stream.set_display_rotation(rotation)
         for number, picture in enumerate(pictures):

@@ -139,16 +139,18 @@ class Trail:
 
     roi: Roi
     time_s: float
+    since_s: float  # when they came into view
     velocity: Floats = field(default_factory=lambda: np.zeros(2))
 
     def followed(self, roi: Roi, time_s: float, *, steady: bool = True) -> Trail:
         """The trail at its next place; unless it is steady, the velocity is to be learnt anew."""
         gap_s = time_s - self.time_s
         if not steady or not 0.0 < gap_s < 0.5:
-            return Trail(roi, time_s)
+            return Trail(roi, time_s, time_s)
         moved = [roi.centre_x_px - self.roi.centre_x_px, roi.centre_y_px - self.roi.centre_y_px]
         share = 1.0 - np.exp(-gap_s / 0.15)
-        return Trail(roi, time_s, self.velocity + share * (np.array(moved) / gap_s - self.velocity))
+        velocity = self.velocity + share * (np.array(moved) / gap_s - self.velocity)
+        return Trail(roi, time_s, self.since_s, velocity)
 
     def predicted(self, time_s: float) -> Roi:
         """Square in which the person is expected."""
@@ -193,14 +195,14 @@ class Trail:
         return abs(roi.centre_x_px - predicted.centre_x_px) / predicted.size_px
 
     def numbers(self) -> Floats:
-        """The trail as a row of seven numbers."""
-        return np.array([*roi_numbers(self.roi), self.time_s, *self.velocity])
+        """The trail as a row of eight numbers."""
+        return np.array([*roi_numbers(self.roi), self.time_s, self.since_s, *self.velocity])
 
     @classmethod
     def of(cls, numbers: Floats) -> Trail:
         """The trail of :meth:`numbers`."""
         values = numbers.tolist()
-        return cls(Roi(*values[:4]), values[4], np.array(values[5:]))
+        return cls(Roi(*values[:4]), values[4], values[5], np.array(values[6:]))
 
 
 @dataclass(eq=False)

@@ -27,7 +27,7 @@ from sd2core.timebase import Timebase
 
 FORMAT = "sd2-landmarks"
 VERSION = 1
-_SEARCH_VERSION = 4
+_SEARCH_VERSION = 5
 
 _ARRAYS = (*PER_FRAME, "silhouette_frames", "silhouettes")
 _PLACES = ("image_px", "depth_px", "world_m", "visibility")

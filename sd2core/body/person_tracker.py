@@ -42,6 +42,10 @@ _SAME_OTHER = 0.5
 """Difference in place and size up to which a detection is taken for another person who is known."""
 _TELLING = 0.08
 """Difference of sizes, as logarithms, that tells people apart."""
+_WHOLE = 0.8
+"""Share of the difference of sizes up to which somebody is seen as they were."""
+_PARTED_S = 1.5
+"""Time within which who was in the person's place comes out beside them."""
 
 
 @dataclass(eq=False)
@@ -63,18 +67,23 @@ class PersonTracker:
     """Since when somebody else has been in view instead of the person; -inf: for too long."""
     hopes: list[tuple[Trail, Pose]] = field(default_factory=list)
     """Looks at one who may be the person that had gone; they count once that is sure."""
+    lately: list[Trail] = field(default_factory=list)
+    """Where the person was at the looks of the last :data:`_PARTED_S`."""
+    mistaken_s: float = np.inf
+    """Up to when the person was followed, and then somebody else; inf: nobody else was."""
 
     def begin(self, roi: Roi, time_s: float) -> None:
         """Start at a square with the person, whose colours are still to be learnt."""
-        self.trail, self.lost, self.unclear = Trail(roi, time_s), False, False
+        self.trail, self.lost, self.unclear = Trail(roi, time_s, time_s), False, False
         self.looked_round_s, self.stranger_s, self.hopes = -np.inf, np.inf, []
+        self.lately = [self.trail]
         for other in self.others:
-            other.trail = replace(other.trail, time_s=-np.inf)
+            other.trail = replace(other.trail, time_s=-np.inf, since_s=-np.inf)
 
     def step(self, picture: Pixels, time_s: float) -> Pose | None:
         """Find the person in the next picture."""
         assert self.trail is not None
-        self.unclear = False
+        self.unclear, self.mistaken_s = False, np.inf
         self.people = self._watched(picture, time_s)
         pose = looks = None
         if not self.lost:
@@ -95,10 +104,11 @@ class PersonTracker:
             self.lost = True
             return None
         self._accept(pose, looks, time_s)
-        if time_s - self.looked_round_s >= _LOOK_ROUND_S:
+        grown = max(past.growth(pose.next_roi) for past in self.lately)
+        if time_s - self.looked_round_s >= _LOOK_ROUND_S or grown > 2.0 * _TELLING:
             self.looked_round_s = time_s
             self._look_round(picture, self._seen(picture, pose.next_roi), pose, time_s)
-        return pose
+        return pose if self.mistaken_s == np.inf else None
 
     def _meet(self, time_s: float) -> None:
         """Somebody else, or nobody, is in view instead of the person."""
@@ -134,7 +144,7 @@ class PersonTracker:
         if not near or self.stranger_s == -np.inf:  # others have come: who is alike may be one
             self.hopes = []
         same = self.own.may_be(looks, THE_SAME)
-        self.hopes = [*self.hopes, (Trail(roi, time_s), pose)] if same else []
+        self.hopes = [*self.hopes, (Trail(roi, time_s, time_s), pose)] if same else []
         here = self.trail.goes_on(roi, time_s)
         least_s = _SURE_HERE_S if here else _SURE_S
         sure = same and time_s - self.hopes[0][0].time_s > least_s - 1e-9
@@ -222,6 +232,8 @@ class PersonTracker:
     def _accept(self, pose: Pose, looks: Signature, time_s: float) -> None:
         assert self.trail is not None
         self.trail = self.trail.followed(pose.next_roi, time_s, steady=not self.lost)
+        since_s = time_s - _PARTED_S
+        self.lately = [*(each for each in self.lately if each.time_s > since_s), self.trail]
         self.lost, self.stranger_s = False, np.inf
         if self.own is None:
             self.own = Looks(looks)
@@ -240,9 +252,13 @@ class PersonTracker:
         people = self._people(picture, self.trail.predicted(time_s))
         if not people:
             return people
+        rois = [each.roi for each in people]
+        if len(rois) > 1 and not self.lost:  # one of them is the person
+            unlike = [self.trail.unlike(roi, time_s) for roi in rois]
+            rois.pop(int(np.argmin(unlike)))
         for other in self.others:
-            unlike = [other.trail.unlike(each.roi, time_s) for each in people]
-            roi = people[int(np.argmin(unlike))].roi
+            unlike = [other.trail.unlike(roi, time_s) for roi in rois]
+            roi = rois[int(np.argmin(unlike))]
             if min(unlike) < min(_SAME_OTHER, self.trail.unlike(roi, time_s)):
                 other.trail = other.trail.followed(roi, time_s)
         return people
@@ -260,10 +276,36 @@ class PersonTracker:
             looks = signature(other.roi.cut(picture), other)
             known = max(self.others, key=lambda each: similarity(looks, each.looks), default=None)
             if known is None or not alike(known.looks, looks):
-                known = Bystander(looks, Trail(other.next_roi, time_s))
+                known = Bystander(looks, Trail(other.next_roi, time_s, time_s))
                 self.others = [*self.others, known][-_MAX_CANDIDATES:]
             elif known.trail.time_s < time_s:
                 known.trail = known.trail.followed(other.next_roi, time_s)
+            self.mistaken_s = self._was_until_s(known)
+            if self.mistaken_s < np.inf:
+                self.unclear = True
+                known.looks = signature(pose.roi.cut(picture), pose)
+                self.trail, known.trail, self.lately = known.trail, self.lately[-1], []
+                return
+
+    def _was_until_s(self, other: Bystander) -> float:
+        """Time up to which one who is now seen beside the person was the person; inf: never.
+
+        While one covers another in like clothes only their sizes tell them apart.
+        """
+        assert self.own is not None
+        if not self.own.may_be(other.looks):
+            return np.inf
+        here, there = self.lately[-1], other.trail
+        grown = {
+            past.time_s: past.growth(here.roi)
+            for past in self.lately
+            if past.time_s < there.since_s
+            and past.growth(there.roi) + _TELLING < past.growth(here.roi)
+            and past.is_near(there.roi, there.time_s)
+        }
+        # While one comes out from behind the other, landmarks are of both.
+        whole = _WHOLE * max(grown.values(), default=0.0)
+        return max((time_s for time_s, by in grown.items() if by >= whole), default=np.inf)
 
     def beside(self, pose: Pose | None) -> NDArray[np.bool_]:
         """True for each of :data:`PLACES` where others are in the last picture."""
@@ -288,12 +330,14 @@ class PersonTracker:
         assert self.own is not None
         looks = [each.looks for each in self.others]
         trails = [each.trail.numbers() for each in self.others]
+        lately = [each.numbers() for each in self.lately]
         return {
             "trail": self.trail.numbers(),
             "clock": np.array([self.looked_round_s, self.stranger_s, float(self.lost)]),
             "own": np.array([self.own.recent, *self.own.kept]),
             "others": np.array(looks, np.float32).reshape(-1, *self.own.recent.shape),
-            "trails": np.array(trails, np.float64).reshape(-1, 7),
+            "trails": np.array(trails, np.float64).reshape(-1, 8),
+            "lately": np.array(lately, np.float64).reshape(-1, 8),
         }
 
     def restore(self, state: dict[str, NDArray[np.generic]]) -> None:
@@ -301,6 +345,7 @@ class PersonTracker:
         self.trail = Trail.of(np.asarray(state["trail"], np.float64))
         self.looked_round_s, self.stranger_s, lost = (float(value) for value in state["clock"])
         self.lost = bool(lost)
+        self.lately = [Trail.of(each) for each in np.asarray(state["lately"], np.float64)]
         recent, *kept = np.asarray(state["own"], np.float32)
         self.own = Looks(recent, kept)
         self.others = [

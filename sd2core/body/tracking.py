@@ -36,6 +36,8 @@ class Search:
         )
         self._order = np.concatenate([ahead, behind[1:]])
         self._turn = len(ahead)
+        # The second half runs backwards in time.
+        self._times_s = np.abs(times[self._order] - times[start.frame])
         self._rois = np.full((len(self._order), 4), np.nan)
         self._confidence = np.zeros(len(self._order))
         self._unclear = np.zeros(len(self._order), bool)
@@ -54,17 +56,15 @@ class Search:
 
     def run(self, seen: Seen) -> Sightings:
         """Search the frames that are left."""
-        times = self._video.timebase.times_s
-        first = self._start.frame
         for picture in self._pictures():
             number = self._done
             frame = int(self._order[number])
             if number in (0, self._turn):
                 self._follower.begin(self._start.roi, 0.0)
-            # The second half runs backwards in time.
-            pose = self._follower.step(picture, abs(float(times[frame] - times[first])))
+            pose = self._follower.step(picture, float(self._times_s[number]))
             self._unclear[number] = self._follower.unclear
             self._others[number] = self._follower.beside(pose)
+            self._forget(number, self._follower.mistaken_s)
             if pose is not None:
                 # With the looks that were in doubt until now.
                 looks = [each for _, each in self._follower.hopes] or [pose]
@@ -83,6 +83,13 @@ class Search:
             self._unclear[rank],
             self._others[rank],
         )
+
+    def _forget(self, number: int, since_s: float) -> None:
+        """Take back what the looks up to a number found after a time: that was somebody else."""
+        row = number
+        while row > 0 and self._times_s[row] > since_s:
+            self._rois[row], self._confidence[row], self._unclear[row] = np.nan, 0.0, True
+            row -= 1
 
     def _pictures(self) -> Iterator[Pixels]:
         """Pictures still to be searched, in that order."""

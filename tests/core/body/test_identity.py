@@ -33,7 +33,7 @@ def looks_of(seed: int) -> Signature:
 
 def walked(speed_px_s: float, steps: int) -> Trail:
     """Trail of somebody 400 pixels large who goes straight on."""
-    trail = Trail(Roi(300.0, 200.0, 400.0), 0.0)
+    trail = Trail(Roi(300.0, 200.0, 400.0), 0.0, 0.0)
     for step in range(1, steps + 1):
         time_s = step * STEP_S
         trail = trail.followed(Roi(300.0 + speed_px_s * time_s, 200.0, 400.0), time_s)
