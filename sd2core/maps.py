@@ -15,6 +15,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
 from sd2core.files.numpy_files import open_npz_file
 from sd2core.mesh.presence import Presence, checked
+from sd2core.mesh.vertex_parts import JOINTS, KINEMATICS, QUANTITIES
 from sd2core.numerics.map_accuracy import MapAccuracy
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
@@ -60,6 +61,9 @@ class LimbMaps:
 
     parts: tuple[str, ...]
     values: NDArray[np.float32]  # (parts, bins, frames)
+    # (joints, quantities, frames) as sd2core.mesh.vertex_parts names them; files of before have
+    # none.
+    kinematics: NDArray[np.float32] | None = None
 
     def __post_init__(self) -> None:
         values = np.ascontiguousarray(self.values, np.float32)
@@ -68,17 +72,27 @@ class LimbMaps:
                 f"Limb maps of shape {values.shape} and {len(self.parts)} parts",
                 "(parts, bins, frames), at least one part",
             )
+        moves = self.kinematics
+        if moves is not None and moves.shape != (len(JOINTS), len(QUANTITIES), values.shape[2]):
+            raise Sd2Error(
+                f"Kinematics of shape {moves.shape}",
+                f"({len(JOINTS)} joints, {len(QUANTITIES)} quantities, {values.shape[2]} frames)",
+            )
         object.__setattr__(self, "parts", tuple(str(part) for part in self.parts))
         object.__setattr__(self, "values", values)
 
-    def energies(self, parts: Sequence[str]) -> NDArray[np.float32]:
-        """Energies by frame, part and bin, (frames, len(parts) · bins).
+    def inputs(self, parts: Sequence[str]) -> NDArray[np.float32]:
+        """Energies by frame, part and bin, (frames, len(parts) · bins), or kinematics.
 
-        A part without a side (``forearm``) is the sum of both. Raises Sd2Error if a part is
-        missing.
+        A part without a side (``forearm``) is the sum of both.
+        :data:`~sd2core.mesh.vertex_parts.KINEMATICS` are all quantities of all joints, and the
+        root of what is seen of each part. Raises Sd2Error if a part is missing.
         """
         found = []
         for part in parts:
+            if part == KINEMATICS:
+                found.append(self._moving())
+                continue
             rows = [
                 number
                 for number, name in enumerate(self.parts)
@@ -91,9 +105,46 @@ class LimbMaps:
             found.append(self.values[rows].sum(axis=0))
         return np.ascontiguousarray(np.concatenate(found).T)
 
+    def _moving(self) -> NDArray[np.float32]:
+        """Columns of :data:`KINEMATICS`, one after another."""
+        if self.kinematics is None:
+            raise Sd2Error(
+                "The limb maps are of a version that did not keep kinematics",
+                "limb maps with kinematics",
+                "Make the map or the pairs again with --limbs",
+            )
+        seen = np.sqrt(self.values.sum(axis=1))
+        return np.concatenate([self.kinematics.reshape(-1, seen.shape[1]), seen])
+
     def between(self, start: int, stop: int) -> LimbMaps:
         """Limb maps of frames ``start`` to ``stop`` (exclusive)."""
-        return LimbMaps(self.parts, self.values[..., start:stop])
+        return self.of_frames(slice(start, stop))
+
+    def empty(self, frames: int) -> LimbMaps:
+        """Limb maps like these of so many frames, all zero."""
+        values, moves = self.values, self.kinematics
+        return LimbMaps(
+            self.parts,
+            np.zeros((*values.shape[:2], frames), np.float32),
+            None if moves is None else np.zeros((*moves.shape[:2], frames), np.float32),
+        )
+
+    def put(self, start: int, other: LimbMaps) -> None:
+        """Write others of the same parts over the frames from ``start`` on."""
+        inside = slice(start, start + other.values.shape[-1])
+        here = self.values[..., inside]
+        # Most parts stand still for long; what is zero and stays so takes no memory.
+        changes = other.values.any(axis=-1) | here.any(axis=-1)  # (parts, bins)
+        here[changes] = other.values[changes]
+        if self.kinematics is not None and other.kinematics is not None:
+            self.kinematics[..., inside] = other.kinematics
+
+    def of_frames(self, frames: slice) -> LimbMaps:
+        """Limb maps of some of the frames."""
+        moves = self.kinematics
+        return LimbMaps(
+            self.parts, self.values[..., frames], None if moves is None else moves[..., frames]
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,7 +274,8 @@ class DopplerMap:
         """Write ``values``, ``velocity_mps``, ``times_s`` and ``meta`` to one ``.npz``.
 
         Also ``present`` if there are columns without a person, ``expected`` and ``sd`` if
-        the uncertainty of the values is known, and ``parts`` and ``limbs`` if the map is split.
+        the uncertainty of the values is known, and ``parts``, ``limbs`` and ``kinematics`` if
+        the map is split.
         """
         meta = {
             "format": "sd2-doppler-map",
@@ -247,6 +299,8 @@ class DopplerMap:
             arrays |= {"expected": self.uncertainty.expected, "sd": self.uncertainty.sd}
         if self.limbs is not None:
             arrays |= {"parts": np.array(self.limbs.parts), "limbs": self.limbs.values}
+            if self.limbs.kinematics is not None:
+                arrays["kinematics"] = self.limbs.kinematics
         with atomic_write(Path(path)) as stream:
             np.savez_compressed(stream, **arrays)
 
@@ -296,7 +350,9 @@ class DopplerMap:
                 uncertainty=CellUncertainty(arrays["expected"], arrays["sd"])
                 if {"expected", "sd"} <= arrays.keys()
                 else None,
-                limbs=LimbMaps(tuple(arrays["parts"].tolist()), arrays["limbs"])
+                limbs=LimbMaps(
+                    tuple(arrays["parts"].tolist()), arrays["limbs"], arrays.get("kinematics")
+                )
                 if {"parts", "limbs"} <= arrays.keys()
                 else None,
             )
@@ -333,9 +389,16 @@ def joined(maps: Sequence[DopplerMap]) -> DopplerMap:
         timebase=Timebase(np.concatenate([one.times_s for one in maps])),
         present=np.concatenate(present),
         uncertainty=None,
-        limbs=LimbMaps(limbs[0].parts, np.concatenate([one.values for one in limbs], axis=2))
-        if alike
-        else None,
+        limbs=_joined_limbs(limbs) if alike else None,
+    )
+
+
+def _joined_limbs(limbs: Sequence[LimbMaps]) -> LimbMaps:
+    moves = [one.kinematics for one in limbs if one.kinematics is not None]
+    return LimbMaps(
+        limbs[0].parts,
+        np.concatenate([one.values for one in limbs], axis=2),
+        np.concatenate(moves, axis=2) if len(moves) == len(limbs) else None,
     )
 
 

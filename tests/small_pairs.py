@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from sd2core.maps import LimbMaps
-from sd2core.mesh.vertex_parts import PARTS
+from sd2core.mesh.vertex_parts import JOINTS, PARTS, QUANTITIES
 from sd2core.pairs.store import PairWriter, Take
 from sd2core.sensor import VelocityAxis
 
@@ -45,9 +45,11 @@ def take(subject: str, name: str, frames: int, seed: int, placement: int = 0) ->
 
 def split(whole: Take) -> Take:
     """Return the take with limb maps: every part has a share of the map."""
-    shares = np.random.default_rng(len(whole.times_s)).dirichlet(np.ones(len(PARTS)))
+    rng = np.random.default_rng(len(whole.times_s))
+    shares = rng.dirichlet(np.ones(len(PARTS)))
     values = shares[:, None, None] * whole.synthetic.T
-    return replace(whole, limbs=LimbMaps(PARTS, values))
+    moves = rng.normal(size=(len(JOINTS), len(QUANTITIES), len(whole.times_s)))
+    return replace(whole, limbs=LimbMaps(PARTS, values, moves.astype(np.float32)))
 
 
 def write_pairs(

@@ -49,6 +49,7 @@ _SETTINGS = {
     "ssm_learning_rate": ("training", "ssm_learning_rate"),
     "early_stopping": ("training", "early_stopping_epochs"),
     "balanced": ("training", "balanced"),
+    "velocity_weight": ("training", "velocity_weight"),
     "select_by": ("training", "select_by"),
     "seed": ("training", "seed"),
     "device": ("machine", "device"),
@@ -117,9 +118,9 @@ def _add_learning(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--inputs",
         dest="model_inputs",
-        choices=("map", "limbs"),
-        help="learn from the map, or from that of each part of the body, which the pairs must"
-        " hold (--limbs) (default: map)",
+        choices=("map", "limbs", "kinematics"),
+        help="learn from the map, from that of each part of the body, or from how its joints move;"
+        " the pairs must hold both (--limbs) (default: map)",
     )
     group.add_argument(
         "--set",
@@ -149,6 +150,13 @@ def _add_learning(parser: argparse.ArgumentParser) -> None:
         type=positive_int,
         metavar="N",
         help="end after N epochs without a better one (default: never)",
+    )
+    group.add_argument(
+        "--velocity-weight",
+        type=float,
+        metavar="W",
+        help="learn the mean velocity of a frame beside the map: weight of 1 m/s beside the error"
+        " of the map (default: 0, as in the paper)",
     )
     group.add_argument(
         "--balanced",

@@ -15,6 +15,7 @@ from sd2core.datasets.reading import Dataset, open_dataset
 from sd2core.datasets.source import KINDS
 from sd2core.datasets.splitting import RULE, borrowed, split_people
 from sd2core.files.atomic import atomic_write_text
+from sd2core.mesh.vertex_parts import QUANTITIES
 from sd2core.numerics.map_accuracy import MapAccuracy
 
 CARD_FORMAT = "sd2-dataset-card"
@@ -341,8 +342,11 @@ def _simulated(card: dict[str, Any]) -> str:
 def _limbs(card: dict[str, Any]) -> str:
     if not card["parts"]:
         return ""
-    parts = ", ".join(card["parts"])
-    return f"\n\nThe array `limbs` holds the synthetic map split by the parts of the body: {parts}."
+    parts, joints = ", ".join(card["parts"]), ", ".join(card["joints"])
+    return (
+        f"\n\nThe array `limbs` holds the synthetic map split by the parts of the body: {parts}."
+        f" The array `kinematics` holds of {joints}: {', '.join(QUANTITIES)}."
+    )
 
 
 def _imu(card: dict[str, Any]) -> str:

@@ -91,8 +91,9 @@ def cut_source(
 
     ``null_bins`` are set to zero. ``label_numbers`` holds the data set's number of each label of
     the source. A block has, per segment (first axis), the kinds that the source has, ``limbs``
-    if they are wanted and its synthetic map has them, ``imu`` if it is wanted, and ``available``,
-    ``label``, ``segment_label``, ``purity``, ``start_s``, ``start_frame``, ``resampled``.
+    and ``kinematics`` if they are wanted and its synthetic map has them, ``imu`` if it is wanted,
+    and ``available``, ``label``, ``segment_label``, ``purity``, ``start_s``, ``start_frame``,
+    ``resampled``.
     """
     known = source.known
     kinds = [kind for kind in options.kinds if kind in source.maps]
@@ -107,6 +108,8 @@ def cut_source(
         limbs = source.maps["synthetic"].limbs if options.limbs and "synthetic" in kinds else None
         if limbs is not None:
             split = _values(limbs.values, source.times_s, clip, null_bins)
+            assert limbs.kinematics is not None
+            moving = _values(limbs.kinematics, source.times_s, clip, ())
         if options.imu:
             felt = np.stack([source.imu[name].channels for name in options.imu], axis=2)
             channels = _values(felt.transpose(2, 1, 0), source.times_s, clip, ())
@@ -119,7 +122,9 @@ def cut_source(
                 # A map that is partly unknown says nothing, rather than something false.
                 arrays[kind] = cut(values[kind], starts, length) * whole[:, None, None]
                 if kind == "synthetic" and limbs is not None:
-                    arrays["limbs"] = cut(split, starts, length) * whole[:, None, None, None]
+                    rows = whole[:, None, None, None]
+                    arrays["limbs"] = cut(split, starts, length) * rows
+                    arrays["kinematics"] = cut(moving, starts, length) * rows
                 arrays["available"][:, KINDS.index(kind)] = whole
             if options.imu:
                 arrays["imu"] = cut(channels, starts, length)

@@ -91,6 +91,7 @@ class Counting:
         if segments:
             split = split_people(list(of_subject), options.validation, options.test)
         maps = len(of_kind) + len(options.parts)
+        more = len(options.imu), len(options.joints)
         return Forecast(
             sources=len(self.outlines),
             segments=segments,
@@ -99,6 +100,6 @@ class Counting:
             of_kind={kind: of_kind[kind] for kind in KINDS if kind in of_kind},
             split=split,
             frame_rate_hz=rate_hz,
-            total_bytes=segments * bytes_per_segment(options.length, bins, maps, len(options.imu)),
+            total_bytes=segments * bytes_per_segment(options.length, bins, maps, *more),
             failed=tuple(self.failed),
         )

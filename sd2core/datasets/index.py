@@ -12,6 +12,7 @@ from sd2core.datasets.source import BACKGROUND, Source
 from sd2core.denoise.resample_to_model import MOST_RESAMPLED
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
+from sd2core.mesh.vertex_parts import KINEMATICS
 from sd2core.version import __version__
 
 
@@ -61,6 +62,7 @@ def header_of(source: Source, options: DatasetOptions) -> Header:
         min_share=options.min_share,
         kinds_wanted=options.kinds,
         parts=options.parts,
+        joints=options.joints,
         imu=options.imu,
         title=options.title,
         made_by=f"SD² Studio {__version__}",
@@ -85,6 +87,8 @@ def check_fits(source: Source, header: Header) -> None:
                 f"limb maps of {', '.join(header.parts)}",
                 "Make it with `sd2 synth --limbs`, or export without limbs",
             )
+        if header.joints:
+            limbs.inputs((KINEMATICS,))
     lacking = [name for name in header.imu if name not in source.imu]
     if lacking:
         raise Sd2Error(
@@ -144,6 +148,7 @@ def refuse_other_settings(out: Path, there: Header, options: DatasetOptions) -> 
         ("an overlap of", there.overlap, options.overlap),
         ("kinds", list(there.kinds_wanted), list(options.kinds)),
         ("parts", list(there.parts), list(options.parts)),
+        ("joints", list(there.joints), list(options.joints)),
         ("inertial sensors at", list(there.imu), list(options.imu)),
         ("frames/s", there.frame_rate_hz, options.frame_rate_hz),
         ("null bins", there.null_bins, options.null_bins),

@@ -14,6 +14,7 @@ from sd2core.datasets.source import KINDS
 from sd2core.errors import Sd2Error
 from sd2core.io.kinds import DATASET_FORMAT
 from sd2core.maps import MapKind
+from sd2core.mesh.vertex_parts import QUANTITIES
 from sd2core.sensor import VelocityAxis
 
 FORMAT = DATASET_FORMAT
@@ -75,6 +76,7 @@ class Header:
     subjects: tuple[str, ...] = ()  # Numbers in ``subject`` are places in it.
     splits: dict[str, tuple[str, ...]] = field(default_factory=dict)  # Subjects of each split.
     parts: tuple[str, ...] = ()  # Parts of the body in ``limbs``; none: there are no limb maps.
+    joints: tuple[str, ...] = ()  # Joints in ``kinematics``, which go with limb maps.
     imu: tuple[str, ...] = ()  # Places of the inertial sensors in ``imu``; none: no such array.
     # Meaning of the value 1 in each kind; several where sources differ.
     units: dict[str, tuple[str, ...]] = field(default_factory=dict)
@@ -103,7 +105,9 @@ class Header:
             axis = VelocityAxis(int(entry["bins"]), float(entry["v_max_mps"]))
             names = (one.name for one in fields(cls) if one.name != "axis")
             # Before there were limb maps, headers did not have parts.
-            content = {name: ({"parts": (), "imu": ()} | entry)[name] for name in names}
+            content = {
+                name: ({"parts": (), "joints": (), "imu": ()} | entry)[name] for name in names
+            }
             return _HEADER.validate_python({**content, "axis": axis})
         except Sd2Error as error:
             raise Sd2Error(f"{path}: {error.found}", error.expected) from error
@@ -145,6 +149,8 @@ def row_shapes(header: Header) -> dict[str, tuple[str, tuple[int, ...]]]:
     )
     if header.parts:
         maps["limbs"] = ("float32", (header.length, len(header.parts), header.axis.bins))
+    if header.joints:
+        maps["kinematics"] = ("float32", (header.length, len(header.joints), len(QUANTITIES)))
     if header.imu:
         maps["imu"] = ("float32", (header.length, len(header.imu), len(IMU_CHANNELS)))
     return maps | {"label": ("int16", (header.length,))} | COLUMNS
@@ -171,15 +177,17 @@ def chunk_of(row: tuple[int, ...]) -> tuple[int, ...]:
     return (CHUNK_SEGMENTS if len(row) >= 2 else CHUNK_ROWS, *row)
 
 
-def bytes_per_segment(header_length: int, bins: int, maps: int, imu: int = 0) -> int:
+def bytes_per_segment(
+    header_length: int, bins: int, maps: int, imu: int = 0, joints: int = 0
+) -> int:
     """Size of a segment in bytes before compression; limb maps are as many maps as parts.
 
-    ``imu`` is the number of inertial sensors.
+    ``imu`` is the number of inertial sensors, ``joints`` that of joints whose kinematics are kept.
     """
     import numpy as np
 
     columns = sum(
         np.dtype(kind).itemsize * int(np.prod(row, dtype=int)) for kind, row in COLUMNS.values()
     )
-    values = bins * maps + len(IMU_CHANNELS) * imu
+    values = bins * maps + len(IMU_CHANNELS) * imu + len(QUANTITIES) * joints
     return 4 * header_length * values + 2 * header_length + columns

@@ -11,7 +11,7 @@ from sd2core.errors import Sd2Error
 from sd2core.imu.mounting import checked_places
 from sd2core.imu.signals import LEAST_FRAMES
 from sd2core.maps import MapKind
-from sd2core.mesh.vertex_parts import PARTS
+from sd2core.mesh.vertex_parts import JOINTS, PARTS
 from sd2core.pairs.segments import LENGTH, OVERLAP, segment_starts
 
 LabelRule = Literal["foreground", "majority"]
@@ -103,3 +103,8 @@ class DatasetOptions:
     def parts(self) -> tuple[str, ...]:
         """Parts of the body by which synthetic maps are split; none without ``limbs``."""
         return PARTS if self.limbs else ()
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Joints whose kinematics are kept beside limb maps."""
+        return JOINTS if self.limbs else ()

@@ -187,7 +187,8 @@ class Source:
                 sums.update(kind.encode())
                 sums.update(self.maps[kind].values.data)
                 limbs = self.maps[kind].limbs
-                sums.update(b"" if limbs is None else limbs.values.data)
+                for values in () if limbs is None else (limbs.values, limbs.kinematics):
+                    sums.update(b"" if values is None else np.ascontiguousarray(values).data)
                 sums.update(self.known[kind].tobytes())
         for name, signals in self.imu.items():
             sums.update(name.encode())

@@ -28,15 +28,14 @@ from sd2core.labels.files import read_labels as read_own
 from sd2core.labels.formats import read_labels
 from sd2core.labels.label_set import GESTURES
 from sd2core.labels.spans import Labels
-from sd2core.maps import DopplerMap, LimbMaps, MapKind
-from sd2core.pairs.store import open_takes
+from sd2core.maps import DopplerMap, MapKind
+from sd2core.pairs.store import limbs_between, open_takes
 from sd2core.progress import Progress
 from sd2core.recording.recording import SUFFIX, is_recording
 from sd2core.sensor import VelocityAxis, VirtualSensor
 from sd2core.timebase import Timebase
 
 _EXPECTED = "recordings (.sd2), pairs (.zarr), Doppler maps (.npz), or folders of recordings"
-_PAIR_ARRAYS = ("synthetic", "radar", "times_s", "label")
 
 
 def gather(
@@ -239,7 +238,7 @@ class _PairStore:
         sums = hashlib.blake2b(
             json.dumps([about, self._header["kind"], self._kinds, model]).encode(), digest_size=16
         )
-        for name in (*_PAIR_ARRAYS, *(["limbs"] if self.parts else [])):
+        for name in self._arrays:
             sums.update(np.ascontiguousarray(self._part(name, take)).data)
         return sums.hexdigest()
 
@@ -259,15 +258,11 @@ class _PairStore:
             values = self._part(name, take).T
             return DopplerMap(values, self._axis, clock, kind, unit, self._null_bins, meta=meta)
 
-        def limbs() -> LimbMaps | None:
-            if not self.parts:
-                return None
-            return LimbMaps(self.parts, self._part("limbs", take).transpose(1, 2, 0))
-
         maps: dict[MapKind, DopplerMap] = {}
         if {"synthetic", "denoised"} & {*self._kinds}:
             counted = as_map("synthetic", "synthetic", "share of vertices")
-            maps["synthetic"] = replace(counted, limbs=limbs())
+            limbs = limbs_between(self._header, self._arrays, take["start"], take["stop"])
+            maps["synthetic"] = replace(counted, limbs=limbs)
         if self._model is not None:
             maps["denoised"] = self._denoising.denoised(maps["synthetic"], self._model)
         if self._radar in self._kinds:

@@ -34,8 +34,9 @@ LABEL_TARGETS: tuple[LabelTarget, ...] = get_args(LabelTarget)
 NOT_LEARNT = -100
 """Frames whose label has no class: what torch's losses leave out."""
 
-MapArray = MapKind | Literal["limbs"]
-"""Array of energies: a kind of map, or the synthetic map split by the parts of the body."""
+MapArray = MapKind | Literal["limbs", "kinematics"]
+"""Array of energies: a kind of map, or the synthetic map split by the parts of the body; or the
+kinematics of its joints."""
 
 _CHUNKS_KEPT = 8
 
@@ -54,7 +55,8 @@ class SegmentDataset(TorchDataset[Item]):
         Data set in any format.
     inputs : str
         Kind of map: an item's first tensor, float32 of shape (length, bins); or ``"limbs"``, of
-        shape (length, parts, bins), where the data set has them (``header.parts``).
+        shape (length, parts, bins), and ``"kinematics"``, (length, joints, quantities), where
+        the data set has them (``header.parts``).
     target : str
         Its second: another of these; ``"class"`` or ``"label"`` of the segment, an int64
         number; or ``"frame class"`` or ``"frame label"``, int64 of shape (length,). Segments
@@ -96,7 +98,9 @@ class SegmentDataset(TorchDataset[Item]):
         self._kept: OrderedDict[tuple[str, int], NDArray] = OrderedDict()
         with open_dataset(self.path) as dataset:
             self.header = dataset.header
-            there = (*self.header.kinds, *(["limbs"] if self.header.parts else []))
+            there: tuple[str, ...] = self.header.kinds
+            there += ("limbs",) if self.header.parts else ()
+            there += ("kinematics",) if self.header.joints else ()
             for what in (inputs, *([target] if target not in LABEL_TARGETS else [])):
                 if what not in there:
                     targets = ", ".join((*there, *LABEL_TARGETS))
@@ -128,7 +132,8 @@ class SegmentDataset(TorchDataset[Item]):
         for row, one, other in zip(rows.tolist(), energies, targets, strict=True):
             gain = self._gain(row)
             goal = other if self.target in LABEL_TARGETS else other * gain
-            items.append((torch.from_numpy(one * gain), torch.as_tensor(goal)))
+            given = one if self.inputs == "kinematics" else one * gain
+            items.append((torch.from_numpy(given), torch.as_tensor(goal)))
         return items
 
     def __getstate__(self) -> dict[str, Any]:
@@ -194,4 +199,4 @@ class SegmentDataset(TorchDataset[Item]):
 def _kind_of(array: str) -> int:
     """Place of an array's kind in ``available``; limb maps are where the synthetic map is."""
     names: tuple[str, ...] = KINDS
-    return names.index("synthetic" if array == "limbs" else array)
+    return names.index("synthetic" if array in ("limbs", "kinematics") else array)

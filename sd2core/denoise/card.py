@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, get_args
 
 from sd2core.denoise.scaling import Scaling, null_columns
 from sd2core.errors import Sd2Error
+from sd2core.mesh.vertex_parts import JOINTS, KINEMATICS, PARTS, QUANTITIES
 from sd2core.sensor import VelocityAxis
 
 FORMAT = "sd2-denoiser"
@@ -18,6 +19,25 @@ VERSION = 1
 DENOISER_PARTS = ("trunk", "upper_arm", "forearm", "thigh", "lower_leg")
 """Parts of the body whose limb maps a new model takes. Both sides together: apart they gain
 nothing with real radar (docs/real-pairs.md)."""
+
+KINEMATICS_COLUMNS = len(JOINTS) * len(QUANTITIES) + len(PARTS)
+"""Numbers per frame that :data:`~sd2core.mesh.vertex_parts.KINEMATICS` are."""
+
+Inputs = Literal["map", "limbs", "kinematics"]
+"""Input of a denoiser: the map as in the paper, that of each part, or how joints move."""
+
+PARTS_OF: Mapping[str, tuple[str, ...]] = {
+    "map": (),
+    "limbs": DENOISER_PARTS,
+    "kinematics": (KINEMATICS,),
+}
+"""What a new model's input is made of (:attr:`ModelCard.parts`)."""
+
+
+def maps_in(parts: Sequence[str]) -> int:
+    """Number of maps in an input of these parts; none: the map itself."""
+    return sum(part != KINEMATICS for part in parts) if parts else 1
+
 
 TrainedOn = Literal["simulated", "real"]
 """Origin of the training targets: a simulated radar or a real one."""
@@ -36,7 +56,7 @@ class ModelCard:
     trained_on: TrainedOn
     unit: str = "power"  # Meaning of the value 1 in the result.
     parts: tuple[str, ...] = ()
-    """Parts of the body whose limb maps are the input; none: the input is the map itself."""
+    """Parts of the body whose limb maps are the input, or kinematics; none: the map itself."""
     title: str = ""  # Name in lists; the file's name if it is empty.
     # ``data``, ``command``, ``metrics``, ``limits`` and other content for JSON.
     about: Mapping[str, Any] = field(default_factory=dict)
@@ -56,19 +76,38 @@ class ModelCard:
         object.__setattr__(self, "null_bins", bins)
 
     @property
-    def inputs(self) -> Literal["map", "limbs"]:
+    def inputs(self) -> Inputs:
         """Kind of input."""
+        if self.more:
+            return "kinematics"
         return "limbs" if self.parts else "map"
+
+    @property
+    def maps(self) -> int:
+        """Number of maps in the input."""
+        return maps_in(self.parts)
+
+    @property
+    def more(self) -> int:
+        """Number of numbers per frame in the input, after the maps."""
+        return KINEMATICS_COLUMNS if KINEMATICS in self.parts else 0
 
     @property
     def features(self) -> int:
         """Numbers per frame of the input: the bins of all its maps, one map after the other."""
-        return self.axis.bins * max(1, len(self.parts))
+        return self.axis.bins * self.maps + self.more
+
+    @property
+    def moving_features(self) -> list[int]:
+        """Features that are zero where nothing moves."""
+        first = self.axis.bins * self.maps
+        speeds = range(len(JOINTS) * len(QUANTITIES) if self.more else 0)
+        return [*range(first), *(first + number for number in speeds[:: len(QUANTITIES)])]
 
     @property
     def null_features(self) -> list[int]:
         """Numbers of the input that are zero on purpose."""
-        return null_columns(self.null_bins, self.axis.bins, max(1, len(self.parts)))
+        return null_columns(self.null_bins, self.axis.bins, self.maps)
 
     @property
     def name(self) -> str:

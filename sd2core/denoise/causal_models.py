@@ -15,8 +15,8 @@ class S4Denoiser(S4Stack, Denoiser):
 
     Parameters
     ----------
-    parts : int
-        Maps in the input.
+    parts, more : int
+        Maps in the input, and numbers per frame after them.
     channels : int
         Width H of the layers.
     depth : int
@@ -35,6 +35,7 @@ class S4Denoiser(S4Stack, Denoiser):
         bins: int,
         *,
         parts: int = 1,
+        more: int = 0,
         channels: int = 128,
         depth: int = 4,
         state_size: int = 64,
@@ -44,10 +45,9 @@ class S4Denoiser(S4Stack, Denoiser):
         dt_min: float = DT_MIN,
         dt_max: float = DT_MAX,
     ) -> None:
-        super().__init__(bins, parts)
+        super().__init__(bins, parts, more)
         self.causal = not bidirectional
-        self.window = 72 if bidirectional else None
-        self.lift = nn.Linear(parts * bins, channels)
+        self.lift = self.lifting(channels)
         self.layers = nn.ModuleList(
             S4Layer(
                 channels,
@@ -73,13 +73,13 @@ class SerialS4Denoiser(S4Denoiser):
 
     longest = 512
 
-    def __init__(self, bins: int, *, parts: int = 1, channels: int = 128, **layers: Any):
-        super().__init__(bins, parts=parts, channels=channels, **layers)
-        self.lift = nn.Linear(parts, channels)
+    def __init__(self, bins: int, *, channels: int = 128, **layers: Any):
+        super().__init__(bins, channels=channels, **layers)
+        self.lift = nn.Linear(self.prepare_pictures(), channels)
         self.head = nn.Linear(channels, 1)
 
     def forward(self, values: Tensor) -> Tensor:
-        """Denoise whole sequences, (batch, frames, parts · bins), as rows of cells."""
+        """Denoise whole sequences, (batch, frames, features), as rows of cells."""
         return super().forward(self._cells(values)).view(*values.shape[:2], self.bins)
 
     def chunk(self, values: Tensor, state: State) -> tuple[Tensor, State]:
@@ -93,15 +93,15 @@ class SerialS4Denoiser(S4Denoiser):
         return answer[:, 0], state
 
     def _cells(self, values: Tensor) -> Tensor:
-        """Values of every cell, (batch, frames · bins, parts)."""
+        """Values of every cell, (batch, frames · bins, channels)."""
         return self.pictures(values).flatten(2).transpose(1, 2)
 
 
 class GruDenoiser(Denoiser):
     """Baseline: linear layer, GRU layers (K. Cho et al., EMNLP 2014), linear layer; causal.
 
-    The input has ``parts`` maps. All layers have ``channels`` units; ``dropout`` is between
-    layers, while training.
+    The input has ``parts`` maps and ``more`` numbers per frame. All layers have ``channels``
+    units; ``dropout`` is between layers, while training.
     """
 
     def __init__(
@@ -109,12 +109,13 @@ class GruDenoiser(Denoiser):
         bins: int,
         *,
         parts: int = 1,
+        more: int = 0,
         channels: int = 144,
         depth: int = 2,
         dropout: float = 0.0,
     ) -> None:
-        super().__init__(bins, parts)
-        self.lift = nn.Linear(parts * bins, channels)
+        super().__init__(bins, parts, more)
+        self.lift = self.lifting(channels)
         self.recurrent = nn.GRU(
             channels,
             channels,
@@ -126,7 +127,7 @@ class GruDenoiser(Denoiser):
 
     def initial_state(self, batch: int = 1) -> State:
         """Zero state, (layers, batch, channels)."""
-        weight = self.lift.weight
+        weight = self.head.weight
         return weight.new_zeros(self.recurrent.num_layers, batch, self.recurrent.hidden_size)
 
     def chunk(self, values: Tensor, state: State) -> tuple[Tensor, State]:

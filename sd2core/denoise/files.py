@@ -86,7 +86,7 @@ def load_model(model: Path | str) -> TrainedDenoiser:
     from sd2core.denoise.registry import build
 
     def built() -> Denoiser:
-        return build(card.model, card.axis.bins, max(1, len(card.parts)), **card.options)
+        return build(card.model, card.axis.bins, card.maps, card.more, **card.options)
 
     network = read_network(path, built, card.model, shapes, _EXPECTED)
     return TrainedDenoiser(network, card)

@@ -17,12 +17,15 @@ from sd2core.denoise.model import Denoiser
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import Presence, runs
-from sd2core.pairs.segments import OVERLAP, cut, join, segment_starts
+from sd2core.pairs.segments import LENGTH, OVERLAP, cut, join, segment_starts
 from sd2core.progress import Progress, silent
 from sd2core.version import __version__
 
 CHUNK = 512
 """Number of frames of a long map that a causal model computes at once."""
+
+PIECE = 2048
+"""Number that a model that looks both ways over any number of frames is given together."""
 
 _ROUND = 64
 _BATCH = 16
@@ -43,10 +46,11 @@ class TrainedDenoiser:
             raise Sd2Error(
                 f"The network has {network.bins} bins, its axis {card.axis.bins}", "the same number"
             )
-        if network.parts != max(1, len(card.parts)):
+        if (network.parts, network.more) != (card.maps, card.more):
             raise Sd2Error(
-                f"The network takes {network.parts} maps, its card says {len(card.parts)} parts",
-                "the same number, or one map and no parts",
+                f"The network takes {network.parts} maps and {network.more} numbers, its card says"
+                f" {card.maps} and {card.more}",
+                "the same numbers",
             )
         self.network = network.eval()
         self.card = card
@@ -119,7 +123,7 @@ class TrainedDenoiser:
             )
         if not len(energies):
             return np.zeros((0, self.card.axis.bins), np.float32)
-        run = self._in_chunks if self.network.window is None else self._in_windows
+        run = self._in_chunks if self.network.causal else self._in_windows
         given = self.compressed(energies)
         return self.expanded(run(given, progress), given)
 
@@ -127,7 +131,7 @@ class TrainedDenoiser:
         """Input of the network from energies (…, features)."""
         values = np.array(energies, dtype=np.float32)
         values[..., self.card.null_features] = 0.0
-        return self.card.scaling.input.compress(values)
+        return self.card.scaling.compress_input(values)
 
     def expanded(
         self, answer: NDArray[np.float32], given: NDArray[np.float32]
@@ -137,7 +141,7 @@ class TrainedDenoiser:
         Where nothing moves there is nothing, and nowhere less than the floor (decision 53).
         """
         energies = self.card.scaling.target.expand(answer)
-        energies[~given.any(axis=-1)] = 0.0
+        energies[~given[..., self.card.moving_features].any(axis=-1)] = 0.0
         energies[energies < self.card.scaling.floor] = 0.0
         energies[..., list(self.card.null_bins)] = 0.0
         return energies
@@ -166,13 +170,18 @@ class TrainedDenoiser:
                 done[start : start + CHUNK] = answer[0].cpu().numpy()
         return done[:frames]
 
+    def windows_in(self, frames: int) -> tuple[int, int]:
+        """Length and overlap of the windows of a clip, for a model that looks at later frames."""
+        if self.network.window is not None:
+            return self.network.window, OVERLAP
+        return (frames, 0) if frames <= PIECE else (PIECE, LENGTH)
+
     def _in_windows(self, values: NDArray[np.float32], progress: Progress) -> NDArray[np.float32]:
-        """Apply a model of fixed windows, which overlap and are blended."""
-        window = self.network.window
-        assert window is not None
+        """Apply a model to windows, which overlap and are blended."""
         frames = len(values)
+        window, overlap = self.windows_in(frames)
         known = np.pad(values, ((0, max(0, window - frames)), (0, 0)), "symmetric")
-        starts = segment_starts(len(known), window, OVERLAP)
+        starts = segment_starts(len(known), window, overlap)
         windows = cut(known, starts, window)
         done = np.empty((*windows.shape[:2], self.card.axis.bins), np.float32)
         with torch.no_grad():
@@ -221,20 +230,20 @@ class TrainedDenoiser:
 class LiveDenoiser:
     """Denoiser of single frames, without delay.
 
-    A causal model gives the result for the whole map (``equals_batch`` is True). A model of fixed
-    windows gets the last frames only and denoises the newest, at the window's border, where it
+    A causal model gives the result for the whole map (``equals_batch`` is True). One that looks at
+    later frames gets the last ones only and denoises the newest, at the window's border, where it
     knows less than in the middle: its result differs from that for the whole map.
     """
 
     def __init__(self, trained: TrainedDenoiser) -> None:
         self._trained = trained
-        self.equals_batch = trained.network.window is None
+        self.equals_batch = trained.network.causal
         self.reset()
 
     def reset(self) -> None:
         """Forget the frames so far and begin a new clip."""
         network = self._trained.network
-        self._frames: deque[NDArray[np.float32]] = deque(maxlen=network.window or 1)
+        self._frames: deque[NDArray[np.float32]] = deque(maxlen=network.window or LENGTH)
         with torch.no_grad():
             self._state = network.initial_state(1) if self.equals_batch else None
 
@@ -298,7 +307,7 @@ class LiveDenoiser:
                 return answer
             self._frames.append(compressed)
             known = np.stack(self._frames)
-            missing = (network.window or 0) - len(known)
+            missing = (network.window or LENGTH) - len(known)
             # The past is mirrored until there is enough of it.
             known = np.pad(known, ((missing, 0), (0, 0)), "symmetric")
             answer = network(torch.from_numpy(known)[None].to(device))[0, -1].cpu().numpy()
@@ -314,8 +323,8 @@ def denoise_long(
 ) -> None:
     """Denoise a long map block by block, with the result of :meth:`TrainedDenoiser.denoise`.
 
-    A causal model continues from its last state; one of fixed windows gets the windows that it
-    would get in the whole map. So results are equal to the rounding of single precision.
+    A causal model continues from its last state; another one gets the windows that it would get
+    in the whole map. So results are equal to the rounding of single precision.
 
     ``runs`` are half-open ranges of frames that are clips of their own, from
     :func:`~sd2core.denoise.resample_to_model.clips`; ``times_s`` are the times of all frames, and
@@ -366,14 +375,14 @@ def _blocks(
     trained: TrainedDenoiser, count: int, read: Read
 ) -> Iterator[tuple[int, NDArray[np.float32]]]:
     """Denoise frames at the model's rate block by block; yields first frames and results."""
-    window = trained.network.window
-    if window is None:
+    if trained.network.causal:
         live = trained.live()
         for low in range(0, count, _BLOCK):
             yield low, live.advance(read(low, min(low + _BLOCK, count)))
         return
     # Windows begin every so many frames from the start of the run.
-    step = window - OVERLAP
+    window, overlap = trained.windows_in(count)
+    step = window - overlap
     for low in range(0, count, _BLOCK):
         high = min(low + _BLOCK, count)
         first = max((low - window) // step * step, 0)

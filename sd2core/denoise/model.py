@@ -8,6 +8,11 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
+_LEAST_DEVIATION = 0.01
+
+DRAWN = 4
+"""Maps as which kinematics are drawn, for networks of pictures."""
+
 State = Any
 """Internal state of a causal model after the frames so far."""
 
@@ -20,38 +25,97 @@ class Denoiser(nn.Module):
     """
 
     causal: bool = True  # True if a frame depends on itself and earlier frames only.
-    window: int | None = None  # Frames that it looks at together; None for any length.
+    window: int | None = None  # Frames that it looks at together; None for any number.
     longest: int = 8192  # Frames that are computed at once in use; longer clips in pieces.
 
-    def __init__(self, bins: int, parts: int = 1) -> None:
+    def __init__(self, bins: int, parts: int = 1, more: int = 0) -> None:
         super().__init__()
         self.bins = bins
         self.parts = parts  # Maps in the input, one per part of the body, or the map alone.
+        self.more = more  # Numbers per frame after the maps: kinematics.
+
+    @property
+    def features(self) -> int:
+        """Numbers per frame of the input."""
+        return self.parts * self.bins + self.more
 
     def forward(self, values: Tensor) -> Tensor:
-        """Denoise (batch, frames, parts · bins); the answer is (batch, frames, bins)."""
+        """Denoise (batch, frames, features); the answer is (batch, frames, bins)."""
         return self.chunk(values, self.initial_state(len(values)))[0]
 
     def chunk(self, values: Tensor, state: State) -> tuple[Tensor, State]:
         """Denoise the next frames, as :meth:`forward`; also returns the state after them."""
-        raise NotImplementedError(f"{type(self).__name__} looks at {self.window} frames together")
+        raise NotImplementedError(f"{type(self).__name__} looks at later frames, too")
 
     def step(self, frame: Tensor, state: State) -> tuple[Tensor, State]:
-        """Denoise the next frame (batch, parts · bins)."""
+        """Denoise the next frame (batch, features)."""
         answer, state = self.chunk(frame[:, None], state)
         return answer[:, 0], state
 
     def initial_state(self, batch: int = 1) -> State:
         """State before the first frame."""
-        raise NotImplementedError(f"{type(self).__name__} looks at {self.window} frames together")
+        raise NotImplementedError(f"{type(self).__name__} looks at later frames, too")
+
+    def lifting(self, channels: int) -> nn.Module:
+        """Layer from the features of a frame to channels."""
+        linear = nn.Linear(self.features, channels)
+        return nn.Sequential(Standard(self.more), linear) if self.more else linear
+
+    def prepare_pictures(self) -> int:
+        """Prepare :meth:`pictures` in a constructor; returns the number of their channels."""
+        if not self.more:
+            return self.parts
+        wide = 2 * self.bins
+        self.draw = nn.Sequential(
+            Standard(self.more),
+            nn.Linear(self.more, wide),
+            nn.SiLU(),
+            nn.Linear(wide, DRAWN * self.bins),
+        )
+        return self.parts + DRAWN
 
     def pictures(self, values: Tensor) -> Tensor:
-        """Maps of (batch, frames, parts · bins) as channels, (batch, parts, frames, bins)."""
-        return values.unflatten(2, (self.parts, self.bins)).transpose(1, 2)
+        """Maps of (batch, frames, features), (batch, channels, frames, bins).
+
+        Kinematics are drawn as maps by two layers that learn.
+        """
+        maps = values[..., : self.parts * self.bins]
+        if self.more:
+            maps = torch.cat([maps, self.draw(values[..., self.parts * self.bins :])], dim=-1)
+        return maps.unflatten(2, (-1, self.bins)).transpose(1, 2)
 
     def ssm_parameters(self) -> Iterator[nn.Parameter]:
         """Parameters of state spaces: no weight decay, and a learning rate of their own."""
         return iter(())
+
+
+class Standard(nn.Module):
+    """Brings the last features to a mean of 0 and a deviation of 1, as in the training."""
+
+    def __init__(self, count: int) -> None:
+        super().__init__()
+        self.count = count
+        self.register_buffer("mean", torch.zeros(count))
+        self.register_buffer("scale", torch.ones(count))
+
+    def fit(self, values: Tensor) -> None:
+        """Take mean and deviation from features (frames, …)."""
+        last = values[:, values.shape[1] - self.count :]
+        self.mean, deviation = last.mean(dim=0), last.std(dim=0)
+        # What hardly ever changes is not blown up.
+        self.scale = 1.0 / deviation.clamp(min=_LEAST_DEVIATION)
+
+    def forward(self, values: Tensor) -> Tensor:
+        """Standardise (…, features)."""
+        others, last = values.tensor_split([values.shape[-1] - self.count], dim=-1)
+        return torch.cat([others, (last - self.mean) * self.scale], dim=-1)
+
+
+def fit_standards(network: nn.Module, values: Tensor) -> None:
+    """Fit all :class:`Standard` of a network to features to learn from, (frames, features)."""
+    for module in network.modules():
+        if isinstance(module, Standard):
+            module.fit(values)
 
 
 def parameter_count(model: nn.Module) -> int:

@@ -104,10 +104,11 @@ def summary(name: str) -> str:
     return _entry(name).summary
 
 
-def build(name: str, bins: int = 32, parts: int = 1, **given: Any) -> Denoiser:
+def build(name: str, bins: int = 32, parts: int = 1, more: int = 0, **given: Any) -> Denoiser:
     """Create a model of :data:`MODELS` or :data:`FILTERS` with fresh weights.
 
-    ``parts`` is the number of maps in the input; filters take one. Options that are not given
+    ``parts`` is the number of maps in the input, ``more`` that of numbers per frame beside them;
+    filters take one map. Options that are not given
     come from :func:`options`. Raises Sd2Error when there is no such model or option, or an
     option is not of its kind, or for more bins than a map has.
     """
@@ -118,7 +119,7 @@ def build(name: str, bins: int = 32, parts: int = 1, **given: Any) -> Denoiser:
         check_option(f"model {name}", option, value, entry.options, _LARGEST)
     module, _, class_name = entry.place.partition(".")
     found = getattr(import_module(f"sd2core.denoise.{module}"), class_name)
-    several = {} if name in FILTERS else {"parts": parts}
+    several = {} if name in FILTERS else {"parts": parts, "more": more}
     model: Denoiser = found(bins, **several, **entry.fixed, **{**entry.options, **given})
     return model
 

@@ -88,7 +88,7 @@ def input_of(doppler: DopplerMap, parts: Sequence[str] = ()) -> Stretch:
     if not parts:
         return np.ascontiguousarray(doppler.values.T)
     assert doppler.limbs is not None
-    return doppler.limbs.energies(parts)
+    return doppler.limbs.inputs(parts)
 
 
 def check_bins(doppler: DopplerMap, card: Card) -> None:

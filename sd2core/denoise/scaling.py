@@ -91,6 +91,7 @@ class Scaling:
     # Half the weakest energy above zero in the radar's maps of the training: no such radar shows
     # less, and what it shows is not lost to a small error.
     floor: float = 0.0
+    more: int = 0  # Numbers in the input after the energies, which stay as they are.
 
     @classmethod
     def fitted(
@@ -103,20 +104,33 @@ class Scaling:
         input_exponent: float = EXPONENT,
         target_exponent: float = EXPONENT,
     ) -> Scaling:
-        """Fit both on training data: inputs (frames, parts · bins) and targets (frames, bins)."""
+        """Fit both on training data: inputs (frames, features) and targets (frames, bins).
+
+        The first ``parts`` · bins features are maps; what follows is not compressed.
+        """
         inputs, targets = list(inputs), list(targets)
-        bins = inputs[0].shape[1] // parts if inputs else 0
+        bins = targets[0].shape[1] if targets else 0
+        maps = [values[:, : parts * bins] for values in inputs]
         return cls(
-            Compression.fitted(inputs, null_columns(null_bins, bins, parts), input_exponent),
+            Compression.fitted(maps, null_columns(null_bins, bins, parts), input_exponent)
+            if parts
+            else Compression(1.0, 1.0),
             Compression.fitted(targets, null_bins, target_exponent),
             0.5 * min(float(values[values > 0].min(initial=np.inf)) for values in targets),
+            inputs[0].shape[1] - parts * bins,
         )
+
+    def compress_input(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Compress the energies of an input (…, features)."""
+        energies, others = np.split(values, [values.shape[-1] - self.more], axis=-1)
+        return np.concatenate([self.input.compress(energies), others], axis=-1)
 
     def to_json(self) -> dict[str, Any]:
         """Content of a model file."""
         return {
             "law": "power",
             "target_floor": self.floor,
+            "input_more": self.more,
             **{
                 f"{name}_{part}": getattr(getattr(self, name), part)
                 for name in ("input", "target")
@@ -137,4 +151,5 @@ class Scaling:
             Compression(float(content["target_reference"]), float(content["target_exponent"])),
             # Files of before there was a floor have none.
             float(content.get("target_floor", 0.0)),
+            int(content.get("input_more", 0)),
         )

@@ -20,8 +20,8 @@ class UNetDenoiser(Denoiser):
 
     Parameters
     ----------
-    parts : int
-        Maps in the input.
+    parts, more : int
+        Maps in the input, and numbers per frame after them.
     channels : int
         Width of the first level; each level below is twice as wide.
     depth : int
@@ -38,16 +38,18 @@ class UNetDenoiser(Denoiser):
         bins: int,
         *,
         parts: int = 1,
+        more: int = 0,
         channels: int = 12,
         depth: int = 3,
         dropout: float = 0.0,
     ) -> None:
-        super().__init__(bins, parts)
+        super().__init__(bins, parts, more)
+        given = self.prepare_pictures()
         self._step = 2**depth
         widths = [channels * 2**level for level in range(depth + 1)]
         self.down = nn.ModuleList(
             _two_convolutions(before, after)
-            for before, after in zip([parts, *widths[:-1]], widths, strict=True)
+            for before, after in zip([given, *widths[:-1]], widths, strict=True)
         )
         self.shrink = nn.MaxPool2d(2)
         self.dropout = nn.Dropout(dropout)
@@ -60,9 +62,9 @@ class UNetDenoiser(Denoiser):
         self.to(memory_format=torch.channels_last)
 
     def forward(self, values: Tensor) -> Tensor:
-        """Denoise (batch, frames, parts · bins) of any number of frames; it learns from 72."""
+        """Denoise (batch, frames, features) of any number of frames; it learns from 72."""
         frames, bins = values.shape[1], self.bins
-        picture = padded(self.pictures(values), self._step, self._step)  # (B, parts, L', bins')
+        picture = padded(self.pictures(values), self._step, self._step)  # (B, channels, L', bins')
         picture = picture.contiguous(memory_format=torch.channels_last)
         bridges = []
         for level, convolutions in enumerate(self.down):
@@ -111,8 +113,8 @@ class SwinDenoiser(Denoiser):
 
     Parameters
     ----------
-    parts : int
-        Maps in the input.
+    parts, more : int
+        Maps in the input, and numbers per frame after them.
     channels : int
         Width of the fine level, a multiple of 16; the coarse one is twice as wide.
     depth : int
@@ -127,14 +129,15 @@ class SwinDenoiser(Denoiser):
         bins: int,
         *,
         parts: int = 1,
+        more: int = 0,
         channels: int = 48,
         depth: int = 2,
         dropout: float = 0.0,
     ) -> None:
-        super().__init__(bins, parts)
+        super().__init__(bins, parts, more)
         self._frames_step, self._bins_step = (2 * PATCH * size for size in WINDOW)
         columns = (bins + -bins % self._bins_step) // PATCH
-        self.embed = nn.Conv2d(parts, channels, PATCH, stride=PATCH)
+        self.embed = nn.Conv2d(self.prepare_pictures(), channels, PATCH, stride=PATCH)
         self.velocity = nn.Parameter(
             nn.init.trunc_normal_(torch.empty(columns, channels), std=0.02)
         )
@@ -149,7 +152,7 @@ class SwinDenoiser(Denoiser):
         self.head = nn.Linear(channels, PATCH * PATCH)
 
     def forward(self, values: Tensor) -> Tensor:
-        """Denoise (batch, frames, parts · bins) of any number of frames; it learns from 72."""
+        """Denoise (batch, frames, features) of any number of frames; it learns from 72."""
         frames, bins = values.shape[1], self.bins
         picture = padded(self.pictures(values), self._frames_step, self._bins_step)
         tokens = self.embed(picture).permute(0, 2, 3, 1) + self.velocity  # (B, L/2, bins/2, C)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from sd2core.doppler.cell_uncertainty import cell_uncertainty
 from sd2core.doppler.frame_counts import FrameCounts
 from sd2core.doppler.histogram import Counts
+from sd2core.doppler.kinematics import kinematics
 from sd2core.doppler.masks import Occlusion, Quality, Visibility
 from sd2core.doppler.options import PRESETS, SynthesisOptions
 from sd2core.doppler.parallel import Ticket, run_jobs, run_light_jobs
@@ -48,7 +49,7 @@ class Stretch:
     quality: Quality
     """The weakest visibility that was used: ``frozen`` falls back to facing where no depth or
     exact visibility is kept."""
-    limbs: NDArray[np.float32] | None = None  # values by part of the body, (parts, bins, n)
+    limbs: LimbMaps | None = None  # the split of the values
     processor_s: float = 0.0
     """Processor time that visibility and counting took, all threads together."""
 
@@ -323,9 +324,7 @@ class Synthesizer:
                 "notes": map_notes(self.prepared, sensor, start, stop),
             },
             present=self.mesh.presence.measured[start:stop],
-            limbs=None
-            if parts is None or stretch.limbs is None
-            else LimbMaps(parts.names, stretch.limbs),
+            limbs=stretch.limbs,
         )
 
     def stretch(
@@ -360,7 +359,11 @@ class Synthesizer:
             return raw, smooth(raw, times_s, first, start, stop, options, self.mesh.presence)
 
         raw, values = smoothed(counts.histogram.sum(axis=1).T)
-        limbs = None if parts is None else smoothed(counts.histogram.transpose(1, 2, 0))[1]
+        limbs = None
+        if parts is not None:
+            split = smoothed(counts.histogram.transpose(1, 2, 0))[1].astype(np.float32)
+            moves = kinematics(self.mesh, parts, sensor, (start, stop))
+            limbs = LimbMaps(parts.names, split, moves)
         inside = slice(start - first, stop - first)
         nobody = ~self.mesh.presence.there[first:last]
         counts.visible[nobody] = counts.beyond[nobody] = 0
@@ -371,7 +374,7 @@ class Synthesizer:
             (visible / self.mesh.represented_count).astype(np.float32) if shares else None,
             (beyond / np.maximum(visible, 1)).astype(np.float32) if shares else None,
             quality,
-            None if limbs is None else limbs.astype(np.float32),
+            limbs,
             processor_s,
         )
 

@@ -1,4 +1,4 @@
-"""Parts of the body that the vertices of a mesh belong to."""
+"""Parts of the body that the vertices of a mesh belong to, and the joints between them."""
 
 from __future__ import annotations
 
@@ -22,6 +22,50 @@ PARTS: tuple[str, ...] = (
 )
 """Parts of the body in the order of limb maps; L and R are the person's own sides. The trunk has
 the head, forearms have the hands, lower legs the feet."""
+
+JOINTS: tuple[str, ...] = (
+    "trunk",
+    "head",
+    *(
+        f"{joint}.{side}"
+        for side in "LR"
+        for joint in ("shoulder", "elbow", "hand", "hip", "knee", "foot")
+    ),
+)
+"""Joints and ends in the order of kinematics; L and R are the person's own sides."""
+
+KINEMATICS = "kinematics"
+"""Input that a denoiser may take: how joints move, and how much is seen of each part."""
+
+QUANTITIES: tuple[str, ...] = (
+    "towards_mps",
+    "speed_mps",
+    "nearer_m",
+    "aside_m",
+    "above_m",
+    "sigma_mps",
+)
+"""Of every joint: velocity towards the sensor and speed; place about the middle of the trunk,
+towards the sensor, to the right as it sees them, and up; standard deviation of the first, 0 where
+none is known."""
+
+
+def mirrored_columns() -> tuple[NDArray[np.intp], NDArray[np.float32]]:
+    """Order and signs of the columns of kinematics after left and right were exchanged.
+
+    Columns are the quantities of each joint, and then one for each of :data:`PARTS`.
+    """
+    columns = np.arange(len(JOINTS) * len(QUANTITIES)).reshape(len(JOINTS), -1)
+    joints = [JOINTS.index(_other_side(name)) for name in JOINTS]
+    parts = [columns.size + PARTS.index(_other_side(name)) for name in PARTS]
+    signs = np.ones(columns.size + len(PARTS), np.float32)
+    signs[columns[:, QUANTITIES.index("aside_m")]] = -1.0
+    return np.array([*columns[joints].ravel(), *parts], np.intp), signs
+
+
+def _other_side(name: str) -> str:
+    base, dot, side = name.partition(".")
+    return base + dot + {"L": "R", "R": "L", "": ""}[side]
 
 
 @dataclass(frozen=True, eq=False)

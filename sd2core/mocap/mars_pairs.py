@@ -28,7 +28,7 @@ from sd2core.io.radar.mars import (
     mars_parts,
     read_mars,
 )
-from sd2core.maps import DopplerMap, LimbMaps
+from sd2core.maps import DopplerMap
 from sd2core.mesh.vertex_parts import PARTS
 from sd2core.mocap.driving import KINECT_MARKERS, DrivenClip, SkeletonClip, puppet_of
 from sd2core.mocap.radar_place import RadarPlace, Seen, estimate_place
@@ -120,7 +120,7 @@ def body_doppler(
         found,
         values=found.values[:, ::every],
         timebase=Timebase(times_s[::every]),
-        limbs=None if limbs is None else LimbMaps(limbs.parts, limbs.values[..., ::every]),
+        limbs=None if limbs is None else limbs.of_frames(slice(None, None, every)),
     )
 
 

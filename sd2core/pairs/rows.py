@@ -14,6 +14,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.limits import open_regular
 from sd2core.files.stores import Damage, StoredArray
 from sd2core.files.texts import first_fault, parse_json, whole_lines
+from sd2core.mesh.vertex_parts import QUANTITIES
 
 INDEX_NAME = "takes.jsonl"
 REMAKE = "Make the pairs again with `sd2 simulate campaign` or `sd2 pairs`"
@@ -38,6 +39,7 @@ class _Header(BaseModel):
     labels: Annotated[tuple[str, ...], Field(min_length=1)]
     provenance: dict[str, Any]
     parts: tuple[str, ...] = ()
+    joints: tuple[str, ...] = ()
 
 
 class _Entry(BaseModel):
@@ -94,15 +96,20 @@ def check_array(array: StoredArray, frames: int, row: tuple[int, ...], kind: str
         )
 
 
-def row_kinds(bins: int, parts: int) -> dict[str, tuple[tuple[int, ...], str]]:
-    """Shape of a row and type of every array, by the number of bins and of parts of the body."""
+def row_kinds(header: Mapping[str, Any]) -> dict[str, tuple[tuple[int, ...], str]]:
+    """Shape of a row and type of every array, by a store's header."""
+    bins, parts, joints = header["bins"], len(header.get("parts", ())), header.get("joints", ())
     kinds: dict[str, tuple[tuple[int, ...], str]] = {
         "synthetic": ((bins,), "float32"),
         "radar": ((bins,), "float32"),
         "times_s": ((), "float64"),
         "label": ((), "int8"),
     }
-    return kinds | ({"limbs": ((parts, bins), "float32")} if parts else {})
+    if parts:
+        kinds["limbs"] = (parts, bins), "float32"
+    if joints:  # stores of before there were kinematics have none
+        kinds["kinematics"] = (len(joints), len(QUANTITIES)), "float32"
+    return kinds
 
 
 def read_rows(

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Sequence, Set
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -29,6 +29,7 @@ from sd2core.files.stores import (
     read_attributes,
 )
 from sd2core.maps import LimbMaps
+from sd2core.mesh.vertex_parts import JOINTS, PARTS
 from sd2core.pairs.rows import (
     INDEX_NAME,
     REMAKE,
@@ -114,7 +115,7 @@ class Take:
                 "pairs with limb maps",
                 "Make the pairs again with --limbs, or let the model take the map (inputs = map)",
             )
-        return self.limbs.energies(parts)
+        return self.limbs.inputs(parts)
 
     @property
     def title(self) -> str:
@@ -202,11 +203,12 @@ class PairWriter:
             "labels": list(labels),
             "provenance": json.loads(json.dumps(provenance)),
             "parts": list(parts),
+            "joints": list(JOINTS) if tuple(parts) == PARTS else [],
         }
         if not (self._path / "zarr.json").exists() or _stillborn(self._path):
             _begin(self._path, header)
         self._group = _reopened(self._path, header)
-        names = row_kinds(axis.bins, len(parts))
+        names = row_kinds(header)
         self._arrays = {name: growing(self._group, self._path, name) for name in names}
         index = read_takes(self._path, provenance)
         drop_torn_line(self._path, len(index))
@@ -250,6 +252,10 @@ class PairWriter:
         written = {name: getattr(take, name) for name in _ARRAYS}
         if take.limbs is not None:
             written["limbs"] = take.limbs.values.transpose(2, 0, 1)
+        if "kinematics" in self._arrays:
+            if take.limbs is None or take.limbs.kinematics is None:
+                raise Sd2Error(f"Take {take.title} has no kinematics", f"some, as {self._path} has")
+            written["kinematics"] = take.limbs.kinematics.transpose(2, 0, 1)
         for name, values in written.items():
             array = self._arrays[name]
             # What a killed writer left beyond the last line is written over.
@@ -288,11 +294,8 @@ def read_pairs(path: Path) -> PairSet:
     path = Path(path)
     header, index, lazily = open_takes(path)
     arrays = read_rows(path, lazily, index)
-    limbs, parts = arrays.pop("limbs", None), tuple(header.get("parts", ()))
-
-    def split(start: int, stop: int) -> LimbMaps | None:
-        return None if limbs is None else LimbMaps(parts, limbs[start:stop].transpose(1, 2, 0))
-
+    split: dict[str, Any] = {}
+    split |= {name: arrays.pop(name) for name in ("limbs", "kinematics") if name in arrays}
     try:
         takes = tuple(
             Take(
@@ -300,7 +303,7 @@ def read_pairs(path: Path) -> PairSet:
                 name=entry["name"],
                 placement=entry["placement"],
                 sensor_position_m=np.array(entry["sensor_position_m"], np.float64),
-                limbs=split(entry["start"], entry["stop"]),
+                limbs=limbs_between(header, split, entry["start"], entry["stop"]),
                 **{name: array[entry["start"] : entry["stop"]] for name, array in arrays.items()},
             )
             for entry in index
@@ -337,10 +340,24 @@ def open_takes(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]], dict[s
     group = open_group(path)
     arrays: dict[str, StoredArray] = {}
     frames = max(entry["stop"] for entry in index)
-    for name, (row, kind) in row_kinds(header["bins"], len(header.get("parts", ()))).items():
+    for name, (row, kind) in row_kinds(header).items():
         arrays[name] = array_in(group, path, name, "frames")
         check_array(arrays[name], frames, row, kind)
     return header, index, arrays
+
+
+def limbs_between(
+    header: Mapping[str, Any], arrays: Mapping[str, Any], start: int, stop: int
+) -> LimbMaps | None:
+    """Limb maps of frames of a store; None where it has none."""
+    if not header.get("parts"):
+        return None
+    limbs, moves = (
+        np.asarray(arrays[name][start:stop]).transpose(1, 2, 0) if name in arrays else None
+        for name in ("limbs", "kinematics")
+    )
+    assert limbs is not None
+    return LimbMaps(tuple(header["parts"]), limbs, moves)
 
 
 def read_description(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
@@ -384,10 +401,9 @@ def _begin(path: Path, header: dict[str, Any]) -> None:
     """Make a store without takes, which takes its name when it is whole."""
     if path.exists() and not is_pair_store(path) and (not path.is_dir() or any(path.iterdir())):
         raise Sd2Error(f"{path} is there and holds no pairs", "a new or empty folder")
-    bins, parts = header["bins"], len(header["parts"])
     with atomic_folder(path) as folder:
         group = create_group(folder, header)
-        for name, (row, kind) in row_kinds(bins, parts).items():
+        for name, (row, kind) in row_kinds(header).items():
             chunks = (_CHUNK_FRAMES, *row)
             create_array(group, name, shape=(0, *row), dtype=kind, chunks=chunks, fill_value=0)
 

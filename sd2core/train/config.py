@@ -124,8 +124,8 @@ class ModelConfig:
 
     name: str = _setting(text, "s4")  # Architecture, see `sd2 train --help`.
     options: Mapping[str, Any] = _setting(table, factory=dict)  # Of the architecture.
-    # The map, as in the paper, or that of each part of the body.
-    inputs: str = _setting(choice("map", "limbs"), "map")
+    # The map, as in the paper, that of each part of the body, or how its joints move.
+    inputs: str = _setting(choice("map", "limbs", "kinematics"), "map")
 
     def __post_init__(self) -> None:
         _check(self, "model")
@@ -150,6 +150,8 @@ class TrainingConfig:
     early_stopping_epochs: int | None = _setting(number(1, 1_000_000, whole=True), None)
     # Frames of rare velocities count more, see :func:`sd2core.train.data.frame_weights`.
     balanced: bool = _setting(flag, False)
+    # Of the error of a frame's mean velocity, in 1 / (m/s), beside that of the map; 0: none.
+    velocity_weight: float = _setting(number(0.0, 100.0), 0.0)
     # The best epoch is that of the lowest validation error of this kind.
     select_by: str = _setting(choice("rmse", "mae"), "rmse")
     seed: int = _setting(number(0, 2**31 - 1, whole=True), 0)  # Of weights, order and dropout.

@@ -12,8 +12,10 @@ from typing import Any
 import numpy as np
 import torch
 from lightning.pytorch import LightningModule
+from torch import nn
 
 from sd2core.denoise.model import Denoiser
+from sd2core.mesh.vertex_parts import mirrored_columns
 from sd2core.train.callbacks import TrainingCallbacks
 from sd2core.train.checkpoint import Checkpoint, moments_of, set_moments
 from sd2core.train.data import Windows, frame_weights
@@ -37,12 +39,15 @@ class DenoiserModule(LightningModule):
         super().__init__()
         self.network = network
         # Not buffers: they belong to no checkpoint, and need not be broadcast.
-        self._inputs = torch.from_numpy(callbacks.exam.scaling.input.compress(windows.inputs))
+        self._inputs = torch.from_numpy(callbacks.exam.scaling.compress_input(windows.inputs))
         self._targets = torch.from_numpy(callbacks.exam.scaling.target.compress(windows.targets))
         balanced = callbacks.config.training.balanced
         weights = frame_weights(windows.targets, callbacks.exam.axis) if balanced else None
         self._weights = None if weights is None else torch.from_numpy(weights)  # (frames,)
         self._frames = torch.arange(windows.length)
+        self._mirror = None
+        if callbacks.exam.scaling.more:
+            self._mirror = tuple(torch.from_numpy(each) for each in mirrored_columns())
         self._callbacks = callbacks
         self._moments = checkpoint.moments if checkpoint is not None else None
 
@@ -82,9 +87,14 @@ class DenoiserModule(LightningModule):
         if callbacks.config.data.range_factor > 1.0:
             # (g·x / r)^p = g^p · (x / r)^p: gains are as well applied to compressed values.
             scaling = callbacks.exam.scaling
-            inputs = inputs * (batch.gain**scaling.input.exponent)[:, None, None]
+            energies = inputs.shape[-1] - scaling.more
+            gains = (batch.gain**scaling.input.exponent)[:, None, None]
+            inputs = torch.cat([inputs[..., :energies] * gains, inputs[..., energies:]], dim=-1)
             targets = targets * (batch.gain**scaling.target.exponent)[:, None, None]
-        difference = (self.network(inputs) - targets).float()
+        if self._mirror is not None:
+            inputs = self._mirrored(inputs)
+        answers = self.network(inputs).float()
+        difference = answers - targets
         if len(callbacks.exam.counted) < difference.shape[-1]:
             difference = difference.index_select(-1, callbacks.counted_on(difference.device))
         squares = difference.square()
@@ -93,7 +103,35 @@ class DenoiserModule(LightningModule):
         if self._weights is not None:
             square = (squares * self._weights[rows][..., None]).mean()
         # At zero the root has no slope.
-        return (square + 1e-12).sqrt()
+        loss = (square + 1e-12).sqrt()
+        weight = callbacks.config.training.velocity_weight
+        return loss + weight * self._velocity_loss(answers, targets) if weight else loss
+
+    def _mirrored(self, inputs: torch.Tensor) -> torch.Tensor:
+        """Kinematics with left and right exchanged in half of the segments: the map is the same."""
+        assert self._mirror is not None
+        order, signs = (each.to(inputs.device) for each in self._mirror)
+        first = inputs.shape[-1] - len(order)
+        other = torch.cat([inputs[..., :first], inputs[..., first:][..., order] * signs], dim=-1)
+        turned = torch.rand(len(inputs), 1, 1, device=inputs.device) < 0.5
+        return torch.where(turned, other, inputs)
+
+    def _velocity_loss(self, answers: torch.Tensor, targets: torch.Tensor) -> torch.Tensor:
+        """Mean error of the mean velocity, m/s; below 0.1 m/s it counts less."""
+        exam = self._callbacks.exam
+        counted = self._callbacks.counted_on(answers.device)
+        velocities = torch.as_tensor(exam.axis.centres_mps, dtype=torch.float32)
+        velocities = velocities.to(answers.device)[counted]
+
+        def mean_of(compressed: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+            energies = compressed.clamp(min=0.0)[..., counted] ** (1 / exam.scaling.target.exponent)
+            total = energies.sum(dim=-1)
+            return (energies * velocities).sum(dim=-1) / (total + 1e-3), total
+
+        (found, _), (wanted, total) = mean_of(answers), mean_of(targets.float())
+        moving = (total > 0).float()
+        off = nn.functional.smooth_l1_loss(found, wanted, beta=0.1, reduction="none")
+        return (off * moving).sum() / moving.sum().clamp(min=1.0)
 
     def configure_gradient_clipping(
         self,

@@ -294,7 +294,7 @@ def _architecture(card: ModelCard) -> str:
     """The model's name, with the options that are not its defaults."""
     usual = options(card.model)
     other = [f"{name}={value}" for name, value in card.options.items() if usual.get(name) != value]
-    other += ["limbs"] * bool(card.parts)
+    other += [] if card.inputs == "map" else [card.inputs]
     return card.model + (f" ({', '.join(other)})" if other else "")
 
 

@@ -13,10 +13,10 @@ import torch
 from lightning.pytorch import Trainer
 from lightning.pytorch.strategies import DDPStrategy
 
-from sd2core.denoise.card import DENOISER_PARTS, ModelCard
+from sd2core.denoise.card import PARTS_OF, ModelCard, maps_in
 from sd2core.denoise.files import save_model
 from sd2core.denoise.live import TrainedDenoiser
-from sd2core.denoise.model import Denoiser, parameter_count
+from sd2core.denoise.model import Denoiser, fit_standards, parameter_count
 from sd2core.denoise.registry import build, options
 from sd2core.denoise.scaling import Scaling
 from sd2core.errors import Sd2Error
@@ -55,7 +55,7 @@ def carry_out(
     if checkpoint is not None:
         # Sums over other numbers of threads differ in their last digits.
         threads = config.machine.threads or int(checkpoint.about["threads"])
-    parts = DENOISER_PARTS if config.model.inputs == "limbs" else ()
+    parts = PARTS_OF[config.model.inputs]
     data = prepare(read_mixed(config.data.pairs), config.data, parts)
     digest = data.digest
     if checkpoint is not None and checkpoint.about["data_digest"] != digest:
@@ -67,13 +67,13 @@ def carry_out(
         )
     precision = precision_of(config.machine, device)
     with settled(config.machine, threads), signals_kept():
-        network = _network(config, data, checkpoint)
         scaling = Scaling.fitted(
             (take.inputs(parts) for take in data.learnt_takes),
             (take.radar for take in data.learnt_takes),
             data.pairs.null_bins,
-            parts=max(1, len(parts)),
+            parts=maps_in(parts),
         )
+        network = _network(config, data, scaling, checkpoint)
         about = _About(config, data, scaling, command, machine_words(device, precision, threads))
         learnt = config.training
         callbacks = TrainingCallbacks(
@@ -116,14 +116,18 @@ def carry_out(
     return callbacks.outcome, callbacks.position
 
 
-def _network(config: TrainConfig, data: TrainingData, checkpoint: Checkpoint | None) -> Denoiser:
+def _network(
+    config: TrainConfig, data: TrainingData, scaling: Scaling, checkpoint: Checkpoint | None
+) -> Denoiser:
     torch.manual_seed(config.training.seed)
     network = build(
         config.model.name,
         data.pairs.axis.bins,
-        max(1, len(data.parts)),
+        maps_in(data.parts),
+        scaling.more,
         **config.model.options,
     )
+    fit_standards(network, torch.from_numpy(data.training.inputs))
     length = config.data.segment_frames
     if network.window not in (None, length):
         raise Sd2Error(

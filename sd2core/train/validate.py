@@ -54,7 +54,7 @@ class Exam:
         energies = segments.targets.reshape(-1, axis.bins).copy()
         energies[:, list(null_bins)] = 0.0
         return cls(
-            torch.from_numpy(scaling.input.compress(segments.inputs)),
+            torch.from_numpy(scaling.compress_input(segments.inputs)),
             torch.from_numpy(scaling.target.compress(segments.targets)),
             np.where(segments.moving.ravel(), peak_velocity_mps(energies, axis), np.nan),
             scaling,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable
+from copy import deepcopy
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -23,7 +24,6 @@ from sd2core.denoise.resample_to_model import input_of, is_regular
 from sd2core.doppler.synthesizer import Stretch
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap, LimbMaps
-from sd2core.mesh.vertex_parts import PARTS
 from sd2core.pairs.segments import LENGTH, OVERLAP
 from sd2core.timebase import Timebase
 
@@ -291,7 +291,7 @@ class DenoisedMap(QObject):
         begin, end = with_context(self._known, piece)
         source, denoiser, revision = self._source, self.denoiser, self._revision
         # Copied: the values go on changing while the model works.
-        limbs = None if source.limbs is None else source.limbs.values[..., begin:end].copy()
+        limbs = None if source.limbs is None else deepcopy(source.limbs.between(begin, end))
         doppler = cut_out(source, begin, source.values[:, begin:end].copy(), limbs)
 
         def work(emit: object) -> _Answer:
@@ -454,9 +454,9 @@ def cut_out(
     doppler: DopplerMap,
     start: int,
     values: NDArray[np.float32],
-    limbs: NDArray[np.float32] | None = None,
+    limbs: LimbMaps | None = None,
 ) -> DopplerMap:
-    """Part of a map, with other values (bins, frames), and (parts, bins, frames) of its limbs."""
+    """Part of a map, with other values (bins, frames), and its split."""
     stop = start + values.shape[1]
     whole = (start, stop) == (0, len(doppler.timebase))
     return replace(
@@ -465,7 +465,7 @@ def cut_out(
         timebase=doppler.timebase if whole else Timebase(doppler.times_s[start:stop]),
         present=None if doppler.present is None else doppler.present[start:stop],
         uncertainty=None,
-        limbs=None if limbs is None else LimbMaps(PARTS, limbs),
+        limbs=limbs,
     )
 
 

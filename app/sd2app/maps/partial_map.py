@@ -15,7 +15,6 @@ from sd2core.doppler.options import SynthesisOptions
 from sd2core.doppler.synthesizer import Stretch
 from sd2core.maps import DopplerMap, LimbMaps
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.mesh.vertex_parts import PARTS
 from sd2core.sensor import VirtualSensor
 
 ROUGH, PREVIEW, FINAL = 1, 2, 3
@@ -30,7 +29,7 @@ class PartialMap:
 
     def __init__(self, bins: int, frames: int) -> None:
         self.values = np.zeros((bins, frames), np.float32)
-        self.limbs: NDArray[np.float32] | None = None  # (parts, bins, frames), where wanted
+        self.limbs: LimbMaps | None = None  # where they are wanted
         self.quality = np.zeros(frames, np.uint8)  # see FINAL
         self.sensor: VirtualSensor | None = None  # placement that all of it is for
 
@@ -60,11 +59,8 @@ class PartialMap:
             self.limbs = None
         else:
             if self.limbs is None:
-                self.limbs = np.zeros((len(stretch.limbs), *self.values.shape), np.float32)
-            here = self.limbs[..., inside]
-            # Most parts stand still for long; what is zero and stays so takes no memory.
-            changes = stretch.limbs.any(axis=-1) | here.any(axis=-1)  # (parts, bins)
-            here[changes] = stretch.limbs[changes]
+                self.limbs = stretch.limbs.empty(self.frames)
+            self.limbs.put(start, stretch.limbs)
         self.quality[inside] = quality
 
     def mark_stale(self) -> None:
@@ -135,7 +131,7 @@ class ShownMap:
             unit=part.unit,
             null_bins=options.null_bins,
             present=mesh.presence.measured,
-            limbs=None if self.partial.limbs is None else LimbMaps(PARTS, self.partial.limbs),
+            limbs=self.partial.limbs,
         )
         self._track.set_map(painted, None if self.partial.full else self.partial.quality > 0)
 

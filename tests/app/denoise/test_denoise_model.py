@@ -143,7 +143,7 @@ def test_where_the_parts_of_the_body_are_known_the_bundled_model_for_them_is_use
     context = make(FakeDenoisers.bundled(2.0, limbs_gain=3.0))
     open_it(context, qtbot, path)
     assert context.denoise.card.name == LIMBS_MODEL
-    of_forearm = context.synthesis.whole_map().limbs.energies(("forearm.R",)).T
+    of_forearm = context.synthesis.whole_map().limbs.inputs(("forearm.R",)).T
     np.testing.assert_allclose(
         context.denoised.map.values, fading(of_forearm, np.float32(3.0)), rtol=1e-4, atol=1e-7
     )

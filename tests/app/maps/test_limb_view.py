@@ -167,14 +167,14 @@ def test_a_denoiser_of_parts_gets_them(context, denoisers, qtbot, body):
     open_it(context, qtbot, body)
     context.denoise.use(path)
     rest(context, qtbot)
-    expected = split(body, VirtualSensor()).energies(("forearm.R",)).T
+    expected = split(body, VirtualSensor()).inputs(("forearm.R",)).T
     np.testing.assert_allclose(
         context.denoised.map.values, fading(expected, np.float32(2.0)), rtol=1e-4, atol=1e-7
     )
     # Elsewhere, too.
     context.edits.place_sensor(VirtualSensor((0.8, 0.0, 0.3)))
     rest(context, qtbot)
-    moved = split(body, context.sensor.sensor).energies(("forearm.R",)).T
+    moved = split(body, context.sensor.sensor).inputs(("forearm.R",)).T
     np.testing.assert_allclose(
         context.denoised.map.values, fading(moved, np.float32(2.0)), rtol=1e-4, atol=1e-7
     )

@@ -78,4 +78,4 @@ def test_parts_are_painted_whole_also_where_they_become_zero(strokes):
         painted = replace(stretch_of(stop - start, 1.0), limbs=limbs)
         partial.paint(VirtualSensor(), start, painted, FINAL)
         wanted[..., start:stop] = limbs
-        np.testing.assert_array_equal(partial.limbs, wanted)
+        np.testing.assert_array_equal(partial.limbs.values, wanted)

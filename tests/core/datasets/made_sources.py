@@ -9,7 +9,7 @@ import numpy as np
 
 from sd2core.datasets.source import Source
 from sd2core.maps import DopplerMap, LimbMaps, MapKind
-from sd2core.mesh.vertex_parts import PARTS
+from sd2core.mesh.vertex_parts import JOINTS, PARTS, QUANTITIES
 from sd2core.sensor import VelocityAxis, VirtualSensor
 from sd2core.timebase import Timebase
 
@@ -50,8 +50,9 @@ def source(
     }
     if limbs:
         split = rng.integers(0, 100, (len(PARTS), AXIS.bins, frames)).astype(np.float32)
+        moves = rng.normal(size=(len(JOINTS), len(QUANTITIES), frames)).astype(np.float32)
         maps["synthetic"] = replace(
-            maps["synthetic"], values=split.sum(axis=0), limbs=LimbMaps(PARTS, split)
+            maps["synthetic"], values=split.sum(axis=0), limbs=LimbMaps(PARTS, split, moves)
         )
     if label is None:
         label = rng.integers(0, 3, frames).astype(np.int16)

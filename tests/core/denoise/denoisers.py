@@ -8,11 +8,12 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from sd2core.denoise.card import ModelCard
+from sd2core.denoise.card import KINEMATICS_COLUMNS, ModelCard, maps_in
 from sd2core.denoise.live import TrainedDenoiser
 from sd2core.denoise.registry import build
 from sd2core.denoise.scaling import Compression, Scaling
 from sd2core.maps import DopplerMap
+from sd2core.mesh.vertex_parts import KINEMATICS
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 
@@ -37,7 +38,9 @@ WINDOWED = ("unet", "swin")
 def trained(name: str, seed: int = 0, bins: int = 32, **card: Any) -> TrainedDenoiser:
     """A model with random weights, none of them zero, and answers that are mostly positive."""
     torch.manual_seed(seed)
-    network = build(name, bins, max(1, len(card.get("parts", ()))), **SMALL[name])
+    parts = card.get("parts", ())
+    more = KINEMATICS_COLUMNS if KINEMATICS in parts else 0
+    network = build(name, bins, maps_in(parts), more, **SMALL[name])
     with torch.no_grad():
         for parameter in network.parameters():
             parameter += 0.3 * torch.randn_like(parameter)
@@ -46,7 +49,7 @@ def trained(name: str, seed: int = 0, bins: int = 32, **card: Any) -> TrainedDen
     about = {
         "model": name,
         "options": SMALL[name],
-        "scaling": Scaling(Compression(0.01), Compression(1e-4, 0.25)),
+        "scaling": Scaling(Compression(0.01), Compression(1e-4, 0.25), more=more),
         "axis": VelocityAxis(bins, 2.0),
         "null_bins": (14, 15, 16) if bins == 32 else (),
         "frame_rate_hz": 30.0,

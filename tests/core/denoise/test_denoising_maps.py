@@ -152,17 +152,46 @@ def test_live_forgets_where_nobody_is(name: str) -> None:
         np.testing.assert_array_equal(stream.step(frame), fresh.step(frame))
 
 
-def test_a_state_space_that_looks_ahead_works_in_windows(tmp_path: Path) -> None:
-    options = {"channels": 4, "depth": 1, "state_size": 4, "bidirectional": True}
-    card = replace(trained("s4").card, options=options)
-    save_model(tmp_path / "both.safetensors", TrainedDenoiser(build("s4", **options), card))
-    denoiser, values = load_model(tmp_path / "both.safetensors"), energies(72)
+BOTH_WAYS = {"channels": 4, "depth": 1, "state_size": 4, "bidirectional": True}
+
+
+def looking_both_ways(path: Path) -> TrainedDenoiser:
+    card = replace(trained("s4").card, options=BOTH_WAYS)
+    save_model(path, TrainedDenoiser(build("s4", **BOTH_WAYS), card))
+    return load_model(path)
+
+
+def test_a_state_space_that_looks_both_ways_sees_the_whole_clip(tmp_path: Path) -> None:
+    denoiser, values = looking_both_ways(tmp_path / "both.safetensors"), energies(200)
     assert not denoiser.network.causal
     assert not denoiser.live().equals_batch
     other = values.copy()
-    other[60] *= 4.0
+    other[190] *= 4.0
     moved = np.abs(denoiser.denoise_values(values) - denoiser.denoise_values(other))
     assert moved[:60].any()
+    for frames in (1, 7):
+        assert denoiser.denoise_values(values[:frames]).shape == (frames, 32)
+
+
+def test_pieces_of_a_long_clip_are_those_of_the_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    denoiser, values = looking_both_ways(tmp_path / "both.safetensors"), energies(700)
+    at_once = denoiser.denoise_values(values)
+    monkeypatch.setattr(live, "PIECE", 200)
+    monkeypatch.setattr(live, "_BLOCK", 150)
+    whole, written = denoiser.denoise_values(values), np.zeros_like(values)
+
+    def write(start: int, answers: np.ndarray) -> None:
+        written[start : start + len(answers)] = answers
+
+    times_s = np.arange(len(values)) / 30.0
+    live.denoise_long(
+        denoiser, [(0, len(values))], times_s, lambda low, high: values[low:high], write
+    )
+    np.testing.assert_allclose(written, whole, rtol=1e-4, atol=1e-6 * whole.max())
+    # A border 36 frames away does not matter much.
+    assert np.abs(whole - at_once).max() < 0.02 * at_once.max()
 
 
 @pytest.mark.parametrize("name", WINDOWED)

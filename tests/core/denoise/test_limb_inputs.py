@@ -10,14 +10,18 @@ import torch
 from denoisers import CAUSAL, SMALL, energies, synthetic_map, trained
 from numpy.typing import NDArray
 
-from sd2core.denoise.card import ModelCard
+from sd2core.denoise.card import KINEMATICS_COLUMNS, ModelCard
 from sd2core.denoise.files import load_model, save_model
 from sd2core.denoise.live import TrainedDenoiser
+from sd2core.denoise.model import fit_standards
 from sd2core.denoise.registry import FILTERS
+from sd2core.denoise.scaling import Compression, Scaling
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap, LimbMaps
+from sd2core.mesh.vertex_parts import JOINTS, KINEMATICS, QUANTITIES, mirrored_columns
 
 PARTS = ("trunk", "forearm", "lower_leg")
+MOVING = (KINEMATICS,)
 SIDES = ("trunk", "forearm.L", "forearm.R", "lower_leg.L", "lower_leg.R")
 NETWORKS = [name for name in SMALL if name not in FILTERS]
 
@@ -32,7 +36,7 @@ def split_map(frames: int, rate_hz: float = 30.0) -> DopplerMap:
 
 def columns(doppler: DopplerMap) -> NDArray[np.float32]:
     assert doppler.limbs is not None
-    return doppler.limbs.energies(PARTS)
+    return doppler.limbs.inputs(PARTS)
 
 
 @pytest.mark.parametrize("name", NETWORKS)
@@ -47,6 +51,59 @@ def test_all_of_the_parts_count(name: str, frames: int, bins: int) -> None:
             other = values.clone()
             other[..., part * bins : (part + 1) * bins] += 1.0
             assert not torch.allclose(network(other), answer)
+
+
+@pytest.mark.parametrize("name", NETWORKS)
+def test_every_network_takes_kinematics(name: str) -> None:
+    """Alone or beside maps; what learnt them standardises them."""
+    for parts, maps in ((MOVING, 0), ((*PARTS, *MOVING), 3)):
+        network = trained(name, parts=parts).network.eval()
+        more = KINEMATICS_COLUMNS
+        values = torch.randn(2, 72, 32 * maps + more) + 3.0
+        with torch.no_grad():
+            before = network(values)
+            assert before.shape == (2, 72, 32)
+            for column in (0, more - 1):
+                other = values.clone()
+                other[..., 32 * maps + column] += 1.0
+                assert not torch.allclose(network(other), before)
+            fit_standards(network, values.flatten(0, 1))
+            moved = values.clone()
+            moved[..., 32 * maps :] *= 5.0
+            fitted = network(values)
+            fit_standards(network, moved.flatten(0, 1))
+            torch.testing.assert_close(network(moved), fitted, rtol=1e-3, atol=1e-3)
+
+
+def test_left_and_right_exchanged_twice_are_as_before() -> None:
+    order, signs = mirrored_columns()
+    values = np.random.default_rng(0).normal(size=(4, KINEMATICS_COLUMNS)).astype(np.float32)
+    once = values[:, order] * signs
+    np.testing.assert_array_equal(once[:, order] * signs, values)
+    width = len(QUANTITIES)
+    for left, right in (("hand.L", "hand.R"), ("knee.L", "knee.R"), ("trunk", "trunk")):
+        one, two = (once[:, JOINTS.index(left) * width :], values[:, JOINTS.index(right) * width :])
+        flipped = np.where(np.array(QUANTITIES) == "aside_m", -1.0, 1.0)
+        np.testing.assert_array_equal(one[:, :width], two[:, :width] * flipped)
+
+
+def test_a_body_that_stands_still_is_not_seen() -> None:
+    model = trained("gru", parts=MOVING)
+    values = np.random.default_rng(0).random((5, KINEMATICS_COLUMNS)).astype(np.float32)
+    assert model.denoise_values(values).any(axis=1).all()
+    values[3, : len(JOINTS) * len(QUANTITIES) : len(QUANTITIES)] = 0.0
+    assert model.denoise_values(values).any(axis=1).tolist() == [True, True, True, False, True]
+
+
+def test_the_file_of_a_model_of_kinematics(tmp_path: Path) -> None:
+    scaling = Scaling(Compression(1.0, 1.0), Compression(1e-4, 0.25), more=KINEMATICS_COLUMNS)
+    model = trained("s4", parts=MOVING, scaling=scaling)
+    fit_standards(model.network, torch.randn(50, KINEMATICS_COLUMNS))
+    save_model(tmp_path / "moving.safetensors", model)
+    again = load_model(tmp_path / "moving.safetensors")
+    assert (again.card.inputs, again.card.scaling.more) == ("kinematics", KINEMATICS_COLUMNS)
+    values = np.random.default_rng(0).normal(size=(30, KINEMATICS_COLUMNS)).astype(np.float32)
+    np.testing.assert_array_equal(again.denoise_values(values), model.denoise_values(values))
 
 
 @pytest.mark.parametrize("name", [name for name in CAUSAL if name in NETWORKS])
@@ -103,5 +160,5 @@ def test_the_file_says_what_goes_in(tmp_path: Path) -> None:
     old = model.card.to_json()
     del old["parts"]
     assert ModelCard.from_json(old).inputs == "map"
-    with pytest.raises(Sd2Error, match="takes 3 maps, its card says 0 parts"):
+    with pytest.raises(Sd2Error, match="takes 3 maps and 0 numbers, its card says 1 and 0"):
         TrainedDenoiser(model.network, trained("s4").card)

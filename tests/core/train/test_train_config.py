@@ -42,7 +42,7 @@ def configs(draw: st.DrawFn) -> TrainConfig:
         ModelConfig(
             draw(NAMES),
             draw(st.dictionaries(NAMES, st.booleans() | st.integers() | SHARES | NAMES)),
-            draw(st.sampled_from(["map", "limbs"])),
+            draw(st.sampled_from(["map", "limbs", "kinematics"])),
         ),
         TrainingConfig(
             minutes=draw(st.none() | st.floats(0.01, 1000.0)),

@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import torch
 from safetensors.torch import load_file
@@ -20,6 +21,8 @@ from small_pairs import write_pairs
 
 from sd2core.denoise.files import describe_model, load_model
 from sd2core.errors import Sd2Error
+from sd2core.mesh.vertex_parts import KINEMATICS
+from sd2core.pairs.store import read_pairs
 from sd2core.runs import pace
 from sd2core.runs.control import write_control
 from sd2core.runs.progress import Event, ProgressTail, last_of, read_events, standing
@@ -128,6 +131,26 @@ class TestLearning:
         assert same(tmp_path / "a", tmp_path / "b")
         assert not same(tmp_path / "a", tmp_path / "c")
         assert not same(tmp_path / "a", tmp_path / "balanced")
+
+    def test_kinematics_are_learnt_from(self, tmp_path: Path) -> None:
+        """Half of the segments are mirrored, by the seed; the mean velocity counts if asked to."""
+        pairs = write_pairs(tmp_path / "split.zarr", limbs=True, null_bins=(3,))
+        values = {"model": {"inputs": "kinematics"}}
+        for name, weight in (("a", 0.0), ("b", 0.0), ("c", 1.0)):
+            config = settings(pairs, epochs=2, velocity_weight=weight).with_values(values)
+            ending = begin(config, tmp_path / name)
+        assert same(tmp_path / "a", tmp_path / "b")
+        assert not same(tmp_path / "a", tmp_path / "c")
+        assert ending.model is not None
+        model = load_model(ending.model)
+        assert (model.card.inputs, model.card.maps, model.card.features) == ("kinematics", 0, 93)
+        take = read_pairs(pairs).takes[0]
+        assert model.denoise_values(take.inputs(model.card.parts)).shape == take.radar.shape
+        taken = [take.inputs((KINEMATICS,)) for take in read_pairs(pairs).of(["s1"]).takes]
+        lift = model.network.get_submodule("lift.0")
+        torch.testing.assert_close(
+            lift.get_buffer("mean"), torch.from_numpy(np.concatenate(taken)).mean(dim=0)
+        )
 
     @pytest.mark.parametrize("model", ["gru", "s4"])
     def test_mixed_precision(self, pairs: Path, tmp_path: Path, model: str) -> None:
