@@ -265,7 +265,8 @@ def _add_campaign(kinds: argparse._SubParsersAction) -> None:
         "make pairs of synthetic Doppler and simulated radar to train a denoiser on",
         handler=_campaign,
         description=(
-            "People of random shape swipe to the right, left, down and up. Varied, they stand\n"
+            "People of random shape swipe to the right, left, down and up, or move as real people\n"
+            "were recorded (--movements captured), or both in turn. Varied, they stand\n"
             "anywhere, turned a little, swipe in random order, rest, and do other things. As in\n"
             "the paper, they face a radar and a camera 2.2 m ahead, and swipe to and fro in one\n"
             "take, up and down in another, and rest in a third. Of every take there is the\n"
@@ -278,7 +279,8 @@ def _add_campaign(kinds: argparse._SubParsersAction) -> None:
             "  sd2 simulate campaign --out campaign.zarr\n"
             "  sd2 simulate campaign --people 3 --minutes 5 --seed 1 --out small.zarr\n"
             "  sd2 simulate campaign --sensors 3 --out ranges.zarr\n"
-            "  sd2 simulate campaign --protocol paper --out as-in-the-paper.zarr"
+            "  sd2 simulate campaign --protocol paper --out as-in-the-paper.zarr\n"
+            "  sd2 simulate campaign --movements both --motions motions --radars drawn --out all"
         ),
     )
     add_output(parser, "FILE.zarr", "the pairs to write")
@@ -294,6 +296,32 @@ def _add_campaign(kinds: argparse._SubParsersAction) -> None:
         "--order",
         choices=("to-and-fro", "random"),
         help="of the paper's swipes: one kind in a take, or all four (default: to-and-fro)",
+    )
+    parser.add_argument(
+        "--movements",
+        choices=("swipes", "captured", "both"),
+        default="swipes",
+        help="what people do: swipes, what real people were recorded doing, or both in turn"
+        " (default: swipes)",
+    )
+    parser.add_argument(
+        "--motions",
+        type=Path,
+        metavar="FOLDER",
+        help="recorded motions, as `python -m tools.motion_capture drive` makes them",
+    )
+    parser.add_argument(
+        "--motion-role",
+        choices=("learn", "calibrate", "measure"),
+        default="learn",
+        help="people of that folder: those to learn from, or those kept apart (default: learn)",
+    )
+    parser.add_argument(
+        "--radars",
+        choices=("one", "drawn"),
+        default="one",
+        help="the same radar in all takes, or looks, surface, noise and threshold drawn for each"
+        " (default: one)",
     )
     add_value(parser, "--seed", _seed, "N", "seed of all random numbers", 0)
     parser.add_argument(
@@ -342,6 +370,12 @@ def _protocol(options: argparse.Namespace) -> Protocol:
     from sd2core.simulate.campaign.protocol import PAPER, VARIED
 
     if options.protocol == "paper":
+        if options.movements != "swipes" or options.radars != "one":
+            raise Sd2Error(
+                f"--protocol paper with movements {options.movements} and radars {options.radars}",
+                "swipes before one radar, as in the paper",
+                "Leave the protocol out",
+            )
         return replace(PAPER, order=options.order or PAPER.order)
     if options.order == PAPER.order:
         raise Sd2Error(
@@ -349,7 +383,8 @@ def _protocol(options: argparse.Namespace) -> Protocol:
             "another order or protocol",
             "Add --protocol paper",
         )
-    return VARIED
+    drawn = options.radars == "drawn"
+    return replace(VARIED, movements=options.movements, drawn_radars=drawn)
 
 
 def _campaign(options: argparse.Namespace) -> None:
@@ -363,6 +398,8 @@ def _campaign(options: argparse.Namespace) -> None:
         options.sensors,
         limbs=options.limbs,
         protocol=_protocol(options),
+        motions=options.motions,
+        role=options.motion_role,
         error_sizes=options.fit_error_sizes,
     )
     with progress_bar("Simulating", unit="take") as progress:

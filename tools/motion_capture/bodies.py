@@ -6,25 +6,22 @@ import multiprocessing
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.body.initial import Pose
-from sd2core.body.model import Skeleton
-from sd2core.body.rotations import applied, from_vector, product, to_vector
-from sd2core.body.shape import BodyShape
+from sd2core.body.rotations import applied, product, to_vector
 from sd2core.errors import Sd2Error
-from sd2core.files.atomic import atomic_write
+from sd2core.mocap.body_motion import BodyMotion, load_motions
 from sd2core.mocap.driving import SkeletonClip, puppet_of, resample_pose
 from sd2core.processes import end_with_parent
 from sd2core.progress import Progress, silent
-from tools.motion_capture.catalogue import RATE_HZ, Role, Trial, trials
+from tools.motion_capture.catalogue import RATE_HZ, Trial, trials
 from tools.motion_capture.points import MARKERS
+
+__all__ = ["BodyMotion", "drive_bodies", "load_motions", "minutes", "moved_transforms"]
 
 Floats = NDArray[np.float64]
 
@@ -33,65 +30,6 @@ _LEAST_S = 1.0
 _MOST_S = 20.0
 """Of one recording; what follows is much alike."""
 _NEAR_M = 4.0
-_LEG = ("upperleg01.L", "lowerleg01.L", "foot.L")
-
-
-@dataclass(frozen=True, eq=False)
-class BodyMotion:
-    """One trial as rotations of our joints; the world has y down, the floor at 0, and 30 Hz."""
-
-    trial: str
-    person: str
-    what: str
-    role: Role
-    shape: BodyShape  # of the person
-    vectors: Floats  # (T, J, 3) rotation vectors of the joints of sd2core.body.rig.JOINTS
-    translation_m: Floats  # (T, 3)
-    residual_m: float  # mean distance of the body's points from the recorded ones
-
-    def __len__(self) -> int:
-        return len(self.vectors)
-
-    def pose_on(self, skeleton: Skeleton, own: Skeleton, frames: slice) -> Pose:
-        """Pose of some frames on another skeleton, with steps as long as its legs.
-
-        ``own`` is the skeleton of the person's shape.
-        """
-        scale = _leg_m(skeleton) / _leg_m(own)
-        place_m = scale * (own.heads_m[0] + self.translation_m[frames]) - skeleton.heads_m[0]
-        return Pose(from_vector(self.vectors[frames]), place_m)
-
-    def save(self, path: Path) -> None:
-        """Write one ``.npz``, whole or not at all."""
-        arrays: dict[str, Any] = vars(self) | {
-            "shape": np.append(self.shape.coefficients, self.shape.stature_m),
-            "vectors": self.vectors.astype(np.float32),
-            "translation_m": self.translation_m.astype(np.float32),
-        }
-        with atomic_write(path) as stream:
-            np.savez_compressed(stream, **arrays)
-
-    @classmethod
-    def load(cls, path: Path) -> BodyMotion:
-        """Read what :meth:`save` wrote."""
-        with np.load(path, allow_pickle=False) as data:
-            known: dict[str, Any] = {
-                name: data[name].item() if not data[name].ndim else data[name].astype(np.float64)
-                for name in data.files
-            }
-        shape = known.pop("shape")
-        return cls(shape=BodyShape(shape[:-1], float(shape[-1])), **known)
-
-
-def _leg_m(skeleton: Skeleton) -> float:
-    heads_m = skeleton.heads_m[[skeleton.index[bone] for bone in _LEG]]
-    return float(np.linalg.norm(np.diff(heads_m, axis=0), axis=1).sum())
-
-
-def load_motions(folder: Path, role: Role) -> list[BodyMotion]:
-    """All motions of a folder that are for one use, by name."""
-    motions = [BodyMotion.load(path) for path in sorted(folder.glob("*.npz"))]
-    return [motion for motion in motions if motion.role == role]
 
 
 def drive_bodies(

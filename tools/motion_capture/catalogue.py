@@ -10,12 +10,12 @@ from __future__ import annotations
 import csv
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
+from sd2core.mocap.body_motion import RATE_HZ, Role
 from tools.motion_capture.points import (
     CMU_ASF,
     HAHNE_BVH,
@@ -28,10 +28,6 @@ from tools.motion_capture.points import (
 from tools.motion_capture.skeletons import read_amc, read_bvh
 
 Floats = NDArray[np.float64]
-Role = Literal["learn", "calibrate", "measure"]
-
-RATE_HZ = 30.0
-
 MEASURED = frozenset({"cmu02", "cmu08", "cmu09", "cmu12", "cmu49", "ui09", "ui10"})
 """Persons that nothing is learnt from or tuned on."""
 

@@ -15,6 +15,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing, contextmanager
 from pathlib import Path
 
+from sd2core.body.shape import ShapeSpace
 from sd2core.errors import Sd2Error
 from sd2core.mesh.vertex_parts import PARTS
 from sd2core.pairs.store import PairWriter, Take, TakeKey
@@ -23,7 +24,13 @@ from sd2core.progress import Progress, silent
 from sd2core.simulate.campaign.fit_errors import FitErrors
 from sd2core.simulate.campaign.motion import LABELS
 from sd2core.simulate.campaign.scene import subject_name
-from sd2core.simulate.campaign.takes import OPTIONS, Campaign, TakeMaker, take_name
+from sd2core.simulate.campaign.takes import (
+    OPTIONS,
+    Campaign,
+    TakeMaker,
+    motions_of,
+    take_name,
+)
 from sd2core.version import __version__
 
 _AHEAD = 3
@@ -57,6 +64,7 @@ def make_campaign(
     if subjects < 1:
         raise Sd2Error(f"{subjects} subjects", "at least one")
     known = FitErrors.load(errors)
+    captured = motions_of(campaign, ShapeSpace())
     writer = PairWriter(
         Path(out),
         kind="simulated",
@@ -66,6 +74,7 @@ def make_campaign(
         labels=LABELS,
         provenance={
             **campaign.provenance(),
+            **({} if captured is None else {"motions": captured.provenance}),
             "fit_errors": {**known.provenance, "sha256": digest(known)},
             "version": __version__,
         },

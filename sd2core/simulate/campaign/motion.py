@@ -40,7 +40,7 @@ from sd2core.simulate.people.walking import Mode
 LABELS = ("background", "left-to-right", "right-to-left", "up-to-down", "down-to-up")
 """Directions as the camera sees them; its left is the body's right."""
 
-Kind = Literal["gestures", "moving", "pacing", "resting"]
+Kind = Literal["gestures", "moving", "pacing", "resting", "captured"]
 KINDS: dict[Kind, float] = {"gestures": 0.74, "moving": 0.18, "pacing": 0.08}
 """Contents of a take, each with its probability."""
 _IN_TURN: tuple[Kind, ...] = ("gestures", "gestures", "resting")

@@ -13,7 +13,8 @@ motion would be anywhere.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +41,7 @@ PROCESSING = ProcessingOptions(clutter=CLUTTER)
 
 _NO_PLANE = np.array([0.0, 0.0, 0.0, 1.0])
 _BLOCK_FRAMES = 16
+_SMOOTH, _LOOKS = 0.25, (1, 2, 4, 8, 12)
 _EMPTY_FRAMES, _EMPTY_ROOM = 128, 2026
 
 
@@ -52,6 +54,22 @@ class TargetOptions:
     link: LinkBudget | None = field(default_factory=LinkBudget)
     # Least level of a cell over the noise's mean, in standard deviations of its power.
     above_noise: float = 5.0
+    smooth: bool = False  # All of the body's surface reflects in phase, without random phases.
+
+    def drawn(self, rng: np.random.Generator) -> TargetOptions:
+        """Options of another radar: looks, surface, noise within 10 dB, and its threshold."""
+        smooth = bool(rng.random() < _SMOOTH)
+        looks = 1 if smooth else int(rng.choice(_LOOKS))
+        noise_db, above = float(rng.uniform(-10.0, 10.0)), float(rng.uniform(3.0, 8.0))
+        link = self.link
+        if link is not None:
+            link = replace(link, noise_figure_db=link.noise_figure_db + noise_db)
+        return TargetOptions(looks, link, above, smooth)
+
+    def provenance(self) -> dict[str, Any]:
+        """Content for a campaign's provenance; once all surfaces were rough and nothing said so."""
+        said = asdict(self)
+        return said if self.smooth else {name: said[name] for name in said if name != "smooth"}
 
 
 def radar_target(
@@ -77,6 +95,8 @@ def radar_target(
     scene = MeshScene(mesh, config, sensor)
     assert mesh.faces is not None  # MeshScene refuses a mesh without
     phases = np.exp(2j * np.pi * rng.random((options.looks, len(mesh.faces))))
+    if options.smooth:
+        phases[:] = 1.0
     phases = phases.astype(np.complex64)
     static = WaveScene(mesh, config, sensor).static(reflectors)[0]  # (chirps, samples)
     chain = FrameChain(config, PROCESSING)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -84,12 +84,23 @@ class Setting:
     sensors: tuple[VirtualSensor, ...]  # The take's own beside the camera, then others.
     reflectors: tuple[Reflector, ...]
 
+    def turned(self, rng: np.random.Generator) -> Setting:
+        """The same scene with the person turned anyhow."""
+        return replace(self, heading_deg=float(rng.uniform(-180.0, 180.0)))
+
     def place(self, transforms: Floats) -> Floats:
         """Transforms (T, B, 3, 4) of a body on the floor's origin, brought here."""
         turn = about(np.array([0.0, 1.0, 0.0]), np.array([self.heading_deg]))[0]
         placed = np.einsum("ij,tbjk->tbik", turn, transforms)
         placed[..., 3] += self.place_m
         return placed
+
+
+def kept_away(transforms: Floats) -> Floats:
+    """Transforms of a body, farther away if it came nearer to the camera than others do."""
+    moved = transforms.copy()
+    moved[..., 2, 3] += max(0.0, RANGES_M[0] - float(transforms[:, 0, 2, 3].min()))
+    return moved
 
 
 def random_setting(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,13 +17,15 @@ from sd2core.body.skinning import pose_vertices
 from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.mocap.body_motion import Role
 from sd2core.pairs.store import Take
 from sd2core.radar_config import PAPER_RADAR, RadarConfig
+from sd2core.simulate.campaign.captured import CapturedMotions
 from sd2core.simulate.campaign.fit_errors import FitErrors
 from sd2core.simulate.campaign.motion import perform
 from sd2core.simulate.campaign.protocol import VARIED, Protocol
 from sd2core.simulate.campaign.radar import PROCESSING, TargetOptions, radar_target
-from sd2core.simulate.campaign.scene import random_setting, random_subject
+from sd2core.simulate.campaign.scene import kept_away, random_setting, random_subject
 from sd2core.timebase import Timebase
 
 FITTED: Resolution = "medium"
@@ -48,6 +51,8 @@ class Campaign:
     target: TargetOptions = field(default_factory=TargetOptions)
     limbs: bool = False  # The input is also split by the parts of the body.
     protocol: Protocol = VARIED
+    motions: Path | None = None  # Folder of recorded motions, for a protocol that has them.
+    role: Role = "learn"  # People of that folder.
     # Factor of the errors of a take's fit, drawn between these; 1: as measured, 0: none.
     error_sizes: tuple[float, float] = (1.0, 1.0)
 
@@ -58,6 +63,12 @@ class Campaign:
             raise Sd2Error(f"A take of {self.take_seconds:g} s", "2 to 600 s")
         if self.placements < 1:
             raise Sd2Error(f"{self.placements} placements", "at least one")
+        if (self.motions is None) != (self.protocol.movements == "swipes"):
+            raise Sd2Error(
+                f"Movements {self.protocol.movements} and recorded motions from {self.motions}",
+                "recorded motions for movements captured or both, and for those only",
+                "Say with --motions where they are",
+            )
         least, most = self.error_sizes
         if not 0.0 <= least <= most <= 10.0:
             raise Sd2Error(f"Errors of fits {least:g} to {most:g} times as large", "0 to 10 times")
@@ -75,13 +86,20 @@ class Campaign:
             "seed": self.seed,
             "take_seconds": self.take_seconds,
             "radar": self.radar.as_dict(),
-            "target": {**asdict(self.target), "clutter": PROCESSING.clutter},
+            "target": {**self.target.provenance(), "clutter": PROCESSING.clutter},
             "surfaces": {"synthetic": FITTED, "radar": TRUE},
             "synthesis": asdict(OPTIONS),
             **self.protocol.provenance(),
             # Campaigns of before say nothing: their errors were as measured.
             **({} if self.error_sizes == (1.0, 1.0) else {"error_sizes": self.error_sizes}),
         }
+
+
+def motions_of(campaign: Campaign, space: ShapeSpace) -> CapturedMotions | None:
+    """Recorded motions of a campaign, if it has any."""
+    if campaign.motions is None:
+        return None
+    return CapturedMotions(campaign.motions, campaign.role, space)
 
 
 class TakeMaker:
@@ -94,6 +112,7 @@ class TakeMaker:
         self._campaign = campaign
         self._errors = errors
         self._space = ShapeSpace()
+        self._captured = motions_of(campaign, self._space)
         self._bodies: dict[Resolution, tuple[Body, Floats]] = {
             resolution: (Body.load(resolution), self._space.directions_m(resolution))
             for resolution in (TRUE, FITTED)
@@ -120,15 +139,6 @@ class TakeMaker:
         subject = random_subject(self._space, campaign.seed, subject_number)
         skeleton = self._space.skeleton(subject.shape)
         times_s = campaign.radar.frame_repetition_s * np.arange(campaign.frames, dtype=np.float64)
-        performed = perform(
-            rngs[_MOTION],
-            subject,
-            skeleton,
-            self._space.base_skeleton,
-            times_s,
-            protocol=campaign.protocol,
-            number=number,
-        )
         setting = random_setting(
             rngs[_SETTING],
             subject.shape.stature_m,
@@ -136,11 +146,32 @@ class TakeMaker:
             campaign.radar,
             campaign.protocol,
         )
+        if self._captured is not None and campaign.protocol.captured(number):
+            performed = self._captured.perform(
+                rngs[_MOTION], subject, subject_number, skeleton, times_s
+            )
+            times_s = times_s[: len(performed.label)]
+            setting = setting.turned(rngs[_SETTING])
+        else:
+            performed = perform(
+                rngs[_MOTION],
+                subject,
+                skeleton,
+                self._space.base_skeleton,
+                times_s,
+                protocol=campaign.protocol,
+                number=number,
+            )
         transforms = setting.place(skeleton.transforms(*performed.motion))
+        if performed.kind == "captured":
+            transforms = kept_away(transforms)
         true = self._mesh(TRUE, subject.shape, transforms, times_s)
         fitted = self._fitted(rngs[_FIT], subject.shape, transforms, times_s)
         synthesizer = Synthesizer(fitted, OPTIONS, threads=1)
         seed = [campaign.seed, _TAKE, subject_number, number, _RADAR]
+        target = campaign.target
+        if campaign.protocol.drawn_radars:
+            target = target.drawn(np.random.default_rng([*seed, _TAKE]))
         takes = []
         for placement, sensor in enumerate(setting.sensors):
             radar = radar_target(
@@ -151,7 +182,7 @@ class TakeMaker:
                 OPTIONS.null_bins,
                 reflectors=setting.reflectors,
                 seed=[*seed, placement, *([look] if look else [])],
-                options=campaign.target,
+                options=target,
                 on_frame=on_frame,
             )
             synthetic = synthetic_map(synthesizer, sensor, limbs=campaign.limbs)

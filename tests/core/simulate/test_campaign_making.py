@@ -125,7 +125,13 @@ def test_several_processes_make_the_same_and_a_longer_one_begins_alike(
     out = tmp_path / "both.zarr"
     assert make_campaign(out, SHORT, subjects=2, minutes=0.5 * MINUTES, processes=2) == 2
     assert make_campaign(out, SHORT, subjects=2, minutes=MINUTES, processes=1) == 2
-    assert same(read_pairs(out), read_pairs(whole))
+    assert [take.key for take in read_pairs(out).takes] == [
+        take.key for take in read_pairs(whole).takes
+    ]
+    for one, other in zip(read_pairs(out).takes, read_pairs(whole).takes, strict=True):
+        assert one.synthetic.tobytes() == other.synthetic.tobytes()
+        # Products of matrices on one thread and on several differ in the last digit.
+        np.testing.assert_allclose(one.radar, other.radar, rtol=0.0, atol=1e-8 * one.radar.max())
 
 
 @pytest.mark.slow
