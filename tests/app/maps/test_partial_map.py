@@ -8,6 +8,8 @@ from hypothesis import strategies as st
 
 from sd2app.maps.partial_map import FINAL, PREVIEW, ROUGH, PartialMap, pieces
 from sd2core.doppler.synthesizer import Stretch
+from sd2core.maps import LimbMaps
+from sd2core.mesh.vertex_parts import JOINTS, QUANTITIES
 from sd2core.sensor import VirtualSensor
 
 
@@ -71,11 +73,15 @@ def test_another_plan_leaves_the_values_until_they_are_replaced():
 )
 def test_parts_are_painted_whole_also_where_they_become_zero(strokes):
     partial, wanted = PartialMap(2, 10), np.zeros((3, 2, 10), np.float32)
+    kinematics = np.zeros((len(JOINTS), len(QUANTITIES), 10), np.float32)
     for start, frames, seed in strokes:
         stop, rng = min(start + frames, 10), np.random.default_rng(seed)
         limbs = rng.random((3, 2, stop - start)).astype(np.float32)
         limbs[rng.random((3, 2)) < 0.6] = 0  # most parts stand still
-        painted = replace(stretch_of(stop - start, 1.0), limbs=limbs)
+        moves = rng.normal(size=(*kinematics.shape[:2], stop - start)).astype(np.float32)
+        split = LimbMaps(("a", "b", "c"), limbs, moves)
+        painted = replace(stretch_of(stop - start, 1.0), limbs=split)
         partial.paint(VirtualSensor(), start, painted, FINAL)
-        wanted[..., start:stop] = limbs
+        wanted[..., start:stop], kinematics[..., start:stop] = limbs, moves
         np.testing.assert_array_equal(partial.limbs.values, wanted)
+        np.testing.assert_array_equal(partial.limbs.kinematics, kinematics)

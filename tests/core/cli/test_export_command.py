@@ -85,13 +85,14 @@ def test_limb_maps_are_exported_on_request(sd2: Sd2, tmp_path: Path) -> None:
     for more in ((), ("--limbs",)):
         told = sd2(*asked[:1], *asked[2:], *more, "--dry-run", "--json")
         sizes.append(json.loads(told.out)["total_bytes"])
-    assert sizes[1] - sizes[0] == 9 * 20 * 32 * 4
+    assert sizes[1] - sizes[0] == (9 * 32 + 14 * 6) * 20 * 4
     told = sd2(*asked, "--limbs")
     assert told.code == 1
     assert "left out anna" in told.err
     assert "the parts of the body are not known" in told.err
     with open_dataset(out) as dataset:
         assert dataset["limbs"].shape == (1, 20, 9, 32)
+        assert dataset["kinematics"].shape == (1, 20, 14, 6)
     assert "trunk, upper_arm.L" in sd2("info", out).out
     refused = sd2(*asked)
     assert refused.code == 1
