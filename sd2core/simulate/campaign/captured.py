@@ -41,8 +41,9 @@ class CapturedMotions:
             if len(motion) >= _SHORTEST_S * RATE_HZ * math.exp(_PACE)
         ]
         if not motions:
+            least_s = _SHORTEST_S * math.exp(_PACE)
             raise Sd2Error(
-                f"{folder} holds no recorded motion to {role} of {_SHORTEST_S * math.exp(_PACE):.1f} s or more",
+                f"{folder} holds no recorded motion to {role} of {least_s:.1f} s or more",
                 "a folder that `python -m tools.motion_capture drive` made of motion capture",
                 "Say where it is with --motions",
             )
