@@ -82,17 +82,17 @@ class LimbMaps:
         object.__setattr__(self, "values", values)
 
     def inputs(self, parts: Sequence[str]) -> NDArray[np.float32]:
-        """Energies by frame, part and bin, (frames, len(parts) · bins), or kinematics.
+        """Energies by frame, part and bin, (frames, len(parts) · bins), or the map and kinematics.
 
-        A part without a side (``forearm``) is the sum of both.
-        :data:`~sd2core.mesh.vertex_parts.KINEMATICS` are all quantities of all joints, and the
-        root of what is seen of each part. Raises Sd2Error if a part is missing.
+        A part without a side (``forearm``) is the sum of both. For
+        :data:`~sd2core.mesh.vertex_parts.KINEMATICS` alone columns are those of the map, all
+        quantities of all joints, and the root of what is seen of each part. Raises Sd2Error if a
+        part is missing.
         """
+        if tuple(parts) == (KINEMATICS,):
+            return np.ascontiguousarray(self._moving().T)
         found = []
         for part in parts:
-            if part == KINEMATICS:
-                found.append(self._moving())
-                continue
             rows = [
                 number
                 for number, name in enumerate(self.parts)
@@ -106,7 +106,7 @@ class LimbMaps:
         return np.ascontiguousarray(np.concatenate(found).T)
 
     def _moving(self) -> NDArray[np.float32]:
-        """Columns of :data:`KINEMATICS`, one after another."""
+        """The map, and kinematics below it."""
         if self.kinematics is None:
             raise Sd2Error(
                 "The limb maps are of a version that did not keep kinematics",
@@ -114,7 +114,8 @@ class LimbMaps:
                 "Make the map or the pairs again with --limbs",
             )
         seen = np.sqrt(self.values.sum(axis=1))
-        return np.concatenate([self.kinematics.reshape(-1, seen.shape[1]), seen])
+        joints = self.kinematics.reshape(-1, seen.shape[1])
+        return np.concatenate([self.values.sum(axis=0), joints, seen])
 
     def between(self, start: int, stop: int) -> LimbMaps:
         """Limb maps of frames ``start`` to ``stop`` (exclusive)."""

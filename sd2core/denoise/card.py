@@ -35,8 +35,8 @@ PARTS_OF: Mapping[str, tuple[str, ...]] = {
 
 
 def maps_in(parts: Sequence[str]) -> int:
-    """Number of maps in an input of these parts; none: the map itself."""
-    return sum(part != KINEMATICS for part in parts) if parts else 1
+    """Number of maps in an input of these parts; none, or kinematics: the map itself."""
+    return max(1, len(parts))
 
 
 TrainedOn = Literal["simulated", "real"]
@@ -56,7 +56,8 @@ class ModelCard:
     trained_on: TrainedOn
     unit: str = "power"  # Meaning of the value 1 in the result.
     parts: tuple[str, ...] = ()
-    """Parts of the body whose limb maps are the input, or kinematics; none: the map itself."""
+    """Parts of the body whose limb maps are the input; none: the map itself; ``kinematics`` alone:
+    the map and how joints move."""
     title: str = ""  # Name in lists; the file's name if it is empty.
     # ``data``, ``command``, ``metrics``, ``limits`` and other content for JSON.
     about: Mapping[str, Any] = field(default_factory=dict)
@@ -90,19 +91,12 @@ class ModelCard:
     @property
     def more(self) -> int:
         """Number of numbers per frame in the input, after the maps."""
-        return KINEMATICS_COLUMNS if KINEMATICS in self.parts else 0
+        return KINEMATICS_COLUMNS if self.parts == (KINEMATICS,) else 0
 
     @property
     def features(self) -> int:
         """Numbers per frame of the input: the bins of all its maps, one map after the other."""
         return self.axis.bins * self.maps + self.more
-
-    @property
-    def moving_features(self) -> list[int]:
-        """Features that are zero where nothing moves."""
-        first = self.axis.bins * self.maps
-        speeds = range(len(JOINTS) * len(QUANTITIES) if self.more else 0)
-        return [*range(first), *(first + number for number in speeds[:: len(QUANTITIES)])]
 
     @property
     def null_features(self) -> list[int]:

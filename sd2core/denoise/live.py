@@ -141,7 +141,7 @@ class TrainedDenoiser:
         Where nothing moves there is nothing, and nowhere less than the floor (decision 53).
         """
         energies = self.card.scaling.target.expand(answer)
-        energies[~given[..., self.card.moving_features].any(axis=-1)] = 0.0
+        energies[~given[..., : self.card.features - self.card.more].any(axis=-1)] = 0.0
         energies[energies < self.card.scaling.floor] = 0.0
         energies[..., list(self.card.null_bins)] = 0.0
         return energies

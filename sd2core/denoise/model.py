@@ -32,7 +32,7 @@ class Denoiser(nn.Module):
         super().__init__()
         self.bins = bins
         self.parts = parts  # Maps in the input, one per part of the body, or the map alone.
-        self.more = more  # Numbers per frame after the maps: kinematics.
+        self.more = more  # Numbers per frame after the maps.
 
     @property
     def features(self) -> int:
@@ -87,6 +87,43 @@ class Denoiser(nn.Module):
     def ssm_parameters(self) -> Iterator[nn.Parameter]:
         """Parameters of state spaces: no weight decay, and a learning rate of their own."""
         return iter(())
+
+
+class WithKinematics(Denoiser):
+    """What a network makes of kinematics, added to a linear map of the frame's histogram.
+
+    The network sees kinematics alone: beside a histogram it would learn less from them.
+    """
+
+    def __init__(self, network: Denoiser) -> None:
+        super().__init__(network.bins, 1, network.more)
+        self.causal, self.window, self.longest = network.causal, network.window, network.longest
+        self.network = network
+        self.skip = nn.Linear(self.bins, self.bins)
+        nn.init.eye_(self.skip.weight)
+        nn.init.zeros_(self.skip.bias)
+
+    def forward(self, values: Tensor) -> Tensor:
+        """Denoise (batch, frames, features)."""
+        return self.network(values[..., self.bins :]) + self.skip(values[..., : self.bins])
+
+    def chunk(self, values: Tensor, state: State) -> tuple[Tensor, State]:
+        """Denoise the next frames, as :meth:`forward`."""
+        answer, state = self.network.chunk(values[..., self.bins :], state)
+        return answer + self.skip(values[..., : self.bins]), state
+
+    def step(self, frame: Tensor, state: State) -> tuple[Tensor, State]:
+        """Denoise the next frame."""
+        answer, state = self.network.step(frame[..., self.bins :], state)
+        return answer + self.skip(frame[..., : self.bins]), state
+
+    def initial_state(self, batch: int = 1) -> State:
+        """State of the network before the first frame."""
+        return self.network.initial_state(batch)
+
+    def ssm_parameters(self) -> Iterator[nn.Parameter]:
+        """Those of the network."""
+        return self.network.ssm_parameters()
 
 
 class Standard(nn.Module):

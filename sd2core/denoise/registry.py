@@ -107,7 +107,7 @@ def summary(name: str) -> str:
 def build(name: str, bins: int = 32, parts: int = 1, more: int = 0, **given: Any) -> Denoiser:
     """Create a model of :data:`MODELS` or :data:`FILTERS` with fresh weights.
 
-    ``parts`` is the number of maps in the input, ``more`` that of numbers per frame beside them;
+    ``parts`` is the number of maps in the input, ``more`` that of kinematics after the one map;
     filters take one map. Options that are not given
     come from :func:`options`. Raises Sd2Error when there is no such model or option, or an
     option is not of its kind, or for more bins than a map has.
@@ -119,9 +119,13 @@ def build(name: str, bins: int = 32, parts: int = 1, more: int = 0, **given: Any
         check_option(f"model {name}", option, value, entry.options, _LARGEST)
     module, _, class_name = entry.place.partition(".")
     found = getattr(import_module(f"sd2core.denoise.{module}"), class_name)
-    several = {} if name in FILTERS else {"parts": parts, "more": more}
+    several = {} if name in FILTERS else {"parts": 0 if more else parts, "more": more}
     model: Denoiser = found(bins, **several, **entry.fixed, **{**entry.options, **given})
-    return model
+    if not more:
+        return model
+    from sd2core.denoise.model import WithKinematics
+
+    return WithKinematics(model)
 
 
 def fit_filter(

@@ -112,9 +112,7 @@ class Scaling:
         bins = targets[0].shape[1] if targets else 0
         maps = [values[:, : parts * bins] for values in inputs]
         return cls(
-            Compression.fitted(maps, null_columns(null_bins, bins, parts), input_exponent)
-            if parts
-            else Compression(1.0, 1.0),
+            Compression.fitted(maps, null_columns(null_bins, bins, parts), input_exponent),
             Compression.fitted(targets, null_bins, target_exponent),
             0.5 * min(float(values[values > 0].min(initial=np.inf)) for values in targets),
             inputs[0].shape[1] - parts * bins,

@@ -105,7 +105,6 @@ REAL_MODELS = {
     "s4-both-limbs": (*_BOTH_WAYS, "--inputs", "limbs"),
     "s4-both-kinematics": (*_BOTH_WAYS, "--inputs", "kinematics"),
     "gru-kinematics": ("gru", "--inputs", "kinematics"),
-    "unet-kinematics": ("unet", "--inputs", "kinematics"),
 }
 
 REAL_HEADING = "Real pairs"

@@ -44,8 +44,9 @@ def trained(name: str, seed: int = 0, bins: int = 32, **card: Any) -> TrainedDen
     with torch.no_grad():
         for parameter in network.parameters():
             parameter += 0.3 * torch.randn_like(parameter)
-        if hasattr(network, "head"):
-            network.head.bias += 5.0  # negative answers are no energy
+        inner = getattr(network, "network", network)
+        if hasattr(inner, "head"):
+            inner.head.bias += 5.0  # negative answers are no energy
     about = {
         "model": name,
         "options": SMALL[name],

@@ -15,7 +15,6 @@ from sd2core.denoise.files import load_model, save_model
 from sd2core.denoise.live import TrainedDenoiser
 from sd2core.denoise.model import fit_standards
 from sd2core.denoise.registry import FILTERS
-from sd2core.denoise.scaling import Compression, Scaling
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap, LimbMaps
 from sd2core.mesh.vertex_parts import JOINTS, KINEMATICS, QUANTITIES, mirrored_columns
@@ -55,24 +54,27 @@ def test_all_of_the_parts_count(name: str, frames: int, bins: int) -> None:
 
 @pytest.mark.parametrize("name", NETWORKS)
 def test_every_network_takes_kinematics(name: str) -> None:
-    """Alone or beside maps; what learnt them standardises them."""
-    for parts, maps in ((MOVING, 0), ((*PARTS, *MOVING), 3)):
-        network = trained(name, parts=parts).network.eval()
-        more = KINEMATICS_COLUMNS
-        values = torch.randn(2, 72, 32 * maps + more) + 3.0
-        with torch.no_grad():
-            before = network(values)
-            assert before.shape == (2, 72, 32)
-            for column in (0, more - 1):
-                other = values.clone()
-                other[..., 32 * maps + column] += 1.0
-                assert not torch.allclose(network(other), before)
-            fit_standards(network, values.flatten(0, 1))
-            moved = values.clone()
-            moved[..., 32 * maps :] *= 5.0
-            fitted = network(values)
-            fit_standards(network, moved.flatten(0, 1))
-            torch.testing.assert_close(network(moved), fitted, rtol=1e-3, atol=1e-3)
+    """Beside the map; what learnt them standardises them."""
+    network = trained(name, parts=MOVING).network.eval()
+    values = torch.randn(2, 72, 32 + KINEMATICS_COLUMNS) + 3.0
+    with torch.no_grad():
+        before = network(values)
+        assert before.shape == (2, 72, 32)
+        for column in (0, 32, 31 + KINEMATICS_COLUMNS):
+            other = values.clone()
+            other[..., column] += 1.0
+            assert not torch.allclose(network(other), before)
+        fit_standards(network, values.flatten(0, 1))
+        moved = values.clone()
+        moved[..., 32:] *= 5.0
+        fitted = network(values)
+        fit_standards(network, moved.flatten(0, 1))
+        torch.testing.assert_close(network(moved), fitted, rtol=1e-3, atol=1e-3)
+        if name in CAUSAL:
+            first, state = network.chunk(moved[:, :11], network.initial_state(2))
+            then, state = network.step(moved[:, 11], state)
+            both = torch.cat([first, then[:, None]], 1)
+            torch.testing.assert_close(both, network(moved[:, :12]), rtol=1e-3, atol=1e-3)
 
 
 def test_left_and_right_exchanged_twice_are_as_before() -> None:
@@ -89,20 +91,19 @@ def test_left_and_right_exchanged_twice_are_as_before() -> None:
 
 def test_a_body_that_stands_still_is_not_seen() -> None:
     model = trained("gru", parts=MOVING)
-    values = np.random.default_rng(0).random((5, KINEMATICS_COLUMNS)).astype(np.float32)
+    values = np.random.default_rng(0).random((5, 32 + KINEMATICS_COLUMNS)).astype(np.float32)
     assert model.denoise_values(values).any(axis=1).all()
-    values[3, : len(JOINTS) * len(QUANTITIES) : len(QUANTITIES)] = 0.0
+    values[3, :32] = 0.0
     assert model.denoise_values(values).any(axis=1).tolist() == [True, True, True, False, True]
 
 
 def test_the_file_of_a_model_of_kinematics(tmp_path: Path) -> None:
-    scaling = Scaling(Compression(1.0, 1.0), Compression(1e-4, 0.25), more=KINEMATICS_COLUMNS)
-    model = trained("s4", parts=MOVING, scaling=scaling)
+    model = trained("s4", parts=MOVING)
     fit_standards(model.network, torch.randn(50, KINEMATICS_COLUMNS))
     save_model(tmp_path / "moving.safetensors", model)
     again = load_model(tmp_path / "moving.safetensors")
     assert (again.card.inputs, again.card.scaling.more) == ("kinematics", KINEMATICS_COLUMNS)
-    values = np.random.default_rng(0).normal(size=(30, KINEMATICS_COLUMNS)).astype(np.float32)
+    values = np.random.default_rng(0).random((30, 32 + KINEMATICS_COLUMNS)).astype(np.float32)
     np.testing.assert_array_equal(again.denoise_values(values), model.denoise_values(values))
 
 

@@ -142,8 +142,9 @@ def test_kinematics_come_with_limb_maps(tmp_path) -> None:  # type: ignore[no-un
     again = DopplerMap.load(tmp_path / "map.npz").limbs
     assert again is not None
     columns = again.inputs((KINEMATICS,))
-    assert columns.shape == (10, len(JOINTS) * len(QUANTITIES) + len(PARTS))
-    np.testing.assert_array_equal(columns[:, 0], made.limbs.kinematics[0, 0])
+    assert columns.shape == (10, 32 + len(JOINTS) * len(QUANTITIES) + len(PARTS))
+    np.testing.assert_allclose(columns[:, :32], made.values.T, rtol=1e-5, atol=1e-8)
+    np.testing.assert_array_equal(columns[:, 32], made.limbs.kinematics[0, 0])
     with pytest.raises(Sd2Error, match=r"did not keep kinematics.*--limbs"):
         LimbMaps(again.parts, again.values).inputs((KINEMATICS,))
     with pytest.raises(Sd2Error, match=r"Kinematics of shape \(2, 3, 4\)"):
