@@ -48,8 +48,9 @@ PAGE = """\
 # The denoiser
 
 How near do the bundled denoisers bring a synthetic map to a radar's? Measured on a person whom
-they have not seen, and on the bundled sample. **Every radar here is simulated**; other models, and
-real radar, are in [denoisers compared](denoiser-comparison.md). Made by
+they have not seen, and on the bundled sample. **Every radar here is simulated**; other models
+are in [denoisers compared](denoiser-comparison.md), a real radar in
+[denoisers on a real radar](real-denoisers.md). Made by
 
 ```sh
 make denoiser

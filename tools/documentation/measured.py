@@ -62,6 +62,10 @@ PAGES = {
     "fitting.md": Measured("make fitting", (*_BODY, "tools/fitting")),
     "denoiser.md": Measured("make denoiser", ("sd2core/denoise", *_DENOISERS, *_CAMPAIGN)),
     "denoiser-comparison.md": Measured("make denoiser-comparison", (*_LEARNING, *_CAMPAIGN)),
+    "real-denoisers.md": Measured(
+        "python -m tools.documentation.real_denoisers",
+        ("sd2core/pairs", "sd2core/mocap", *_LEARNING),
+    ),
     "range-synthesis.md": Measured("make range-synthesis", (*_LEARNING, *_CAMPAIGN)),
     "real-pairs.md": Measured(
         "python -m tools.documentation.real_pairs", ("sd2core/pairs", *_LEARNING)

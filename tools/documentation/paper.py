@@ -72,7 +72,7 @@ make paper
 on {machine}. **No real radar has part in this page, but in the paper's own numbers**: its data are
 not published, and `sd2 simulate campaign --protocol paper` stands in
 ([decision 26](decisions/0026-the-simulated-campaign.md)). Beside a real radar:
-[denoisers compared](denoiser-comparison.md#real-pairs), [real gestures](real-gestures.md).
+[denoisers on a real radar](real-denoisers.md), [real gestures](real-gestures.md).
 
 """
 

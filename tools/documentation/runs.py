@@ -116,6 +116,11 @@ def errors_of(group: Mapping[str, Any]) -> list[str]:
     return [spread(group[name]) for name in ERRORS]
 
 
+def run_of(group: Mapping[str, Any]) -> str:
+    """Name of the run without its seed, or of the filter."""
+    return group["models"][0]["name"].rpartition("-")[0] if group["trained"] else group["name"]
+
+
 def spread(values: Mapping[str, Any], digits: int = 3) -> str:
     """Mean over trainings, and their standard deviation where there are several."""
     sd = values["sd"]
