@@ -88,7 +88,7 @@ def check_fits(source: Source, header: Header) -> None:
                 "Make it with `sd2 synth --limbs`, or export without limbs",
             )
         if header.joints:
-            limbs.inputs((KINEMATICS,))
+            limbs.inputs((KINEMATICS,))  # refuses those of before there were kinematics
     lacking = [name for name in header.imu if name not in source.imu]
     if lacking:
         raise Sd2Error(

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal, get_args
 
+from sd2core.denoise.known import KnownMovements
 from sd2core.denoise.scaling import Scaling, null_columns
 from sd2core.errors import Sd2Error
 from sd2core.mesh.vertex_parts import JOINTS, KINEMATICS, PARTS, QUANTITIES
@@ -58,6 +59,7 @@ class ModelCard:
     parts: tuple[str, ...] = ()
     """Parts of the body whose limb maps are the input; none: the map itself; ``kinematics`` alone:
     the map and how joints move."""
+    known: KnownMovements | None = None  # What it learnt from; None: files of before do not say.
     title: str = ""  # Name in lists; the file's name if it is empty.
     # ``data``, ``command``, ``metrics``, ``limits`` and other content for JSON.
     about: Mapping[str, Any] = field(default_factory=dict)
@@ -122,6 +124,7 @@ class ModelCard:
             "trained_on": self.trained_on,
             "unit": self.unit,
             "parts": list(self.parts),
+            "known": None if self.known is None else asdict(self.known),
             "title": self.title,
             "about": dict(self.about),
             "parameters": self.parameters,
@@ -155,6 +158,7 @@ class ModelCard:
                 trained_on=content["trained_on"],
                 unit=str(content["unit"]),
                 parts=tuple(str(part) for part in content.get("parts", ())),
+                known=KnownMovements.from_json(content.get("known")),
                 title=str(content["title"]),
                 about=dict(content["about"]),
                 parameters=int(content["parameters"]),

@@ -138,13 +138,24 @@ class TrainedDenoiser:
     ) -> NDArray[np.float32]:
         """Energies (…, bins) from output of the network, of its input (…, features).
 
-        Where nothing moves there is nothing, and nowhere less than the floor (decision 53).
+        Where nothing moves there is nothing, and nowhere less than the floor (decision 53). What
+        the model does not know stays the synthetic map's
+        (:class:`~sd2core.denoise.known.KnownMovements`).
         """
         energies = self.card.scaling.target.expand(answer)
         energies[~given[..., : self.card.features - self.card.more].any(axis=-1)] = 0.0
         energies[energies < self.card.scaling.floor] = 0.0
+        if self.card.known is not None:
+            energies = self.card.known.passed_through(energies, self._whole(given), self.card.axis)
         energies[..., list(self.card.null_bins)] = 0.0
         return energies
+
+    def _whole(self, given: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Energies of the whole map (…, bins) in the network's input (…, features)."""
+        card = self.card
+        maps = card.scaling.input.expand(given[..., : card.maps * card.axis.bins])
+        whole: NDArray[np.float32] = maps.reshape(*given.shape[:-1], card.maps, -1).sum(axis=-2)
+        return whole
 
     def live(self) -> LiveDenoiser:
         """Denoiser of single frames, at the model's frame rate."""
@@ -212,6 +223,9 @@ class TrainedDenoiser:
                 f"frames at {doppler.timebase.frames_per_s:.4g}/s were interpolated to the model's"
                 f" {card.frame_rate_hz:g}/s and back"
             )
+        strange = card.known and card.known.note(doppler.values.T, card.axis)
+        if strange:
+            notes.append(strange)
         told = {
             "model": card.model,
             "name": card.name,

@@ -15,6 +15,7 @@ from lightning.pytorch.strategies import DDPStrategy
 
 from sd2core.denoise.card import PARTS_OF, ModelCard, maps_in
 from sd2core.denoise.files import save_model
+from sd2core.denoise.known import KnownMovements
 from sd2core.denoise.live import TrainedDenoiser
 from sd2core.denoise.model import Denoiser, fit_standards, parameter_count
 from sd2core.denoise.registry import build, options
@@ -74,7 +75,10 @@ def carry_out(
             parts=maps_in(parts),
         )
         network = _network(config, data, scaling, checkpoint)
-        about = _About(config, data, scaling, command, machine_words(device, precision, threads))
+        machine = machine_words(device, precision, threads)
+        learnt_pairs = [(take.synthetic, take.radar) for take in data.learnt_takes]
+        known = KnownMovements.of(learnt_pairs, data.pairs.axis)
+        about = _About(config, data, scaling, command, machine, known)
         learnt = config.training
         callbacks = TrainingCallbacks(
             config,
@@ -189,6 +193,7 @@ class _About:
     scaling: Scaling
     command: str
     machine: dict[str, Any]
+    known: KnownMovements | None
 
     def save(self, path: Path, network: Denoiser, found: Validation, epoch: int) -> None:
         training = network.training
@@ -210,6 +215,7 @@ class _About:
             frame_rate_hz=pairs.frame_rate_hz,
             trained_on=pairs.kind,
             parts=self.data.parts,
+            known=self.known,
             about={
                 "data": self._data_words(),
                 "command": self.command,
