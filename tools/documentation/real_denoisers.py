@@ -68,6 +68,8 @@ that of the mean. How much of it the radar's few points allow:
 
 {gain} {beside_ridge}
 
+Wanted were 35 % less than *none*, a correlation of 0.84, and peaks nearer than `ridge`'s.
+
 ## What this cannot say
 
 - Three persons' exercises, not swipes, and the input is a Kinect's skeleton, not a fitted video.
