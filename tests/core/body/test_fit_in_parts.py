@@ -298,9 +298,8 @@ class TestFit:
         """Fitted in windows, they differ little from those of one window, seams or not."""
         known = swiping(self.FRAMES)
         found = []
-        for frames in (self.FRAMES, 90):
+        for frames in (self.FRAMES, 120):
             with pytest.MonkeyPatch.context() as patch:
-                patch.setattr(fit_windows, "_OVERLAP_FRAMES", 30)
                 patch.setattr(fit_windows, "_WINDOW_FRAMES", frames)
                 patch.setattr(track, "PART_FRAMES", frames)
                 found.append(fit_body(known, CAMERA, stature_m=STATURE_M).keypoints_m)
@@ -310,7 +309,7 @@ class TestFit:
         apart = velocity_mps(found[1], times_s) - true
         shared = np.zeros(self.FRAMES, bool)
         for seam in seams:
-            shared[seam - 1 : seam + 30 + 1] = True
+            shared[seam - 1 : seam + fit_windows._OVERLAP_FRAMES + 1] = True
         assert len(seams) == 1
         typical = np.sqrt((true**2).sum(axis=-1).mean())
         at_seams, elsewhere = (
