@@ -85,11 +85,14 @@ class Search:
         )
 
     def _forget(self, number: int, since_s: float) -> None:
-        """Take back what the looks up to a number found after a time: that was somebody else."""
-        row = number
-        while row > 0 and self._times_s[row] > since_s:
-            self._rois[row], self._confidence[row], self._unclear[row] = np.nan, 0.0, True
-            row -= 1
+        """Take back what the looks up to a number found after a time: that was somebody else.
+
+        The other half, and the start, stay as they are.
+        """
+        half = slice(self._turn if number >= self._turn else 1, number + 1)
+        later = self._times_s[half] > since_s
+        self._rois[half][later], self._confidence[half][later] = np.nan, 0.0
+        self._unclear[half][later] = True
 
     def _pictures(self) -> Iterator[Pixels]:
         """Pictures still to be searched, in that order."""

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,9 +15,11 @@ from hypothesis import strategies as st
 from sd2core.body.identity import ALIKE, Looks, Signature, Trail, alike, similarity
 from sd2core.body.landmark_models import LandmarkModels
 from sd2core.body.landmarks import find_landmarks
-from sd2core.body.person_selection import Rectangle
+from sd2core.body.person_selection import Rectangle, Start
+from sd2core.body.person_tracker import PersonTracker
 from sd2core.body.roi import Roi
 from sd2core.body.track import TORSO_CORNERS, LandmarkTrack
+from sd2core.body.tracking import Search
 from sd2core.io.video import open_video
 
 STEP_S = 1.0 / 10.0
@@ -212,3 +216,20 @@ def test_another_one_who_comes_when_the_person_has_gone_is_not_taken_for_them(
     assert track.present[:7].all()
     assert not track.present[16:].any()
     assert "whoever is seen may be somebody else" in " ".join(track.notes)
+
+
+@pytest.mark.parametrize(("number", "since_s", "taken_back"), [
+    (8, 0.3, [4, 5, 6, 7, 8]), (13, 0.0, [10, 11, 12, 13]), (13, 0.2, [12, 13]), (8, 0.0, range(1, 9)),
+])  # fmt: skip
+def test_what_is_taken_back_is_of_one_half_of_the_search(
+    number: int, since_s: float, taken_back: list[int]
+) -> None:
+    """From a start in frame 4 ten looks lead ahead and four back; times are of either half."""
+    times = SimpleNamespace(times_s=0.1 * np.arange(14))
+    video: Any = SimpleNamespace(timebase=times, width=320, height=240)
+    nobody: Any = None
+    search = Search(video, Start(4, Roi(1.0, 1.0, 1.0)), PersonTracker(nobody, nobody))
+    search._rois[:] = 1.0
+    search._forget(number, since_s + 1e-9)
+    assert np.flatnonzero(np.isnan(search._rois[:, 0])).tolist() == list(taken_back)
+    assert np.flatnonzero(search._unclear).tolist() == list(taken_back)
