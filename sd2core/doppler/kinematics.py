@@ -5,7 +5,7 @@ Joints are found on any surface whose parts are known: where two parts meet, and
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -33,10 +33,23 @@ _BLOCK_FRAMES = 256
 
 @dataclass(frozen=True, eq=False)
 class _Joints:
-    """Joints of a mesh in all frames, whatever the sensor is."""
+    """Joints of a mesh, whatever the sensor is; places are found where they are asked for."""
 
-    places_m: Floats  # (T, J, 3)
-    limbs: NDArray[np.intp] | None  # (J,) limb of its uncertainty that each joint follows
+    parts: VertexParts
+    rows: list[NDArray[np.intp]]  # vertices whose mean each joint is
+    places_m: Floats  # (T, J, 3), in those blocks of frames that are known
+    known: NDArray[np.bool_]
+
+    def between(self, mesh: MeshSequence, start: int, stop: int) -> Floats:
+        """Places in frames ``start`` to ``stop`` (exclusive), (n, J, 3)."""
+        for number in range(start // _BLOCK_FRAMES, -(-stop // _BLOCK_FRAMES)):
+            if not self.known[number]:
+                first = number * _BLOCK_FRAMES
+                block = mesh.read(first, min(first + _BLOCK_FRAMES, mesh.frame_count))
+                found = [block[:, row].mean(axis=1, dtype=np.float64) for row in self.rows]
+                self.places_m[first : first + len(block)] = np.stack(found, axis=1)
+                self.known[number] = True
+        return self.places_m[start:stop]
 
 
 def kinematics(
@@ -68,7 +81,9 @@ def kinematics(
     joints = _joints_of(mesh, parts)
     place = np.asarray(sensor.position_m, np.float64)
     knots = moments(mesh.times_s, np.arange(start, stop), 1, mesh.presence)
-    before, after = (joints.places_m[each[:, 0]] for each in (knots.before, knots.after))
+    origin = min(int(knots.before.min()), start)
+    places_m = joints.between(mesh, origin, max(int(knots.after.max()) + 1, stop))
+    before, after = (places_m[each[:, 0] - origin] for each in (knots.before, knots.after))
     towards = radial_velocity(
         before.transpose(0, 2, 1), after.transpose(0, 2, 1), place, knots.duration_s
     )
@@ -76,17 +91,23 @@ def kinematics(
     speed = np.divide(
         moved_m, knots.duration_s, out=np.zeros_like(moved_m), where=knots.duration_s > 0
     )
-    own = joints.places_m[start:stop]
+    own = places_m[start - origin : stop - origin]
     about = own - own[:, :1]
     nearer = place - own[:, 0]
     nearer[:, 1] = 0.0
     nearer /= np.maximum(np.linalg.norm(nearer, axis=1, keepdims=True), 1e-9)
     aside = np.cross(nearer, [0.0, 1.0, 0.0])
     sigma = np.zeros_like(towards)
-    if mesh.uncertainty is not None and joints.limbs is not None:
-        at_limbs = np.zeros((stop - start, len(mesh.uncertainty.limbs), 3))
-        at_limbs[:, joints.limbs] = own
-        sigma = mesh.uncertainty.towards(place, at_limbs, start)[:, joints.limbs]
+    if (known := mesh.uncertainty) is not None:
+        limbs = [np.bincount(known.vertex_limb[row]).argmax() for row in joints.rows]
+        of_joints = replace(
+            known,
+            limbs=JOINTS,
+            vertex_limb=np.arange(len(JOINTS), dtype=np.uint8),
+            along_mps=known.along_mps[start:stop, limbs],
+            across_mps=known.across_mps[start:stop, limbs],
+        )
+        sigma = of_joints.towards(place, own)
     told = (
         towards, speed, np.einsum("tjk,tk->tj", about, nearer),
         np.einsum("tjk,tk->tj", about, aside), -about[..., 1], sigma,
@@ -101,20 +122,15 @@ _FOUND: WeakKeyDictionary[MeshSequence, _Joints] = WeakKeyDictionary()
 
 def _joints_of(mesh: MeshSequence, parts: VertexParts) -> _Joints:
     """Joints of a mesh, found once."""
-    if mesh not in _FOUND:
+    found = _FOUND.get(mesh)
+    if found is None or found.parts is not parts:
         first = mesh.frame(int(np.argmax(mesh.presence.there))).astype(np.float64)
         rows = joint_vertices(first, mesh.faces, parts)
-        places = np.empty((mesh.frame_count, len(rows), 3))
-        for start in range(0, mesh.frame_count, _BLOCK_FRAMES):
-            block = mesh.read(start, min(start + _BLOCK_FRAMES, mesh.frame_count))
-            for number, row in enumerate(rows):
-                places[start : start + len(block), number] = block[:, row].mean(axis=1)
-        limbs = None
-        if mesh.uncertainty is not None:
-            of_vertex = mesh.uncertainty.vertex_limb
-            limbs = np.array([np.bincount(of_vertex[row]).argmax() for row in rows], np.intp)
-        _FOUND[mesh] = _Joints(places, limbs)
-    return _FOUND[mesh]
+        places_m = np.zeros((mesh.frame_count, len(rows), 3))
+        blocks = -(-mesh.frame_count // _BLOCK_FRAMES)
+        found = _Joints(parts, rows, places_m, np.zeros(blocks, bool))
+        _FOUND[mesh] = found
+    return found
 
 
 def joint_vertices(

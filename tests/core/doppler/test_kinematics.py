@@ -151,6 +151,28 @@ def test_kinematics_come_with_limb_maps(tmp_path) -> None:  # type: ignore[no-un
         LimbMaps(again.parts, again.values, np.zeros((2, 3, 4), np.float32))
 
 
+def test_only_the_frames_around_a_stretch_are_read() -> None:
+    """A long recording is streamed: a stretch must not read all of it."""
+    long = turning_body(600)
+    whole = told(long)
+    read: list[tuple[int, int]] = []
+
+    class Watched:
+        shape, dtype, ndim = long.vertices.shape, long.vertices.dtype, 3
+
+        def __getitem__(self, key: slice | int) -> np.ndarray:
+            if isinstance(key, slice):
+                read.append((key.start, key.stop))
+            return np.asarray(long.vertices[key])
+
+    watched = replace(long, vertices=Watched())
+    for _ in range(2):
+        part = kinematics(watched, known_parts(watched), VirtualSensor(), (300, 310))
+        np.testing.assert_array_equal(part, whole[..., 300:310])
+    # A block of frames, and one to find the joints in.
+    assert sum(stop - start for start, stop in read) <= 256 + 1
+
+
 def test_other_parts_have_none() -> None:
     thirds = np.arange(TURNING.vertex_count) % 3
     assert kinematics(TURNING, VertexParts(("a", "b", "c"), thirds), VirtualSensor()) is None
