@@ -218,9 +218,15 @@ def test_another_one_who_comes_when_the_person_has_gone_is_not_taken_for_them(
     assert "whoever is seen may be somebody else" in " ".join(track.notes)
 
 
-@pytest.mark.parametrize(("number", "since_s", "taken_back"), [
-    (8, 0.3, [4, 5, 6, 7, 8]), (13, 0.0, [10, 11, 12, 13]), (13, 0.2, [12, 13]), (8, 0.0, range(1, 9)),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("number", "since_s", "taken_back"),
+    [
+        (8, 0.3, [4, 5, 6, 7, 8]),
+        (8, 0.0, list(range(1, 9))),
+        (13, 0.2, [12, 13]),
+        (13, 0.0, [10, 11, 12, 13]),
+    ],
+)
 def test_what_is_taken_back_is_of_one_half_of_the_search(
     number: int, since_s: float, taken_back: list[int]
 ) -> None:
@@ -231,5 +237,5 @@ def test_what_is_taken_back_is_of_one_half_of_the_search(
     search = Search(video, Start(4, Roi(1.0, 1.0, 1.0)), PersonTracker(nobody, nobody))
     search._rois[:] = 1.0
     search._forget(number, since_s + 1e-9)
-    assert np.flatnonzero(np.isnan(search._rois[:, 0])).tolist() == list(taken_back)
-    assert np.flatnonzero(search._unclear).tolist() == list(taken_back)
+    assert np.flatnonzero(np.isnan(search._rois[:, 0])).tolist() == taken_back
+    assert np.flatnonzero(search._unclear).tolist() == taken_back
