@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from sd2core.cli.options import add_command, add_json, add_map_output, add_value
+from sd2core.cli.options import add_command, add_json, add_map_output, add_texture, add_value
 from sd2core.cli.output import progress_bar
 from sd2core.errors import Sd2Error
 
@@ -25,7 +25,8 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         ),
         examples=(
             "  sd2 denoise map.npz --out denoised.npz\n"
-            "  sd2 denoise map.npz --out denoised.npz --model runs/first/best.safetensors"
+            "  sd2 denoise map.npz --out denoised.npz --model runs/first/best.safetensors\n"
+            "  sd2 denoise map.npz --out as-the-radar-shows-it.npz --texture"
         ),
     )
     add_value(parser, "map", Path, "MAP", "a map from `sd2 synth`")
@@ -36,6 +37,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         help="a model file from `sd2 train`, or the name of one that is installed (default: of"
         " those that come with SD² Studio the one for limb maps, where there are such)",
     )
+    add_texture(parser)
     add_json(parser)
 
 
@@ -62,8 +64,11 @@ def _denoise(options: argparse.Namespace) -> None:
     # Before torch is loaded, which takes seconds.
     card = describe_model(path)
     check_map(doppler, card)
+    texture = None if options.texture is None else card.needed_texture()
     with progress_bar("Denoising") as progress:
         denoised = load_model(path).denoise(doppler, progress)
+    if texture is not None:
+        denoised = texture.on(denoised, options.texture)
     denoised.save(options.out)
     description = describe_map(options.out, denoised)
     description.facts = {"model": model_words(card)} | description.facts

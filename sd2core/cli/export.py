@@ -17,6 +17,7 @@ from sd2core.cli.options import (
     add_limbs,
     add_output,
     add_people_kept_out,
+    add_texture,
     add_value,
     bin_list,
     given,
@@ -170,6 +171,7 @@ def _add_making(parser: argparse.ArgumentParser) -> None:
         metavar="FILE|NAME",
         help="the denoiser (default: that of each recording, or the bundled one)",
     )
+    add_texture(group)
     add_count(group)
     add_axis(group)
     group.add_argument(
@@ -262,6 +264,7 @@ def _making(options: argparse.Namespace) -> Making:
         else read_placements(Path(options.placements)),
         simulation=None if options.simulate is None else Simulation(named_radar(options.simulate)),
         model=options.model,
+        texture=options.texture,
         limbs=options.limbs,
         imu=options.imu,
     )

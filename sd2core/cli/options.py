@@ -47,6 +47,19 @@ def add_value(
     parser.add_argument(name, type=kind, metavar=metavar, default=default, help=text)
 
 
+def add_texture(parser: argparse._ActionsContainer) -> None:
+    """Add ``--texture``."""
+    parser.add_argument(
+        "--texture",
+        type=int,
+        nargs="?",
+        const=0,
+        metavar="SEED",
+        help="draw denoised maps as a radar would show them, with its speckle and gaps, instead"
+        " of the mean (SEED of the random numbers: 0)",
+    )
+
+
 def add_json(parser: argparse._ActionsContainer) -> None:
     """Add ``--json``."""
     parser.add_argument(

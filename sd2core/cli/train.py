@@ -42,6 +42,8 @@ _SETTINGS = {
     "range_factor": ("data", "range_factor"),
     "model": ("model", "name"),
     "model_inputs": ("model", "inputs"),
+    "start": ("model", "start"),
+    "frozen": ("model", "frozen"),
     "epochs": ("training", "epochs"),
     "minutes": ("training", "minutes"),
     "batch_size": ("training", "batch_size"),
@@ -87,6 +89,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             "  sd2 train campaign.zarr mars.zarr --test-subjects s6 --seed 1 --out runs/both\n"
             "  sd2 train settings.toml --epochs 100 --out runs/short\n"
             "  sd2 train --resume runs/s4\n"
+            "  sd2 train mine.zarr --from denoiser --learning-rate 0.0005 --out runs/mine\n"
             "  sd2 train campaign.zarr --set channels=64 --set dropout=0.1 --show-settings"
         ),
     )
@@ -130,6 +133,18 @@ def _add_learning(parser: argparse.ArgumentParser) -> None:
         metavar="NAME=VALUE",
         help="an option of the model, e.g. channels=64; may be given several times",
     )
+    group.add_argument(
+        "--from",
+        dest="start",
+        metavar="FILE|NAME",
+        help="go on from a model with pairs of one's own",
+    )
+    group.add_argument(
+        "--frozen",
+        action="store_true",
+        default=None,
+        help="with --from: let the last layers learn alone, for very few pairs",
+    )
     add_value(group, "--epochs", positive_int, "N", "passes over all segments (default: 500)")
     group.add_argument(
         "--minutes",
@@ -147,9 +162,9 @@ def _add_learning(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument(
         "--early-stopping",
-        type=positive_int,
+        type=int,
         metavar="N",
-        help="end after N epochs without a better one (default: never)",
+        help="end after N epochs without a better one, 0: never (default: 100)",
     )
     group.add_argument(
         "--velocity-weight",
@@ -249,7 +264,7 @@ def _option(text: str) -> tuple[str, Any]:
 
 def _train(options: argparse.Namespace) -> int:
     from sd2core.train.config import config_text
-    from sd2core.train.start import begin, check, go_on
+    from sd2core.train.start import begin, check, go_on, with_start
 
     if options.resume is not None:
         _refuse_with_resume(options)
@@ -258,6 +273,7 @@ def _train(options: argparse.Namespace) -> int:
         return _say_ending(options, options.resume, ending)
     config = _config(options)
     if options.show_settings:
+        config = with_start(config)
         check(config)
         print(config_text(config, Path.cwd()), end="")
         return 0
@@ -302,6 +318,10 @@ def _config(options: argparse.Namespace) -> TrainConfig:
             "Make some with `sd2 simulate campaign`",
         )
     values: dict[str, dict[str, Any]] = {}
+    if options.start is not None:
+        from sd2core.denoise.files import find_model
+
+        options.start = find_model(options.start)
     if options.background:
         values["machine"] = {"threads": 1, "nice": _BACKGROUND_NICE}
     for option, value in given(options, _SETTINGS).items():

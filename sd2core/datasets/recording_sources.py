@@ -81,6 +81,8 @@ class Making:
     model : str, optional
         Denoiser, by file or name; None: that of the recording, or the bundled one where
         none is chosen. A recording that is set to have no denoiser has no denoised map.
+    texture : int, optional
+        Seed with which denoised maps are drawn as the radar would show them; None: the mean.
     limbs : bool
         Split the synthetic map by the parts of the body; a recording where they are not known
         fails.
@@ -94,6 +96,7 @@ class Making:
     placements: Placements | Literal["planned"] | None = None
     simulation: Simulation | None = None
     model: str | None = None
+    texture: int | None = None
     limbs: bool = False
     imu: tuple[str, ...] = ()
 
@@ -172,7 +175,7 @@ class _Shared:
 
     def __init__(self, making: Making) -> None:
         self.making = making
-        self._denoising = Denoising()
+        self._denoising = Denoising(making.texture)
         self._opened: _Opened | None = None
 
     def opened(self, recording: Recording) -> _Opened:
@@ -392,6 +395,7 @@ def _fingerprint(recording: Recording, key: SourceKey, making: Making) -> str:
         "simulation": None if making.simulation is None else making.simulation.as_json(),
         "kinds": making.kinds,
         **({"imu": making.imu} if making.imu else {}),
+        **({} if making.texture is None else {"texture": making.texture}),
         "files": [
             [cached_digest(file) for file in files_at(path)]
             for path in (recording.mesh, recording.faces, recording.radar, *models)
@@ -411,9 +415,10 @@ def _models_of(recording: Recording, making: Making) -> list[Path]:
 
 
 class Denoising:
-    """Denoiser of maps that keeps the model used last."""
+    """Denoiser of maps that keeps the model used last; with a seed it draws their texture."""
 
-    def __init__(self) -> None:
+    def __init__(self, texture: int | None) -> None:
+        self._texture = texture
         self._path: Path | None = None
         self._model: TrainedDenoiser | None = None
 
@@ -424,4 +429,7 @@ class Denoising:
 
             check_map(synthetic, describe_model(path))  # before torch is loaded: it takes seconds
             self._model, self._path = load_model(path), path
-        return self._model.denoise(synthetic)
+        denoised = self._model.denoise(synthetic)
+        if self._texture is None:
+            return denoised
+        return self._model.card.needed_texture().on(denoised, self._texture)

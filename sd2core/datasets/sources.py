@@ -18,7 +18,7 @@ from sd2core.datasets.recording_sources import (
     labels_and_classes,
     recording_sources,
 )
-from sd2core.datasets.source import KINDS, LazySource, Outline, Source, SourceKey, label_per_frame
+from sd2core.datasets.source import LazySource, Outline, Source, SourceKey, label_per_frame
 from sd2core.denoise.files import default_name, find_model
 from sd2core.errors import Sd2Error
 from sd2core.files.digests import cached_digest
@@ -84,7 +84,7 @@ def gather(
             "Leave it out, or export without inertial sensors",
         )
     labelled = dict(zip(maps, label_files, strict=False))
-    found = pair_sources(pairs, making.kinds, making.model, limbs=making.limbs) if pairs else []
+    found = pair_sources(pairs, making) if pairs else []
     recordings = {path: name for path, name in zip(single, names, strict=True) if path not in maps}
     found += recording_sources(list(recordings), list(recordings.values()), making)
     for path, name in zip(single, names, strict=True):
@@ -175,22 +175,16 @@ def _sensor(meta: dict[str, Any]) -> VirtualSensor:
 # -- Pairs: synthetic Doppler beside a radar's, take by take -------------------------------------
 
 
-def pair_sources(
-    paths: Sequence[Path],
-    kinds: tuple[MapKind, ...] = KINDS,
-    model: str | None = None,
-    *,
-    limbs: bool = False,
-) -> list[LazySource]:
+def pair_sources(paths: Sequence[Path], making: Making) -> list[LazySource]:
     """Return one source per take of the stores of pairs.
 
     Subjects of the same name in different stores are different people: they are then called
-    ``STORE:NAME``. Denoised maps are made from the synthetic ones, with a ``model`` given by file
-    or name; None: the bundled one. With ``limbs``, stores without limb maps raise Sd2Error.
+    ``STORE:NAME``. Of the making count its kinds, model, texture and limbs: with those, stores
+    without limb maps raise Sd2Error.
     """
-    stores = [_PairStore(path, kinds, model) for path in paths]
+    stores = [_PairStore(path, making) for path in paths]
     unsplit = [str(one.path) for one in stores if not one.parts]
-    if limbs and unsplit:
+    if making.limbs and unsplit:
         raise Sd2Error(
             f"{', '.join(unsplit)}: pairs without limb maps",
             "pairs that are split by the parts of the body",
@@ -206,20 +200,21 @@ def pair_sources(
 
 
 class _PairStore:
-    def __init__(self, path: Path, kinds: tuple[MapKind, ...], model: str | None) -> None:
+    def __init__(self, path: Path, making: Making) -> None:
         self.path = path
+        self._texture = making.texture
         self._header, self.takes, self._arrays = open_takes(path)
         self._radar: MapKind = self._header["kind"]
         possible: tuple[MapKind, ...] = ("synthetic", "denoised", self._radar)
-        self._kinds = tuple(kind for kind in possible if kind in kinds)
+        self._kinds = tuple(kind for kind in possible if kind in making.kinds)
         self._axis = VelocityAxis(int(self._header["bins"]), float(self._header["v_max_mps"]))
         self._null_bins = tuple(self._header["null_bins"])
         self._labels = tuple(self._header["labels"])
         self.parts = tuple(self._header.get("parts", ()))
         self._model: Path | None = None
         if "denoised" in self._kinds:
-            self._model = find_model(model or default_name(limbs=bool(self.parts)))
-        self._denoising = Denoising()
+            self._model = find_model(making.model or default_name(limbs=bool(self.parts)))
+        self._denoising = Denoising(making.texture)
 
     def lazy(self, number: int, subject: str) -> LazySource:
         take = self.takes[number]
@@ -234,9 +229,11 @@ class _PairStore:
     def _fingerprint(self, take: dict[str, Any]) -> str:
         """Hash of the take's own rows, as a store may grow."""
         model = "" if self._model is None else cached_digest(self._model)
+        texture = [] if self._texture is None else [self._texture]
         about = {name: value for name, value in take.items() if name not in ("start", "stop")}
         sums = hashlib.blake2b(
-            json.dumps([about, self._header["kind"], self._kinds, model]).encode(), digest_size=16
+            json.dumps([about, self._header["kind"], self._kinds, model, *texture]).encode(),
+            digest_size=16,
         )
         for name in self._arrays:
             sums.update(np.ascontiguousarray(self._part(name, take)).data)

@@ -9,13 +9,15 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 from sd2core.denoise.known import KnownMovements
+from sd2core.denoise.registry import options_of_version_1
 from sd2core.denoise.scaling import Scaling, null_columns
+from sd2core.denoise.texture import Texture
 from sd2core.errors import Sd2Error
 from sd2core.mesh.vertex_parts import JOINTS, KINEMATICS, PARTS, QUANTITIES
 from sd2core.sensor import VelocityAxis
 
 FORMAT = "sd2-denoiser"
-VERSION = 1
+VERSION = 2
 
 DENOISER_PARTS = ("trunk", "upper_arm", "forearm", "thigh", "lower_leg")
 """Parts of the body whose limb maps a new model takes. Both sides together: apart they gain
@@ -59,6 +61,7 @@ class ModelCard:
     parts: tuple[str, ...] = ()
     """Parts of the body whose limb maps are the input; none: the map itself; ``kinematics`` alone:
     the map and how joints move."""
+    texture: Texture | None = None  # Of the radar's maps about the answers; None: not known.
     known: KnownMovements | None = None  # What it learnt from; None: files of before do not say.
     title: str = ""  # Name in lists; the file's name if it is empty.
     # ``data``, ``command``, ``metrics``, ``limits`` and other content for JSON.
@@ -110,6 +113,16 @@ class ModelCard:
         """Name of the file, without its suffix; the kind of model before there is a file."""
         return self.path.stem if self.path is not None else self.model
 
+    def needed_texture(self) -> Texture:
+        """Texture of the radar's maps; Sd2Error if the model does not know it."""
+        if self.texture is None:
+            raise Sd2Error(
+                f"The model {self.title or self.name} does not know the texture of a radar's maps",
+                "one that was trained by this version, or later",
+                "Train it again with `sd2 train`, or leave --texture out",
+            )
+        return self.texture
+
     def to_json(self) -> dict[str, Any]:
         """Content of the header of a model file."""
         return {
@@ -125,6 +138,7 @@ class ModelCard:
             "unit": self.unit,
             "parts": list(self.parts),
             "known": None if self.known is None else asdict(self.known),
+            "texture": None if self.texture is None else asdict(self.texture),
             "title": self.title,
             "about": dict(self.about),
             "parameters": self.parameters,
@@ -146,9 +160,12 @@ class ModelCard:
                     f"a denoiser up to version {VERSION}",
                     "Use the version of SD² Studio that made it, or a newer one",
                 )
+            name, chosen = str(content["model"]), dict(content["options"])
+            if content["version"] < VERSION:
+                chosen = options_of_version_1(name, chosen)
             return cls(
-                model=str(content["model"]),
-                options=dict(content["options"]),
+                model=name,
+                options=chosen,
                 scaling=Scaling.from_json(content["scaling"]),
                 axis=VelocityAxis(
                     int(content["axis"]["bins"]), float(content["axis"]["v_max_mps"])
@@ -159,6 +176,7 @@ class ModelCard:
                 unit=str(content["unit"]),
                 parts=tuple(str(part) for part in content.get("parts", ())),
                 known=KnownMovements.from_json(content.get("known")),
+                texture=Texture.from_json(content.get("texture")),
                 title=str(content["title"]),
                 about=dict(content["about"]),
                 parameters=int(content["parameters"]),

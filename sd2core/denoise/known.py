@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -50,6 +50,17 @@ class KnownMovements:
         gain = targets[moving].sum(dtype=np.float64) / inputs[moving].sum(dtype=np.float64)
         most = float(np.quantile(spread, 1.0 - _RARE))
         return cls(float(slowest), float(fastest), most, float(gain))
+
+    def together(self, other: KnownMovements | None) -> KnownMovements:
+        """What a model knows that learnt from both, from these last."""
+        if other is None:
+            return self
+        return replace(
+            self,
+            slowest_mps=min(self.slowest_mps, other.slowest_mps),
+            fastest_mps=max(self.fastest_mps, other.fastest_mps),
+            spread_mps=max(self.spread_mps, other.spread_mps),
+        )
 
     def strangeness(self, energies: NDArray[np.float32], axis: VelocityAxis) -> NDArray[np.float32]:
         """How far each frame (…, bins) is from what is known, from 0 to 1, (…,)."""

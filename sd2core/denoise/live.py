@@ -245,21 +245,23 @@ class LiveDenoiser:
     """Denoiser of single frames, without delay.
 
     A causal model gives the result for the whole map (``equals_batch`` is True). One that looks at
-    later frames gets the last ones only and denoises the newest, at the window's border, where it
-    knows less than in the middle: its result differs from that for the whole map.
+    later frames gives that of its causal part, if it has one; otherwise it gets the last frames
+    only and denoises the newest, at the window's border, where it knows less than in the middle.
     """
 
     def __init__(self, trained: TrainedDenoiser) -> None:
         self._trained = trained
+        self._causal = trained.network.live
         self.equals_batch = trained.network.causal
         self.reset()
 
     def reset(self) -> None:
         """Forget the frames so far and begin a new clip."""
-        network = self._trained.network
-        self._frames: deque[NDArray[np.float32]] = deque(maxlen=network.window or LENGTH)
+        self._frames: deque[NDArray[np.float32]] = deque(
+            maxlen=self._trained.network.window or LENGTH
+        )
         with torch.no_grad():
-            self._state = network.initial_state(1) if self.equals_batch else None
+            self._state = None if self._causal is None else self._causal.initial_state(1)
 
     def step(self, energies: NDArray[np.float32], present: bool = True) -> NDArray[np.float32]:
         """Denoise the next frame, (bins,), of energies (features,).
@@ -284,7 +286,7 @@ class LiveDenoiser:
         """
         there = Presence.of(present, len(energies)).there
         answers = np.zeros((len(energies), self._trained.card.axis.bins), np.float32)
-        if not self.equals_batch:
+        if self._causal is None:
             for frame, values in enumerate(energies):
                 answers[frame] = self.step(values, bool(there[frame]))
             return answers
@@ -292,13 +294,13 @@ class LiveDenoiser:
         for start, stop in runs(there):
             if start > begins:
                 self.reset()
-            answers[start:stop] = self._run(energies[start:stop])
+            answers[start:stop] = self._run(self._causal, energies[start:stop])
             begins = stop
         if begins < len(energies):
             self.reset()
         return answers
 
-    def _run(self, energies: NDArray[np.float32]) -> NDArray[np.float32]:
+    def _run(self, causal: Denoiser, energies: NDArray[np.float32]) -> NDArray[np.float32]:
         """Denoise frames without a gap."""
         trained = self._trained
         compressed = trained.compressed(energies)
@@ -306,7 +308,7 @@ class LiveDenoiser:
         with torch.no_grad():
             for start in range(0, len(compressed), CHUNK):
                 chunk = torch.from_numpy(compressed[start : start + CHUNK])[None]
-                answer, self._state = trained.network.chunk(chunk.to(trained.device), self._state)
+                answer, self._state = causal.chunk(chunk.to(trained.device), self._state)
                 done[start : start + CHUNK] = answer[0].cpu().numpy()
         return trained.expanded(done, compressed)
 
@@ -314,9 +316,9 @@ class LiveDenoiser:
         network, device = self._trained.network, self._trained.device
         answer: NDArray[np.float32]
         with torch.no_grad():
-            if self.equals_batch:
+            if self._causal is not None:
                 frame = torch.from_numpy(compressed)[None].to(device)
-                tensor, self._state = network.step(frame, self._state)
+                tensor, self._state = self._causal.step(frame, self._state)
                 answer = tensor[0].cpu().numpy()
                 return answer
             self._frames.append(compressed)

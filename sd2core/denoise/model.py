@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import chain
 from typing import Any
 
 import torch
@@ -38,6 +39,11 @@ class Denoiser(nn.Module):
     def features(self) -> int:
         """Numbers per frame of the input."""
         return self.parts * self.bins + self.more
+
+    @property
+    def live(self) -> Denoiser | None:
+        """Causal network of the same use, for live frames; None if there is none."""
+        return self if self.causal else None
 
     def forward(self, values: Tensor) -> Tensor:
         """Denoise (batch, frames, features); the answer is (batch, frames, bins)."""
@@ -89,33 +95,41 @@ class Denoiser(nn.Module):
         return iter(())
 
 
-class WithKinematics(Denoiser):
-    """What a network makes of kinematics, added to a linear map of the frame's histogram.
+class Corrected(Denoiser):
+    """A linear map of each frame's histogram, and a network that corrects it.
 
-    The network sees kinematics alone: beside a histogram it would learn less from them.
+    So a network need not learn what the input already tells. One with kinematics sees those
+    alone: beside a histogram it would learn less from them.
     """
 
-    def __init__(self, network: Denoiser) -> None:
-        super().__init__(network.bins, 1, network.more)
+    def __init__(self, network: Denoiser, parts: int) -> None:
+        super().__init__(network.bins, parts, network.more)
         self.causal, self.window, self.longest = network.causal, network.window, network.longest
         self.network = network
+        self._first = parts * self.bins if self.more else 0
         self.skip = nn.Linear(self.bins, self.bins)
         nn.init.eye_(self.skip.weight)
         nn.init.zeros_(self.skip.bias)
 
+    def _of_frame(self, values: Tensor) -> Tensor:
+        """Answer (…, bins) of each frame's histogram; of parts those of their sum, nearly."""
+        maps = values[..., : self.parts * self.bins].unflatten(-1, (self.parts, self.bins))
+        whole = maps[..., 0, :] if self.parts == 1 else torch.linalg.vector_norm(maps, dim=-2)
+        return self.skip(whole)
+
     def forward(self, values: Tensor) -> Tensor:
         """Denoise (batch, frames, features)."""
-        return self.network(values[..., self.bins :]) + self.skip(values[..., : self.bins])
+        return self.network(values[..., self._first :]) + self._of_frame(values)
 
     def chunk(self, values: Tensor, state: State) -> tuple[Tensor, State]:
         """Denoise the next frames, as :meth:`forward`."""
-        answer, state = self.network.chunk(values[..., self.bins :], state)
-        return answer + self.skip(values[..., : self.bins]), state
+        answer, state = self.network.chunk(values[..., self._first :], state)
+        return answer + self._of_frame(values), state
 
     def step(self, frame: Tensor, state: State) -> tuple[Tensor, State]:
         """Denoise the next frame."""
-        answer, state = self.network.step(frame[..., self.bins :], state)
-        return answer + self.skip(frame[..., : self.bins]), state
+        answer, state = self.network.step(frame[..., self._first :], state)
+        return answer + self._of_frame(frame), state
 
     def initial_state(self, batch: int = 1) -> State:
         """State of the network before the first frame."""
@@ -124,6 +138,33 @@ class WithKinematics(Denoiser):
     def ssm_parameters(self) -> Iterator[nn.Parameter]:
         """Those of the network."""
         return self.network.ssm_parameters()
+
+
+class TwoNetworks(Denoiser):
+    """A network that looks both ways, for whole recordings, and a causal one for live frames.
+
+    They learn at the same time and share nothing.
+    """
+
+    causal = False
+
+    def __init__(self, whole: Denoiser, forwards: Denoiser) -> None:
+        super().__init__(whole.bins, whole.parts, whole.more)
+        self.window, self.longest = whole.window, whole.longest
+        self.whole, self.forwards = whole, forwards
+
+    @property
+    def live(self) -> Denoiser:
+        """The causal one."""
+        return self.forwards
+
+    def forward(self, values: Tensor) -> Tensor:
+        """Denoise (batch, frames, features) both ways."""
+        return self.whole(values)
+
+    def ssm_parameters(self) -> Iterator[nn.Parameter]:
+        """Those of both."""
+        return chain(self.whole.ssm_parameters(), self.forwards.ssm_parameters())
 
 
 class Standard(nn.Module):

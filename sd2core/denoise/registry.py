@@ -28,22 +28,26 @@ _S4 = {
     "channels": 128,
     "depth": 4,
     "state_size": 64,
-    "dropout": 0.0,
+    "dropout": 0.3,
     "dt_min": 0.02,
     "dt_max": 1.0,
+    "skip": True,
 }
+
+# ``live``: beside the one that looks both ways a causal one, for live frames.
+_BOTH_WAYS = {"bidirectional": True, "live": True}
 
 _ENTRIES: dict[str, _Entry] = {
     "s4": _Entry(
         "causal_models.S4Denoiser",
         "structured state space, HiPPO-LegS (the paper's model)",
-        {**_S4, "bidirectional": False},
+        {**_S4, **_BOTH_WAYS},
         {"kernel": "legs"},
     ),
     "s4d": _Entry(
         "causal_models.S4Denoiser",
         "structured state space, diagonal",
-        {**_S4, "bidirectional": False},
+        {**_S4, **_BOTH_WAYS},
         {"kernel": "diagonal"},
     ),
     "s4-serial": _Entry(
@@ -56,17 +60,17 @@ _ENTRIES: dict[str, _Entry] = {
     "gru": _Entry(
         "causal_models.GruDenoiser",
         "gated recurrent network",
-        {"channels": 144, "depth": 2, "dropout": 0.0},
+        {"channels": 144, "depth": 2, "dropout": 0.0, "skip": True},
     ),
     "unet": _Entry(
         "window_models.UNetDenoiser",
         "2D U-Net over windows of 72 frames",
-        {"channels": 12, "depth": 3, "dropout": 0.0},
+        {"channels": 12, "depth": 3, "dropout": 0.0, "skip": True},
     ),
     "swin": _Entry(
         "window_models.SwinDenoiser",
         "Swin transformer over windows of 72 frames",
-        {"channels": 48, "depth": 2, "dropout": 0.0},
+        {"channels": 48, "depth": 2, "dropout": 0.0, "skip": True},
     ),
     "none": _Entry("filters.NoDenoiser", "no denoising"),
     "median": _Entry(
@@ -108,9 +112,9 @@ def build(name: str, bins: int = 32, parts: int = 1, more: int = 0, **given: Any
     """Create a model of :data:`MODELS` or :data:`FILTERS` with fresh weights.
 
     ``parts`` is the number of maps in the input, ``more`` that of kinematics after the one map;
-    filters take one map. Options that are not given
-    come from :func:`options`. Raises Sd2Error when there is no such model or option, or an
-    option is not of its kind, or for more bins than a map has.
+    filters take one map. Options that are not given come from :func:`options`. Raises Sd2Error
+    when there is no such model or option, or an option is not of its kind, or for more bins than
+    a map has.
     """
     entry = _entry(name)
     if not 1 <= bins <= _MOST_BINS:
@@ -119,13 +123,26 @@ def build(name: str, bins: int = 32, parts: int = 1, more: int = 0, **given: Any
         check_option(f"model {name}", option, value, entry.options, _LARGEST)
     module, _, class_name = entry.place.partition(".")
     found = getattr(import_module(f"sd2core.denoise.{module}"), class_name)
-    several = {} if name in FILTERS else {"parts": 0 if more else parts, "more": more}
-    model: Denoiser = found(bins, **several, **entry.fixed, **{**entry.options, **given})
-    if not more:
-        return model
-    from sd2core.denoise.model import WithKinematics
+    from sd2core.denoise.model import Corrected, TwoNetworks
 
-    return WithKinematics(model)
+    several = {} if name in FILTERS else {"parts": 0 if more else parts, "more": more}
+    chosen = {**entry.options, **given}
+    corrects, also_live = chosen.pop("skip", False), chosen.pop("live", False)
+
+    def made(**other: Any) -> Denoiser:
+        network: Denoiser = found(bins, **several, **entry.fixed, **{**chosen, **other})
+        return Corrected(network, parts) if corrects else network
+
+    whole = made()
+    if whole.causal or not also_live:
+        return whole
+    return TwoNetworks(whole, made(bidirectional=False))
+
+
+def options_of_version_1(name: str, stored: Mapping[str, Any]) -> dict[str, Any]:
+    """Options in a model file of version 1, which knew nothing of some of today's."""
+    known = _ENTRIES[name].options if name in _ENTRIES else {}
+    return {**{option: False for option in ("skip", "live") if option in known}, **stored}
 
 
 def fit_filter(

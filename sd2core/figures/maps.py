@@ -83,9 +83,10 @@ def difference_of(
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Level of one map minus that of another, on the clock of the first, and where it is known.
 
-    Each is relative to its own reference and held within the levels shown, so that the
-    difference is that of the two pictures. Both arrays are of shape (bins, frames); unknown
-    are cells of which one map says nothing: no frame, no person, an emptied bin.
+    The first is made as strong as the other altogether (:func:`matching_gain`); both are then
+    relative to the other's reference, and held within the levels shown. Both arrays are of shape
+    (bins, frames); unknown are cells of which one map says nothing: no frame, no person, an
+    emptied bin.
     """
     one, other = minuend.doppler, subtrahend.doppler
     if one.axis != other.axis:
@@ -101,10 +102,21 @@ def difference_of(
     known = np.repeat(there[None], one.axis.bins, axis=0)
     for doppler in (one, other):
         known[[*doppler.null_bins, *doppler.unseen_bins]] = False
-    difference = levels.of(one.values, minuend.reference) - levels.of(
-        other.values[:, frames], subtrahend.reference
+    theirs = other.values[:, frames]
+    gain = matching_gain(one.values[known], theirs[known])
+    difference = levels.of(gain * one.values, subtrahend.reference) - levels.of(
+        theirs, subtrahend.reference
     )
     return np.where(known, difference, 0.0), known
+
+
+def matching_gain(one: NDArray[np.float32], other: NDArray[np.float32]) -> float:
+    """Factor by which the values of one map add up to as much as those of another.
+
+    Counted and measured energies have no common unit. It is 1 if either map is empty.
+    """
+    sums = [float(values.sum(dtype=np.float64)) for values in (one, other)]
+    return sums[1] / sums[0] if min(sums) > 0 else 1.0
 
 
 def draw_maps(

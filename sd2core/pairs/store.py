@@ -102,6 +102,17 @@ class Take:
         """Key of the take."""
         return TakeKey(self.subject, self.name, self.placement)
 
+    def part(self, frames: slice) -> Take:
+        """Some of its frames, with the times that they have."""
+        return replace(
+            self,
+            synthetic=self.synthetic[frames],
+            radar=self.radar[frames],
+            times_s=self.times_s[frames],
+            label=self.label[frames],
+            limbs=None if self.limbs is None else self.limbs.of_frames(frames),
+        )
+
     def inputs(self, parts: Sequence[str] = ()) -> NDArray[np.float32]:
         """Input of a model, (frames, bins), or (frames, parts · bins) of limb maps.
 

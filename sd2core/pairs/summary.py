@@ -46,12 +46,6 @@ class PairFacts:
         """Duration of the movements, each counted once."""
         return sum(take.frames for take in self.takes if take.placement == 0) / self.frame_rate_hz
 
-    @property
-    def divisible(self) -> bool:
-        """True if a subject has several takes."""
-        first = [take.subject for take in self.takes if take.placement == 0]
-        return len(set(first)) < len(first)
-
     def segments(
         self, subjects: Iterable[str], length: int, overlap: int, *, first_only: bool = False
     ) -> int:

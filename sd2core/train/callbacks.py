@@ -56,8 +56,8 @@ class Module(Protocol):
 class TrainingCallbacks:
     """Callbacks of a run between its steps.
 
-    ``position`` is the start, ``about`` goes into checkpoints, and ``save_best(validation,
-    epoch)`` writes the model that is to be used.
+    ``position`` is the start, ``about`` goes into checkpoints, and ``save_best(validation, that of
+    the network for live frames if it is another, epoch)`` writes the model that is to be used.
     """
 
     def __init__(
@@ -70,7 +70,7 @@ class TrainingCallbacks:
         exam: Exam,
         position: Position,
         about: dict[str, Any],
-        save_best: Callable[[Validation, int], None],
+        save_best: Callable[[Validation, Validation | None, int], None],
     ) -> None:
         self.config, self.order, self.exam, self.position = config, order, exam, position
         self.outcome: Outcome = "stopped"
@@ -97,7 +97,7 @@ class TrainingCallbacks:
         """True if nothing is left to do at this position."""
         training, position = self.config.training, self.position
         patience = training.early_stopping_epochs
-        if patience is not None and position.epochs_since_best >= patience:
+        if patience and position.epochs_since_best >= patience:
             return True
         if training.minutes is not None:
             return position.elapsed_s >= 60.0 * training.minutes
@@ -268,7 +268,10 @@ class TrainingCallbacks:
 
     def _write_best(self, found: Validation, epoch: int) -> None:
         if self._leads:
-            self._save_best(found, epoch)
+            network = self._module.network
+            other = network.live if network.live is not network else None
+            live = None if other is None else validate(other, self.exam)
+            self._save_best(found, live, epoch)
 
     def _set_state(self, state: State) -> None:
         if self._leads:

@@ -76,6 +76,11 @@ def paths(key: str, value: Any) -> tuple[Path, ...]:
     return tuple(Path(one) for one in value)
 
 
+def one_path(key: str, value: Any) -> Path:
+    """Rule for a path."""
+    return paths(key, [value])[0]
+
+
 def table(key: str, value: Any) -> dict[str, Any]:
     """Rule for a flat table of plain values."""
     plain = isinstance(value, Mapping) and all(
@@ -126,6 +131,10 @@ class ModelConfig:
     options: Mapping[str, Any] = _setting(table, factory=dict)  # Of the architecture.
     # The map, as in the paper, that of each part of the body, or how its joints move.
     inputs: str = _setting(choice("map", "limbs", "kinematics"), "map")
+    # Model file to go on from; name, options and inputs are then that model's.
+    start: Path | None = _setting(one_path, None)  # noqa: RUF009 (a field)
+    # Of a model to go on from only the last layers learn.
+    frozen: bool = _setting(flag, False)
 
     def __post_init__(self) -> None:
         _check(self, "model")
@@ -146,8 +155,8 @@ class TrainingConfig:
     warm_up: float = _setting(number(0.0, 0.5), 0.03)  # Share of the run in which the rate rises.
     final_rate: float = _setting(number(0.0, 1.0), 0.01)  # Share of the rate at the end.
     clip_norm: float = _setting(number(0.0, 1e6), 1.0)  # Gradients are clipped to it; 0 is off.
-    # End after so many epochs without a better one.
-    early_stopping_epochs: int | None = _setting(number(1, 1_000_000, whole=True), None)
+    # End after so many epochs without a better one; 0: never.
+    early_stopping_epochs: int = _setting(number(0, 1_000_000, whole=True), 100)
     # Frames of rare velocities count more, see :func:`sd2core.train.data.frame_weights`.
     balanced: bool = _setting(flag, False)
     # Of the error of a frame's mean velocity, in 1 / (m/s), beside that of the map; 0: none.
@@ -237,6 +246,9 @@ def config_from(
         )
     stored = paths("data.pairs", sections["data"]["pairs"])
     sections["data"]["pairs"] = tuple(located_path(str(path), folder) for path in stored)
+    if "start" in sections["model"]:
+        start = one_path("model.start", sections["model"]["start"])
+        sections["model"]["start"] = located_path(str(start), folder)
     return TrainConfig(**{name: _SECTIONS[name](**given) for name, given in sections.items()})
 
 

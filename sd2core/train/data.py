@@ -33,8 +33,8 @@ class Split:
     validation: tuple[str, ...]
     test: tuple[str, ...]
     by_take: bool = False
-    """True without people for validation, as with one subject: the last fifth of everyone's takes
-    is used instead, and the errors say nothing about other people."""
+    """True without people for validation, as with one subject: the last fifth of everyone's takes,
+    or of the one take there is, is used instead, and the errors say nothing about other people."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -335,16 +335,21 @@ def _axis_words(pairs: PairSet) -> str:
 
 
 def _by_take(takes: tuple[Take, ...]) -> tuple[tuple[Take, ...], tuple[Take, ...]]:
-    """The last fifth of everyone's motions, with all their placements, apart from the others."""
+    """The last fifth of everyone's motions, with all their placements, apart from the others.
+
+    If nobody has two motions, the last fifth of each.
+    """
     kept: set[tuple[str, str]] = set()
     for subject in dict.fromkeys(take.subject for take in takes):
         motions = list(dict.fromkeys(take.name for take in takes if take.subject == subject))
         if len(motions) > 1:
             kept |= {(subject, name) for name in motions[-max(1, len(motions) // 5) :]}
     if not kept:
-        raise Sd2Error(
-            "There is no subject with more than one take",
-            "one take to learn from and one to choose the best epoch by",
+        cuts = [round(0.8 * len(take.times_s)) for take in takes]
+        pairs = list(zip(takes, cuts, strict=True))
+        return (
+            tuple(take.part(slice(cut)) for take, cut in pairs),
+            tuple(take.part(slice(cut, None)) for take, cut in pairs),
         )
     return (
         tuple(take for take in takes if (take.subject, take.name) not in kept),

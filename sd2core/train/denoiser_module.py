@@ -21,6 +21,9 @@ from sd2core.train.checkpoint import Checkpoint, moments_of, set_moments
 from sd2core.train.data import Windows, frame_weights
 from sd2core.train.steps import Step, optimiser_of, set_rate
 
+_SHARP = 4
+"""Power of the energies whose mean velocity is nearly that of the strongest."""
+
 
 class DenoiserModule(LightningModule):
     """Denoiser with all that it learns from.
@@ -45,7 +48,7 @@ class DenoiserModule(LightningModule):
         weights = frame_weights(windows.targets, callbacks.exam.axis) if balanced else None
         self._weights = None if weights is None else torch.from_numpy(weights)  # (frames,)
         self._frames = torch.arange(windows.length)
-        self._mirror = None
+        self._mirror: tuple[torch.Tensor, ...] = ()
         if callbacks.exam.scaling.more:
             self._mirror = tuple(torch.from_numpy(each) for each in mirrored_columns())
         self._callbacks = callbacks
@@ -63,6 +66,7 @@ class DenoiserModule(LightningModule):
         """Bring all frames to the device: they are a few hundred MB at most."""
         for name in ("_inputs", "_targets", "_frames"):
             setattr(self, name, getattr(self, name).to(self.device))
+        self._mirror = tuple(each.to(self.device) for each in self._mirror)
         if self._weights is not None:
             self._weights = self._weights.to(self.device)
 
@@ -80,7 +84,10 @@ class DenoiserModule(LightningModule):
         torch.manual_seed(int(seed.generate_state(1, np.uint64)[0]))
 
     def training_step(self, batch: Step, batch_idx: int) -> torch.Tensor:
-        """Root mean square error of one batch, of weighted frames if the training is balanced."""
+        """Root mean square error of one batch, of weighted frames if the training is balanced.
+
+        With a network for live frames the sum of both errors.
+        """
         callbacks = self._callbacks
         rows = batch.start[:, None] + self._frames  # (segments, length)
         inputs, targets = self._inputs[rows], self._targets[rows]
@@ -91,15 +98,25 @@ class DenoiserModule(LightningModule):
             gains = (batch.gain**scaling.input.exponent)[:, None, None]
             inputs = torch.cat([inputs[..., :energies] * gains, inputs[..., energies:]], dim=-1)
             targets = targets * (batch.gain**scaling.target.exponent)[:, None, None]
-        if self._mirror is not None:
+        if self._mirror:
             inputs = self._mirrored(inputs)
-        answers = self.network(inputs).float()
+        loss = self._loss(self.network(inputs).float(), targets, rows, noted=True)
+        live = self.network.live
+        if live is not None and live is not self.network:
+            loss = loss + self._loss(live(inputs).float(), targets, rows)
+        return loss
+
+    def _loss(
+        self, answers: torch.Tensor, targets: torch.Tensor, rows: torch.Tensor, noted: bool = False
+    ) -> torch.Tensor:
+        callbacks = self._callbacks
         difference = answers - targets
         if len(callbacks.exam.counted) < difference.shape[-1]:
             difference = difference.index_select(-1, callbacks.counted_on(difference.device))
         squares = difference.square()
         square = squares.mean()
-        callbacks.note(square.detach(), len(batch.index))
+        if noted:
+            callbacks.note(square.detach(), len(rows))
         if self._weights is not None:
             square = (squares * self._weights[rows][..., None]).mean()
         # At zero the root has no slope.
@@ -109,29 +126,42 @@ class DenoiserModule(LightningModule):
 
     def _mirrored(self, inputs: torch.Tensor) -> torch.Tensor:
         """Kinematics with left and right exchanged in half of the segments: the map is the same."""
-        assert self._mirror is not None
-        order, signs = (each.to(inputs.device) for each in self._mirror)
+        order, signs = self._mirror
         first = inputs.shape[-1] - len(order)
         other = torch.cat([inputs[..., :first], inputs[..., first:][..., order] * signs], dim=-1)
         turned = torch.rand(len(inputs), 1, 1, device=inputs.device) < 0.5
         return torch.where(turned, other, inputs)
 
     def _velocity_loss(self, answers: torch.Tensor, targets: torch.Tensor) -> torch.Tensor:
-        """Mean error of the mean velocity, m/s; below 0.1 m/s it counts less."""
+        """Mean errors of the mean and the peak velocity, m/s; below 0.1 m/s they count less.
+
+        The peak of an answer is its mean velocity with the eighth power of the amplitude, which
+        has a slope.
+        """
         exam = self._callbacks.exam
         counted = self._callbacks.counted_on(answers.device)
         velocities = torch.as_tensor(exam.axis.centres_mps, dtype=torch.float32)
         velocities = velocities.to(answers.device)[counted]
+        power = 1 / exam.scaling.target.exponent
+        found, wanted = (
+            values.float().clamp(min=0.0)[..., counted] ** power for values in (answers, targets)
+        )
+        moving = (wanted.sum(dim=-1) > 0).float()
 
-        def mean_of(compressed: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-            energies = compressed.clamp(min=0.0)[..., counted] ** (1 / exam.scaling.target.exponent)
-            total = energies.sum(dim=-1)
-            return (energies * velocities).sum(dim=-1) / (total + 1e-3), total
+        def mean_of(energies: torch.Tensor) -> torch.Tensor:
+            return (energies * velocities).sum(dim=-1) / (energies.sum(dim=-1) + 1e-3)
 
-        (found, _), (wanted, total) = mean_of(answers), mean_of(targets.float())
-        moving = (total > 0).float()
-        off = nn.functional.smooth_l1_loss(found, wanted, beta=0.1, reduction="none")
-        return (off * moving).sum() / moving.sum().clamp(min=1.0)
+        strongest = found.amax(dim=-1, keepdim=True) + 1e-3
+        errors = {
+            "mean": (mean_of(found), mean_of(wanted)),
+            "peak": (mean_of((found / strongest) ** _SHARP), velocities[wanted.argmax(dim=-1)]),
+        }
+        off = sum(
+            nn.functional.smooth_l1_loss(*pair, beta=0.1, reduction="none")
+            for pair in errors.values()
+        )
+        loss: torch.Tensor = (off * moving).sum() / moving.sum().clamp(min=1.0)
+        return loss
 
     def configure_gradient_clipping(
         self,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from lightning.pytorch import Trainer
 from lightning.pytorch.strategies import DDPStrategy
 
 from sd2core.denoise.card import PARTS_OF, ModelCard, maps_in
-from sd2core.denoise.files import save_model
+from sd2core.denoise.files import load_model, save_model
 from sd2core.denoise.known import KnownMovements
 from sd2core.denoise.live import TrainedDenoiser
 from sd2core.denoise.model import Denoiser, fit_standards, parameter_count
@@ -67,6 +67,7 @@ def carry_out(
             "Start a new run, or go on with the version that began this one",
         )
     precision = precision_of(config.machine, device)
+    start = None if config.model.start is None else _start(config.model.start, data)
     with settled(config.machine, threads), signals_kept():
         scaling = Scaling.fitted(
             (take.inputs(parts) for take in data.learnt_takes),
@@ -74,10 +75,15 @@ def carry_out(
             data.pairs.null_bins,
             parts=maps_in(parts),
         )
-        network = _network(config, data, scaling, checkpoint)
+        if start is not None:
+            # Its first layers know the input as it was; the radar may be another.
+            scaling = replace(scaling, input=start.card.scaling.input)
+        network = _network(config, data, scaling, start, checkpoint)
         machine = machine_words(device, precision, threads)
         learnt_pairs = [(take.synthetic, take.radar) for take in data.learnt_takes]
         known = KnownMovements.of(learnt_pairs, data.pairs.axis)
+        if start is not None and known is not None:
+            known = known.together(start.card.known)
         about = _About(config, data, scaling, command, machine, known)
         learnt = config.training
         callbacks = TrainingCallbacks(
@@ -89,7 +95,7 @@ def carry_out(
             Exam.of(data.validation, scaling, data.pairs.axis, data.pairs.null_bins),
             checkpoint.position if checkpoint is not None else Position(),
             {"data_digest": digest, "threads": threads},
-            lambda found, epoch: about.save(folder.best, network, found, epoch),
+            lambda found, live, epoch: about.save(folder.best, network, found, live, epoch),
         )
         module = DenoiserModule(network, data.training, callbacks, checkpoint)
         _say_start(writer, callbacks, data, network, device, resumed=checkpoint is not None)
@@ -120,8 +126,30 @@ def carry_out(
     return callbacks.outcome, callbacks.position
 
 
+def _start(path: Path, data: TrainingData) -> TrainedDenoiser:
+    """The model to go on from."""
+    start = load_model(path)
+    card, pairs = start.card, data.pairs
+    for what, its, ours in (
+        ("velocity axis", card.axis, pairs.axis),
+        ("null bins", card.null_bins, tuple(pairs.null_bins)),
+        ("frame rate", card.frame_rate_hz, pairs.frame_rate_hz),
+    ):
+        if its != ours:
+            raise Sd2Error(
+                f"The {what} of {path} is {its}, that of the pairs {ours}",
+                "the same",
+                "Make the pairs like those that the model learnt from, or train a new one",
+            )
+    return start
+
+
 def _network(
-    config: TrainConfig, data: TrainingData, scaling: Scaling, checkpoint: Checkpoint | None
+    config: TrainConfig,
+    data: TrainingData,
+    scaling: Scaling,
+    start: TrainedDenoiser | None,
+    checkpoint: Checkpoint | None,
 ) -> Denoiser:
     torch.manual_seed(config.training.seed)
     network = build(
@@ -131,7 +159,13 @@ def _network(
         scaling.more,
         **config.model.options,
     )
-    fit_standards(network, torch.from_numpy(data.training.inputs))
+    if start is None:
+        fit_standards(network, torch.from_numpy(data.training.inputs))
+    else:
+        network.load_state_dict(start.network.state_dict())
+        if config.model.frozen:
+            for name, parameter in network.named_parameters():
+                parameter.requires_grad_(not {"head", "skip"}.isdisjoint(name.split(".")))
     length = config.data.segment_frames
     if network.window not in (None, length):
         raise Sd2Error(
@@ -195,17 +229,23 @@ class _About:
     machine: dict[str, Any]
     known: KnownMovements | None
 
-    def save(self, path: Path, network: Denoiser, found: Validation, epoch: int) -> None:
+    def save(
+        self,
+        path: Path,
+        network: Denoiser,
+        found: Validation,
+        live: Validation | None,
+        epoch: int,
+    ) -> None:
         training = network.training
         try:
-            save_model(path, TrainedDenoiser(network, self.card(found, epoch)))
+            save_model(path, TrainedDenoiser(network, self.card(found, live, epoch)))
         finally:
             network.train(training)
 
-    def card(self, found: Validation, epoch: int) -> ModelCard:
+    def card(self, found: Validation, live: Validation | None, epoch: int) -> ModelCard:
         config, pairs, split = self.config, self.data.pairs, self.data.split
         name = config.model.name
-        mae_mps = found.mae_mps if math.isfinite(found.mae_mps) else None
         return ModelCard(
             model=name,
             options={**options(name), **config.model.options},
@@ -216,12 +256,13 @@ class _About:
             trained_on=pairs.kind,
             parts=self.data.parts,
             known=self.known,
+            texture=found.texture,
             about={
                 "data": self._data_words(),
                 "command": self.command,
                 "metrics": {
-                    "validation_rmse": found.rmse,
-                    "validation_mae_mps": mae_mps,
+                    **_errors("validation", found),
+                    **({} if live is None else _errors("live_validation", live)),
                     "epoch": epoch,
                 },
                 "limits": self._limits(),
@@ -231,6 +272,7 @@ class _About:
                     "test": list(split.test),
                 },
                 "seed": config.training.seed,
+                **({} if config.model.start is None else {"start": config.model.start.name}),
                 "machine": self.machine,
                 "provenance": pairs.provenance,
             },
@@ -251,5 +293,10 @@ class _About:
         if self.data.pairs.kind == "simulated":
             said.append("Learnt from a simulated radar; nothing is said about a real one.")
         if self.data.split.by_take:
-            said.append("Validated on other takes of the same person, not on other people.")
+            said.append("Validated on other minutes of the same people, not on other people.")
         return " ".join(said)
+
+
+def _errors(name: str, found: Validation) -> dict[str, float | None]:
+    mae_mps = found.mae_mps if math.isfinite(found.mae_mps) else None
+    return {f"{name}_rmse": found.rmse, f"{name}_mae_mps": mae_mps}

@@ -23,7 +23,7 @@ from sd2core.files.atomic import atomic_write_text
 from sd2core.files.lock import FileLock
 from sd2core.runs.control import Control, signals_kept, write_control
 from sd2core.runs.progress import Event, ProgressWriter
-from sd2core.train.config import TrainConfig, config_text, read_config
+from sd2core.train.config import ModelConfig, TrainConfig, config_text, read_config
 from sd2core.train.folder import TrainingFolder
 
 if TYPE_CHECKING:
@@ -56,6 +56,7 @@ def begin(
     progress. Raises Sd2Error for what the user can mend; the run's folder then says it,
     too, if it was made.
     """
+    config = with_start(config)
     check(config)
     folder = TrainingFolder(out)
     if _is_other_rank():
@@ -100,6 +101,31 @@ def go_on(out: Path, *, command: str = "", watch: Watch | None = None) -> Ending
         return _trained(folder, config, command, watch, resume=resume, lock=lock)
     finally:
         lock.release()
+
+
+def with_start(config: TrainConfig) -> TrainConfig:
+    """Settings with the kind of model that they go on from, if they go on from one.
+
+    Raises Sd2Error if that is none, or other settings ask for another kind.
+    """
+    model = config.model
+    if model.start is None:
+        if model.frozen:
+            raise Sd2Error("model.frozen is true, and no model is given", "model.start")
+        return config
+    from sd2core.denoise.files import describe_model
+
+    card = describe_model(model.start)
+    kind = {"name": card.model, "options": dict(card.options)}
+    for key, value in {**kind, "inputs": card.inputs}.items():
+        wanted = getattr(model, key)
+        if wanted not in (value, getattr(ModelConfig(), key)):
+            raise Sd2Error(
+                f"The {key} of {model.start} is {value!r}, and {wanted!r} is asked for",
+                "the model's own, or none",
+                "Train a new model for another kind",
+            )
+    return config.with_values({"model": {**kind, "inputs": card.inputs}})
 
 
 def check(config: TrainConfig) -> None:

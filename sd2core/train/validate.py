@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from sd2core.denoise.metrics import velocity_error
 from sd2core.denoise.model import Denoiser
 from sd2core.denoise.scaling import Scaling
+from sd2core.denoise.texture import Texture
 from sd2core.maps import peak_velocity_mps
 from sd2core.sensor import VelocityAxis
 from sd2core.train.data import Segments
@@ -28,6 +29,7 @@ class Validation:
     """Of the peak velocity per frame, as :mod:`sd2core.denoise.metrics` defines it, in frames in
     which something moves. A model begins each segment without a state; ``sd2 eval``, which
     gives it whole takes, finds less."""
+    texture: Texture | None  # of the radar's maps about the answers
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +72,7 @@ def validate(
     training = model.training
     model.eval()
     squares, cells = 0.0, 0
-    found_mps = []
+    found = []
     bins = exam.axis.bins
     nulled = [number for number in range(bins) if number not in exam.counted]
     try:
@@ -85,8 +87,13 @@ def validate(
                 cells += difference.numel()
                 energies = exam.scaling.target.expand(answer.cpu().numpy())
                 energies[..., nulled] = 0.0
-                found_mps.append(peak_velocity_mps(energies.reshape(-1, bins), exam.axis))
+                found.append(energies)
     finally:
         model.train(training)
-    error = velocity_error(np.concatenate(found_mps), exam.peaks_mps)
-    return Validation((squares / cells) ** 0.5, error.mae_mps)
+    answers = np.concatenate(found)
+    peaks_mps = peak_velocity_mps(answers.reshape(-1, bins), exam.axis)
+    error = velocity_error(peaks_mps, exam.peaks_mps)
+    radar = exam.scaling.target.expand(exam.targets.cpu().numpy())
+    counted = list(exam.counted)
+    texture = Texture.fitted(answers[..., counted], radar[..., counted])
+    return Validation((squares / cells) ** 0.5, error.mae_mps, texture)

@@ -18,6 +18,7 @@ from numcodecs import Blosc, GZip, Zstd
 from sd2core.classify.files import load_classifier, save_classifier
 from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.reading import open_dataset
+from sd2core.datasets.recording_sources import Making
 from sd2core.datasets.sources import pair_sources
 from sd2core.datasets.writing import write_dataset
 from sd2core.denoise.files import load_model, save_model
@@ -154,7 +155,7 @@ def _write_pairs(path: Path) -> None:
 def _write_dataset(path: Path) -> None:
     pairs = path.with_name(f"pairs of {path.name}.zarr")
     _write_pairs(pairs)
-    sources = pair_sources([pairs], ("synthetic", "simulated"))
+    sources = pair_sources([pairs], Making(kinds=("synthetic", "simulated")))
     write_dataset(path, sources, DatasetOptions(length=30, overlap=10))
 
 

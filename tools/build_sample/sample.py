@@ -1,23 +1,29 @@
 """The bundled sample: a body makes eight swipes in front of a camera and a radar.
 
-Video, mesh and radar come from the same motion. The picture and the radar signal are
-made from the fine surface; the recording carries a coarser one, as a body fitted to a
-video would be, with coordinates rounded so that it is small.
+Video and radar come from the same motion, of the fine surface. The recording's mesh, ``fit.zarr``,
+is what `sd2 fit` makes of its video; ``mesh.zarr`` beside it is the true one, on as coarse a
+surface. Coordinates of both are rounded so that they are small.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.body.fit_video import FitChoices, FitReport, fit_video
 from sd2core.body.model import Body, Resolution
+from sd2core.body.shape import ShapeSpace
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_folder
 from sd2core.files.stores import create_array, create_group
-from sd2core.fmcw.options import Reflector, SignalOptions
+from sd2core.fmcw import simulate_radar
+from sd2core.fmcw.options import Reflector, SignalOptions, WaveOptions
+from sd2core.io.mesh import load_mesh
 from sd2core.io.mesh_arrays import write_small
 from sd2core.io.radar.infineon import write_capture
 from sd2core.io.video_writing import write_video
@@ -28,10 +34,8 @@ from sd2core.radar_config import PAPER_RADAR
 from sd2core.recording.recording import SUFFIX, Recording, Span
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
-from tools.build_sample.facets import facet_visibility
 from tools.build_sample.posing import posed
 from tools.build_sample.render import Camera, Renderer
-from tools.build_sample.signal import simulate_capture
 from tools.build_sample.swipes import DURATION_S, SPANS, swipes
 
 FRAMES_PER_S = 30
@@ -50,10 +54,12 @@ _ROOM = (
     Reflector((1.3, 0.3, 2.9), 0.010),
     Reflector((-1.1, -0.5, 1.6), 0.002),
 )
+_RECEIVERS_M = ((-0.03, 0.0, 0.0), (0.0, 0.0, 0.0), (0.03, 0.0, 0.0))
+"""So far apart that the speckle of each is its own."""
 _SNR_DB = 34.0
 """Against the whole body; the hand echoes some 20 dB weaker than the torso."""
 _SEED = 2
-_STAGES = 5
+_STAGES = 4
 _CHUNK_FRAMES = 150
 
 
@@ -61,9 +67,9 @@ def make_sample(out: Path, progress: Progress = silent, *, duration_s: float = D
     """Make the sample recording and return its folder; the same bytes, except for the video.
 
     ``.sd2`` is appended to a name without it; the folder appears when it is complete. ``progress``
-    counts frames over five stages: posed, drawn, posed for the recording, examined for hidden
-    parts, and seen by the radar. ``duration_s`` keeps the motion's beginning only; gestures that do
-    not fit are left out. Raises Sd2Error when the folder exists and is not empty.
+    counts frames over four stages: posed, drawn, posed for the recording, and seen by the radar;
+    before the last the video is fitted. ``duration_s`` keeps the motion's beginning only; gestures
+    that do not fit are left out. Raises Sd2Error when the folder exists and is not empty.
     """
     out = Path(out)
     if out.suffix != SUFFIX:
@@ -94,18 +100,16 @@ def _fill(folder: Path, times_s: NDArray[np.float64], progress: Progress) -> Non
         (camera.width, camera.height),
     )
     recorded = body_sequence(RECORDED, times_s, camera, stage(2))
-    rounded = np.rint(recorded.read(0, frames) / _ROUNDING_M) * _ROUNDING_M
-    write_compact_mesh(
-        MeshSequence(rounded.astype(np.float32), recorded.faces, recorded.timebase),
-        folder / "mesh.zarr",
-    )
-    capture = simulate_capture(
+    write_compact_mesh(_rounded(recorded), folder / "mesh.zarr")
+    write_compact_mesh(_rounded(_fitted(folder / "video.mp4", camera)), folder / "fit.zarr")
+    capture = simulate_radar(
         fine,
-        PAPER_RADAR,
+        replace(PAPER_RADAR, receivers=len(_RECEIVERS_M)),
         sensor=_SENSOR,
-        visibility=facet_visibility(fine, _SENSOR, stage(3)),
+        visibility="exact",
+        wave=WaveOptions(coherent=False, receiver_offsets_m=_RECEIVERS_M),
         options=SignalOptions(snr_db=_SNR_DB, reflectors=_ROOM, seed=_SEED),
-        progress=stage(4),
+        progress=stage(3),
     )
     write_capture(
         folder / "radar",
@@ -119,7 +123,7 @@ def _fill(folder: Path, times_s: NDArray[np.float64], progress: Progress) -> Non
     Recording.create(
         folder,
         video=folder / "video.mp4",
-        mesh=folder / "mesh.zarr",
+        mesh=folder / "fit.zarr",
         radar=folder / "radar",
         sensor=_SENSOR,
         spans=tuple(
@@ -130,6 +134,22 @@ def _fill(folder: Path, times_s: NDArray[np.float64], progress: Progress) -> Non
         title=TITLE,
         simulated=True,
     )
+
+
+def _fitted(video: Path, camera: Camera) -> MeshSequence:
+    """What `sd2 fit` makes of the video of a person whose height and camera are known."""
+    stature_m = ShapeSpace().base_stature_m
+    choices = FitChoices(focal_px=camera.focal_px, stature_m=stature_m, resolution=RECORDED)
+    report = FitReport(lambda _: silent, lambda *_: None, lambda *_: None)
+    with TemporaryDirectory() as place:
+        fit_video(video, Path(place) / "fit.zarr", choices, report)
+        fit = load_mesh(Path(place) / "fit.zarr")
+        return replace(fit, vertices=fit.read(0, fit.frame_count))
+
+
+def _rounded(mesh: MeshSequence) -> MeshSequence:
+    rounded = np.rint(mesh.read(0, mesh.frame_count) / _ROUNDING_M) * _ROUNDING_M
+    return replace(mesh, vertices=rounded.astype(np.float32), source="")
 
 
 def body_sequence(

@@ -80,6 +80,18 @@ class DenoiseFeature(Feature):
                 ),
             ),
             Action(
+                "texture", "Model", "Denoised as the radar would show it", (),
+                "Draw the speckle and the gaps of a radar's map instead of the mean",
+                lambda: model.set_textured(not model.textured),
+                lambda: model.card is not None and model.card.texture is not None,
+                lambda: model.textured,
+                why_not=lambda: (
+                    "There is no denoised map: choose a model under Model"
+                    if model.card is None
+                    else "This model does not know the texture of a radar's maps"
+                ),
+            ),
+            Action(
                 "live", "Model", "Denoise live while playing", ("V",),
                 "Frame by frame as the clock reaches them, knowing the past only, as beside a"
                 " radar",

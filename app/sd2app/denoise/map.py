@@ -21,6 +21,7 @@ from sd2app.session.content import reference_of
 from sd2app.session.maps import MapModel
 from sd2app.session.tasks import Job, TaskList
 from sd2core.denoise.resample_to_model import input_of, is_regular
+from sd2core.denoise.texture import Texture
 from sd2core.doppler.synthesizer import Stretch
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap, LimbMaps
@@ -40,6 +41,7 @@ _WAITS = "too slow to be dragged, follows when the sensor rests"
 
 AT_ONCE = 2048
 """Frames that are denoised together; a clip up to this length always is whole."""
+TEXTURE_SEED = 0
 CONTEXT = 288
 """Frames around a part that its preview is made with: four windows of training."""
 
@@ -86,6 +88,7 @@ class DenoisedMap(QObject):
         self._job: Job | None = None
         self.denoiser: RemoteDenoiser | None = None  # the model in use
         self.words = ""
+        self._texture: Texture | None = None
         self._held = False
         self._runner = LatestRunner("denoise", self, self._receive)
         self._runner.failed.connect(lambda error: self._fail(str(error)))
@@ -145,9 +148,15 @@ class DenoisedMap(QObject):
 
     # --- requests -------------------------------------------------------------------------
 
-    def use(self, denoiser: RemoteDenoiser | None, words: str = "") -> None:
-        """Denoise with another model, called ``words`` on the track, or not at all."""
+    def use(
+        self, denoiser: RemoteDenoiser | None, words: str = "", texture: Texture | None = None
+    ) -> None:
+        """Denoise with another model, called ``words`` on the track, or not at all.
+
+        With a texture the map is drawn as the radar would show it.
+        """
         self._stop()
+        self._texture = texture
         self._took_s.clear()
         self.denoiser = denoiser
         self.words = words
@@ -363,6 +372,8 @@ class DenoisedMap(QObject):
                 limbs=None,
             )
         inside = slice(*piece)
+        if self._texture is not None:
+            values = self._texture.drawn(values.T, (TEXTURE_SEED,), piece[0]).T
         self._made.values[:, inside] = values
         self._strongest = max(self._strongest, float(values.max(initial=0.0)))
         self._shown[inside] = self._known[inside]

@@ -12,7 +12,7 @@ from PySide6.QtCore import QObject, Signal
 from sd2app.background.latest import LatestRunner, delayed
 from sd2app.background.model_worker.client import RemoteDenoiser
 from sd2app.background.model_worker.library import DenoiserLibrary
-from sd2app.denoise.map import DenoisedMap
+from sd2app.denoise.map import TEXTURE_SEED, DenoisedMap
 from sd2app.denoise.text import origin_words, track_words
 from sd2app.maps.model import SynthesisModel
 from sd2app.maps.partial_map import Part, View
@@ -25,6 +25,8 @@ from sd2core.errors import Sd2Error
 if TYPE_CHECKING:
     from sd2core.denoise.card import ModelCard
 
+TEXTURED = " · drawn as the radar would show it"
+_TEXTURED = "textured"
 _PATIENCE_MS = 2000
 """Longest delay of the first model, which waits for the synthetic map."""
 
@@ -58,6 +60,7 @@ class DenoiseModel(QObject):
         self._loaded: Loaded | None = None
         self._before: Loaded | None = None
         self._comparing = False
+        self.textured = session.settings.flag(_TEXTURED, False)  # by the user
         self._awake = False
         self._splits = True  # False once it is known that the mesh's parts are not
         self._runner = LatestRunner("denoiser", self, self._set_model, self._fail)
@@ -142,6 +145,12 @@ class DenoiseModel(QObject):
             self._show_before()
             self.changed.emit()
 
+    def set_textured(self, textured: bool) -> None:
+        """Show the map as the radar would, with its speckle and gaps, or the mean."""
+        self.textured = textured
+        self._session.settings.set_value(_TEXTURED, textured)
+        self._set_model(self._loaded)
+
     def export(self, path: Path) -> None:
         """Write the denoised map on screen, computed again with its provenance.
 
@@ -149,7 +158,11 @@ class DenoiseModel(QObject):
         """
         if self._loaded is None:
             raise Sd2Error("No model denoises this recording", "one", "Choose it under Model")
-        self._loaded.denoiser.denoise(self._synthesis.whole_map()).save(path)
+        made = self._loaded.denoiser.denoise(self._synthesis.whole_map())
+        texture = self._loaded.card.texture
+        if self.textured and texture is not None:
+            made = texture.on(made, TEXTURE_SEED)
+        made.save(path)
 
     def close(self) -> None:
         """Stop computing and let go of the models."""
@@ -250,7 +263,9 @@ class DenoiseModel(QObject):
         if loaded is None:
             self.map.use(None)
         else:
-            self.map.use(loaded.denoiser, origin_words(loaded.card))
+            texture = loaded.card.texture if self.textured else None
+            words = origin_words(loaded.card) + (TEXTURED if texture is not None else "")
+            self.map.use(loaded.denoiser, words, texture)
         self._show_before()
         self.changed.emit()
 

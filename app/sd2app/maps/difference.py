@@ -9,16 +9,17 @@ from PySide6.QtCore import QObject, Signal
 from sd2app.session.display import HeatmapLevels
 from sd2app.session.maps import Reading
 from sd2app.session.session import Session
+from sd2core.figures.maps import matching_gain
 
 _SHOWN = "difference"
 
 
 class DifferenceModel(QObject):
-    """Two maps in levels below their own 0 dB, on the clock of the first.
+    """Level of one map minus that of another, on the clock of the first.
 
-    Counted and measured energies have no common unit, so each is taken relative to its
-    own reference, as the heatmaps show it; what is below the faintest level shown counts
-    as that level. On a linear scale it is the difference of shares of the references.
+    Counted and measured energies have no common unit: the first is taken as strong as the other
+    altogether, where both are known. What is below the faintest level shown counts as that level.
+    On a linear scale it is the difference of shares of the other's reference.
     """
 
     changed = Signal()  # values
@@ -30,10 +31,12 @@ class DifferenceModel(QObject):
         self._session = session
         self.wanted = session.settings.flag(_SHOWN, False)  # by the user
         self._state = self.wanted, self.why_not
+        self._gain: float | None = None
         for signal in (self.denoised.changed, self.real.changed, session.display.levels_changed):
             signal.connect(self._follow)
 
     def _follow(self) -> None:
+        self._gain = None
         self.changed.emit()
         state = self.wanted, self.why_not
         if state != self._state:
@@ -70,6 +73,24 @@ class DifferenceModel(QObject):
                 bins |= {*track.map.null_bins, *track.map.unseen_bins}
         return tuple(sorted(bins))
 
+    @property
+    def gain(self) -> float:
+        """Factor that makes the denoised map as strong as the measured one."""
+        one, other = self.denoised, self.real
+        if self._gain is None and one.map is not None and other.map is not None:
+            start_s = max(one.offset_s + one.map.times_s[0], other.offset_s + other.map.times_s[0])
+            end_s = min(one.offset_s + one.map.times_s[-1], other.offset_s + other.map.times_s[-1])
+            parts = []
+            for track in (one, other):
+                assert track.map is not None
+                own_s = track.map.times_s + track.offset_s
+                frames = track.known & (start_s <= own_s) & (own_s <= end_s)
+                values = np.delete(track.values[:, frames], self.blank_bins, axis=0)
+                # Their frames are of other lengths.
+                parts.append(values.sum(axis=1) / max(np.count_nonzero(frames), 1))
+            self._gain = matching_gain(*parts)
+        return self._gain or 1.0
+
     def set_wanted(self, wanted: bool) -> None:
         """Show or hide it, and store the choice."""
         if wanted != self.wanted:
@@ -90,9 +111,12 @@ class DifferenceModel(QObject):
         levels: HeatmapLevels,
     ) -> NDArray[np.float32]:
         """Difference of values (bins, n) each, from −1 to 1; zero where one says nothing."""
-        difference = self.denoised.shade(denoised, levels) - self.real.shade(real, levels)
+        difference = self._shade(denoised, levels) - self.real.shade(real, levels)
         difference[list(self.blank_bins)] = 0.0
         return difference
+
+    def _shade(self, denoised: NDArray[np.float32], levels: HeatmapLevels) -> NDArray[np.float32]:
+        return self.real.shade(np.float32(self.gain) * denoised, levels)
 
     def read(self, time_s: float, velocity_mps: float) -> Reading | None:
         """Cell under the pointer, with both levels."""
@@ -106,7 +130,7 @@ class DifferenceModel(QObject):
         levels = self._session.display.levels
         full, unit = self.full_scale(levels)
         shade = float(
-            self.denoised.shade(np.array(one.value, np.float32), levels)
+            self._shade(np.array(one.value, np.float32), levels)
             - self.real.shade(np.array(other.value, np.float32), levels)
         )
         text = "not defined" if note else f"{full * shade:+.1f} {unit}".replace("-", "−")
@@ -117,6 +141,6 @@ class DifferenceModel(QObject):
             velocity_mps=one.velocity_mps,
             value=one.value,
             level_db=one.level_db - other.level_db,
-            note=note or f"{one.level} − ({other.level})",
+            note=note or f"{one.level} − ({other.level}), as strong altogether",
             text=text,
         )

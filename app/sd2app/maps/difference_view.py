@@ -67,7 +67,7 @@ class DifferenceView(HeatmapView):
         return signed_table(colours.real, colours.level, colours.denoised)
 
     def _status(self) -> str:
-        return "each relative to its own 0 dB, as shown above"
+        return "both as strong altogether, relative to the radar's 0 dB"
 
     def _paint_corner(self, painter: QPainter, box: QRectF, left: float) -> float:
         """Paint the colour bar; returns its width."""

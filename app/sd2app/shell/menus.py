@@ -64,9 +64,9 @@ LAYOUT: Mapping[str, tuple[str, ...]] = {
         "compare_labels", "next_disagreement", "previous_disagreement", "end_comparison",
     ),
     "Model": (
-        "@denoisers", "-", "open_model", "model_card", "-", "difference", "compare_models", "live",
-        "-", "@classifiers", "open_classifier", "classifier_card", "show_classes",
-        "train_classifier",
+        "@denoisers", "-", "open_model", "model_card", "-", "difference", "texture",
+        "compare_models", "live", "-", "@classifiers", "open_classifier", "classifier_card",
+        "show_classes", "train_classifier",
     ),
     "Help": ("first_five_minutes", "manual", "keys", "-", "sample", "-", "about"),
 }  # fmt: skip

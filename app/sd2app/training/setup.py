@@ -25,7 +25,7 @@ _DEFAULTS: dict[str, str | int | float] = {
     "epochs": TrainingConfig().epochs,
     "batch_size": TrainingConfig().batch_size,
     "learning_rate": TrainingConfig().learning_rate,
-    "early_stopping_epochs": 0,
+    "early_stopping_epochs": 100,
     "range_factor": 1.0,
     "seed": TrainingConfig().seed,
 }
@@ -122,9 +122,6 @@ class TrainingSetupModel(RunSetup[Store]):
             return (
                 "These pairs differ in their velocity axis or frame rate. Choose pairs of one kind."
             )
-        division = self.division
-        if division is not None and division.by_take and not any(one.divisible for one in facts):
-            return "All of it is one take. Add another to choose the best model by."
         if not self._segments():
             return "Every take is shorter than one segment of 72 frames."
         return ""
@@ -145,7 +142,7 @@ class TrainingSetupModel(RunSetup[Store]):
                 batch_size=values["batch_size"],
                 epochs=values["epochs"],
                 learning_rate=values["learning_rate"],
-                early_stopping_epochs=values["early_stopping_epochs"] or None,
+                early_stopping_epochs=values["early_stopping_epochs"],
                 seed=values["seed"],
             ),
             MachineConfig(threads=1, nice=10),

@@ -79,7 +79,7 @@ def load_capture(path: Path | str) -> RadarCapture:
     >>> from sd2core.files.resources import resource_path
     >>> capture = sd2.load_capture(resource_path("swipes.sd2") / "radar")
     >>> capture.simulated, capture.samples.shape
-    (True, (450, 1, 64, 32))
+    (True, (450, 3, 64, 32))
     """
     path = Path(path).expanduser()
     if not path.exists():

@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from sd2core.body.limbs import LIMBS, vertex_limbs
 from sd2core.body.model import Body, Resolution
 from sd2core.body.parts import synthetic_map
 from sd2core.body.rotations import Floats
@@ -17,6 +19,7 @@ from sd2core.body.skinning import pose_vertices
 from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
 from sd2core.mocap.body_motion import Role
 from sd2core.pairs.store import Take
 from sd2core.radar_config import PAPER_RADAR, RadarConfig
@@ -34,7 +37,10 @@ FITTED: Resolution = "medium"
 TRUE: Resolution = "low"
 """Echoes of a rough surface depend little on how finely it is cut (decision 26)."""
 
-OPTIONS = replace(PRESETS["paper"], count="plain")
+OPTIONS = PRESETS["paper"]
+
+_STATED = 0.3
+"""Standard deviation of the logarithm of a stated error over the true one: of a body, of a limb."""
 
 _TAKE = 0  # subjects have 1 in this place of the seed
 _MOTION, _SETTING, _FIT, _RADAR = range(4)
@@ -166,7 +172,7 @@ class TakeMaker:
         if performed.kind == "captured":
             transforms = kept_away(transforms)
         true = self._mesh(TRUE, subject.shape, transforms, times_s)
-        fitted = self._fitted(rngs[_FIT], subject.shape, transforms, times_s)
+        fitted = self._fitted(rngs[_FIT], subject.shape, transforms, true)
         synthesizer = Synthesizer(fitted, OPTIONS, threads=1)
         seed = [campaign.seed, _TAKE, subject_number, number, _RADAR]
         target = campaign.target
@@ -202,18 +208,27 @@ class TakeMaker:
         return takes
 
     def _fitted(
-        self, rng: np.random.Generator, shape: BodyShape, transforms: Floats, times_s: Floats
+        self, rng: np.random.Generator, shape: BodyShape, transforms: Floats, true: MeshSequence
     ) -> MeshSequence:
-        """The mesh that a fit of this take's video might give."""
+        """The mesh that a fit of this take's video might give, with the errors that it states."""
         if self._errors is None:
-            return self._mesh(FITTED, shape, transforms, times_s)
+            return self._mesh(FITTED, shape, transforms, true.times_s)
         drawn = self._errors.draw(rng)
         drawn = drawn.scaled(float(rng.uniform(*self._campaign.error_sizes)))
         found = drawn.shape(shape)
         held = drawn.transforms(
             self._space.skeleton(shape), transforms, self._space.skeleton(found)
         )
-        return self._mesh(FITTED, found, held, times_s)
+        fitted = self._mesh(FITTED, found, held, true.times_s)
+        wrong = self._mesh(TRUE, found, held, true.times_s)
+        low, medium = (self._bodies[resolution][0] for resolution in (TRUE, FITTED))
+        sizes = limb_errors(true, wrong, vertex_limbs(low))
+        # A fit is right about its errors on average, and about a clip's to half as much again.
+        sizes *= np.exp(rng.normal(0.0, _STATED, (2, 1)) + rng.normal(0.0, _STATED, sizes.shape))
+        stated = np.repeat(sizes[:, None], len(true.times_s), axis=1)
+        return replace(
+            fitted, uncertainty=VelocityUncertainty(LIMBS, vertex_limbs(medium), *stated)
+        )
 
     def _mesh(
         self, resolution: Resolution, shape: BodyShape, transforms: Floats, times_s: Floats
@@ -221,6 +236,21 @@ class TakeMaker:
         body = self._space.shaped(*self._bodies[resolution], shape)
         vertices = pose_vertices(body, transforms)
         return MeshSequence(vertices, body.faces, Timebase(times_s), source="simulated body")
+
+
+def limb_errors(true: MeshSequence, found: MeshSequence, limbs: NDArray[np.uint8]) -> Floats:
+    """Errors of limbs' velocities, m/s: along the camera's line of sight and across, (2, L).
+
+    Root mean squares over a clip of two meshes of the same vertices, whose limbs are given, (V,).
+    """
+    places_m = np.asarray(true.vertices, np.float64)
+    off_mps = np.gradient(np.asarray(found.vertices, np.float64) - places_m, true.times_s, axis=0)
+    line = places_m / np.linalg.norm(places_m, axis=2, keepdims=True)
+    along = np.einsum("tvk,tvk->tv", off_mps, line) ** 2
+    across = 0.5 * ((off_mps**2).sum(axis=2) - along)
+    squares = np.stack([each.mean(axis=0) for each in (along, across)])  # (2, V)
+    counts = np.bincount(limbs, minlength=len(LIMBS))
+    return np.sqrt([np.bincount(limbs, each, len(LIMBS)) / counts for each in squares.clip(0.0)])
 
 
 def take_name(number: int) -> str:

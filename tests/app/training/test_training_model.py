@@ -288,7 +288,8 @@ def test_one_person_is_divided_by_takes_and_that_is_said(made, qtbot, tmp_path) 
     model.setup.remove(model.setup.data[0].path)
     assert model.setup.problem == "Add pairs to learn from."
     model.setup.add(write_pairs(tmp_path / "take.zarr", subjects=1))
-    qtbot.waitUntil(lambda: "one take" in model.setup.problem)
+    qtbot.waitUntil(lambda: not model.setup.problem)
+    assert model.setup.division.by_take
     model.setup.remove(tmp_path / "take.zarr")
     model.setup.add(write_pairs(tmp_path / "one.zarr", subjects=1, takes=5))
     qtbot.waitUntil(lambda: not model.setup.problem)

@@ -47,20 +47,20 @@ def test_a_broken_copy_of_the_sample_is_told_and_the_rest_of_it_used(
     sd2: Sd2, recording: Path, damage: Callable[[Path], None]
 ) -> None:
     assert "every chunk has its checksum" in sd2("info", recording, "--verify").out
-    damage(recording / "mesh.zarr" / CHUNK)
+    damage(recording / "fit.zarr" / CHUNK)
     refused = sd2("info", recording, "--verify")
     assert refused.code == 1
-    assert f"mesh.zarr is damaged: frames 150 to 299 of vertices ({CHUNK}" in refused.err
+    assert f"fit.zarr is damaged: frames 150 to 299 of vertices ({CHUNK}" in refused.err
     told = sd2("info", recording)
     assert told.code == 0
-    assert "note: mesh.zarr is damaged: frames 150 to 299 of vertices" in told.out
+    assert "note: fit.zarr is damaged: frames 150 to 299 of vertices" in told.out
     assert "in 150 of 450 frames (5.00 s), first at 5.00 s" in told.out
     out = recording.parent / "map.npz"
-    assert sd2("synth", recording / "mesh.zarr", "--out", out, "--visibility", "none").code == 0
+    assert sd2("synth", recording / "fit.zarr", "--out", out, "--visibility", "none").code == 0
     found = np.load(out)["values"]
     assert not found[:, 150:300].any()
     whole = recording.parent / "whole.npz"
-    mesh = resource_path("swipes.sd2") / "mesh.zarr"
+    mesh = resource_path("swipes.sd2") / "fit.zarr"
     sd2("synth", mesh, "--out", whole, "--visibility", "none")
     # Smoothing reaches across the border, from frames that are there only.
     for frames in (slice(0, 120), slice(330, 450)):

@@ -25,6 +25,7 @@ FURTHER_OUTPUTS = {
 
 SEVERAL_MEANINGS = {
     "--count": {"N", None},  # of pictures; how vertices are counted
+    "--from": {"PATH", "FILE|NAME"},  # where a folder was; a model to go on from
     "--imu": {"FILE", "LIST"},  # a real sensor's samples; places of virtual ones
     "--model": {"FILE", "FILE|NAME", "NAME", None},  # one that was trained; kind of one to train
     "--placements": {"FILE", "FILE|planned", None},  # a plan; which of those in pairs are used

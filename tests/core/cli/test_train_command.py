@@ -109,7 +109,7 @@ class TestTrain:
         )
         # What one architecture was told says nothing to another.
         other = shown(sd2, toml, "--model", "s4", "--inputs", "limbs")["model"]
-        assert other == {"name": "s4", "inputs": "limbs", "options": {}}
+        assert other == {"name": "s4", "inputs": "limbs", "frozen": False, "options": {}}
 
     def test_the_settings_shown_are_the_settings(
         self, sd2: Sd2, pairs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -18,8 +18,8 @@ from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 
 SMALL: dict[str, dict[str, Any]] = {
-    "s4": {"channels": 8, "depth": 2, "state_size": 8},
-    "s4d": {"channels": 8, "depth": 2, "state_size": 8},
+    "s4": {"channels": 8, "depth": 2, "state_size": 8, "bidirectional": False},
+    "s4d": {"channels": 8, "depth": 2, "state_size": 8, "bidirectional": False},
     "s4-serial": {"channels": 4, "depth": 2, "state_size": 4},
     "gru": {"channels": 8},
     "unet": {"channels": 2},

@@ -19,7 +19,7 @@ from denoisers import SMALL, energies, trained
 from safetensors.torch import save
 
 from sd2core.denoise import files
-from sd2core.denoise.card import ModelCard
+from sd2core.denoise.card import VERSION, ModelCard
 from sd2core.denoise.files import (
     available_models,
     describe_model,
@@ -145,8 +145,8 @@ def test_a_folder_and_nothing(tmp_path: Path) -> None:
 
 
 def test_a_newer_version(model: Path) -> None:
-    change_card(model, lambda card: card.update(version=2))
-    refused(model, "version 2")
+    change_card(model, lambda card: card.update(version=VERSION + 1))
+    refused(model, f"version {VERSION + 1}")
 
 
 @pytest.mark.parametrize(
@@ -192,7 +192,7 @@ def test_weights_that_are_no_numbers(tmp_path: Path) -> None:
     path = tmp_path / "nan.safetensors"
     spoilt = trained("gru")
     with torch.no_grad():
-        spoilt.network.head.bias[3] = torch.nan
+        spoilt.network.skip.bias[3] = torch.nan
     save_model(path, spoilt)
     refused(path, "NaN")
 

@@ -49,7 +49,7 @@ def test_causal_models_do_not_know_the_future(name: str) -> None:
 
 @pytest.mark.parametrize("name", WINDOWED)
 def test_windowed_models_look_both_ways_and_far(name: str) -> None:
-    model = network(name)
+    model = trained(name, seed=1).network
     values = torch.rand(1, 72, 32)
     other = values.clone()
     other[:, 40, 20] += 1.0
@@ -168,8 +168,40 @@ def test_the_level_of_a_map_is_not_normalised_away() -> None:
         assert (faint - strong).abs().max() > 1e-3, name
 
 
+@pytest.mark.parametrize("name", ["s4", "s4d"])
+def test_a_state_space_looks_both_ways_and_has_another_that_does_not(name: str) -> None:
+    model = build(name, **(SMALL[name] | {"bidirectional": True})).eval()
+    live = model.live
+    assert live is not None
+    assert live.causal
+    assert not model.causal
+    values = torch.rand(1, 300, 32)
+    other = values.clone()
+    other[:, 250:] = torch.rand(1, 50, 32)
+    with torch.no_grad():
+        torch.testing.assert_close(live(values)[:, :250], live(other)[:, :250])
+        assert not torch.allclose(model(values)[:, :250], model(other)[:, :250])
+    parameters = {id(one) for one in model.ssm_parameters()}
+    assert len(parameters) == sum(1 for part in (model.whole, live) for _ in part.ssm_parameters())
+    lone = build(name, **(SMALL[name] | {"bidirectional": True, "live": False}))
+    assert lone.live is None
+
+
+@pytest.mark.parametrize("name", TRAINED)
+@pytest.mark.parametrize(("parts", "more"), [(1, 0), (3, 0), (1, 93)])
+def test_a_network_corrects_a_linear_map_of_the_frame(name: str, parts: int, more: int) -> None:
+    model = build(name, 32, parts, more, **SMALL[name]).eval()
+    values = torch.rand(2, 72, model.features)
+    with torch.no_grad():
+        for parameter in model.network.parameters():
+            parameter.zero_()
+        whole = values[..., : parts * 32].unflatten(-1, (parts, 32)).square().sum(-2).sqrt()
+        torch.testing.assert_close(model(values), whole)
+
+
 def test_sizes_are_comparable() -> None:
-    counts = {name: parameter_count(build(name)) for name in MODELS}
+    alone = {"s4": {"bidirectional": False}, "s4d": {"bidirectional": False}}
+    counts = {name: parameter_count(build(name, **alone.get(name, {}))) for name in MODELS}
     assert max(counts.values()) < 1.35 * min(counts.values()), counts
 
 

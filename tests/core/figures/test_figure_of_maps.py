@@ -28,14 +28,18 @@ def row_of(values, reference=1.0, title="A map", offset_s=0.0, rate=10.0, **more
     return MapRow(doppler, title, reference, offset_s)
 
 
-def test_the_difference_is_that_of_levels_below_the_own_reference():
-    one = row_of([[1.0, 0.1], [0.01, 0.0]])
-    other = row_of([[50.0, 500.0], [500.0, 500.0]], reference=500.0)
+@pytest.mark.parametrize("unit", [1.0, 7e-5])
+def test_the_difference_is_that_of_maps_made_as_strong_as_each_other(unit):
+    # Both add up to 1,110 of the other's unit, whatever that of the first is.
+    one = row_of(np.array([[100.0, 10.0], [1000.0, 0.0]]) * unit)
+    other = row_of([[10.0, 100.0], [500.0, 500.0]], reference=1000.0)
     difference, known = difference_of(one, other, Levels(low_db=-30.0, high_db=0.0))
-    np.testing.assert_allclose(difference, [[10.0, -10.0], [-20.0, -30.0]], atol=1e-5)
+    np.testing.assert_allclose(
+        difference, [[10.0, -10.0], [10 * np.log10(2.0), 10 * np.log10(2.0) - 30.0]], atol=1e-4
+    )
     assert known.all()
     difference, _ = difference_of(one, other, Levels(scale="linear"))
-    np.testing.assert_allclose(difference, [[90.0, -90.0], [-99.0, -100.0]], atol=1e-4)
+    np.testing.assert_allclose(difference, [[9.0, -9.0], [50.0, -50.0]], atol=1e-3)
 
 
 def test_maps_on_other_clocks_meet_at_the_same_moment():
@@ -51,11 +55,16 @@ def test_maps_on_other_clocks_meet_at_the_same_moment():
 
 def test_where_one_says_nothing_there_is_no_difference():
     one = row_of(np.ones((4, 3)), null_bins=(1,), present=np.array([True, False, True]))
-    other = row_of(np.full((4, 3), 0.1), unseen_bins=(3,))
+    quiet = np.full((4, 3), 0.1)
+    quiet[1], quiet[3] = 1e6, 1e6  # where the other says nothing, or it itself
+    quiet[0] = 1e-4
+    other = row_of(quiet, unseen_bins=(3,))
     difference, known = difference_of(one, other, Levels())
     assert known.tolist() == [[True, False, True], [False] * 3, [True, False, True], [False] * 3]
     assert (difference[~known] == 0).all()
-    np.testing.assert_allclose(difference[known], 10.0, atol=1e-5)
+    # Half of 0.1001 and half of it, against 0.0001 and 0.1; all within 30 dB.
+    np.testing.assert_allclose(difference[0, [0, 2]], 10 * np.log10(0.05005) + 30.0, atol=1e-3)
+    np.testing.assert_allclose(difference[2, [0, 2]], 10 * np.log10(0.5005), atol=1e-3)
     with pytest.raises(Sd2Error, match="different velocity axes"):
         difference_of(one, row_of(np.ones((5, 3))), Levels())
 

@@ -28,7 +28,6 @@ def test_facts_equal_what_is_read(store) -> None:
     assert (facts.kind, facts.bins, facts.v_max_mps) == ("simulated", 8, 2.0)
     assert facts.subjects == pairs.subjects
     assert facts.placements == 2
-    assert facts.divisible
     assert facts.duration_s == pytest.approx(420 / 30.0)
     for subjects in (("s1",), ("s2",), ("s1", "s2")):
         for first_only in (False, True):

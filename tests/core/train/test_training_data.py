@@ -130,9 +130,16 @@ class TestSegments:
         several = write_pairs(tmp_path / "several.zarr", ("s1", "s2"), takes=3)
         data = prepare(read_pairs(several), DataConfig((several,), (), ()))
         assert [take.title for take in data.learnt_takes] == ["s1/t0", "s1/t1", "s2/t0", "s2/t1"]
-        lone = write_pairs(tmp_path / "lone.zarr", ("s1",), takes=1)
-        with pytest.raises(Sd2Error, match="no subject with more than one take"):
-            prepare(read_pairs(lone), DataConfig((lone,)))
+
+    def test_a_lone_take_is_split_by_time(self, tmp_path: Path) -> None:
+        lone = write_pairs(tmp_path / "lone.zarr", ("s1",), takes=1, frames=400)
+        pairs = read_pairs(lone)
+        data = prepare(pairs, DataConfig((lone,)))
+        assert data.split.by_take
+        (whole,), (learnt,) = pairs.takes, data.learnt_takes
+        np.testing.assert_array_equal(learnt.radar, whole.radar[:320])
+        assert len(data.validation) == 2  # of 72 frames, overlapping: the last 80
+        np.testing.assert_array_equal(data.validation.targets[-1], whole.radar[-72:])
 
     def test_inputs_and_targets_are_of_the_same_frames(self, tmp_path: Path) -> None:
         pairs = read_pairs(write_pairs(tmp_path / "p.zarr", ("s1",), takes=1))

@@ -95,6 +95,70 @@ def at(step: int, action: Callable[[], None]) -> Callable[[Event], None]:
     return watch
 
 
+@pytest.fixture(scope="module")
+def learnt(pairs: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    run = tmp_path_factory.mktemp("start") / "run"
+    return begin(settings(pairs, "s4", epochs=3), run).model or run
+
+
+class TestGoingOn:
+    """From a model that is there."""
+
+    def test_it_begins_where_the_other_ended(
+        self, pairs: Path, learnt: Path, tmp_path: Path
+    ) -> None:
+        config = settings(pairs, epochs=1, learning_rate=1e-7)
+        config = replace(config, model=ModelConfig(start=learnt))
+        ending = begin(config, tmp_path / "run")
+        before, after = (
+            describe_model(learnt),
+            describe_model(tmp_path / "run" / "best.safetensors"),
+        )
+        assert (after.model, after.options) == (before.model, before.options)
+        assert after.scaling.input == before.scaling.input
+        assert after.about["start"] == learnt.name
+        assert ending.validation_rmse == pytest.approx(
+            before.about["metrics"]["validation_rmse"], rel=1e-3
+        )
+        assert "live_validation_rmse" in after.about["metrics"]
+        # Resumed, or looked at: the run says what it is.
+        assert (
+            f'start = "{os.path.relpath(learnt, tmp_path / "run")}"'
+            in (tmp_path / "run" / "config.toml").read_text()
+        )
+
+    def test_frozen_layers_stay(self, pairs: Path, learnt: Path, tmp_path: Path) -> None:
+        config = replace(settings(pairs, epochs=2), model=ModelConfig(start=learnt, frozen=True))
+        begin(config, tmp_path / "run")
+        before, after = load_file(learnt), weights(tmp_path / "run", "best.safetensors")
+        changed = {name for name in before if not torch.equal(before[name], after[name])}
+        assert changed
+        assert all({"head", "skip"} & {*name.split(".")} for name in changed)
+
+    @pytest.mark.parametrize(
+        ("model", "words"),
+        [
+            ({"name": "gru"}, "The name of .* is 's4', and 'gru' is asked for"),
+            ({"inputs": "limbs"}, "The inputs of .* is 'map', and 'limbs'"),
+            ({"options": {"channels": 4}}, "The options of"),
+        ],
+    )
+    def test_another_kind_is_refused(
+        self, pairs: Path, learnt: Path, tmp_path: Path, model: dict[str, Any], words: str
+    ) -> None:
+        config = replace(settings(pairs), model=ModelConfig(start=learnt, **model))
+        with pytest.raises(Sd2Error, match=words):
+            begin(config, tmp_path / "run")
+        with pytest.raises(Sd2Error, match=r"model\.frozen is true, and no model"):
+            begin(replace(config, model=ModelConfig(frozen=True)), tmp_path / "run")
+
+    def test_other_pairs_are_refused(self, learnt: Path, tmp_path: Path) -> None:
+        other = write_pairs(tmp_path / "other.zarr", null_bins=(4,))
+        config = replace(settings(other), model=ModelConfig(start=learnt))
+        with pytest.raises(Sd2Error, match="null bins"):
+            begin(config, tmp_path / "run")
+
+
 class TestLearning:
     def test_it_beats_what_it_is_given(self, pairs: Path, tmp_path: Path) -> None:
         config = settings(pairs, epochs=30, learning_rate=0.03)
@@ -185,7 +249,7 @@ class TestLearning:
     ) -> None:
         errors = iter([0.5, 0.4, 0.6, 0.4, 0.5, 0.1])
         monkeypatch.setattr(
-            "sd2core.train.callbacks.validate", lambda *_: Validation(next(errors), 1.0)
+            "sd2core.train.callbacks.validate", lambda *_: Validation(next(errors), 1.0, None)
         )
         ending = begin(settings(pairs, early_stopping_epochs=3, epochs=6), tmp_path / "run")
         assert (ending.outcome, ending.best_epoch) == ("finished", 2)

@@ -142,14 +142,19 @@ def test_the_difference_has_a_sign_and_says_what_it_is(denoised, qtbot):
     assert view.isVisible()
     qtbot.wait(100)  # until the tracks have found their heights
     assert view.title() == "Denoised − radar (simulated)"
-    assert "own 0 dB" in view._status()
+    assert "as strong altogether" in view._status()
     levels, palette = c.display.levels, c.display.palette
     # The ball is seen by the denoiser where the radar, pure noise, sees little: and the
     # other way round at velocities that the ball does not have.
     time_s, fast, slow = 0.5, 1.2, -1.7
     cells = {v: (c.denoised.read(time_s, v), c.real.read(time_s, v)) for v in (fast, slow)}
+    # Made as strong as the radar's map where both know something.
+    kept = [n for n in range(32) if n not in view._difference.blank_bins]
+    ours, theirs = (track.map.values[kept].sum(axis=0).mean() for track in (c.denoised, c.real))
+    assert view._difference.gain == pytest.approx(theirs / ours, rel=0.1)
+    gain = view._difference.gain
     shade = {
-        v: float(c.denoised.shade(np.float32(one.value), levels))
+        v: float(c.real.shade(np.float32(gain * one.value), levels))
         - float(c.real.shade(np.float32(other.value), levels))
         for v, (one, other) in cells.items()
     }

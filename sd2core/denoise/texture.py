@@ -1,0 +1,161 @@
+"""Texture of a radar's map: how it scatters about the mean that a network predicts.
+
+A cell of a Doppler map shows an echo in a part of the frames only, and with a power that
+fluctuates as that of many scatterers does (speckle; F. T. Ulaby et al., "Microwave Remote
+Sensing", vol. II, section 7-2): gamma distributed, with as many looks as were averaged. A model's
+answer is the mean over all of that, smoother than any radar's map.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import expit, gammaincinv, ndtr
+
+from sd2core.errors import Sd2Error
+from sd2core.maps import DopplerMap
+
+Energies = NDArray[np.float32]
+
+_BLOCK = 512
+_GROUPS = 24
+_ROUNDS = 30
+_LEAST_SHOWN = 50
+_SEGMENTS = 64
+_PERSISTENCES = (0.0, 0.25, 0.5, 0.75, 0.9, 0.97)
+_FARTHEST = 9.0
+
+
+@dataclass(frozen=True)
+class Texture:
+    """Law of the power of a cell, given its mean m.
+
+    It shows with a probability that is logistic in log m, with the power
+    (floor + gain · m) · G, where G is gamma distributed with mean 1 and ``looks`` as its shape.
+    Neighbouring frames are correlated, bins are not.
+    """
+
+    half: float  # Mean at which a cell shows in half of the frames.
+    slope: float  # Of the logistic law, per unit of log m.
+    floor: float  # Mean power of what shows of the weakest cells.
+    gain: float
+    looks: float
+    persistence: float  # Correlation of a cell's fluctuations from frame to frame, 0 to below 1.
+
+    def __post_init__(self) -> None:
+        positive = min(self.half, self.slope, self.looks, self.floor + self.gain)
+        if not (positive > 0 and min(self.floor, self.gain) >= 0 and 0 <= self.persistence < 1):
+            raise Sd2Error(f"A texture is {self}", "numbers above 0, a persistence below 1")
+
+    @classmethod
+    def fitted(cls, means: Energies, radar: Energies) -> Texture | None:
+        """Fit it to a model's answers and a radar's maps, (…, frames, bins); None of too few."""
+        shows = radar > 0
+        if min(shows.sum(), (~shows & (means > 0)).sum()) < _LEAST_SHOWN:
+            return None
+        known = means > 0
+        half, slope = _logistic(np.log(means[known], dtype=np.float64), shows[known])
+        mean, power = (values[shows & known].astype(np.float64) for values in (means, radar))
+        groups = np.array_split(np.argsort(mean), _GROUPS)
+        level = np.array([mean[one].mean() for one in groups])
+        found = np.array([power[one].mean() for one in groups])
+        scatter = np.array([power[one].var() for one in groups])
+        # Relative errors count.
+        rows = np.stack([np.ones_like(level), level], axis=1) / found[:, None]
+        floor, gain = np.linalg.lstsq(rows, np.ones_like(found))[0].clip(min=0.0).tolist()
+        looks = float(np.median(found**2 / np.maximum(scatter, 1e-9 * found**2)))
+        if not (floor + gain > 0 and slope > 0):
+            return None
+        law = cls(half, slope, floor, gain, looks, 0.0)
+        return replace(law, persistence=law._persistence_of(means, radar))
+
+    def _persistence_of(self, means: Energies, radar: Energies) -> float:
+        """Persistence whose realisations are as alike from frame to frame as a radar's maps."""
+        frames, bins = means.shape[-2:]
+        some, given = (values.reshape(-1, frames, bins)[:_SEGMENTS] for values in (means, radar))
+        wanted = self._likeness(some, given)
+        found = [
+            self._likeness(
+                some,
+                np.stack(
+                    [
+                        replace(self, persistence=one).drawn(segment, (number,))
+                        for number, segment in enumerate(some)
+                    ]
+                ),
+            )
+            for one in _PERSISTENCES
+        ]
+        return float(np.interp(wanted, np.maximum.accumulate(found), _PERSISTENCES))
+
+    def _likeness(self, means: Energies, maps: Energies) -> float:
+        """Correlation of how far neighbouring frames are from their means, where both show."""
+        off = maps / np.maximum(self.floor + self.gain * means, np.finfo(np.float32).tiny) - 1.0
+        off = np.clip(off, -1.0, _FARTHEST)
+        both = (maps[:, 1:] > 0) & (maps[:, :-1] > 0)
+        if both.sum() < _LEAST_SHOWN:
+            return 0.0
+        return float(np.corrcoef(off[:, 1:][both], off[:, :-1][both])[0, 1])
+
+    def drawn(self, energies: Energies, seed: Sequence[int], first: int = 0) -> Energies:
+        """A realisation of frames (frames, bins) whose mean is given, from frame ``first`` on.
+
+        It depends on the seed and on the number of each frame, not on where a stretch begins.
+        """
+        mean = energies.astype(np.float64)
+        with np.errstate(divide="ignore"):
+            shown = expit(self.slope * (np.log(mean) - np.log(self.half)))
+        frames, bins = energies.shape
+        rank = ndtr(_fluctuations(seed, first, frames, bins, self.persistence))
+        above = np.clip((rank - (1.0 - shown)) / np.maximum(shown, 1e-12), 0.0, 1.0 - 1e-9)
+        power = (self.floor + self.gain * mean) * gammaincinv(self.looks, above) / self.looks
+        return np.where(rank > 1.0 - shown, power, 0.0).astype(np.float32)
+
+    def on(self, doppler: DopplerMap, seed: int) -> DopplerMap:
+        """A denoised map as the radar would show it; other maps get other fluctuations."""
+        content = zlib.crc32(doppler.values.tobytes())
+        note = f"drawn as the radar would show it (seed {seed}): it scatters about the mean"
+        notes = [*doppler.meta.get("notes", []), note]
+        meta = {**doppler.meta, "texture": {"seed": seed}, "notes": notes}
+        drawn = self.drawn(np.ascontiguousarray(doppler.values.T), (seed, content))
+        return replace(doppler, values=drawn.T, meta=meta)
+
+    @classmethod
+    def from_json(cls, content: Mapping[str, Any] | None) -> Texture | None:
+        """From the dictionary of its fields; models of before there were textures have none."""
+        return None if content is None else cls(**{name: float(content[name]) for name in content})
+
+
+def _fluctuations(
+    seed: Sequence[int], first: int, frames: int, bins: int, persistence: float
+) -> NDArray[np.float64]:
+    """Normal numbers (frames, bins), correlated from frame to frame, anew in every block."""
+    found = []
+    for block in range(first // _BLOCK, -(-(first + frames) // _BLOCK)):
+        rng = np.random.default_rng([*seed, block])
+        rows = min(_BLOCK, first + frames - block * _BLOCK)
+        values = rng.standard_normal((rows, bins))
+        values[1:] *= np.sqrt(1.0 - persistence**2)
+        for frame in range(1, rows):
+            values[frame] += persistence * values[frame - 1]
+        found.append(values)
+    start = first % _BLOCK
+    return np.concatenate(found)[start : start + frames] if found else np.zeros((0, bins))
+
+
+def _logistic(levels: NDArray[np.float64], shows: NDArray[np.bool_]) -> tuple[float, float]:
+    """Level at which half shows, as an energy, and slope: maximum likelihood, by Newton's steps."""
+    middle, spread = levels.mean(), levels.std() + 1e-9
+    rows = np.stack([np.ones_like(levels), (levels - middle) / spread])
+    weights = np.zeros(2)
+    for _ in range(_ROUNDS):
+        chance = expit(weights @ rows)
+        curvature = (rows * (chance * (1 - chance) + 1e-6)) @ rows.T
+        weights += np.linalg.solve(curvature + 1e-6 * np.eye(2), rows @ (shows - chance))
+    slope = float(weights[1] / spread)
+    return float(np.exp(middle - weights[0] / slope)) if slope > 0 else 1.0, slope

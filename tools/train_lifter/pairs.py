@@ -1,0 +1,159 @@
+"""Pairs of what a fit of each take shows and what a simulated radar shows of the person."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+from sd2core.body.parts import synthetic_map
+from sd2core.body.skinning import pose_vertices
+from sd2core.body.track import LANDMARKS
+from sd2core.doppler import Synthesizer
+from sd2core.errors import Sd2Error
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.mesh.vertex_parts import PARTS
+from sd2core.pairs.store import PairWriter, TakeKey
+from sd2core.pairs.store import Take as Pair
+from sd2core.progress import Progress, silent
+from sd2core.radar_config import PAPER_RADAR
+from sd2core.sensor import Vector, VirtualSensor, aimed_at, position_from_spherical
+from sd2core.simulate.campaign.motion import LABELS
+from sd2core.simulate.campaign.radar import TargetOptions, radar_target
+from sd2core.simulate.campaign.scene import RANGES_M
+from sd2core.simulate.campaign.takes import FITTED, OPTIONS, TRUE
+from tools.fitting.whole_fit import fit_body, mesh_of
+from tools.motion_capture.bodies import BodyMotion
+from tools.train_lifter.data import load_takes
+from tools.train_lifter.deeds import Manner
+from tools.train_lifter.fits import track_of
+from tools.train_lifter.takes import Scene, Stage, Take
+
+_BESIDE_M = 0.25
+_TRUNK = [LANDMARKS.index(f"{place}.{side}") for place in ("shoulder", "hip") for side in "LR"]
+_GROUPS, _PLACEMENTS = 10, 2
+_SAME_M = 1e-3
+
+
+def make_pairs(
+    out: Path,
+    folder: Path,
+    seed: int,
+    *,
+    held_out: bool = False,
+    manner: Manner = "any",
+    motions: Sequence[BodyMotion] = (),
+    progress: Progress = silent,
+) -> int:
+    """Add a pair for every take in which the person is seen throughout; return their number.
+
+    ``folder`` holds takes that :func:`~tools.train_lifter.data.make_lifter_data` made with the same
+    arguments. Each is seen by two drawn radars, beside the camera and from anywhere around. Raises
+    Sd2Error if the takes were made with others.
+    """
+    writer = PairWriter(
+        out,
+        kind="simulated",
+        axis=OPTIONS.axis,
+        null_bins=OPTIONS.null_bins,
+        frame_rate_hz=1.0 / PAPER_RADAR.frame_repetition_s,
+        labels=LABELS,
+        provenance={
+            "made_by": "python -m tools.train_lifter pairs",
+            "simulated": True,
+            "radar": PAPER_RADAR.as_dict(),
+            "synthesis": asdict(OPTIONS),
+        },
+        parts=PARTS,
+    )
+    made = 0
+    takes = load_takes(folder)
+    for number, (take, scene) in enumerate(_with_scenes(takes, seed, held_out, manner, motions)):
+        progress(number, len(takes))
+        subject = f"{folder.name}-{number % _GROUPS}"
+        name = f"take-{number:05d}"
+        if TakeKey(subject, name, 0) in writer.done:
+            continue
+        track = track_of(take)
+        if not track.present.all():
+            continue
+        fitted = mesh_of(fit_body(track, take.camera, stature_m=take.stature_m), FITTED)
+        true = _true(scene, fitted)
+        synthesizer = Synthesizer(fitted, OPTIONS, threads=1)
+        chest_m = tuple(take.keypoints_m[:, _TRUNK].mean(axis=(0, 1)).tolist())
+        for placement in range(_PLACEMENTS):
+            rng = np.random.default_rng([seed, int(held_out), number, placement])
+            sensor = _sensor(rng, chest_m, placement)
+            radar = radar_target(
+                true,
+                PAPER_RADAR,
+                sensor,
+                OPTIONS.axis,
+                OPTIONS.null_bins,
+                seed=(seed, int(held_out), number, placement),
+                options=TargetOptions().drawn(rng),
+            )
+            found = synthetic_map(synthesizer, sensor, limbs=True)
+            writer.append(
+                Pair(
+                    subject,
+                    name,
+                    np.ascontiguousarray(found.values.T),
+                    radar,
+                    fitted.times_s,
+                    np.zeros(len(fitted.times_s), np.int8),
+                    np.array(sensor.position_m),
+                    placement,
+                    found.limbs,
+                )
+            )
+        made += 1
+    progress(len(takes), len(takes))
+    return made
+
+
+def _with_scenes(
+    takes: Sequence[Take],
+    seed: int,
+    held_out: bool,
+    manner: Manner,
+    motions: Sequence[BodyMotion],
+) -> Iterator[tuple[Take, Scene]]:
+    """Takes with what they were drawn of, drawn anew."""
+    stage = Stage()
+    for number, take in enumerate(takes):
+        rng = np.random.default_rng((seed, int(held_out), number))
+        frames = len(take.confidence)
+        if motions:
+            scene = stage.captured(rng, motions, frames)
+        else:
+            scene = stage.scene(rng, held_out=held_out, manner=manner, frames=frames)
+        if not np.allclose(scene.keypoints_m, take.keypoints_m, atol=_SAME_M):
+            raise Sd2Error(
+                f"Take {number} shows another person, or other motion",
+                "the seed, manner and motions that the takes were made with",
+            )
+        yield take, scene
+
+
+def _sensor(rng: np.random.Generator, chest_m: Vector, placement: int) -> VirtualSensor:
+    """One beside the camera, or anywhere around the person."""
+    if placement:
+        place_m = position_from_spherical(
+            chest_m,
+            float(rng.uniform(*RANGES_M)),
+            float(rng.uniform(-180.0, 180.0)),
+            float(rng.uniform(-10.0, 25.0)),
+        )
+    else:
+        x_m, y_m = rng.uniform(-_BESIDE_M, _BESIDE_M, 2).tolist()
+        place_m = (x_m, y_m, 0.0)
+    return aimed_at(VirtualSensor(place_m), chest_m)
+
+
+def _true(scene: Scene, like: MeshSequence) -> MeshSequence:
+    body = Stage().space.load(TRUE, scene.shape)
+    vertices = pose_vertices(body, scene.transforms)
+    return MeshSequence(vertices, body.faces, like.timebase, source="simulated body")
