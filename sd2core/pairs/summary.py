@@ -30,6 +30,7 @@ class PairFacts:
     v_max_mps: float
     frame_rate_hz: float
     takes: tuple[TakeFacts, ...]
+    has_limbs: bool = False  # The input is also split by the parts of the body.
 
     @property
     def subjects(self) -> tuple[str, ...]:
@@ -74,6 +75,7 @@ def pair_facts(path: Path) -> PairFacts:
             v_max_mps=float(header["v_max_mps"]),
             frame_rate_hz=float(header["frame_rate_hz"]),
             takes=takes,
+            has_limbs=bool(header.get("parts")),
         )
     except (KeyError, TypeError, ValueError) as error:
         raise Sd2Error(f"{path}: its description is damaged ({error!r})") from error

@@ -5,6 +5,7 @@ from __future__ import annotations
 from PySide6.QtWidgets import QCheckBox, QMessageBox
 
 from sd2app.feature import Shell
+from sd2app.session.document import DocumentModel
 from sd2app.training.model import TrainingModel
 from sd2app.widgets.dialogs import ask_folder
 
@@ -12,8 +13,8 @@ from sd2app.widgets.dialogs import ask_folder
 class TrainingDialogs:
     """Dialogs, followed by calls of the model."""
 
-    def __init__(self, shell: Shell, training: TrainingModel) -> None:
-        self.shell, self._training = shell, training
+    def __init__(self, shell: Shell, training: TrainingModel, document: DocumentModel) -> None:
+        self.shell, self._training, self._document = shell, training, document
         self._parent = shell.dialog_parent
 
     def ask_store(self) -> None:
@@ -21,10 +22,26 @@ class TrainingDialogs:
         if path := ask_folder(self._parent, "Folder of pairs to learn from"):
             self._training.setup.add(path)
 
+    @property
+    def why_not_this(self) -> str:
+        """Reason why no pairs can be made of the open recording; empty where they can."""
+        recording = self._document.recording
+        if self._training.pair_maker.out is not None:
+            return "Pairs are being made"
+        if recording is None or recording.mesh is None or recording.radar is None:
+            return "It takes a recording with a mesh and a radar capture"
+        return "Save the recording first" if self._document.modified else ""
+
+    def make_of_this(self) -> None:
+        """Make pairs of the open recording."""
+        recording = self._document.recording
+        if recording is not None:
+            self.shell.attempt(lambda: self._training.make_pairs(recording.folder))
+
     def ask_recordings(self) -> None:
         """Let the user choose recordings to make pairs of."""
         if path := ask_folder(self._parent, "A recording, or a folder of some"):
-            self.shell.attempt(lambda: self._training.pair_maker.make(path))
+            self.shell.attempt(lambda: self._training.make_pairs(path))
 
     def open_run(self) -> None:
         """Let the user choose a run in another folder, such as one started in a terminal."""

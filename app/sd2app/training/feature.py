@@ -31,7 +31,7 @@ class TrainingFeature(Feature):
         self._session, self._shell = session, shell
         self.model = TrainingModel(session.settings, parent, command or COMMAND)
         self.adoption = ModelAdoption(self.model, denoise, session.maps, user_models_folder, parent)
-        self._dialogs = TrainingDialogs(shell, self.model)
+        self._dialogs = TrainingDialogs(shell, self.model, session.document)
         for model in (self.model, self.adoption):
             model.failed.connect(shell.warn)
             model.noted.connect(shell.note)

@@ -24,7 +24,7 @@ from sd2core.files.paths import user_data
 from sd2core.processes import ONE_THREAD
 from sd2core.runs.command_folder import COMMAND, launch
 from sd2core.runs.folder import LIVE
-from sd2core.train.config import DataConfig, TrainConfig, TrainingConfig
+from sd2core.train.config import DataConfig, ModelConfig, TrainConfig, TrainingConfig
 from sd2core.train.folder import RunStatus, TrainingFolder, runs_in
 
 Closing = Literal["ask", "keep", "stop"]
@@ -118,6 +118,13 @@ class TrainingModel(Runs[TrainingMonitor]):
         path = _new_run(self._folder, config)
         self._launch(path, train_arguments(config, path))
 
+    def make_pairs(self, place: Path) -> None:
+        """Make pairs of a recording, or of those in a folder, for the input that is set up.
+
+        Raises what :meth:`PairMaker.make` does.
+        """
+        self.pair_maker.make(place, limbs=bool(self.setup.parts))
+
     def resume(self) -> None:
         """Go on with the run in view where it ended; raises what :meth:`start` does."""
         run = self.run
@@ -172,8 +179,14 @@ class TrainingModel(Runs[TrainingMonitor]):
 
 def train_arguments(config: TrainConfig, run: Path) -> list[str]:
     """Arguments of ``sd2 train`` for all that differs from the defaults."""
+    model = config.model
     # The model is named even where it is the default: it is what one looks for.
-    words = ["train", *map(str, config.data.pairs), "--model", config.model.name, "--background"]
+    kind = ["--model", model.name]
+    if model.start is not None:
+        kind = ["--from", str(model.start)]
+    elif model.inputs != ModelConfig().inputs:
+        kind += ["--inputs", model.inputs]
+    words = ["train", *map(str, config.data.pairs), *kind, "--background"]
     for section, plain in (("data", DataConfig(config.data.pairs)), ("training", TrainingConfig())):
         mine = getattr(config, section)
         for one in fields(mine):
@@ -190,7 +203,9 @@ def quoted(arguments: list[str]) -> str:
 
 
 def _new_run(folder: Path, config: TrainConfig) -> Path:
-    return free_folder(folder, config.model.name, config.data.pairs)
+    start = config.model.start
+    name = config.model.name if start is None else start.stem
+    return free_folder(folder, name, config.data.pairs)
 
 
 def _title(status: RunStatus) -> str:

@@ -43,8 +43,8 @@ class PairMaker(QObject):
         self.out: Path | None = None  # store that is being made
         self.cancelling = False  # it has been asked to end
 
-    def make(self, place: Path) -> None:
-        """Make pairs of a recording, or of all recordings in a folder.
+    def make(self, place: Path, *, limbs: bool = False) -> None:
+        """Make pairs of a recording, or of all recordings in a folder; with ``limbs`` also split.
 
         Raises Sd2Error if there is none with a mesh and a radar capture, some are being made, or
         it cannot be started; OSError if the folder cannot be read, or that of the pairs not be
@@ -57,6 +57,7 @@ class PairMaker(QObject):
         out = _free(self._folder, place.stem)
         folder = CommandFolder(out.with_name(f".{out.stem}"))
         words = ["pairs", "recordings", *map(str, recordings), "--out", str(out)]
+        words += ["--limbs"] * limbs
         try:
             process = folder.start(words, {"what": "pairs"}, self._command, {})
         except Sd2Error:

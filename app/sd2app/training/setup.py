@@ -10,18 +10,23 @@ from PySide6.QtCore import QObject
 from sd2app.background.run_setup import RunSetup
 from sd2app.settings import Settings, StoredChoices
 from sd2app.widgets.text import counted, duration_text
+from sd2core.denoise.card import PARTS_OF, ModelCard
+from sd2core.denoise.files import available_models
 from sd2core.errors import Sd2Error
 from sd2core.pairs.summary import PairFacts, pair_facts
 from sd2core.runs.pace import known_pace_s
 from sd2core.train.config import DataConfig, MachineConfig, ModelConfig, TrainConfig, TrainingConfig
 from sd2core.train.data import Split, split_subjects
 
+INPUTS = ("map", "limbs", "kinematics")
 MODELS = ("s4", "s4d", "gru", "unet", "swin", "s4-serial")
 _DATA = DataConfig(pairs=(Path(),))
 _PAIRS, _KNOWN = "training/pairs", "training/known_pairs"
 _MOST_KNOWN = 10
 _DEFAULTS: dict[str, str | int | float] = {
     "model": "s4",
+    "inputs": "map",
+    "start": "",
     "epochs": TrainingConfig().epochs,
     "batch_size": TrainingConfig().batch_size,
     "learning_rate": TrainingConfig().learning_rate,
@@ -29,7 +34,8 @@ _DEFAULTS: dict[str, str | int | float] = {
     "range_factor": 1.0,
     "seed": TrainingConfig().seed,
 }
-"""Defaults, from the paper where it has them; 0 epochs of patience: no early stopping."""
+"""Defaults, from the paper where it has them; 0 epochs of patience: no early stopping; no start: a
+new model."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +77,9 @@ class TrainingSetupModel(RunSetup[Store]):
     kind = Store
 
     def __init__(self, settings: Settings, parent: QObject) -> None:
-        values = StoredChoices(settings, "training", _DEFAULTS, {"model": MODELS})
+        self.starts = {card.name: card for card in available_models() if card.model in MODELS}
+        known = {"model": MODELS, "inputs": INPUTS, "start": ("", *self.starts)}
+        values = StoredChoices(settings, "training", _DEFAULTS, known)
         stores = [Store(path) for path in settings.paths(_PAIRS)]
         super().__init__(settings, values, _PAIRS, stores, parent)
 
@@ -122,9 +130,22 @@ class TrainingSetupModel(RunSetup[Store]):
             return (
                 "These pairs differ in their velocity axis or frame rate. Choose pairs of one kind."
             )
+        if self.parts and not all(one.has_limbs for one in facts):
+            return "Some of these pairs are not split by the parts of the body. Learn from the map."
         if not self._segments():
             return "Every take is shorter than one segment of 72 frames."
         return ""
+
+    @property
+    def start(self) -> ModelCard | None:
+        """Model to go on from; None: a new one."""
+        return self.starts.get(self._values["start"])
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """Parts of the body whose maps, or motion, are the input."""
+        start = self.start
+        return PARTS_OF[self._values["inputs"]] if start is None else start.parts
 
     @property
     def config(self) -> TrainConfig:
@@ -137,7 +158,9 @@ class TrainingSetupModel(RunSetup[Store]):
         values = self._values
         return TrainConfig(
             DataConfig(pairs=pairs, range_factor=values["range_factor"]),
-            ModelConfig(name=values["model"]),
+            ModelConfig(name=values["model"], inputs=values["inputs"])
+            if self.start is None
+            else ModelConfig(start=self.start.path),
             TrainingConfig(
                 batch_size=values["batch_size"],
                 epochs=values["epochs"],

@@ -6,8 +6,9 @@ from PySide6.QtWidgets import QGridLayout, QWidget
 
 from sd2app.training.dialogs import TrainingDialogs
 from sd2app.training.model import TrainingModel
-from sd2app.training.text import MODEL_WORDS, division_text
+from sd2app.training.text import INPUT_WORDS, MODEL_WORDS, division_text
 from sd2app.widgets.layouts import STRETCH, pane, row_of
+from sd2app.widgets.model_page import model_title
 from sd2app.widgets.panel import ElidedLabel, Fold, outlined, sentence, title
 from sd2app.widgets.progress_bar import ProgressBar
 from sd2app.widgets.text import counted
@@ -54,7 +55,18 @@ class TrainingSetupView(TrainingForm):
         names = {name: words[0] for name, words in MODEL_WORDS.items()}
         kind = self.choice("model", "Kind of model", names)
         self._about = sentence("")
-        self.column.addLayout(row_of(title("Model"), (kind, 1), spacing_px=8))
+        self._kind = kind
+        self._inputs = self.choice(
+            "inputs", "What it learns from; all but the map need pairs with --limbs", INPUT_WORDS
+        )
+        starts = {name: model_title(card) for name, card in self._pairs.starts.items()}
+        start = self.choice(
+            "start",
+            "Go on from a model with pairs of your own: fewer are enough",
+            {"": "New", **starts},
+        )
+        for name, one in (("Model", kind), ("Input", self._inputs), ("Start", start)):
+            self.column.addLayout(row_of(title(name), (one, 1), spacing_px=8))
         self.column.addWidget(self._about)
         self._add_settings()
         self.add_start(training.start, lambda: training.command)
@@ -107,7 +119,14 @@ class TrainingSetupView(TrainingForm):
             doing = "Cancelling…" if maker.cancelling else "Making"
             self._making_text.setText(f"{doing} {maker.out.name}")
             self._making_cancel.setEnabled(not maker.cancelling)
-        self._about.setText(MODEL_WORDS[setup.value("model")][1])
+        card = setup.start
+        for one in (self._kind, self._inputs):
+            one.setEnabled(card is None)
+        self._about.setText(
+            MODEL_WORDS[setup.value("model")][1]
+            if card is None
+            else f"Goes on from {model_title(card)}, with its kind and its input."
+        )
         self._reset.setVisible(setup.differs)
         estimate = setup.estimate
         count = f"{estimate.segments:,} segments, {counted(estimate.steps, 'step')}"
@@ -124,6 +143,10 @@ class TrainingSetupView(TrainingForm):
         if not menu.isEmpty():
             menu.addSeparator()
         menu.addAction("Folder of pairs…").triggered.connect(self._dialogs.ask_store)
+        one = menu.addAction("Make of this recording")
+        one.setToolTip(self._dialogs.why_not_this or "Its mesh and its radar, as it was saved")
+        one.setEnabled(not self._dialogs.why_not_this)
+        one.triggered.connect(self._dialogs.make_of_this)
         make = menu.addAction("Make of recordings…")
         make.setToolTip("Of one recording, or of all in a folder, that have a mesh and a radar")
         make.setEnabled(self._training.pair_maker.out is None)

@@ -22,6 +22,12 @@ MODEL_WORDS = {
     "s4-serial": ("S4, serialised", "All cells as one long channel; slow, kept for comparison."),
 }
 
+INPUT_WORDS = {
+    "map": "The map",
+    "limbs": "The map of each part of the body",
+    "kinematics": "How the joints move",
+}
+
 _PHASES: dict[Phase, str] = {
     "starting": "Starting…",
     "running": "Training",

@@ -8,10 +8,12 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from answering import answer
 from PySide6.QtCore import QCoreApplication, QEvent, QObject, QRect, Qt, QTimer, Signal
+from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
     QApplication,
     QFileDialog,
@@ -33,10 +35,12 @@ from sd2app.training.dialogs import TrainingDialogs
 from sd2app.training.model import TrainingModel
 from sd2app.training.panel import TrainingPanel, TrainingRunView
 from sd2app.training.result import ModelAdoption
+from sd2app.training.setup_view import TrainingSetupView
 from sd2app.widgets.chart import ChartView
 from sd2app.widgets.inputs import Choice, NumberBox
 from sd2app.widgets.theme import apply_theme
 from sd2core.errors import Sd2Error
+from sd2core.recording.recording import open_recording
 from sd2core.runs.pace import keep_pace
 
 FAKE = Path(__file__).resolve().parents[2] / "fake_train.py"
@@ -96,7 +100,8 @@ class Window:
         self.use = ModelAdoption(self.training, self.denoise, maps, lambda: folder / "models")
         self.said: list[str] = []
         self.display = DisplayModel()
-        self.dialogs = TrainingDialogs(SayingShell(self.said), self.training)
+        self.document = SimpleNamespace(recording=None, modified=False)
+        self.dialogs = TrainingDialogs(SayingShell(self.said), self.training, self.document)
         self.panel = TrainingPanel(self.training, self.use, self.display, self.dialogs)
         self.side = SidePanel({"Train": self.panel})
         self.side.resize(300, 520)
@@ -211,6 +216,65 @@ def test_what_is_set_up_is_what_is_started(made, qtbot, pairs) -> None:
     assert "--early-stopping 7" in command
     click(window, qtbot, "Reset")
     assert (setup.value("epochs"), setup.value("batch_size")) == (500, 64)
+
+
+def test_it_learns_from_joints_or_goes_on_from_a_model(made, qtbot, pairs, tmp_path) -> None:
+    window = made()
+    setup = window.training.setup
+    setup.add(pairs)
+    qtbot.waitUntil(lambda: "6 people" in texts(window))
+    choices = {c.toolTip(): c for c in window.panel.findChildren(Choice)}
+    kind = choices["Kind of model"]
+    (inputs,) = (c for tip, c in choices.items() if tip.startswith("What it learns from"))
+    (start,) = (c for tip, c in choices.items() if tip.startswith("Go on from"))
+    inputs.setFocus()
+    qtbot.keyClick(inputs, Qt.Key.Key_End)
+    assert setup.value("inputs") == "kinematics"
+    assert "not split by the parts of the body" in texts(window)
+    assert not button(window, "Start training").isEnabled()
+    qtbot.keyClick(inputs, Qt.Key.Key_Home)
+    assert button(window, "Start training").isEnabled()
+    # The bundled models, by their titles.
+    assert start.count() >= 3
+    start.setFocus()
+    while setup.value("start") != "denoiser":  # the bundled one that takes the map
+        before = start.currentIndex()
+        qtbot.keyClick(start, Qt.Key.Key_Down)
+        assert start.currentIndex() > before
+    assert not kind.isEnabled()
+    assert not inputs.isEnabled()
+    assert "Goes on from" in texts(window)
+    click(window, qtbot, "Copy command")
+    command = QApplication.clipboard().text()
+    assert f"--from {setup.start.path}" in command
+    assert "--model" not in command
+    qtbot.keyClick(start, Qt.Key.Key_Home)
+    assert setup.start is None
+    assert kind.isEnabled()
+
+
+def test_the_open_recording_is_made_into_pairs(made, qtbot, small_recording) -> None:
+    window = made()
+    menu = window.panel.findChild(TrainingSetupView)._menu
+
+    def this() -> QAction:
+        menu.aboutToShow.emit()
+        return next(one for one in menu.actions() if one.text() == "Make of this recording")
+
+    assert not this().isEnabled()
+    assert "mesh and a radar" in this().toolTip()
+    window.document.recording = open_recording(small_recording)
+    window.document.modified = True
+    assert this().toolTip() == "Save the recording first"
+    window.document.modified = False
+    maker = window.training.pair_maker
+    maker._command = (sys.executable, "-c", "import time; time.sleep(3600)")
+    this().trigger()
+    assert maker.out is not None
+    assert maker.out.name == "ball.zarr"
+    assert this().toolTip() == "Pairs are being made"
+    maker.cancel()
+    qtbot.waitUntil(lambda: maker.out is None, timeout=10_000)
 
 
 def test_a_store_that_is_none_is_named_and_can_be_taken_out(made, qtbot, tmp_path) -> None:
