@@ -332,6 +332,13 @@ def _add_campaign(kinds: argparse._SubParsersAction) -> None:
         help="sensors that see each take: its own, beside the camera, and N - 1 at other ranges"
         " and angles (default: 1)",
     )
+    parser.add_argument(
+        "--rate",
+        type=positive_float,
+        metavar="FPS",
+        help="frames per second of the radar, 10 to 120 (default: 30)",
+    )
+    add_value(parser, "--bins", positive_int, "N", "velocity bins, 16 to 128 (default: 32)")
     add_value(parser, "--take-seconds", positive_float, "S", "length of a take, in seconds", 15.0)
     add_value(parser, "--workers", positive_int, "N", "worker processes", 2)
     add_limbs(parser)
@@ -388,19 +395,26 @@ def _protocol(options: argparse.Namespace) -> Protocol:
 
 
 def _campaign(options: argparse.Namespace) -> None:
+    from sd2core.doppler.options import chosen_options
     from sd2core.pairs.store import read_pairs
     from sd2core.simulate.campaign.making import make_campaign
+    from sd2core.simulate.campaign.radar import radar_at
     from sd2core.simulate.campaign.takes import Campaign
 
+    rate, bins = options.rate or 30.0, options.bins or 32
+    if not (10 <= rate <= 120 and 16 <= bins <= 128):
+        raise Sd2Error(f"{rate:g} frames/s and {bins} bins", "10 to 120 frames/s, 16 to 128 bins")
     campaign = Campaign(
         options.seed,
         options.take_seconds,
         options.sensors,
+        radar_at(rate, bins),
         limbs=options.limbs,
         protocol=_protocol(options),
         motions=options.motions,
         role=options.motion_role,
         error_sizes=options.fit_error_sizes,
+        synthesis=chosen_options("paper", bins, None, {}),
     )
     with progress_bar("Simulating", unit="take") as progress:
         made = make_campaign(

@@ -69,6 +69,10 @@ class KnownMovements:
         beyond = np.maximum(beyond, spread - self.spread_mps)
         return np.clip(beyond / _MARGIN_MPS, 0.0, 1.0).astype(np.float32)
 
+    def strange(self, energies: NDArray[np.float32], axis: VelocityAxis) -> NDArray[np.bool_]:
+        """Frames (…, bins) that are rather the synthetic map's than the model's, (…,)."""
+        return np.asarray(self.strangeness(energies, axis) > 0.5)
+
     def passed_through(
         self, answer: NDArray[np.float32], energies: NDArray[np.float32], axis: VelocityAxis
     ) -> NDArray[np.float32]:
@@ -76,15 +80,22 @@ class KnownMovements:
         share = self.strangeness(energies, axis)[..., None]
         return np.asarray((1.0 - share) * answer + share * np.float32(self.gain) * energies)
 
+    @property
+    def words(self) -> str:
+        """Ranges in words."""
+        return (
+            f"mean velocities of {self.slowest_mps:.2f} to {self.fastest_mps:.2f} m/s,"
+            f" spread up to {self.spread_mps:.2f} m/s"
+        )
+
     def note(self, energies: NDArray[np.float32], axis: VelocityAxis) -> str | None:
         """Sentence on the frames (frames, bins) that are passed through; None if none is."""
-        strange = int(np.count_nonzero(self.strangeness(energies, axis) > 0.5))
+        strange = int(np.count_nonzero(self.strange(energies, axis)))
         if not strange:
             return None
         return (
             f"{strange:,} of {len(energies):,} frames move otherwise than what the model learnt"
-            f" from (mean velocities of {self.slowest_mps:.2f} to {self.fastest_mps:.2f} m/s,"
-            f" spread up to {self.spread_mps:.2f} m/s): they are the synthetic map's"
+            f" from ({self.words}): they are the synthetic map's"
         )
 
     @classmethod

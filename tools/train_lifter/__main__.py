@@ -16,12 +16,14 @@ from sd2core.cli.options import add_command, add_json, positive_int
 from sd2core.cli.output import print_json, progress_bar
 from sd2core.cli.reading import check_output
 from sd2core.errors import Sd2Error
+from sd2core.mocap.body_motion import Role
 from tools.command_line import run_tool
 from tools.motion_capture.bodies import load_motions
 from tools.train_lifter.data import load_takes, make_lifter_data
 from tools.train_lifter.deeds import Manner
 from tools.train_lifter.emulate import landmark_offsets
 from tools.train_lifter.fits import fit_law, repaired
+from tools.train_lifter.pairs import make_pairs
 from tools.train_lifter.score import score
 from tools.train_lifter.swaps import score_sides
 from tools.train_lifter.takes import Take
@@ -52,25 +54,7 @@ def _add_commands(kinds: argparse._SubParsersAction) -> None:
     data.add_argument(
         "--takes", type=positive_int, default=400, metavar="N", help="how many (default: 400)"
     )
-    data.add_argument("--seed", type=int, default=0, metavar="S", help="seed of all random numbers")
-    data.add_argument(
-        "--held-out", action="store_true", help="with the kinds of motion kept for testing"
-    )
-    data.add_argument(
-        "--manner",
-        choices=get_args(Manner),
-        default="any",
-        help=(
-            "how people move: with elbows any way they can be (default), as people have them,"
-            " or gesturing before the camera, with arms or with forearms alone"
-        ),
-    )
-    data.add_argument(
-        "--motions",
-        type=Path,
-        metavar="FOLDER",
-        help="people move as those recorded there do (made by python -m tools.motion_capture)",
-    )
+    _add_motion(data)
     data.add_argument("--processes", type=positive_int, default=2, metavar="P", help="(default: 2)")
     data.add_argument("--models", type=Path, metavar="FOLDER", help="the landmark models")
     data.add_argument(
@@ -79,6 +63,20 @@ def _add_commands(kinds: argparse._SubParsersAction) -> None:
         default=DEFAULT_MODEL,
         help="which of them looks (default: %(default)s)",
     )
+    pairs = add_command(
+        kinds,
+        "pairs",
+        "make pairs to train a denoiser on: fits of such takes beside a simulated radar",
+        handler=_pairs,
+        description="The other options are those that the takes were made with.",
+        examples=(
+            "  python -m tools.train_lifter pairs people --seed 1 --out fits.zarr\n"
+            "  sd2 train campaign.zarr fits.zarr --inputs kinematics --out run"
+        ),
+    )
+    pairs.add_argument("data", type=Path, metavar="DATA", help="folder of the takes")
+    pairs.add_argument("--out", type=Path, required=True, metavar="FILE", help="to write (.zarr)")
+    _add_motion(pairs)
     train = add_command(
         kinds,
         "train",
@@ -132,6 +130,30 @@ def _add_commands(kinds: argparse._SubParsersAction) -> None:
     offsets.add_argument("data", type=Path, metavar="DATA", help="folder of the takes")
 
 
+def _add_motion(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--seed", type=int, default=0, metavar="S", help="seed of all random numbers"
+    )
+    parser.add_argument(
+        "--held-out", action="store_true", help="with the kinds of motion kept for testing"
+    )
+    parser.add_argument(
+        "--manner",
+        choices=get_args(Manner),
+        default="any",
+        help=(
+            "how people move: with elbows any way they can be (default), as people have them,"
+            " or gesturing before the camera, with arms or with forearms alone"
+        ),
+    )
+    parser.add_argument(
+        "--motions",
+        type=Path,
+        metavar="FOLDER",
+        help="people move as those recorded there do (made by python -m tools.motion_capture)",
+    )
+
+
 def _add_learning(parser: argparse.ArgumentParser, steps: int) -> None:
     parser.add_argument("data", type=Path, nargs="+", metavar="DATA", help="folders of the takes")
     parser.add_argument(
@@ -165,6 +187,21 @@ def _data(options: argparse.Namespace) -> None:
             progress=progress,
         )
     print(f"Made {made} takes in {options.out}")
+
+
+def _pairs(options: argparse.Namespace) -> None:
+    role: Role = "calibrate" if options.held_out else "learn"
+    with progress_bar("Fitting", unit="take") as progress:
+        made = make_pairs(
+            options.out,
+            options.data,
+            options.seed,
+            held_out=options.held_out,
+            manner=options.manner,
+            motions=load_motions(options.motions, role) if options.motions else (),
+            progress=progress,
+        )
+    print(f"Added pairs of {made} takes to {options.out}")
 
 
 def _train(options: argparse.Namespace) -> None:

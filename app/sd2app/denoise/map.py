@@ -20,6 +20,7 @@ from sd2app.maps.quality import Companion
 from sd2app.session.content import reference_of
 from sd2app.session.maps import MapModel
 from sd2app.session.tasks import Job, TaskList
+from sd2core.denoise.known import KnownMovements
 from sd2core.denoise.resample_to_model import input_of, is_regular
 from sd2core.denoise.texture import Texture
 from sd2core.doppler.synthesizer import Stretch
@@ -89,6 +90,7 @@ class DenoisedMap(QObject):
         self.denoiser: RemoteDenoiser | None = None  # the model in use
         self.words = ""
         self._texture: Texture | None = None
+        self._movements: KnownMovements | None = None
         self._held = False
         self._runner = LatestRunner("denoise", self, self._receive)
         self._runner.failed.connect(lambda error: self._fail(str(error)))
@@ -149,14 +151,20 @@ class DenoisedMap(QObject):
     # --- requests -------------------------------------------------------------------------
 
     def use(
-        self, denoiser: RemoteDenoiser | None, words: str = "", texture: Texture | None = None
+        self,
+        denoiser: RemoteDenoiser | None,
+        words: str = "",
+        *,
+        texture: Texture | None = None,
+        known: KnownMovements | None = None,
     ) -> None:
         """Denoise with another model, called ``words`` on the track, or not at all.
 
-        With a texture the map is drawn as the radar would show it.
+        With a texture the map is drawn as the radar would show it; of the known movements is said
+        how many frames are others.
         """
         self._stop()
-        self._texture = texture
+        self._texture, self._movements = texture, known
         self._took_s.clear()
         self.denoiser = denoiser
         self.words = words
@@ -292,8 +300,7 @@ class DenoisedMap(QObject):
         piece = next_piece(wanted, self._view())
         if piece is None:
             if not self._go_on_in_order():
-                self._report(0)
-                self.idle.emit()
+                self._end()
             return
         self._report(int(wanted.sum()))
         first, last = piece
@@ -335,6 +342,18 @@ class DenoisedMap(QObject):
         self._runner.submit(work)
         return True
 
+    def _end(self) -> None:
+        """Everything is denoised: say which frames the model passes through."""
+        self._report(0)
+        source, movements = self._source, self._movements
+        if source is not None and movements is not None:
+            passed = int(movements.strange(source.values.T, source.axis).sum())
+            if passed:
+                self.track.set_status(
+                    f"{self.words} · {passed:,} frames unlike what it learnt stay synthetic"
+                )
+        self.idle.emit()
+
     def _receive(self, answer: _Answer) -> None:
         first, last = answer.piece
         if answer.session is None:
@@ -348,8 +367,7 @@ class DenoisedMap(QObject):
             elif (self._done_at < self._changed_at)[self._known].any():
                 self._again.start()
             else:
-                self._report(0)
-                self.idle.emit()
+                self._end()
             return
         if answer.revision == self._revision:  # else the order has begun again
             self._session, self._in_order = answer.session, last

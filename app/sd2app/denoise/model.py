@@ -265,7 +265,7 @@ class DenoiseModel(QObject):
         else:
             texture = loaded.card.texture if self.textured else None
             words = origin_words(loaded.card) + (TEXTURED if texture is not None else "")
-            self.map.use(loaded.denoiser, words, texture)
+            self.map.use(loaded.denoiser, words, texture=texture, known=loaded.card.known)
         self._show_before()
         self.changed.emit()
 

@@ -49,6 +49,7 @@ def denoiser_page(card: ModelCard) -> ModelPage:
     rows = [
         ("Kind", f"{kind_words(card)}, {card.parameters:,} parameters"),
         ("Learned from", "simulated data only" if simulated else "real data"),
+        *([] if card.known is None else [("Movements", card.known.words)]),
         *map_and_file_rows(card.axis, card.frame_rate_hz, card.path),
     ]
     return ModelPage(model_title(card), simulated, rows, list(about_sections(card.about)))

@@ -46,6 +46,7 @@ def describe_card(path: Path, card: ModelCard) -> Description:
     facts = {
         "model": model_words(card),
         **_axis_facts(card),
+        **({} if card.known is None else {"has learnt from": card.known.words}),
         "parameters": f"{card.parameters:,}",
         **dict(_about(card.about)),
     }

@@ -25,7 +25,6 @@ from sd2core.simulate.campaign.fit_errors import FitErrors
 from sd2core.simulate.campaign.motion import LABELS
 from sd2core.simulate.campaign.scene import subject_name
 from sd2core.simulate.campaign.takes import (
-    OPTIONS,
     Campaign,
     TakeMaker,
     motions_of,
@@ -68,8 +67,8 @@ def make_campaign(
     writer = PairWriter(
         Path(out),
         kind="simulated",
-        axis=OPTIONS.axis,
-        null_bins=OPTIONS.null_bins,
+        axis=campaign.synthesis.axis,
+        null_bins=campaign.synthesis.null_bins,
         frame_rate_hz=1.0 / campaign.radar.frame_repetition_s,
         labels=LABELS,
         provenance={

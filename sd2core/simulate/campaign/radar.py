@@ -29,7 +29,7 @@ from sd2core.fmcw.scene import MeshScene
 from sd2core.fmcw.sums import Echoes, turns_of
 from sd2core.fmcw.wave import WaveScene
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.radar_config import CLUTTER, RadarConfig
+from sd2core.radar_config import CLUTTER, PAPER_RADAR, RadarConfig
 from sd2core.scattering.facets import visible_facets
 from sd2core.sensor import VelocityAxis, VirtualSensor
 
@@ -70,6 +70,21 @@ class TargetOptions:
         """Content for a campaign's provenance; once all surfaces were rough and nothing said so."""
         said = asdict(self)
         return said if self.smooth else {name: said[name] for name in said if name != "smooth"}
+
+
+def radar_at(frames_per_s: float, bins: int) -> RadarConfig:
+    """The paper's radar at another frame rate, for maps of so many bins.
+
+    A frame has two chirps per bin, as the paper's, or as many as fit into it.
+    """
+    radar = PAPER_RADAR
+    fitting = int((1.0 + 1e-9) / (frames_per_s * radar.chirp_repetition_s))
+    return replace(
+        radar,
+        frame_repetition_s=1.0 / frames_per_s,
+        chirps_per_frame=min(2 * bins, fitting),
+        name=f"60 GHz, {min(2 * bins, fitting)} chirps, 32 samples, {frames_per_s:g} frames/s",
+    )
 
 
 def radar_target(

@@ -17,6 +17,7 @@ from sd2core.body.rotations import Floats
 from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.body.skinning import pose_vertices
 from sd2core.doppler import PRESETS, Synthesizer
+from sd2core.doppler.options import SynthesisOptions
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
@@ -38,6 +39,7 @@ TRUE: Resolution = "low"
 """Echoes of a rough surface depend little on how finely it is cut (decision 26)."""
 
 OPTIONS = PRESETS["paper"]
+"""Synthesis of the maps, where a campaign has no other axis."""
 
 _STATED = 0.3
 """Standard deviation of the logarithm of a stated error over the true one: of a body, of a limb."""
@@ -61,6 +63,7 @@ class Campaign:
     role: Role = "learn"  # People of that folder.
     # Factor of the errors of a take's fit, drawn between these; 1: as measured, 0: none.
     error_sizes: tuple[float, float] = (1.0, 1.0)
+    synthesis: SynthesisOptions = OPTIONS  # Its axis is that of the radar's maps, too.
 
     def __post_init__(self) -> None:
         if self.seed < 0:
@@ -94,7 +97,7 @@ class Campaign:
             "radar": self.radar.as_dict(),
             "target": {**self.target.provenance(), "clutter": PROCESSING.clutter},
             "surfaces": {"synthetic": FITTED, "radar": TRUE},
-            "synthesis": asdict(OPTIONS),
+            "synthesis": asdict(self.synthesis),
             **self.protocol.provenance(),
             # Campaigns of before say nothing: their errors were as measured.
             **({} if self.error_sizes == (1.0, 1.0) else {"error_sizes": self.error_sizes}),
@@ -173,7 +176,7 @@ class TakeMaker:
             transforms = kept_away(transforms)
         true = self._mesh(TRUE, subject.shape, transforms, times_s)
         fitted = self._fitted(rngs[_FIT], subject.shape, transforms, true)
-        synthesizer = Synthesizer(fitted, OPTIONS, threads=1)
+        synthesizer = Synthesizer(fitted, campaign.synthesis, threads=1)
         seed = [campaign.seed, _TAKE, subject_number, number, _RADAR]
         target = campaign.target
         if campaign.protocol.drawn_radars:
@@ -184,8 +187,8 @@ class TakeMaker:
                 true,
                 campaign.radar,
                 sensor,
-                OPTIONS.axis,
-                OPTIONS.null_bins,
+                campaign.synthesis.axis,
+                campaign.synthesis.null_bins,
                 reflectors=setting.reflectors,
                 seed=[*seed, placement, *([look] if look else [])],
                 options=target,

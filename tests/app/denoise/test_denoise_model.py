@@ -18,6 +18,8 @@ from sd2app.denoise import map as denoised_map
 from sd2app.settings import Settings
 from sd2app.shell.parts import Parts
 from sd2core.denoise.files import LIMBS_MODEL, MAP_MODEL
+from sd2core.denoise.known import KnownMovements
+from sd2core.denoise.texture import Texture
 from sd2core.errors import Sd2Error
 from sd2core.files.resources import resource_path
 from sd2core.io.mesh import load_mesh, save_mesh
@@ -133,6 +135,49 @@ def test_the_bundled_model_is_used_where_nobody_has_chosen(make, qtbot, ball):
     context.document.undo_stack.undo()
     rest(context, qtbot)
     assert is_of(context, 2.0)
+
+
+def test_the_map_is_drawn_as_the_radar_would_show_it_and_the_mean_again(
+    make, qtbot, tmp_path, ball
+):
+    models = FakeDenoisers()
+    law = Texture(half=0.01, slope=1.5, floor=0.0, gain=1.0, looks=2.0, persistence=0.3)
+    (path := tmp_path / "one.safetensors").write_bytes(b"weights")
+    models.add(path, 2.0, texture=law)
+    context = make(models)
+    open_it(context, qtbot, ball)
+    context.denoise.use(path)
+    rest(context, qtbot)
+    assert is_of(context, 2.0)
+    mean = context.denoised.map.values.copy()
+    context.denoise.set_textured(True)
+    rest(context, qtbot)
+    drawn = law.drawn(np.ascontiguousarray(mean.T), (0,)).T
+    np.testing.assert_allclose(context.denoised.map.values, drawn, rtol=1e-4, atol=1e-9)
+    assert "as the radar would show it" in context.denoised.status
+    context.denoise.export(tmp_path / "drawn.npz")
+    assert DopplerMap.load(tmp_path / "drawn.npz").meta["texture"] == {"seed": 0}
+    context.denoise.set_textured(False)
+    rest(context, qtbot)
+    assert is_of(context, 2.0)
+    assert context.denoised.status == "learned from simulated data only"
+
+
+def test_frames_that_the_model_did_not_learn_are_counted_beside_the_title(
+    make, qtbot, tmp_path, ball
+):
+    models = FakeDenoisers()
+    (path := tmp_path / "one.safetensors").write_bytes(b"weights")
+    known = KnownMovements(-0.4, 0.4, 2.0, 1.0)
+    models.add(path, 2.0, known=known)
+    context = make(models)
+    open_it(context, qtbot, ball)
+    context.denoise.use(path)
+    rest(context, qtbot)
+    source = context.synthetic.map
+    passed = int(known.strange(source.values.T, source.axis).sum())
+    assert 0 < passed < FRAMES
+    assert f"{passed} frames unlike what it learnt stay synthetic" in context.denoised.status
 
 
 def test_where_the_parts_of_the_body_are_known_the_bundled_model_for_them_is_used(

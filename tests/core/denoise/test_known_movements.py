@@ -48,6 +48,12 @@ def test_a_frame_is_strange_by_how_far_its_velocity_is_from_what_is_known(bin_nu
     assert share == pytest.approx(min(beyond / 0.15, 1.0), abs=1e-5)
 
 
+def test_what_two_models_know_is_known_together_at_the_last_ones_gain() -> None:
+    together = KNOWN.together(KnownMovements(-0.7, 0.2, 0.3, 9.0))
+    assert together == KnownMovements(-0.7, 0.5, 0.6, KNOWN.gain)
+    assert KNOWN.together(None) == KNOWN
+
+
 def test_what_is_spread_too_far_is_strange_and_an_empty_frame_is_not() -> None:
     both = frames_at(8) + frames_at(23)  # ±1 m/s: a mean of 0
     assert KNOWN.strangeness(both, AXIS)[0] == 1.0

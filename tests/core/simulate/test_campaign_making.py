@@ -14,13 +14,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sd2core.doppler.options import chosen_options
 from sd2core.errors import Sd2Error
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.mesh.vertex_parts import JOINTS, QUANTITIES
 from sd2core.pairs.store import PairSet, PairWriter, Take, read_pairs
 from sd2core.progress import Cancelled
+from sd2core.radar_config import PAPER_RADAR
+from sd2core.sensor import VelocityAxis
 from sd2core.simulate.campaign.fit_errors import FitErrors
 from sd2core.simulate.campaign.making import make_campaign, take_numbers
-from sd2core.simulate.campaign.radar import TargetOptions
-from sd2core.simulate.campaign.takes import Campaign, TakeMaker
+from sd2core.simulate.campaign.radar import TargetOptions, radar_at
+from sd2core.simulate.campaign.takes import Campaign, TakeMaker, limb_errors
+from sd2core.timebase import Timebase
 
 SHORT = Campaign(seed=3, take_seconds=2.0, target=TargetOptions(looks=1))
 MINUTES = 4 * 2.0 / 60.0
@@ -82,6 +88,64 @@ def test_errors_of_fits_of_another_size(whole: Path) -> None:
     assert drawn.synthetic.tobytes() != made.synthetic.tobytes() != exact.synthetic.tobytes()
     with pytest.raises(Sd2Error, match="0 to 10 times"):
         replace(SHORT, error_sizes=(1.0, 0.5))
+
+
+def test_bodies_state_about_how_wrong_they_are() -> None:
+    """σ of the joints: none without errors, and with them their size, on average."""
+    asked = replace(SHORT, limbs=True)
+    exact = TakeMaker(asked).make(0, 0)[0].limbs
+    stated, wrong = [], []
+    for number in range(6):
+        take = TakeMaker(asked, FitErrors.load()).make(0, number)[0].limbs
+        true = TakeMaker(asked).make(0, number)[0].limbs
+        moves = [one.kinematics for one in (take, true)]
+        sigma = moves[0][:, QUANTITIES.index("sigma_mps")]
+        stated.append(sigma.mean(axis=1))
+        wrong.append(np.sqrt(((moves[0] - moves[1])[:, 0] ** 2).mean(axis=1)))
+    assert not exact.kinematics[:, QUANTITIES.index("sigma_mps")].any()
+    ratio = np.log(np.array(stated)) - np.log(np.array(wrong))
+    assert abs(np.median(ratio)) < 0.7
+    # Who is more wrong says so: hands more than the trunk.
+    hand, trunk = (JOINTS.index(name) for name in ("hand.R", "trunk"))
+    assert np.mean(stated, axis=0)[hand] > 1.5 * np.mean(stated, axis=0)[trunk]
+
+
+def test_limbs_err_along_the_line_of_sight_and_across() -> None:
+    """Two limbs on the axis: one moves wrongly along it, the other at right angles."""
+    times_s = np.arange(30) / 30.0
+    true = np.zeros((30, 4, 3))
+    true[..., 2] = 3.0
+    found = true.copy()
+    found[:, :2, 2] += 0.5 * times_s[:, None]
+    found[:, 2:, 0] += 0.2 * times_s[:, None]
+    meshes = [
+        MeshSequence(points.astype(np.float32), None, Timebase(times_s)) for points in (true, found)
+    ]
+    numbers = np.array([0, 0, 1, 1], np.uint8)
+    with np.errstate(invalid="ignore"):  # limbs without vertices
+        along, across = limb_errors(*meshes, numbers)
+    np.testing.assert_allclose(along[:2], [0.5, 0.0], atol=1e-3)
+    np.testing.assert_allclose(across[:2], [0.0, 0.2 / np.sqrt(2.0)], atol=1e-3)
+
+
+def test_frames_and_bins_of_ones_own(tmp_path: Path) -> None:
+    asked = replace(
+        SHORT, radar=radar_at(60.0, 64), synthesis=chosen_options("paper", 64, None, {})
+    )
+    assert asked.radar.chirps_per_frame == 42  # as many as fit
+    assert radar_at(30.0, 32) == PAPER_RADAR
+    assert radar_at(10.0, 128).chirps_per_frame == 256
+    out = tmp_path / "fine.zarr"
+    make_campaign(out, asked, subjects=1, minutes=0.05, processes=1)
+    pairs = read_pairs(out)
+    assert pairs.frame_rate_hz == 60.0
+    assert pairs.axis == VelocityAxis(64, 2.0)
+    # The same velocities are emptied as of 32 bins.
+    emptied = pairs.axis.centres_mps[list(pairs.null_bins)]
+    assert (emptied.min(), emptied.max()) == pytest.approx((-0.21875, 0.09375))
+    take = pairs.takes[0]
+    assert len(take.times_s) == round(SHORT.take_seconds * 60)
+    assert not take.radar[:, list(pairs.null_bins)].any()
 
 
 def test_a_campaign_does_not_go_on_with_errors_of_another_size(whole: Path) -> None:

@@ -1,0 +1,151 @@
+"""Networks that learn from segments of several lengths, at equal training time."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from sd2core.denoise.files import load_model
+from sd2core.files.atomic import atomic_write_text
+from sd2core.files.figure_files import save_figure
+from sd2core.files.tables import markdown_table
+from sd2core.pairs.store import read_pairs
+from tools.documentation.places import IMAGES
+from tools.documentation.runs import evaluated, sd2, settings
+
+LENGTHS = (72, 288, 1152, 4608)
+SETTINGS = {"30 frames/s, 32 bins": (30, 32, 160, 48), "120 frames/s, 128 bins": (120, 128, 40, 12)}
+"""Frame rate, bins, seconds of a take, minutes of all: as many frames in both."""
+
+MODELS = ("s4", "s4d", "gru", "unet", "swin")
+_WINDOWED = ("unet", "swin")
+_FRAMES = 4608
+
+TEXT = """\
+{first} Segments of 72 to 4,608 frames; {minutes:g} minutes of training each, on one thread; a batch
+has 4,608 frames. S4 and S4D look both ways, and begin with a memory of up to 0.7 segments; the GRU
+looks back only; U-Net and Swin transformer take windows of 72 frames. The campaigns have as many
+frames, varied swipes before a **simulated** radar; at 120 frames/s a frame has room for 21 chirps.
+One seed. *Memory*: of the whole training process. *Time*: a frame of a map of 4,608.
+
+{table}
+
+![Error of the mean velocity by the length of the segments](images/denoiser-lengths.png)
+"""
+
+
+class _Run(NamedTuple):
+    model: str
+    length: int
+    path: Path
+    data: Path
+
+
+def long_sequences(folder: Path, minutes: float) -> str:
+    """Train what is missing; the text of the section, and its picture."""
+    folder.mkdir(parents=True, exist_ok=True)
+    found: dict[str, dict[tuple[str, int], dict[str, Any]]] = {}
+    rows = [["network", "segment", "peak MAE m/s", "mean MAE m/s", "map RMSE", "memory", "time"]]
+    for title, (rate, bins, take_s, total_min) in SETTINGS.items():
+        data = folder / f"{rate}.zarr"
+        sd2(
+            *("simulate", "campaign", "--out", data, "--people", 6, "--minutes", total_min),
+            *("--take-seconds", take_s, "--rate", rate, "--bins", bins, "--seed", 4),
+        )
+        runs = [
+            _Run(model, length, folder / f"{rate}-{model}-{length}", data)
+            for model in MODELS
+            for length in (LENGTHS[:1] if model in _WINDOWED else LENGTHS)
+        ]
+        with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+            list(pool.map(lambda run: _train(run, minutes), runs))
+        told = evaluated([run.path / "best.safetensors" for run in runs], data)
+        none, *_ = told["groups"]
+        reports = {one["name"]: one["all"] for group in told["groups"] for one in group["models"]}
+        rows.append([f"**{title}**: none", "", *_errors(none["models"][0]["all"]), "", ""])
+        found[title] = {}
+        for run in runs:
+            score = reports[run.path.name]
+            found[title][run.model, run.length] = score
+            memory = f"{int((run.path / 'memory.txt').read_text()) / 1e6:.0f} MB"
+            took = f"{1e6 * _frame_s(run):.0f} µs"
+            rows.append([run.model, f"{run.length:,}", *_errors(score), memory, took])
+    _draw(found)
+    return TEXT.format(first=_first(found), minutes=minutes, table="\n".join(markdown_table(rows)))
+
+
+def _errors(score: dict[str, Any]) -> list[str]:
+    return [
+        f"{score['peak']['mae_mps']:.3f}",
+        f"{score['mean']['mae_mps']:.3f}",
+        f"{score['map']['rmse_compressed']:.3f}",
+    ]
+
+
+def _train(run: _Run, minutes: float) -> None:
+    """Train one run, and note the most memory that its process had."""
+    if (run.path / "memory.txt").exists():
+        return
+    options = {"dropout": 0.3}
+    if run.model in ("s4", "s4d"):
+        options |= {"live": "false", "dt_min": round(0.02 * 72 / run.length, 6)}
+    command = [
+        *(sys.executable, "-m", "sd2core.cli", "train", str(run.data), "--out", str(run.path)),
+        *("--model", run.model, *settings(options), "--minutes", f"{minutes:g}", "--threads", "1"),
+        *("--segment-frames", str(run.length), "--batch-size", str(_FRAMES // run.length)),
+        *("--velocity-weight", "1"),
+    ]
+    process = subprocess.Popen(command)
+    _, code, usage = os.wait4(process.pid, 0)
+    if code:
+        sys.exit(f"{run.path.name} failed")
+    atomic_write_text(run.path / "memory.txt", f"{usage.ru_maxrss * 1024}\n")
+
+
+def _frame_s(run: _Run) -> float:
+    model = load_model(run.path / "best.safetensors")
+    values = np.concatenate([take.synthetic for take in read_pairs(run.data).takes])[:_FRAMES]
+    model.denoise_values(values)
+    began = time.perf_counter()
+    model.denoise_values(values)
+    return (time.perf_counter() - began) / len(values)
+
+
+def _first(found: dict[str, dict[tuple[str, int], dict[str, Any]]]) -> str:
+    """Sentence on whether a state space leads, and where."""
+    leads = []
+    for title, scores in found.items():
+        best = min(scores, key=lambda run: scores[run]["mean"]["mae_mps"])
+        leads.append((title, *best))
+    where = [f"{title} ({model} at {length:,} frames)" for title, model, length in leads]
+    if all(model in ("s4", "s4d") for _, model, _ in leads):
+        return f"A state space has the nearest mean velocity at {' and '.join(where)}."
+    return f"**A state space does not lead everywhere**: nearest are, at {' and '.join(where)}."
+
+
+def _draw(found: dict[str, dict[tuple[str, int], dict[str, Any]]]) -> None:
+    figure = Figure(figsize=(9.6, 3.4), dpi=110, layout="constrained")
+    for axes, (title, scores) in zip(figure.subplots(1, len(found)), found.items(), strict=True):
+        for model in MODELS:
+            points = [(length, scores[name, length]) for name, length in scores if name == model]
+            axes.plot(
+                [length for length, _ in points],
+                [score["mean"]["mae_mps"] for _, score in points],
+                marker="o",
+                label=model,
+            )
+        axes.set_xscale("log", base=2)
+        axes.set_xticks(LENGTHS, [f"{length:,}" for length in LENGTHS])
+        axes.set_xlabel("frames of a segment")
+        axes.set_title(title, fontsize=9, loc="left")
+    figure.axes[0].set_ylabel("mean velocity, MAE m/s")
+    figure.axes[0].legend(frameon=False, fontsize=8)
+    save_figure(figure, IMAGES / "denoiser-lengths.png")
