@@ -72,7 +72,7 @@ make paper
 on {machine}. **No real radar has part in this page, but in the paper's own numbers**: its data are
 not published, and `sd2 simulate campaign --protocol paper` stands in
 ([decision 26](decisions/0026-the-simulated-campaign.md)). Beside a real radar:
-[denoisers on a real radar](real-denoisers.md), [real gestures](real-gestures.md).
+[denoisers on a real radar](denoiser.md#a-real-radar), [real gestures](real-gestures.md).
 
 """
 
@@ -99,7 +99,7 @@ DENOISERS = """
 `--order random --seed {seed} --minutes {campaign_minutes:g}`, six people: four are learnt from, one
 chooses the best epoch, one is judged. Each model: {seeds} seeds, {minutes:g} minutes of processor
 time on one thread, a dropout of {dropout:g}, about as many parameters: {epochs}. S4 sees only the
-past, its rivals whole windows; [looking ahead](denoiser-comparison.md) it does better.
+past, its rivals whole windows; [looking ahead](denoiser.md#networks-at-equal-time) it does better.
 
 ![One take: synthetic, denoised by three models, and the simulated radar](images/paper-denoised.png)
 

@@ -57,7 +57,7 @@ PAGE = """\
 What are pairs with a **real** radar worth, and how much can a denoiser make of them? A body driven
 by a Kinect's skeleton gives the synthetic map; a 77 GHz radar saw the same person at 10 frames/s
 ([decision 27](decisions/0027-real-pairs.md)). What trained denoisers make of them:
-[denoisers on a real radar](real-denoisers.md). Made by
+[denoisers on a real radar](denoiser.md#a-real-radar). Made by
 
 ```sh
 python -m tools.documentation.real_pairs
