@@ -170,15 +170,16 @@ def _add_learning(parser: argparse.ArgumentParser) -> None:
         "--velocity-weight",
         type=float,
         metavar="W",
-        help="learn the mean velocity of a frame beside the map: weight of 1 m/s beside the error"
-        " of the map (default: 0, as in the paper)",
+        help="learn the mean and the peak velocity of a frame beside the map: weight of 1 m/s"
+        " beside the error of the map (default: 0, as in the paper)",
     )
     group.add_argument(
         "--balanced",
         action="store_true",
         default=None,
-        help="let frames of rare velocities count more, so that fast movements are not shown too"
-        " slow (default: all frames alike, as in the paper)",
+        help="let frames of rare velocities and of weak takes count more, so that fast movements"
+        " are not shown too slow, and far ones not too coarsely (default: all frames alike, as in"
+        " the paper)",
     )
     group.add_argument(
         "--select-by",

@@ -157,9 +157,9 @@ class TrainingConfig:
     clip_norm: float = _setting(number(0.0, 1e6), 1.0)  # Gradients are clipped to it; 0 is off.
     # End after so many epochs without a better one; 0: never.
     early_stopping_epochs: int = _setting(number(0, 1_000_000, whole=True), 100)
-    # Frames of rare velocities count more, see :func:`sd2core.train.data.frame_weights`.
+    # Rare velocities and weak takes count more, see :func:`sd2core.train.data.frame_weights`.
     balanced: bool = _setting(flag, False)
-    # Of the error of a frame's mean velocity, in 1 / (m/s), beside that of the map; 0: none.
+    # Of the errors of a frame's mean and peak velocity, in 1 / (m/s), beside that of the map.
     velocity_weight: float = _setting(number(0.0, 100.0), 0.0)
     # The best epoch is that of the lowest validation error of this kind.
     select_by: str = _setting(choice("rmse", "mae"), "rmse")

@@ -19,7 +19,7 @@ from sd2core.pairs.store import PairSet, Take, read_pairs
 from sd2core.sensor import VelocityAxis
 from sd2core.train.config import DataConfig
 
-_LARGEST_WEIGHT = 8.0
+_LARGEST_WEIGHT, _LEAST_LEVEL = 8.0, 1e-3
 
 RANGE_LAW = 4.0
 """Echo power falls with the fourth power of the range (radar equation)."""
@@ -60,6 +60,7 @@ class Windows:
     own place, and within its take."""
     latest: NDArray[np.int64]
     length: int
+    levels: NDArray[np.float64]  # (frames,), mean energy of a frame of each frame's take
 
     def __len__(self) -> int:
         return len(self.earliest)
@@ -240,27 +241,31 @@ def windows_of(takes: Sequence[Take], config: DataConfig, parts: Sequence[str] =
         earliest=np.concatenate(earliest),
         latest=np.concatenate(latest),
         length=length,
+        levels=np.repeat(
+            [take.radar.sum(axis=1, dtype=np.float64).mean() for take in takes],
+            [len(take.times_s) for take in takes],
+        ),
     )
 
 
-def frame_weights(targets: NDArray[np.float32], axis: VelocityAxis) -> NDArray[np.float32]:
-    """Weights of frames by how rare the speed of their strongest bin is, (frames,).
+def frame_weights(windows: Windows, axis: VelocityAxis) -> NDArray[np.float32]:
+    """Weights of frames by how rare the speed of their strongest bin and how weak their take is.
 
     Fast frames are few, and the mean square error over all of them is least for a model that shows
     them too slow. The weight is the inverse square root of the number of frames of that speed,
     smoothed over the neighbouring speeds, as in Y. Yang et al., "Delving into deep imbalanced
-    regression", ICML 2021. Empty frames are a speed of their own. The mean is 1 but for weights
-    above 8, which are 8.
-
-    ``targets`` are energies, (frames, bins).
+    regression", ICML 2021. Empty frames are a speed of their own. A squared error of amplitudes
+    counts as a share of the take's mean energy: who is twice as far away is 16 times as weak. The
+    mean is 1 but for weights above 8, which are 8. Shape (frames,).
     """
-    speed_mps = np.abs(peak_velocity_mps(targets, axis))
+    speed_mps = np.abs(peak_velocity_mps(windows.targets, axis))
     empty = np.isnan(speed_mps)
     ranks = np.where(empty, 0.0, speed_mps / axis.bin_width_mps).astype(np.intp)
     counts = np.bincount(ranks[~empty], minlength=int(ranks.max(initial=0)) + 1).astype(float)
     shares = np.convolve(np.pad(counts, 1, mode="edge"), [0.25, 0.5, 0.25], mode="valid")
     of_frame = np.where(empty, np.count_nonzero(empty), shares[ranks])
     weights = 1.0 / np.sqrt(np.maximum(of_frame, 1.0))
+    weights /= np.maximum(windows.levels, _LEAST_LEVEL * (windows.levels.mean() or 1.0))
     return np.minimum(weights / weights.mean(), _LARGEST_WEIGHT).astype(np.float32)
 
 

@@ -45,7 +45,7 @@ class DenoiserModule(LightningModule):
         self._inputs = torch.from_numpy(callbacks.exam.scaling.compress_input(windows.inputs))
         self._targets = torch.from_numpy(callbacks.exam.scaling.target.compress(windows.targets))
         balanced = callbacks.config.training.balanced
-        weights = frame_weights(windows.targets, callbacks.exam.axis) if balanced else None
+        weights = frame_weights(windows, callbacks.exam.axis) if balanced else None
         self._weights = None if weights is None else torch.from_numpy(weights)  # (frames,)
         self._frames = torch.arange(windows.length)
         self._mirror: tuple[torch.Tensor, ...] = ()

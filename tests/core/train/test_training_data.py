@@ -196,26 +196,28 @@ def windows(segments: int) -> Windows:
     """Segments of four frames, each of which may be shifted by one."""
     starts = 6 * np.arange(segments) + 1
     frames = np.zeros((6 * segments, 8), np.float32)
-    return Windows(frames, frames, starts - 1, starts + 1, 4)
+    return Windows(frames, frames, starts - 1, starts + 1, 4, np.ones(len(frames)))
 
 
 class TestFrameWeights:
     AXIS = VelocityAxis(8, 2.0)
 
-    def frames(self, peaks: list[int | None]) -> np.ndarray:
+    def frames(self, peaks: list[int | None], levels: float | np.ndarray = 1.0) -> Windows:
         """Frames with one full bin each, or empty."""
         energies = np.zeros((len(peaks), self.AXIS.bins), np.float32)
         for row, peak in enumerate(peaks):
             if peak is not None:
                 energies[row, peak] = 1.0
-        return energies
+        none = np.zeros(0, np.int64)
+        return Windows(energies, energies, none, none, 1, np.broadcast_to(levels, len(peaks)))
 
     @given(st.lists(st.none() | st.integers(0, 7), min_size=1, max_size=300))
     def test_rarer_speeds_weigh_more_and_both_directions_alike(
         self, peaks: list[int | None]
     ) -> None:
         weights = frame_weights(self.frames(peaks), self.AXIS)
-        mirrored = frame_weights(self.frames(peaks)[:, ::-1], self.AXIS)
+        turned = [None if peak is None else 7 - peak for peak in peaks]
+        mirrored = frame_weights(self.frames(turned), self.AXIS)
         np.testing.assert_array_equal(weights, mirrored)
         assert weights.min() > 0.0
         assert weights.max() <= 8.0
@@ -226,10 +228,17 @@ class TestFrameWeights:
         weights = frame_weights(self.frames([None] * 90 + [0] * 10), self.AXIS)
         assert weights[-1] / weights[0] == pytest.approx(np.sqrt(90 / (0.75 * 10)), rel=1e-5)
 
+    def test_weak_takes_count_as_shares_of_their_energy(self) -> None:
+        levels = np.repeat([4.0, 1.0], 50)
+        weights = frame_weights(self.frames([3] * 100, levels), self.AXIS)
+        assert weights[-1] == pytest.approx(4 * weights[0], rel=1e-5)
+        assert np.isfinite(frame_weights(self.frames([None] * 9, 0.0), self.AXIS)).all()
+
     def test_what_is_rare_is_kept_in_a_weighted_mean(self) -> None:
         """Which is what a model answers that cannot tell frames apart."""
-        energies = self.frames([4] * 95 + [7] * 5)
-        weights = frame_weights(energies, self.AXIS)[:, None]
+        shown = self.frames([4] * 95 + [7] * 5)
+        energies = shown.targets
+        weights = frame_weights(shown, self.AXIS)[:, None]
         even, balanced = energies.mean(axis=0), (weights * energies).sum(axis=0) / weights.sum()
         assert balanced[7] > 3 * even[7]
 
