@@ -88,8 +88,9 @@ class Scaling:
 
     input: Compression
     target: Compression
-    # Half the weakest energy above zero in the radar's maps of the training: no such radar shows
-    # less, and what it shows is not lost to a small error.
+    # Energy below which answers are empty. At first half the weakest energy above zero in the
+    # radar's maps of the training: no such radar shows less; a training raises it to what shows in
+    # enough of the frames.
     floor: float = 0.0
     more: int = 0  # Numbers in the input after the energies, which stay as they are.
 

@@ -102,6 +102,10 @@ class Texture:
             return 0.0
         return float(np.corrcoef(off[:, 1:][both], off[:, :-1][both])[0, 1])
 
+    def mean_that_shows(self, share: float) -> float:
+        """Mean of a cell that shows in this share of the frames, 0 to 1 both excluded."""
+        return float(self.half * (share / (1.0 - share)) ** (1.0 / self.slope))
+
     def drawn(self, energies: Energies, seed: Sequence[int], first: int = 0) -> Energies:
         """A realisation of frames (frames, bins) whose mean is given, from frame ``first`` on.
 

@@ -1,7 +1,7 @@
 """Raw samples of a moving mesh by facets, NUFFT and threads, for any mesh and sensor.
 
-The bundled sample keeps its own, simpler path (``tools/build_sample/signal.py``), whose
-bytes must not change. Source of every formula: :class:`WaveOptions`.
+A simpler path, which tests compare with, is ``tools/build_sample/signal.py``. Source of every
+formula: :class:`WaveOptions`.
 """
 
 from __future__ import annotations

@@ -34,6 +34,9 @@ from sd2core.train.machine import device_of, machine_words, precision_of, settle
 from sd2core.train.steps import Steps
 from sd2core.train.validate import Exam, Validation
 
+_SHOWS = 0.4
+"""Share of the frames in which a cell must show, or it is empty in a denoised map."""
+
 
 def carry_out(
     folder: TrainingFolder,
@@ -246,10 +249,14 @@ class _About:
     def card(self, found: Validation, live: Validation | None, epoch: int) -> ModelCard:
         config, pairs, split = self.config, self.data.pairs, self.data.split
         name = config.model.name
+        scaling = self.scaling
+        if found.texture is not None:
+            floor = max(scaling.floor, found.texture.mean_that_shows(_SHOWS))
+            scaling = replace(scaling, floor=floor)
         return ModelCard(
             model=name,
             options={**options(name), **config.model.options},
-            scaling=self.scaling,
+            scaling=scaling,
             axis=pairs.axis,
             null_bins=pairs.null_bins,
             frame_rate_hz=pairs.frame_rate_hz,

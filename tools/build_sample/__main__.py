@@ -26,8 +26,9 @@ def _add_commands(commands: argparse._SubParsersAction) -> None:
         handler=_make,
         description=(
             "A body makes two swipes to the right, left, down and up, 2.2 m in front of the\n"
-            "camera and a 60 GHz radar: a rendered video, the mesh, and the raw samples of the\n"
-            "radar with noise and static clutter. Takes some minutes."
+            "camera and a 60 GHz radar: a rendered video, what `sd2 fit` makes of it, the true\n"
+            "mesh, and the raw samples of the radar with noise and static clutter. Takes some\n"
+            "minutes, and the landmark models."
         ),
         examples="  python -m tools.build_sample make resources/swipes.sd2",
     )

@@ -56,6 +56,13 @@ def test_a_stretch_is_drawn_as_in_the_whole(first: int, frames: int, seed: int) 
     np.testing.assert_array_equal(part, whole[first : first + frames])
 
 
+@pytest.mark.parametrize("share", [0.1, 0.4, 0.8])
+def test_the_mean_that_shows_in_a_share_of_the_frames(share: float) -> None:
+    law = replace(LAW, persistence=0.0)
+    mean = np.full((20_000, 1), law.mean_that_shows(share), np.float32)
+    assert (law.drawn(mean, (5,)) > 0).mean() == pytest.approx(share, abs=0.015)
+
+
 def test_what_is_empty_stays_empty() -> None:
     mean = energies(100)
     mean[30:40] = 0.0
