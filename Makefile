@@ -13,7 +13,7 @@ TESTS = system-packages-for-tests .venv/.with-test $(COMPILED) landmark-models
 # Among them every module in KERNEL_MODULES of sd2core/numerics/compiled.py.
 KERNELS := $(wildcard sd2core/numerics/*.py sd2core/body/*.py sd2core/scattering/*.py sd2core/doppler/*.py sd2core/fmcw/*.py)
 
-.PHONY: help setup demo test test-slow lint pins fresh-machine docs format bench fuzz wheel bundle screenshots moving-picture accuracy fitting denoiser denoiser-comparison range-synthesis scale classifier real-gestures whole-loop paper soak clean
+.PHONY: help setup demo test test-slow lint pins fresh-machine docs format bench fuzz wheel bundle screenshots moving-picture accuracy fitting denoiser range-synthesis scale classifier real-gestures whole-loop paper soak clean
 
 help:
 	@echo "make demo         set up, and open the sample recording in the window"
@@ -33,8 +33,7 @@ help:
 	@echo "make moving-picture  the one of the README"
 	@echo "make accuracy     docs/accuracy-and-speed.md, measured (some five minutes)"
 	@echo "make fitting      docs/fitting.md, measured (some ten minutes)"
-	@echo "make denoiser     docs/denoiser.md, measured (half an hour)"
-	@echo "make denoiser-comparison  docs/denoiser-comparison.md, trained and measured (hours)"
+	@echo "make denoiser     docs/denoiser.md, trained and measured (an hour and more; after make fitting)"
 	@echo "make range-synthesis  docs/range-synthesis.md, trained (half an hour)"
 	@echo "make classifier   docs/classifier.md, trained (an hour)"
 	@echo "make real-gestures  docs/real-gestures.md: real radar, suggestions and classifiers (five minutes)"
@@ -132,9 +131,6 @@ fitting: setup
 
 denoiser: setup
 	$(BIN)/python -m tools.documentation.denoiser
-
-denoiser-comparison: setup
-	$(BIN)/python -m tools.documentation.denoiser_comparison
 
 range-synthesis: setup
 	$(BIN)/python -m tools.documentation.range_synthesis

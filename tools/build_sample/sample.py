@@ -43,7 +43,7 @@ DISTANCE_M = 2.2
 TITLE = "Eight swipes at 2.2 m"
 RECORDED: Resolution = "medium"
 
-_ROUNDING_M = 2.0**-14
+_ROUNDING_M, _FIT_ROUNDING_M = 2.0**-14, 2.0**-12
 _PLACE_ACROSS_M = 0.05
 _SENSOR = VirtualSensor()
 
@@ -100,8 +100,9 @@ def _fill(folder: Path, times_s: NDArray[np.float64], progress: Progress) -> Non
         (camera.width, camera.height),
     )
     recorded = body_sequence(RECORDED, times_s, camera, stage(2))
-    write_compact_mesh(_rounded(recorded), folder / "mesh.zarr")
-    write_compact_mesh(_rounded(_fitted(folder / "video.mp4", camera)), folder / "fit.zarr")
+    write_compact_mesh(_rounded(recorded, _ROUNDING_M), folder / "mesh.zarr")
+    fit = _fitted(folder / "video.mp4", camera)
+    write_compact_mesh(_rounded(fit, _FIT_ROUNDING_M), folder / "fit.zarr")
     capture = simulate_radar(
         fine,
         replace(PAPER_RADAR, receivers=len(_RECEIVERS_M)),
@@ -147,8 +148,8 @@ def _fitted(video: Path, camera: Camera) -> MeshSequence:
         return replace(fit, vertices=fit.read(0, fit.frame_count))
 
 
-def _rounded(mesh: MeshSequence) -> MeshSequence:
-    rounded = np.rint(mesh.read(0, mesh.frame_count) / _ROUNDING_M) * _ROUNDING_M
+def _rounded(mesh: MeshSequence, to_m: float) -> MeshSequence:
+    rounded = np.rint(mesh.read(0, mesh.frame_count) / to_m) * to_m
     return replace(mesh, vertices=rounded.astype(np.float32), source="")
 
 

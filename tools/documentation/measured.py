@@ -25,8 +25,6 @@ OLD = {
     "accuracy-and-speed.md": "needs an idle machine; how the plain map is counted was rearranged",
     "performance.md": "needs an idle machine for an hour",
     "scale.md": "needs an idle machine; batches changed in what they check",
-    "denoiser.md": _HOURS,
-    "denoiser-comparison.md": _HOURS,
     "range-synthesis.md": _HOURS,
     "real-pairs.md": "a quarter of an hour; nothing that it measures was meant to change",
     "classifier.md": _HOURS,
@@ -60,11 +58,8 @@ PAGES = {
     "performance.md": Measured("make bench", (*_DOPPLER, "sd2core/fmcw")),
     "scale.md": Measured("make scale", ("sd2core/batch", "sd2core/datasets")),
     "fitting.md": Measured("make fitting", (*_BODY, "tools/fitting")),
-    "denoiser.md": Measured("make denoiser", ("sd2core/denoise", *_DENOISERS, *_CAMPAIGN)),
-    "denoiser-comparison.md": Measured("make denoiser-comparison", (*_LEARNING, *_CAMPAIGN)),
-    "real-denoisers.md": Measured(
-        "python -m tools.documentation.real_denoisers",
-        ("sd2core/pairs", "sd2core/mocap", *_LEARNING),
+    "denoiser.md": Measured(
+        "make denoiser", ("sd2core/pairs", "sd2core/mocap", *_LEARNING, *_DENOISERS, *_CAMPAIGN)
     ),
     "range-synthesis.md": Measured("make range-synthesis", (*_LEARNING, *_CAMPAIGN)),
     "real-pairs.md": Measured(

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -146,7 +147,8 @@ def test_hidden_facets_do_not_echo() -> None:
 
 def test_the_bundled_sample_is_small() -> None:
     folder = resource_path("swipes.sd2")
-    assert sum(len(content) for content in files(folder).values()) <= 8_000_000
+    # The true mesh, its video's fit, and a radar of three receivers.
+    assert sum(len(content) for content in files(folder).values()) <= 13_000_000
 
 
 def test_it_says_that_it_is_simulated_everywhere(bundled: Recording) -> None:
@@ -172,18 +174,24 @@ def test_video_mesh_and_radar_share_one_clock(bundled: Recording) -> None:
     np.testing.assert_allclose(mesh.times_s, expected, atol=1e-9)
     np.testing.assert_allclose(capture.timebase.times_s, expected, atol=1e-6)
     assert bundled.radar_offset_s == 0.0
-    assert capture.config == PAPER_RADAR
+    assert capture.config == replace(PAPER_RADAR, receivers=3)
     assert [(s.start_s, s.end_s, s.label) for s in bundled.spans] == [tuple(s) for s in SPANS]
 
 
-def test_the_bundled_mesh_is_the_motion(bundled: Recording) -> None:
-    assert bundled.mesh is not None
+def test_the_true_mesh_is_the_motion_and_that_of_the_recording_its_fit(bundled: Recording) -> None:
+    assert bundled.mesh == bundled.folder / "fit.zarr"
     frames = [0, 66, 300]
     exact = body_sequence(RECORDED, np.array(frames) / FRAMES_PER_S, Camera())
-    stored = load_mesh(bundled.mesh)
+    stored = load_mesh(bundled.folder / "mesh.zarr")
     np.testing.assert_array_equal(stored.faces, exact.faces)
     for row, frame in enumerate(frames):
         assert np.abs(stored.frame(frame) - exact.frame(row)).max() < 3.2e-5
+    fit = load_mesh(bundled.mesh)
+    assert fit.uncertainty is not None
+    assert stored.uncertainty is None
+    np.testing.assert_array_equal(fit.faces, stored.faces)
+    apart = np.linalg.norm(fit.frame(66) - stored.frame(66), axis=1)
+    assert 0.005 < np.median(apart) < 0.06
 
 
 def test_the_mesh_lies_on_the_person_in_the_video(bundled: Recording) -> None:
