@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from functools import partial
 
-from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 
 from sd2app.classify.dialogs import ClassifyDialogs
@@ -77,8 +76,7 @@ class ClassSetupView(TrainingForm):
         self._boxes: dict[str, CheckBox] = {}
         for name in MAPS:
             chosen = partial(self._labelled.set_map, name)
-            box = self._boxes[name] = CheckBox(name, self, chosen, _MAP_TIPS[name])
-            box.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+            self._boxes[name] = CheckBox(name, self, chosen, _MAP_TIPS[name])
         grid = QGridLayout()
         grid.setHorizontalSpacing(8)
         grid.setVerticalSpacing(4)
@@ -107,7 +105,6 @@ class ClassSetupView(TrainingForm):
             lambda on: self._labelled.set_value("quick", "yes" if on else "no"),
             "Two seeds instead of five, and fewer shares of the radar's data",
         )
-        self._quick.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         tip = "Train and compare in the background"
         self._compare = outlined(
             "Compare", tip, partial(self._shell.attempt, self._training.compare), self

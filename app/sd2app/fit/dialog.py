@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from PySide6.QtCore import QSignalBlocker, Qt
-from PySide6.QtWidgets import QDialog, QLabel, QSlider, QToolButton, QWidget
+from PySide6.QtWidgets import QDialog, QLabel, QSlider, QWidget
 
 from sd2app.fit.person_picker import PersonPicker
 from sd2app.fit.setup import ANGLES_DEG, DEFAULT_STATURE_M, STATURES_M, FitSetupModel
@@ -57,13 +55,13 @@ class NewFromVideoDialog(QDialog):
         setup = self._setup
         self._video = ElidedLabel(self)
         self._folder = ElidedLabel(self)
-        self._other_video = self._button("Choose…", "Take another video", self._ask_video)
-        self._other_folder = self._button("Choose…", "Save elsewhere", self._ask_folder)
+        other, elsewhere = "Take another video", "Save elsewhere"
+        self._other_video = outlined("Choose…", other, self._ask_video, self, name=other)
+        self._other_folder = outlined("Choose…", elsewhere, self._ask_folder, self, name=elsewhere)
         self._person = QLabel(self)
         self._person.setWordWrap(True)
-        self._clear = self._button(
-            "Clear", "Have the person chosen", lambda: setup.change(person=None)
-        )
+        tip = "Have the person chosen"
+        self._clear = outlined("Clear", tip, lambda: setup.change(person=None), self, name=tip)
         self._stature = NumberBox(*STATURES_M, " m", "Height of the person", step=0.01)
         self._stature.setValue(DEFAULT_STATURE_M)
         self._stature.valueChanged.connect(lambda value_m: setup.change(stature_m=value_m))
@@ -88,11 +86,6 @@ class NewFromVideoDialog(QDialog):
         )
         self._focal.valueChanged.connect(setup.set_focal)
         self._message = sentence("")
-
-    def _button(self, text: str, tip: str, run: Callable[[], object]) -> QToolButton:
-        button = outlined(text, tip, run, self)
-        button.setAccessibleName(tip)
-        return button
 
     def _lay_out(self) -> None:
         form = form_of(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QSizePolicy, QToolButton, QWidget
+from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from sd2app.feature import Shell
 from sd2app.labels.edits import LabelEdits
@@ -38,13 +38,11 @@ class SpanPage(QWidget):
             choice.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
             choice.setMinimumWidth(48)
             choice.activated.connect(self._filter)
-        columns = outlined("…", "Which columns are shown", None, self)
-        columns.setAccessibleName("Columns")
-        columns.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        tip = "Which columns are shown"
+        columns = outlined("…", tip, table.columns_menu, self, name="Columns")
         columns.setStyleSheet(
             "QToolButton { padding: 2px 8px; } QToolButton::menu-indicator { image: none; }"
         )
-        columns.setMenu(table.columns_menu)
         filters = row_of(
             (self.search, 7), *((one, 4) for one in self._chosen.values()), columns, spacing_px=6
         )

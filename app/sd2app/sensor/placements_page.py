@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtCore import QRectF, QSize
 from PySide6.QtGui import QColor, QImage, QPainter
 from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 
@@ -102,7 +102,6 @@ class PlacementsPage(QWidget):
         self._limits = FactRows(3, at_the_edge=True, parent=self)
         self._radar, self._source = sentence(""), sentence("")
         self._shown = CheckBox("In the scene", self, model.set_shown, "Draw them in the scene")
-        self._shown.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self._current = sentence("", "plain")
         back, on = (
             outlined(text, "Put the sensor there", partial(model.step, by), self)
