@@ -46,6 +46,20 @@ def accepting(dialog: QDialog, text: str) -> tuple[QDialogButtonBox, QPushButton
     return buttons, accept
 
 
+def accepted(dialog: QDialog) -> bool:
+    """Show a dialog until it ends, and let go of it; True if it was accepted."""
+    result = dialog.exec()
+    dialog.deleteLater()
+    return bool(result == QDialog.DialogCode.Accepted)
+
+
+def closing(dialog: QDialog) -> QDialogButtonBox:
+    """Row of buttons that ends a dialog by Close alone."""
+    buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close, dialog)
+    buttons.rejected.connect(dialog.reject)
+    return buttons
+
+
 class ExportButtons(QDialogButtonBox):
     """Buttons Export…, which calls ``ask`` for a destination, and Cancel, which ends the dialog."""
 
