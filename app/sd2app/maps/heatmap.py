@@ -86,7 +86,6 @@ class HeatmapView(TrackMouse, MapWidget):
         alignable: bool = False,
     ) -> None:
         super().__init__(track, session, overlays)
-        self._pointer = session.pointer
         self.setAccessibleName(f"{track.title} map")
         self.alignable = alignable
         self.folded = self.enlarged = False
