@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QObject, SignalInstance
+from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QWidget
 
 from sd2app.feature import Action, Feature, Shell
@@ -35,11 +35,6 @@ class FitFeature(Feature):
         self.on_screen.noted.connect(shell.note)
         self.changing = (self.model.state_changed,)
         self.closing = self.running = (self.model,)  # a fit stops, and can be continued
-
-    @property
-    def landmarks_changed(self) -> tuple[SignalInstance, ...]:
-        """Signals after which there are other landmarks."""
-        return self.model.advanced, self.model.changed
 
     def landmarks_at(self, frame: int) -> NDArray[np.float32] | None:
         """Landmarks that the fit has found in a frame of the video on screen."""

@@ -17,14 +17,13 @@ from sd2app.scene.camera import Preset
 from sd2app.sensor.placements import PlacementsModel
 from sd2app.session.display import DisplayModel, MeshColour
 from sd2app.session.session import Session
+from sd2app.widgets.canvas import MenuPart
 from sd2app.widgets.inputs import Choice, action_button
 from sd2app.widgets.layouts import STRETCH, pane, row_of
 from sd2app.widgets.panel import outlined, title
 
 if TYPE_CHECKING:
     from sd2app.scene.view import SceneView
-    from sd2app.widgets.picture import MenuPart
-
 
 _COLOURS: tuple[tuple[MeshColour, str, str], ...] = (
     ("velocity", "Colour by radial velocity",

@@ -62,7 +62,8 @@ class Features:
         self.video = VideoFeature(
             session,
             shell,
-            self.fit,
+            self.fit.landmarks_at,
+            (self.fit.model.advanced, self.fit.model.changed),
             lambda menu, place: self.labels.offer_frame(menu, place),
             parent,
         )

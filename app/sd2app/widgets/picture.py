@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from PySide6.QtCore import QBuffer, QIODevice, QPoint, QPointF, QRect, Qt
@@ -10,12 +10,10 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtSvg import QSvgGenerator
 from PySide6.QtWidgets import QMenu, QMessageBox, QWidget
 
+from sd2app.widgets.canvas import MenuPart
 from sd2app.widgets.dialogs import ask_new
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
-
-MenuPart = Callable[[QMenu, QPointF], None]
-"""Adds to the context menu of a widget what concerns a place in it."""
 
 _KINDS = "Picture (*.png);;Drawing (*.svg)"
 
