@@ -47,14 +47,12 @@ class CutOutModel(BackgroundModel):
 
     asked = Signal(int, str)  # number of occupied folders, one of them; answer: go_on or give_up
     noted = Signal(str)
-    failed = Signal(str)
 
     def __init__(self, session: Session, parent: QObject) -> None:
         super().__init__(parent)
         self._session = session
         self._plan: _Plan | None = None
-        self._runner = ListedRunner("cut", session.jobs, self, self._receive)
-        self._runner.failed.connect(lambda error: self.failed.emit(str(error)))
+        self._runner = ListedRunner("cut", session.jobs, self, self._receive, self._fail)
 
     def source(self, parts: Iterable[Part] = ("video", "mesh", "maps")) -> CutSource | None:
         """Return the parts of the recording, without maps that are still computed."""

@@ -93,7 +93,7 @@ class Features:
             lambda finder: self.suggestions.model.start(finder),
             parent,
         )
-        finders = (self.classify.gestures,)
+        finders = (self.classify.model,)
         self.suggestions = SuggestionsFeature(session, shell, labels.edits, finders, parent)
         self.agreement = AgreementFeature(session, shell, labels.model, parent)
         self.mesh_comparison = MeshComparisonFeature(
