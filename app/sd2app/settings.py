@@ -14,11 +14,12 @@ _RECENT = 10
 DEFAULT_TOLERANCE = 0.05
 
 
-class _Memory(dict[str, Any]):
+class _Memory:
     """Stands in for QSettings; nothing of it is kept."""
 
-    value = dict.get
-    setValue = dict.__setitem__
+    def __init__(self) -> None:
+        self._values: dict[str, Any] = {}
+        self.value, self.setValue = self._values.get, self._values.__setitem__
 
 
 class Settings:

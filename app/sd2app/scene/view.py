@@ -80,11 +80,11 @@ class SceneView(QWidget):
         self._planned: object = None
         self._backend.widget.installEventFilter(self)
         self._followed = (
+            (session.display.theme_changed, self._follow_theme),
+            (session.display.mesh_changed, self._follow_colour),
             (session.document.opened, self._take_over),
             (session.playback.time_changed, self._follow_clock),
             (session.sensor.changed, self._follow_sensor),
-            (session.display.mesh_changed, self._follow_colour),
-            (session.display.theme_changed, self._follow_theme),
             (synthesis.frame_changed, self._follow_scattering),
             (placements.changed, self._follow_placements),
             (inertial.changed, self._follow_inertial),
@@ -92,12 +92,7 @@ class SceneView(QWidget):
         )
         for signal, slot in self._followed:
             signal.connect(slot)
-        self._follow_theme()
-        self._follow_colour()
-        self._take_over()
-        self._follow_placements()
-        self._follow_inertial()
-        self._follow_placing()
+            slot()
         self._lay_out()
         self._backend.start(self._prepare)
 
