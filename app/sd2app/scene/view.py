@@ -6,15 +6,13 @@ import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
-from typing import get_args
+from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 from PySide6.QtCore import QEvent, QObject, QPointF, QSize, Qt
 from PySide6.QtGui import QCloseEvent, QGuiApplication, QMouseEvent, QResizeEvent, QWheelEvent
 from PySide6.QtWidgets import QLabel, QMenu, QWidget
 
-from sd2app.imu.model import ImuModel
-from sd2app.maps.model import SynthesisModel
 from sd2app.scene.backend import Backend, NoOpenGL, chosen_backend
 from sd2app.scene.camera import Preset
 from sd2app.scene.colours import SceneColours
@@ -22,12 +20,17 @@ from sd2app.scene.inertial import PLACING_HINT, InertialHand
 from sd2app.scene.navigation import Navigator
 from sd2app.scene.overlay import Overlay
 from sd2app.scene.scene import Scene
-from sd2app.sensor.placements import PlacementsModel
-from sd2app.session.session import Session
 from sd2app.widgets.canvas import MenuPart
 from sd2app.widgets.picture import picture_menu
 from sd2core.errors import Sd2Error
-from sd2core.mesh.sequence import MeshSequence
+
+if TYPE_CHECKING:
+    # The view alone loads no kernels.
+    from sd2app.imu.model import ImuModel
+    from sd2app.maps.model import SynthesisModel
+    from sd2app.sensor.placements import PlacementsModel
+    from sd2app.session.session import Session
+    from sd2core.mesh.sequence import MeshSequence
 
 _MOUSE = (
     QEvent.Type.MouseMove,

@@ -15,11 +15,8 @@ from PySide6.QtWidgets import (
 )
 
 from sd2core.files.figure_files import SUFFIXES
-from sd2core.labels.formats import FORMATS
 
 Answer = QMessageBox.StandardButton
-LABEL_SUFFIXES = tuple(dict.fromkeys(suffix for one in FORMATS for suffix in one.suffixes))
-LABEL_FILES = f"Labels ({' '.join(f'*{suffix}' for suffix in LABEL_SUFFIXES)});;All files (*)"
 FIGURES = ";;".join(f"{suffix[1:].upper()} (*{suffix})" for suffix in SUFFIXES)
 
 
