@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from functools import partial
 
-from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
+from PySide6.QtWidgets import QLabel, QWidget
 
 from sd2app.background.run_monitor import UNDER_WAY
 from sd2app.classify.dialogs import ClassifyDialogs
@@ -17,7 +17,7 @@ from sd2app.session.display import DisplayModel
 from sd2app.training.text import division_text
 from sd2app.widgets.chart import Chart, ChartView, Curve, Mark, Scale
 from sd2app.widgets.inputs import CheckBox, TypedLine
-from sd2app.widgets.layouts import row_of
+from sd2app.widgets.layouts import grid_of, row_of
 from sd2app.widgets.panel import FactRows, outlined, rule, sentence, side_by_side, title
 from sd2app.widgets.run_panel import Button, RunPanel, RunView
 from sd2app.widgets.text import counted
@@ -83,11 +83,7 @@ class ClassSetupView(TrainingForm):
         for name in MAPS:
             chosen = partial(self._labelled.set_map, name)
             self._boxes[name] = CheckBox(name, self, chosen, _MAP_TIPS[name])
-        grid = QGridLayout()
-        grid.setHorizontalSpacing(8)
-        grid.setVerticalSpacing(4)
-        grid.setColumnStretch(1, 1)
-        grid.setColumnStretch(3, 1)
+        grid = grid_of(gaps_px=(8, 4), wide=(1, 3))
         grid.addWidget(QLabel("Maps", self), 0, 0)
         grid.addLayout(side_by_side(*self._boxes.values()), 0, 1, 1, 3)
         for row, (text, choice) in enumerate(

@@ -9,7 +9,6 @@ from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import (
     QFrame,
-    QGridLayout,
     QHBoxLayout,
     QLabel,
     QLayout,
@@ -20,7 +19,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from sd2app.widgets.layouts import STRETCH, Part, column_of, row_of
+from sd2app.widgets.layouts import STRETCH, Part, column_of, grid_of, row_of
 
 
 def title(text: str, name: str = "") -> QLabel:
@@ -155,20 +154,15 @@ class FactRows(QWidget):
 
     def __init__(self, most: int, at_the_edge: bool, parent: QWidget) -> None:
         super().__init__(parent)
-        grid = QGridLayout(self)
-        grid.setContentsMargins(0, 0, 0, 0)
-        grid.setHorizontalSpacing(12)
-        grid.setVerticalSpacing(2)
-        grid.setColumnStretch(0 if at_the_edge else 1, 1)
         self._cells: list[tuple[QLabel, QLabel]] = []
-        for row in range(most):
+        for _ in range(most):
             name, value = sentence(""), QLabel(self)
             name.setWordWrap(at_the_edge)
             if at_the_edge:
                 value.setAlignment(Qt.AlignmentFlag.AlignRight)
-            grid.addWidget(name, row, 0)
-            grid.addWidget(value, row, 1)
             self._cells.append((name, value))
+        wide = 0 if at_the_edge else 1
+        self.setLayout(grid_of(*self._cells, gaps_px=(12, 2), wide=(wide,)))
 
     def show_facts(self, facts: Sequence[tuple[str, str]]) -> None:
         """Show facts, and nothing where there are none."""
