@@ -73,10 +73,8 @@ def refuse_description(options: argparse.Namespace) -> None:
 
 def describe(options: argparse.Namespace) -> None:
     """Write a description, once the capture opens with it, and describe the capture."""
-    from pydantic import ValidationError
-
     from sd2core.cli.info.description import describe_capture, show
-    from sd2core.files.texts import first_fault
+    from sd2core.files.texts import faults_in
     from sd2core.io.radar.described import (
         RadarDescription,
         capture_of,
@@ -93,12 +91,8 @@ def describe(options: argparse.Namespace) -> None:
     told = _told_by_sigmf(path) | told
     told.setdefault("axes", plain_axes(path, told.get("dataset")))
     _ask(told)
-    try:
+    with faults_in(f"The description of {path}", "all that its radar needs"):
         description = RadarDescription.model_validate(told)
-    except ValidationError as error:
-        raise Sd2Error(
-            f"The description of {path}: {first_fault(error)}", "all that its radar needs"
-        ) from error
     capture = capture_of(path, description)
     written = write_description(description, path)
     shown = describe_capture(path, capture)

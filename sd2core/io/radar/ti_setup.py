@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from sd2core.errors import Sd2Error
-from sd2core.files.texts import errors_in, first_fault, read_json, read_text
+from sd2core.files.texts import errors_in, faults_in, read_json, read_text
 from sd2core.radar_config import RadarConfig, Sampling
 
 _SAMPLINGS: dict[int, Sampling] = {0: "real", 1: "complex", 2: "complex with image band"}
@@ -240,10 +240,8 @@ class _Studio(_Part):
 
 
 def _of_json(path: Path) -> TiSetup:
-    try:
+    with faults_in(path, _JSON):
         devices = _Studio.model_validate(read_json(path, _JSON)).mmWaveDevices
-    except ValidationError as error:
-        raise Sd2Error(first_fault(error), _JSON) from error
     devices = devices if isinstance(devices, list) else [devices]
     if len(devices) != 1:
         raise Sd2Error(f"It configures {len(devices)} devices", "one")
