@@ -95,10 +95,7 @@ def _ladder(options: argparse.Namespace) -> int:
     synthesis = check_options(mesh, replace(PRESETS["paper"], **chosen_by_user))
     choice = None
     if options.method == "histogram":
-        tolerance = options.tolerance
-        if tolerance is None and options.budget_ms is None:
-            tolerance = _TOLERANCE
-        choice = chosen(mesh, sensor, synthesis, tolerance, options.budget_ms)
+        choice = chosen(mesh, sensor, synthesis, options)
     measurement = None if options.quick else _measured(mesh, sensor, synthesis, options)
     if options.figure is not None and measurement is not None:
         from sd2core.accuracy.results import plot_cost_and_error
@@ -140,16 +137,18 @@ def add_wish(parser: argparse.ArgumentParser, default: str) -> None:
 def chosen(
     mesh: MeshSequence,
     sensor: VirtualSensor,
-    options: SynthesisOptions,
-    tolerance: float | None,
-    budget_ms: float | None,
+    synthesis: SynthesisOptions,
+    options: argparse.Namespace,
     *,
     dragging: bool = True,
 ) -> Choice:
-    """Choose a plan with progress bars; arguments as for :func:`sd2core.accuracy.choose`."""
+    """Choose a plan as :func:`add_wish` asks for it, with progress bars; without a wish by 2 %."""
     from sd2core.accuracy.choosing import choose
     from sd2core.numerics.compiled import warm_up
 
+    tolerance = options.tolerance
+    if tolerance is None and options.budget_ms is None:
+        tolerance = _TOLERANCE
     with progress_bar("Compiling", "file") as progress:
         warm_up(progress)
     with progress_bar("Choosing", "plan") as progress:
@@ -157,9 +156,9 @@ def chosen(
             mesh,
             sensor,
             tolerance=tolerance,
-            budget_ms=budget_ms,
+            budget_ms=options.budget_ms,
             dragging=dragging,
-            options=options,
+            options=synthesis,
             progress=progress,
         )
 

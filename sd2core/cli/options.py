@@ -190,8 +190,8 @@ def add_count(parser: argparse._ActionsContainer) -> None:
 
 
 def given(options: argparse.Namespace, names: Iterable[str]) -> dict[str, Any]:
-    """Those of the named options that the user gave."""
-    values = {name: getattr(options, name) for name in names}
+    """Those of the named options that the command has and the user gave."""
+    values = {name: getattr(options, name, None) for name in names}
     return {name: value for name, value in values.items() if value is not None}
 
 

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from sd2core.recording.recording import Recording
     from sd2core.sensor import VirtualSensor
 
-_TOLERANCE = 0.02
 _LIMITS = (
     ("inside", "stand in the body"),
     ("out_of_range", "see it beyond the radar's range"),
@@ -192,10 +191,7 @@ def _cost(
     places = placements.places()
     middle = sorted(range(len(places)), key=lambda number: places[number].range_m)[len(places) // 2]
     synthesis = check_options(mesh, PRESETS["paper"])
-    tolerance = options.tolerance
-    if tolerance is None and options.budget_ms is None:
-        tolerance = _TOLERANCE
-    choice = chosen(mesh, sensors[middle], synthesis, tolerance, options.budget_ms, dragging=False)
+    choice = chosen(mesh, sensors[middle], synthesis, options, dragging=False)
     return choice, PlacementCost(
         len(sensors), mesh.frame_count, choice.cost_ms, synthesis.axis.bins
     )

@@ -35,33 +35,6 @@ if TYPE_CHECKING:
     from sd2core.mesh.sequence import MeshSequence
     from sd2core.sensor import VirtualSensor
 
-_RUNGS = (
-    "visibility",
-    "depth_resolution",
-    "mask_stride",
-    "vertices_kept",
-    "range_law",
-    "beyond",
-    "oversampling",
-)
-"""Options that a plan sets."""
-
-_COUNTING_ONLY = (
-    "depth_resolution",
-    "mask_stride",
-    "weight",
-    "count",
-    "null_bins",
-    "beyond",
-    "range_exponent",
-    "reference_range_m",
-    "range_law",
-    "trajectory_smoothing_s",
-    "oversampling",
-    "velocity_sigma_bins",
-    "time_sigma_s",
-)
-
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``synth``."""
@@ -235,10 +208,12 @@ def _synth(options: argparse.Namespace) -> None:
 
 
 def _check_wish(options: argparse.Namespace) -> None:
+    from sd2core.accuracy.plans import CHOSEN
+
     wish = "--tolerance" if options.tolerance is not None else "--budget-ms"
     if options.method == "fmcw":
         raise Sd2Error(f"{wish} is given with --method fmcw", f"{wish} with the histogram only")
-    for name in given(options, _RUNGS):
+    for name in given(options, CHOSEN):
         raise Sd2Error(
             f"{wish} is given with {flag(name)}",
             f"one of them: with {wish} the plan chooses how",
@@ -252,7 +227,7 @@ def _as_chosen(
     from sd2core.accuracy.trial import synthesizer_for
 
     base = synthesis_options(options)
-    choice = chosen(mesh, sensor, base, options.tolerance, options.budget_ms, dragging=False)
+    choice = chosen(mesh, sensor, base, options, dragging=False)
     if not choice.holds:
         raise Sd2Error(choice.summary, "a tolerance or budget that can be held", "Allow more of it")
     doppler = _counted(options, synthesizer_for(choice.plan, mesh, base), sensor)
@@ -275,7 +250,10 @@ def _counted(
 
 
 def _check_fmcw(options: argparse.Namespace) -> None:
-    unfit = list(given(options, _COUNTING_ONLY))
+    from sd2core.doppler import SynthesisOptions
+
+    counting = SynthesisOptions.__dataclass_fields__.keys() - {"visibility"}
+    unfit = list(given(options, sorted(counting)))
     unfit += ["preset"] * (options.preset != "paper") + ["uncertainty"] * options.uncertainty
     unfit += ["limbs"] * options.limbs
     if unfit:
@@ -305,7 +283,7 @@ def _by_fmcw(options: argparse.Namespace, mesh: MeshSequence, sensor: VirtualSen
 
 def synthesis_options(options: argparse.Namespace) -> SynthesisOptions:
     """The preset, with options of the command line in its place."""
-    from sd2core.doppler.options import chosen_options
+    from sd2core.doppler.options import SynthesisOptions, chosen_options
 
-    chosen = given(options, ("visibility", *_COUNTING_ONLY))
+    chosen = given(options, SynthesisOptions.__dataclass_fields__)
     return chosen_options(options.preset, options.bins, options.v_max, chosen)
