@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AliasPath, BaseModel, ConfigDict, Field, ValidationError
 
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_folder, atomic_write, atomic_write_text
@@ -61,12 +61,8 @@ class _Shape(BaseModel):
     sample_rate_Hz: float = Field(gt=0)
 
 
-class _Device(BaseModel):
-    fmcw_single_shape: _Shape
-
-
 class _Config(BaseModel):
-    device_config: _Device
+    shape: _Shape = Field(validation_alias=AliasPath("device_config", "fmcw_single_shape"))
 
 
 class _Meta(BaseModel):
@@ -248,7 +244,7 @@ def _read_meta(path: Path) -> _Meta:
 
 def _read_config(path: Path, meta: _Meta) -> RadarConfig:
     try:
-        shape = _Config.model_validate(_read_json(path)).device_config.fmcw_single_shape
+        shape = _Config.model_validate(_read_json(path)).shape
     except ValidationError as error:
         raise _explain(path, error) from error
     mode = (shape.mimo_mode or "off").lower()
