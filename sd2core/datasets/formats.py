@@ -39,9 +39,7 @@ _EXPECTED = "a data set that `sd2 export` made"
 
 def refuse_large_npz(out: Path, segments: int, header: Header) -> None:
     """Refuse an NPZ too large to be opened."""
-    maps = len(header.kinds) + len(header.parts)
-    more = len(header.imu), len(header.joints)
-    size = segments * bytes_per_segment(header.length, header.axis.bins, maps, *more)
+    size = segments * bytes_per_segment(header)
     if size > NPZ_LIMIT_BYTES:
         raise Sd2Error(
             f"{out} would hold {segments:,} segments, {size / 1e9:.1f} GB",

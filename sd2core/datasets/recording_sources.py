@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -172,23 +172,21 @@ class _Shared:
 
     def __init__(self, making: Making) -> None:
         self.making = making
-        self._denoising = Denoising()
         self._opened: _Opened | None = None
 
     def opened(self, recording: Recording) -> _Opened:
         if self._opened is None or self._opened.recording is not recording:
             self._opened = None  # before the next one takes memory
-            self._opened = _Opened(recording, self.making, self._denoising)
+            self._opened = _Opened(recording, self.making)
         return self._opened
 
 
 class _Opened:
     """Open recording whose placements share mesh, synthesizer and radar map."""
 
-    def __init__(self, recording: Recording, making: Making, denoising: Denoising) -> None:
+    def __init__(self, recording: Recording, making: Making) -> None:
         self.recording = recording
         self._making = making
-        self._denoising = denoising
         self._mesh: MeshSequence | None = None
         if recording.mesh is not None:
             self._mesh = recording.load_mesh()
@@ -234,7 +232,7 @@ class _Opened:
             synthetic = self._counted(sensor, counting, limbs=limbs)
             maps["synthetic"] = synthetic
             if model is not None:
-                maps["denoised"] = self._denoising.denoised(synthetic, model)
+                maps["denoised"] = denoised(synthetic, model)
         if key.placement == 0 and self.recording.radar is not None and {
             "simulated", "real"
         } & {*wanted}:  # fmt: skip
@@ -410,18 +408,14 @@ def _models_of(recording: Recording, making: Making) -> list[Path]:
     return [find_model(name) for name in ([chosen] if chosen else [MAP_MODEL, LIMBS_MODEL])]
 
 
-class Denoising:
-    """Denoiser of maps that keeps the model used last."""
+def denoised(synthetic: DopplerMap, path: Path) -> DopplerMap:
+    """Denoise a synthetic map with a model file; the model used last is kept."""
+    check_map(synthetic, describe_model(path))  # before torch is loaded: it takes seconds
+    return _loaded(path, path.stat().st_mtime_ns).denoise(synthetic)
 
-    def __init__(self) -> None:
-        self._path: Path | None = None
-        self._model: TrainedDenoiser | None = None
 
-    def denoised(self, synthetic: DopplerMap, path: Path) -> DopplerMap:
-        """Denoise a synthetic map with a model file."""
-        if self._model is None or path != self._path:
-            from sd2core.denoise.files import load_model
+@lru_cache(maxsize=1)
+def _loaded(path: Path, changed_ns: int) -> TrainedDenoiser:
+    from sd2core.denoise.files import load_model
 
-            check_map(synthetic, describe_model(path))  # before torch is loaded: it takes seconds
-            self._model, self._path = load_model(path), path
-        return self._model.denoise(synthetic)
+    return load_model(path)

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from sd2core.datasets.recording_sources import (
-    Denoising,
     Making,
+    denoised,
     labels_and_classes,
     recording_sources,
 )
@@ -219,7 +219,6 @@ class _PairStore:
         self._model: Path | None = None
         if "denoised" in self._kinds:
             self._model = find_model(model or default_name(limbs=bool(self.parts)))
-        self._denoising = Denoising()
 
     def lazy(self, number: int, subject: str) -> LazySource:
         take = self.takes[number]
@@ -264,7 +263,7 @@ class _PairStore:
             limbs = limbs_between(self._header, self._arrays, take["start"], take["stop"])
             maps["synthetic"] = replace(counted, limbs=limbs)
         if self._model is not None:
-            maps["denoised"] = self._denoising.denoised(maps["synthetic"], self._model)
+            maps["denoised"] = denoised(maps["synthetic"], self._model)
         if self._radar in self._kinds:
             maps[self._radar] = as_map("radar", self._radar, "power")
         known = {one.name: one.gesture_class for one in GESTURES.labels}
