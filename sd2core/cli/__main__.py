@@ -9,7 +9,7 @@ from typing import NoReturn
 
 from sd2core.cli import build_parser, run
 from sd2core.cli.importing import copy_sample
-from sd2core.cli.options import add_command, add_json, add_output
+from sd2core.cli.options import add_command
 from sd2core.errors import Sd2Error
 
 _WINDOW_COMMANDS = ("open", "doctor")
@@ -26,12 +26,12 @@ def main() -> int:
         handler=_demo,
         description="A simulated body makes eight swipes in front of a simulated radar.",
     )
-    add_output(demo, "NAME.sd2", "the copy to write", required=False)
+    demo.add_output("NAME.sd2", "the copy to write", required=False)
     demo.add_argument("--screenshot", type=Path, help=argparse.SUPPRESS)
     for name in _WINDOW_COMMANDS:  # not listed
         absent = commands.add_parser(name)
         absent.set_defaults(handler=_absent, name=name)
-        add_json(absent)
+        absent.add_json()
     words = sys.argv[1:]
     if words and words[0] in _WINDOW_COMMANDS:
         # Whatever else is asked of a command that is not there.

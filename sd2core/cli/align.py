@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sd2core.cli.options import add_command, add_json, positive_float
+from sd2core.cli.options import add_command, positive_float
 from sd2core.cli.output import print_facts, print_json
 from sd2core.errors import Sd2Error
 
@@ -34,19 +34,15 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             "  sd2 align walk.sd2 --within 20 --json"
         ),
     )
-    parser.add_argument(
-        "recordings", type=Path, nargs="+", metavar="RECORDING", help="with a mesh and a radar"
-    )
-    parser.add_argument(
+    parser.add_value("recordings", Path, "RECORDING", "with a mesh and a radar", nargs="+")
+    parser.add_value(
         "--within",
-        type=positive_float,
-        metavar="S",
-        help="search so far before and after the recording's offset, 2 s at least (default: 5)",
+        positive_float,
+        "S",
+        "search so far before and after the recording's offset, 2 s at least (default: 5)",
     )
-    parser.add_argument(
-        "--save", action="store_true", help="write what was found into the recordings"
-    )
-    add_json(parser)
+    parser.add_flag("--save", "write what was found into the recordings")
+    parser.add_json()
 
 
 def _align(options: argparse.Namespace) -> int:

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sd2core.cli.options import add_command, add_json_and_progress, add_value, positive_int
+from sd2core.cli.options import add_command, positive_int
 from sd2core.cli.output import (
     counted,
     duration,
@@ -55,23 +55,19 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             "  sd2 batch --status made"
         ),
     )
-    parser.add_argument("plan", type=Path, nargs="?", metavar="PLAN.toml", help="plan of the batch")
+    parser.add_value("plan", Path, "PLAN.toml", "plan of the batch", nargs="?")
     where = parser.add_mutually_exclusive_group()
-    add_value(
-        where, "--workers", positive_int, "N", "processes on this machine (default: one per core)"
+    where.add_value(
+        "--workers", positive_int, "N", "processes on this machine (default: one per core)"
     )
-    where.add_argument(
-        "--scheduler", metavar="ADDRESS", help="use the workers of this dask-scheduler"
-    )
+    where.add_value("--scheduler", str, "ADDRESS", "use the workers of this dask-scheduler")
     what = parser.add_mutually_exclusive_group()
-    what.add_argument(
-        "--dry-run", action="store_true", help="print tasks, time and bytes, and do nothing"
+    what.add_flag("--dry-run", "print tasks, time and bytes, and do nothing")
+    what.add_value("--status", Path, "FOLDER", "print the state of the batch in this folder")
+    what.add_value(
+        "--stop", Path, "FOLDER", "stop the batch in this folder; the same command resumes it"
     )
-    add_value(what, "--status", Path, "FOLDER", "print the state of the batch in this folder")
-    add_value(
-        what, "--stop", Path, "FOLDER", "stop the batch in this folder; the same command resumes it"
-    )
-    add_json_and_progress(parser)
+    parser.add_json_and_progress()
 
 
 def _batch(options: argparse.Namespace) -> int:

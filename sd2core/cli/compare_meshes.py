@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sd2core.cli.options import add_command, add_figure_output, add_json, add_mesh_reading, position
+from sd2core.cli.options import add_command, position
 from sd2core.cli.output import print_json, print_rows, progress_bar
 from sd2core.errors import Sd2Error
 
@@ -39,18 +39,13 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             "  sd2 compare-meshes ours.zarr wham.pkl --names ours,WHAM --figure both.svg"
         ),
     )
-    parser.add_argument(
-        "meshes", type=Path, nargs="+", metavar="MESH", help="two meshes or more, in one frame"
+    parser.add_value("meshes", Path, "MESH", "two meshes or more, in one frame", nargs="+")
+    parser.add_value("--names", str, "LIST", "what to call them, separated by commas")
+    parser.add_value(
+        "--reference", str, "NAME", "name of the mesh that is right (default: the first)"
     )
-    parser.add_argument("--names", metavar="LIST", help="what to call them, separated by commas")
-    parser.add_argument(
-        "--reference", metavar="NAME", help="name of the mesh that is right (default: the first)"
-    )
-    parser.add_argument(
-        "--sensor",
-        type=position,
-        metavar="X,Y,Z",
-        help="where the radar is, in metres (default: at the camera)",
+    parser.add_value(
+        "--sensor", position, "X,Y,Z", "where the radar is, in metres (default: at the camera)"
     )
     parser.add_argument(
         "--align",
@@ -61,9 +56,9 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             " and maps are never aligned"
         ),
     )
-    add_figure_output(parser, "maps and curves")
-    add_mesh_reading(parser)
-    add_json(parser)
+    parser.add_figure_output("maps and curves")
+    parser.add_mesh_reading()
+    parser.add_json()
 
 
 def _compare(options: argparse.Namespace) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from sd2core.cli.options import add_command, add_json, add_map_output, add_value
+from sd2core.cli.options import add_command
 from sd2core.cli.output import progress_bar
 from sd2core.errors import Sd2Error
 
@@ -28,15 +28,15 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             "  sd2 denoise map.npz --out denoised.npz --model runs/first/best.safetensors"
         ),
     )
-    add_value(parser, "map", Path, "MAP", "a map from `sd2 synth`")
-    add_map_output(parser)
+    parser.add_value("map", Path, "MAP", "a map from `sd2 synth`")
+    parser.add_map_output()
     parser.add_argument(
         "--model",
         metavar="FILE|NAME",
         help="a model file from `sd2 train`, or the name of one that is installed (default: of"
         " those that come with SD² Studio the one for limb maps, where there are such)",
     )
-    add_json(parser)
+    parser.add_json()
 
 
 def _denoise(options: argparse.Namespace) -> None:

@@ -6,13 +6,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sd2core.cli.options import (
-    add_command,
-    add_figure_output,
-    add_json,
-    add_placements_used,
-    add_value,
-)
+from sd2core.cli.command_parser import Options
+from sd2core.cli.options import add_command
 from sd2core.cli.output import print_json, progress_bar
 from sd2core.errors import Sd2Error
 
@@ -53,19 +48,19 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         "--data", type=Path, nargs="+", required=True, metavar="PAIRS", help="stores of pairs"
     )
     add_judging(parser, "those that the first model's run kept for the test, or all", "the errors")
-    add_value(parser, "--markdown", Path, "FILE.md", "write the tables")
+    parser.add_value("--markdown", Path, "FILE.md", "write the tables")
 
 
-def add_judging(parser: argparse.ArgumentParser, usual_subjects: str, drawn: str) -> None:
+def add_judging(parser: Options, usual_subjects: str, drawn: str) -> None:
     """Add whom an evaluation judges on which maps, and the files of its result."""
     parser.add_argument(
         "--subjects",
         metavar="LIST",
         help=f"people to evaluate on, separated by commas, or `all` (default: {usual_subjects})",
     )
-    add_placements_used(parser, "evaluate on maps from", "first")
-    add_figure_output(parser, drawn)
-    add_json(parser)
+    parser.add_placements_used("evaluate on maps from", "first")
+    parser.add_figure_output(drawn)
+    parser.add_json()
 
 
 def named_subjects(text: str, everybody: tuple[str, ...]) -> tuple[str, ...]:

@@ -9,15 +9,9 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from sd2core.cli.command_parser import Options
 from sd2core.cli.options import (
-    add_axis,
     add_command,
-    add_count,
-    add_json_and_progress,
-    add_limbs,
-    add_output,
-    add_people_kept_out,
-    add_value,
     bin_list,
     given,
     name_list,
@@ -69,24 +63,20 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             "  sd2 export recordings/ --out set.zarr --dry-run"
         ),
     )
-    parser.add_argument(
-        "inputs", type=Path, nargs="+", metavar="INPUT", help="recordings, pairs, maps, folders"
-    )
-    add_output(parser, "FILE", "the data set to write (.zarr, .h5 or .npz)")
+    parser.add_value("inputs", Path, "INPUT", "recordings, pairs, maps, folders", nargs="+")
+    parser.add_output("FILE", "the data set to write (.zarr, .h5 or .npz)")
     _add_content(parser)
     _add_making(parser)
-    parser.add_argument(
-        "--dry-run", action="store_true", help="print counts, size and time, and write nothing"
-    )
-    add_json_and_progress(parser)
+    parser.add_flag("--dry-run", "print counts, size and time, and write nothing")
+    parser.add_json_and_progress()
 
 
-def _add_content(parser: argparse.ArgumentParser) -> None:
+def _add_content(parser: Options) -> None:
     group = parser.add_argument_group("segments")
     group.add_argument(
         "--kinds", default=_KINDS, metavar="LIST", help=f"some of {_KINDS} (default: all)"
     )
-    add_limbs(group)
+    group.add_limbs()
     group.add_argument(
         "--imu",
         type=name_list,
@@ -95,20 +85,20 @@ def _add_content(parser: argparse.ArgumentParser) -> None:
         help="also keep what inertial sensors there would feel at every frame, e.g."
         " left-wrist,right-wrist; places as for `sd2 imu`",
     )
-    add_value(group, "--segment-frames", positive_int, "N", "length of a segment", 72)
-    add_value(group, "--overlap-frames", int, "N", "frames that neighbours share", 10)
-    group.add_argument(
+    group.add_value("--segment-frames", positive_int, "N", "length of a segment", 72)
+    group.add_value("--overlap-frames", int, "N", "frames that neighbours share", 10)
+    group.add_value(
         "--rate",
-        type=positive_float,
-        metavar="FPS",
-        help="frames per second; other sources are brought to it (default: the first one's)",
+        positive_float,
+        "FPS",
+        "frames per second; other sources are brought to it (default: the first one's)",
     )
-    group.add_argument(
+    group.add_choice(
         "--label-rule",
-        choices=("foreground", "majority"),
-        default="foreground",
-        help="label of a segment: the gesture with most frames, if they are enough, or the label"
-        " with most frames, background included (default: foreground)",
+        ("foreground", "majority"),
+        "label of a segment: the gesture with most frames, if they are enough, or the label"
+        " with most frames, background included",
+        "foreground",
     )
     group.add_argument(
         "--min-share",
@@ -121,15 +111,14 @@ def _add_content(parser: argparse.ArgumentParser) -> None:
         "--title", default="", metavar="TEXT", help="title of the card and the sheet"
     )
     people = parser.add_argument_group("people")
-    people.add_argument(
+    people.add_value(
         "--subjects",
-        type=name_list,
-        metavar="LIST",
-        help="subject of each recording and map, separated by commas, in their order (default:"
+        name_list,
+        "LIST",
+        "subject of each recording and map, separated by commas, in their order (default:"
         " each recording shows another person)",
     )
-    add_people_kept_out(
-        people,
+    people.add_people_kept_out(
         "kept out to validate with, separated by commas, or none (default: about a sixth of all,"
         " chosen by their names, so that adding people does not move others)",
         "kept out to test with, or none (default: likewise)",
@@ -144,7 +133,7 @@ def _add_content(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _add_making(parser: argparse.ArgumentParser) -> None:
+def _add_making(parser: Options) -> None:
     group = parser.add_argument_group("maps")
     group.add_argument(
         "--placements",
@@ -152,11 +141,11 @@ def _add_making(parser: argparse.ArgumentParser) -> None:
         help="sensors around the body besides the recording's own, as `sd2 placements` writes"
         " them, or those that each recording plans",
     )
-    group.add_argument(
+    group.add_value(
         "--tolerance",
-        type=share,
-        metavar="SHARE",
-        help="make synthetic maps as fast as possible within this error, e.g. 2%% (default: exact)",
+        share,
+        "SHARE",
+        "make synthetic maps as fast as possible within this error, e.g. 2%% (default: exact)",
     )
     group.add_argument(
         "--simulate",
@@ -170,13 +159,13 @@ def _add_making(parser: argparse.ArgumentParser) -> None:
         metavar="FILE|NAME",
         help="the denoiser (default: that of each recording, or the bundled one)",
     )
-    add_count(group)
-    add_axis(group)
-    group.add_argument(
+    group.add_count()
+    group.add_axis()
+    group.add_value(
         "--null-bins",
-        type=bin_list,
-        metavar="LIST",
-        help="bins to set to zero in all kinds (default: those of the synthetic maps)",
+        bin_list,
+        "LIST",
+        "bins to set to zero in all kinds (default: those of the synthetic maps)",
     )
 
 

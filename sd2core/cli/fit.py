@@ -9,14 +9,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sd2core.cli.options import (
-    add_command,
-    add_json_and_progress,
-    add_output,
-    add_value,
-    not_negative_float,
-    positive_float,
-)
+from sd2core.cli.options import add_command, not_negative_float, positive_float
 from sd2core.cli.output import print_event, print_facts, print_json, progress_bar, progress_events
 from sd2core.cli.running import explanation
 from sd2core.errors import Sd2Error
@@ -65,66 +58,51 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             "  sd2 fit walk.mp4 --out walk.npz --field-of-view 68 --resolution low"
         ),
     )
-    add_value(parser, "video", Path, "VIDEO", "any video that FFmpeg reads")
-    add_output(parser, "FILE", "the mesh to write (.zarr or .npz)")
-    parser.add_argument(
+    parser.add_value("video", Path, "VIDEO", "any video that FFmpeg reads")
+    parser.add_output("FILE", "the mesh to write (.zarr or .npz)")
+    parser.add_value(
         "--person-box",
-        type=_rectangle,
-        metavar="X,Y,W,H",
-        help="a rectangle around the person, in pixels (default: who is seen best)",
+        _rectangle,
+        "X,Y,W,H",
+        "a rectangle around the person, in pixels (default: who is seen best)",
     )
-    parser.add_argument(
-        "--person-frame",
-        type=_frame,
-        metavar="N",
-        help="the frame of that rectangle, counted from 0 (default: 0)",
+    parser.add_value(
+        "--person-frame", _frame, "N", "the frame of that rectangle, counted from 0 (default: 0)"
     )
-    parser.add_argument(
-        "--stature-m",
-        type=positive_float,
-        metavar="M",
-        help="how tall the person is, in metres (default: 1.72)",
+    parser.add_value(
+        "--stature-m", positive_float, "M", "how tall the person is, in metres (default: 1.72)"
     )
-    parser.add_argument(
+    parser.add_value(
         "--focal-px",
-        type=positive_float,
-        metavar="PX",
-        help="focal length in pixels (default: as the file says, or 56° across the longer side)",
+        positive_float,
+        "PX",
+        "focal length in pixels (default: as the file says, or 56° across the longer side)",
     )
-    parser.add_argument(
+    parser.add_value(
         "--field-of-view",
-        type=positive_float,
-        metavar="DEG",
-        help="instead of it, the angle across the longer side of the picture",
+        positive_float,
+        "DEG",
+        "instead of it, the angle across the longer side of the picture",
     )
-    parser.add_argument(
+    parser.add_value(
         "--max-gap-s",
-        type=not_negative_float,
-        metavar="S",
-        help="bridge gaps without the person up to this long; longer ones stay empty"
-        " (default: 0.5)",
+        not_negative_float,
+        "S",
+        "bridge gaps without the person up to this long; longer ones stay empty (default: 0.5)",
     )
-    parser.add_argument(
-        "--resolution",
-        choices=("low", "medium", "high"),
-        default="medium",
-        help="1,229, 5,000 or 13,348 vertices (default: medium)",
+    parser.add_choice(
+        "--resolution", ("low", "medium", "high"), "1,229, 5,000 or 13,348 vertices", "medium"
     )
-    parser.add_argument(
+    parser.add_choice(
         "--landmark-model",
-        choices=("full", "heavy"),
-        default="heavy",
-        help="the network that finds the landmarks; full takes half the time and is a little less"
-        " good (default: heavy)",
+        ("full", "heavy"),
+        "the network that finds the landmarks; full takes half the time and is a little less good",
+        "heavy",
     )
-    add_value(parser, "--models", Path, "FOLDER", "a folder with the landmark models")
-    add_value(parser, "--landmarks", Path, "FILE", "keep the landmarks as well (.npz)")
-    parser.add_argument(
-        "--restart",
-        action="store_true",
-        help="start from the beginning, not where a stopped run ended",
-    )
-    add_json_and_progress(parser)
+    parser.add_value("--models", Path, "FOLDER", "a folder with the landmark models")
+    parser.add_value("--landmarks", Path, "FILE", "keep the landmarks as well (.npz)")
+    parser.add_flag("--restart", "start from the beginning, not where a stopped run ended")
+    parser.add_json_and_progress()
 
 
 def _rectangle(text: str) -> tuple[float, float, float, float]:

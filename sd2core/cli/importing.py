@@ -5,17 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from sd2core.cli.options import (
-    add_channel,
-    add_command,
-    add_json,
-    add_mesh_reading,
-    add_output,
-    add_value,
-    finite_float,
-    flag,
-    given,
-)
+from sd2core.cli.options import add_command, finite_float, flag, given
 from sd2core.cli.output import print_json, progress_bar
 from sd2core.errors import Sd2Error
 
@@ -40,38 +30,38 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             "  sd2 import --video a.mkv --radar capture/ --radar-offset-s -0.35 --copy --out a.sd2"
         ),
     )
-    add_output(parser, "NAME.sd2", "the recording to make")
-    add_value(parser, "--video", Path, "FILE", "video of the person")
-    parser.add_argument(
+    parser.add_output("NAME.sd2", "the recording to make")
+    parser.add_value("--video", Path, "FILE", "video of the person")
+    parser.add_value(
         "--mesh",
-        type=Path,
-        metavar="FILE",
-        help="body mesh fitted to the video (.npz, .zarr, a folder of .obj/.ply/.glb, or the"
+        Path,
+        "FILE",
+        "body mesh fitted to the video (.npz, .zarr, a folder of .obj/.ply/.glb, or the"
         " output of VIBE, WHAM or 4D-Humans)",
     )
-    add_mesh_reading(parser)
-    add_value(parser, "--radar", Path, "CAPTURE", "radar capture of the same scene")
-    parser.add_argument(
+    parser.add_mesh_reading()
+    parser.add_value("--radar", Path, "CAPTURE", "radar capture of the same scene")
+    parser.add_value(
         "--radar-offset-s",
-        type=finite_float,
-        default=0.0,
-        metavar="S",
-        help="time in the video, in seconds, of the first radar frame (default: 0)",
+        finite_float,
+        "S",
+        "time in the video, in seconds, of the first radar frame",
+        0.0,
     )
-    add_channel(parser)
-    add_value(parser, "--imu", Path, "FILE", "samples of an inertial sensor (.csv, .sto, .npz)")
-    parser.add_argument(
+    parser.add_channel()
+    parser.add_value("--imu", Path, "FILE", "samples of an inertial sensor (.csv, .sto, .npz)")
+    parser.add_value(
         "--imu-offset-s",
-        type=finite_float,
-        default=0.0,
-        metavar="S",
-        help="time in the video, in seconds, of their first sample (default: 0)",
+        finite_float,
+        "S",
+        "time in the video, in seconds, of their first sample",
+        0.0,
     )
     parser.add_argument(
         "--title", default="", metavar="TEXT", help="what to call it (default: its name)"
     )
-    parser.add_argument("--copy", action="store_true", help="copy the files into the recording")
-    add_json(parser)
+    parser.add_flag("--copy", "copy the files into the recording")
+    parser.add_json()
 
     parser = add_command(
         commands,
@@ -85,9 +75,9 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         ),
         examples="  sd2 relink walk.sd2 /media/disk/experiments",
     )
-    add_value(parser, "recording", Path, "RECORDING", "a recording (.sd2)")
-    add_value(parser, "folder", Path, "FOLDER", "where to look, and in all folders below")
-    add_json(parser)
+    parser.add_value("recording", Path, "RECORDING", "a recording (.sd2)")
+    parser.add_value("folder", Path, "FOLDER", "where to look, and in all folders below")
+    parser.add_json()
 
 
 def copy_sample(out: Path) -> None:

@@ -7,16 +7,8 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sd2core.cli.options import (
-    add_command,
-    add_json,
-    add_mesh_reading,
-    add_output,
-    add_value,
-    not_negative_float,
-    positive_float,
-    vector,
-)
+from sd2core.cli.command_parser import Options
+from sd2core.cli.options import add_command, not_negative_float, positive_float, vector
 from sd2core.cli.output import print_facts, print_json, progress_bar
 from sd2core.errors import Sd2Error
 
@@ -47,17 +39,17 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             "  sd2 imu walk.sd2 --at right-foot --acc-noise 0.002 --acc-range 20 --out foot.npz"
         ),
     )
-    add_value(parser, "mesh", Path, "MESH", "a mesh, or a recording")
+    parser.add_value("mesh", Path, "MESH", "a mesh, or a recording")
     parser.add_argument(
         "--at", required=True, metavar="PLACE|VERTEX", help="where on the body, or which vertex"
     )
-    add_output(parser, "FILE", "the samples to write (.csv, .sto or .npz)")
-    add_value(parser, "--rate", positive_float, "HZ", "samples per second", 100.0)
-    parser.add_argument(
+    parser.add_output("FILE", "the samples to write (.csv, .sto or .npz)")
+    parser.add_value("--rate", positive_float, "HZ", "samples per second", 100.0)
+    parser.add_value(
         "--cutoff",
-        type=positive_float,
-        metavar="HZ",
-        help="where the zero-phase low pass leaves half of the amplitude, in Hz (default: 6, or a"
+        positive_float,
+        "HZ",
+        "where the zero-phase low pass leaves half of the amplitude, in Hz (default: 6, or a"
         " fifth of the mesh's frame rate if that is lower)",
     )
     parser.add_argument(
@@ -68,12 +60,12 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         help="upwards in the mesh's frame (default: 0,-1,0, as for a camera held level)",
     )
     _add_errors(parser)
-    add_mesh_reading(parser)
-    add_json(parser)
+    parser.add_mesh_reading()
+    parser.add_json()
     parser.set_defaults(sensor=None)
 
 
-def _add_errors(parser: argparse.ArgumentParser) -> None:
+def _add_errors(parser: Options) -> None:
     group = parser.add_argument_group("sensor errors", "none by default")
     for short, long, unit in (
         ("acc", "accelerometer", "m/s²"),
@@ -100,7 +92,7 @@ def _add_errors(parser: argparse.ArgumentParser) -> None:
             metavar="LARGEST",
             help=f"its range, plus and minus, in {unit}; what is beyond is clipped",
         )
-    add_value(group, "--seed", int, "N", "seed of the noise", 0)
+    group.add_value("--seed", int, "N", "seed of the noise", 0)
 
 
 def _imu(options: argparse.Namespace) -> None:

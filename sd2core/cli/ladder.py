@@ -6,20 +6,8 @@ import argparse
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from sd2core.cli.options import (
-    add_command,
-    add_count,
-    add_figure_output,
-    add_json,
-    add_mesh_and_sensor,
-    add_mesh_reading,
-    add_method,
-    add_value,
-    given,
-    positive_float,
-    positive_int,
-    share,
-)
+from sd2core.cli.command_parser import Options
+from sd2core.cli.options import add_command, given, positive_float, positive_int, share
 from sd2core.cli.output import print_json, progress_bar
 from sd2core.errors import Sd2Error
 
@@ -54,26 +42,17 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             "  sd2 ladder walk.npz --figure accuracy.png --json"
         ),
     )
-    add_mesh_and_sensor(parser)
+    parser.add_mesh_and_sensor()
     add_wish(parser, "2%%")
-    add_method(parser, "measure counting, or the FMCW signal")
-    parser.add_argument(
-        "--weight",
-        choices=("count", "area", "projected"),
-        default="count",
-        help="what a vertex counts (default: count)",
-    )
-    add_count(parser)
-    parser.add_argument(
-        "--quick", action="store_true", help="only say what the scene requires, without the table"
-    )
-    add_value(parser, "--repeats", positive_int, "N", "how often every plan is timed (default: 5)")
-    parser.add_argument(
-        "--fresh", action="store_true", help="measure again what was measured before"
-    )
-    add_figure_output(parser, "error against cost")
-    add_mesh_reading(parser)
-    add_json(parser)
+    parser.add_method("measure counting, or the FMCW signal")
+    parser.add_choice("--weight", ("count", "area", "projected"), "what a vertex counts", "count")
+    parser.add_count()
+    parser.add_flag("--quick", "only say what the scene requires, without the table")
+    parser.add_value("--repeats", positive_int, "N", "how often every plan is timed (default: 5)")
+    parser.add_flag("--fresh", "measure again what was measured before")
+    parser.add_figure_output("error against cost")
+    parser.add_mesh_reading()
+    parser.add_json()
 
 
 def _ladder(options: argparse.Namespace) -> int:
@@ -116,21 +95,18 @@ def _ladder(options: argparse.Namespace) -> int:
     return 0 if choice is None or choice.holds else 1
 
 
-def add_wish(parser: argparse.ArgumentParser, default: str) -> None:
+def add_wish(parser: Options, default: str) -> None:
     """Add ``--tolerance`` and ``--budget-ms``, of which one may be given."""
     wanted = parser.add_mutually_exclusive_group()
-    wanted.add_argument(
+    wanted.add_value(
         "--tolerance",
-        type=share,
-        metavar="SHARE",
-        help=f"the error that is allowed, as 2%% or 0.02: relative L1 of the smoothed map"
+        share,
+        "SHARE",
+        f"the error that is allowed, as 2%% or 0.02: relative L1 of the smoothed map"
         f" (default: {default})",
     )
-    wanted.add_argument(
-        "--budget-ms",
-        type=positive_float,
-        metavar="MS",
-        help="instead, the milliseconds per frame that are allowed",
+    wanted.add_value(
+        "--budget-ms", positive_float, "MS", "instead, the milliseconds per frame that are allowed"
     )
 
 

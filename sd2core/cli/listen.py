@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sd2core.cli.options import add_command, add_json, add_output, add_value, positive_float
+from sd2core.cli.options import add_command, positive_float
 from sd2core.cli.output import counted, print_event, print_facts
 from sd2core.errors import Sd2Error
 from sd2core.runs.control import stop_signals
@@ -60,23 +60,19 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         help="listen to a DCA1000 on this address of this computer (default: 127.0.0.1, which"
         " only programs on this computer reach; port 4098)",
     )
-    add_value(
-        source, "--replay", Path, "CAPTURE", "a capture, or the one of a recording, at its own rate"
+    source.add_value(
+        "--replay", Path, "CAPTURE", "a capture, or the one of a recording, at its own rate"
     )
-    parser.add_argument(
-        "--setup",
-        type=Path,
-        metavar="FILE",
-        help="the .cfg or .json that the radar runs with (with --dca1000)",
+    parser.add_value(
+        "--setup", Path, "FILE", "the .cfg or .json that the radar runs with (with --dca1000)"
     )
-    add_output(parser, "NAME.sd2", "the recording to write")
-    add_value(parser, "--classifier", Path, "FILE", "a classifier of `sd2 classify train`")
-    add_value(parser, "--seconds", positive_float, "S", "stop after so long (default: never)")
-    add_json(parser)
-    parser.add_argument(
+    parser.add_output("NAME.sd2", "the recording to write")
+    parser.add_value("--classifier", Path, "FILE", "a classifier of `sd2 classify train`")
+    parser.add_value("--seconds", positive_float, "S", "stop after so long (default: never)")
+    parser.add_json()
+    parser.add_flag(
         "--columns",
-        action="store_true",
-        help="with --json, every column of the Doppler map as it comes, receding to approaching",
+        "with --json, every column of the Doppler map as it comes, receding to approaching",
     )
 
 

@@ -7,18 +7,8 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sd2core.cli.options import (
-    add_axis,
-    add_command,
-    add_count,
-    add_json,
-    add_limbs,
-    add_output,
-    bin_list,
-    finite_float,
-    given,
-    position,
-)
+from sd2core.cli.command_parser import Options
+from sd2core.cli.options import add_command, bin_list, finite_float, given, position
 from sd2core.cli.output import print_facts, print_json, progress_bar
 
 if TYPE_CHECKING:
@@ -51,31 +41,29 @@ def _add_recordings(kinds: argparse._SubParsersAction) -> None:
             "  sd2 pairs recordings a1.sd2 a2.sd2 b1.sd2 --subjects anna,anna,ben --out mine.zarr"
         ),
     )
-    parser.add_argument(
-        "recordings", type=Path, nargs="+", metavar="RECORDING", help="with a mesh and a radar"
-    )
+    parser.add_value("recordings", Path, "RECORDING", "with a mesh and a radar", nargs="+")
     _add_pairs(parser, "14,15,16 of 32, else none")
-    add_count(parser)
-    parser.add_argument(
+    parser.add_count()
+    parser.add_value(
         "--subjects",
-        type=lambda text: tuple(text.split(",")),
-        metavar="LIST",
-        help="subject of each recording, separated by commas (default: each shows another person)",
+        lambda text: tuple(text.split(",")),
+        "LIST",
+        "subject of each recording, separated by commas (default: each shows another person)",
     )
 
 
-def _add_pairs(parser: argparse.ArgumentParser, usual_null_bins: str) -> None:
+def _add_pairs(parser: Options, usual_null_bins: str) -> None:
     """Add the store of pairs, and the axis and nulled bins of its maps."""
-    add_output(parser, "FILE.zarr", "the pairs to write")
-    add_axis(parser)
-    parser.add_argument(
+    parser.add_output("FILE.zarr", "the pairs to write")
+    parser.add_axis()
+    parser.add_value(
         "--null-bins",
-        type=bin_list,
-        metavar="LIST",
-        help=f"bins to set to zero in input and target, e.g. 14,15,16 (default: {usual_null_bins})",
+        bin_list,
+        "LIST",
+        f"bins to set to zero in input and target, e.g. 14,15,16 (default: {usual_null_bins})",
     )
-    add_limbs(parser)
-    add_json(parser)
+    parser.add_limbs()
+    parser.add_json()
 
 
 def _add_mars(kinds: argparse._SubParsersAction) -> None:
@@ -96,42 +84,40 @@ def _add_mars(kinds: argparse._SubParsersAction) -> None:
             "  sd2 pairs mars mars_subject1 --out nulled.zarr --null-bins 14,15,16"
         ),
     )
-    parser.add_argument(
+    parser.add_value(
         "folders",
-        type=Path,
+        Path,
+        "FOLDER",
+        "a person's kinect_data_PART.csv and radar_data_PART.csv",
         nargs="+",
-        metavar="FOLDER",
-        help="a person's kinect_data_PART.csv and radar_data_PART.csv",
     )
     _add_pairs(parser, "none")
-    parser.add_argument(
+    parser.add_choice(
         "--visibility",
-        choices=("none", "facing", "depth", "exact"),
-        help="which vertices count (default: facing)",
+        ("none", "facing", "depth", "exact"),
+        "which vertices count (default: facing)",
     )
-    parser.add_argument(
-        "--weight",
-        choices=("count", "area", "projected"),
-        help="weight of a vertex (default: count)",
+    parser.add_choice(
+        "--weight", ("count", "area", "projected"), "weight of a vertex (default: count)"
     )
-    parser.add_argument(
+    parser.add_value(
         "--sensor",
-        type=position,
-        metavar="X,Y,Z",
-        help="where the radar is beside the Kinect, in metres, right, down and forward (default:"
+        position,
+        "X,Y,Z",
+        "where the radar is beside the Kinect, in metres, right, down and forward (default:"
         " estimated; 0,0,0 where only --radar-offset-s is given)",
     )
-    parser.add_argument(
+    parser.add_value(
         "--radar-offset-s",
-        type=finite_float,
-        metavar="S",
-        help="what the radar shows at a time is the motion so many seconds later (default:"
+        finite_float,
+        "S",
+        "what the radar shows at a time is the motion so many seconds later (default:"
         " estimated; 0 where only --sensor is given)",
     )
-    parser.add_argument(
+    parser.add_choice(
         "--target",
-        choices=("share", "intensity"),
-        help="target of each frame: shares that add up to 1, or intensities (default: share)",
+        ("share", "intensity"),
+        "target of each frame: shares that add up to 1, or intensities (default: share)",
     )
 
 

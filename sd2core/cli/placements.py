@@ -7,16 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.ladder import add_wish
-from sd2core.cli.options import (
-    add_command,
-    add_json,
-    add_mesh_reading,
-    add_output,
-    add_value,
-    flag,
-    given,
-    positive_int,
-)
+from sd2core.cli.options import add_command, flag, given, positive_int
 from sd2core.cli.output import counted, duration, print_facts, print_json, print_rows, progress_bar
 from sd2core.errors import Sd2Error
 
@@ -57,23 +48,17 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             "  sd2 placements walk.sd2 --placements grid.json --json"
         ),
     )
-    add_value(parser, "mesh", Path, "MESH", "a mesh, or a recording")
-    parser.add_argument(
-        "--ranges", metavar="LIST", help="distances in metres; with --cloud from:to, as 1:4"
-    )
-    parser.add_argument(
-        "--azimuths", metavar="LIST", help="degrees; with --cloud from:to (default: 0)"
-    )
-    parser.add_argument(
-        "--elevations", metavar="LIST", help="degrees; with --cloud from:to (default: 0)"
-    )
-    add_value(parser, "--cloud", positive_int, "N", "so many random places instead of a grid")
-    add_value(parser, "--seed", int, "N", "seed of the random places (default: 0)")
-    add_value(parser, "--placements", Path, "FILE", "read the places from a file of --out")
-    add_output(parser, "FILE.json", "the plan to write", required=False)
+    parser.add_value("mesh", Path, "MESH", "a mesh, or a recording")
+    parser.add_value("--ranges", str, "LIST", "distances in metres; with --cloud from:to, as 1:4")
+    parser.add_value("--azimuths", str, "LIST", "degrees; with --cloud from:to (default: 0)")
+    parser.add_value("--elevations", str, "LIST", "degrees; with --cloud from:to (default: 0)")
+    parser.add_value("--cloud", positive_int, "N", "so many random places instead of a grid")
+    parser.add_value("--seed", int, "N", "seed of the random places (default: 0)")
+    parser.add_value("--placements", Path, "FILE", "read the places from a file of --out")
+    parser.add_output("FILE.json", "the plan to write", required=False)
     add_wish(parser, "2%%")
-    add_mesh_reading(parser)
-    add_json(parser)
+    parser.add_mesh_reading()
+    parser.add_json()
 
 
 def _placements(options: argparse.Namespace) -> int:

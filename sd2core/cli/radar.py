@@ -7,16 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
-from sd2core.cli.options import (
-    add_axis,
-    add_channel,
-    add_command,
-    add_json,
-    add_map_output,
-    flag,
-    given,
-    span_m,
-)
+from sd2core.cli.options import add_command, flag, given, span_m
 from sd2core.cli.output import progress_bar
 from sd2core.cli.radar_description import add_description, describe, refuse_description
 from sd2core.errors import Sd2Error
@@ -50,33 +41,28 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             "  sd2 radar swing.h5 --out real.npz    (a file that holds the map already)"
         ),
     )
-    parser.add_argument(
+    parser.add_value(
         "capture",
-        type=Path,
-        metavar="CAPTURE",
-        help="a capture's file or folder, the .h5 of a K60168A, a recording, or the word describe",
+        Path,
+        "CAPTURE",
+        "a capture's file or folder, the .h5 of a K60168A, a recording, or the word describe",
     )
-    parser.add_argument(
-        "file", type=Path, nargs="?", metavar="FILE", help="after describe: the samples"
-    )
-    add_map_output(parser, required=False)
-    add_axis(parser)
-    parser.add_argument(
+    parser.add_value("file", Path, "FILE", "after describe: the samples", nargs="?")
+    parser.add_map_output(required=False)
+    parser.add_axis()
+    parser.add_choice(
         "--clutter",
-        choices=get_args(Clutter),
-        default="none",
-        help="what to subtract as static: nothing; each frame's mean over its chirps; the"
+        get_args(Clutter),
+        "what to subtract as static: nothing; each frame's mean over its chirps; the"
         " parabola that fits its chirps best, which swaying leaves no trace in; or the mean"
-        " averaged over frames, which keeps slow movers (default: none)",
+        " averaged over frames, which keeps slow movers",
+        "none",
     )
-    parser.add_argument(
-        "--range",
-        type=span_m,
-        metavar="LO,HI",
-        help="count only echoes from this range in metres (default: all)",
+    parser.add_value(
+        "--range", span_m, "LO,HI", "count only echoes from this range in metres (default: all)"
     )
-    add_channel(parser)
-    add_json(parser)
+    parser.add_channel()
+    parser.add_json()
     add_description(parser)
 
 

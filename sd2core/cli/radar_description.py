@@ -8,7 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from sd2core.cli.options import add_value, finite_float, flag, positive_float, positive_int
+from sd2core.cli.command_parser import Options
+from sd2core.cli.options import finite_float, flag, positive_float, positive_int
 from sd2core.errors import Sd2Error
 
 
@@ -55,11 +56,11 @@ _ENTRIES = {
 }
 
 
-def add_description(parser: argparse.ArgumentParser) -> None:
+def add_description(parser: Options) -> None:
     """Add the entries of a description."""
     group = parser.add_argument_group("description", "after the word describe; all in SI units")
     for name, entry in _ENTRIES.items():
-        add_value(group, flag(name), entry.parse, entry.metavar, entry.meaning)
+        group.add_value(flag(name), entry.parse, entry.metavar, entry.meaning)
 
 
 def refuse_description(options: argparse.Namespace) -> None:

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from sd2core.cli.options import add_command, add_json
+from sd2core.cli.options import add_command
 from sd2core.cli.output import duration, print_facts, print_json, print_rows
 from sd2core.errors import Sd2Error
 
@@ -51,7 +51,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         ("cancel", "end it, and delete what it made"),
     ):
         what.add_argument(f"--{word}", action="store_const", const=word, dest="word", help=about)
-    add_json(parser)
+    parser.add_json()
 
 
 def _runs(options: argparse.Namespace) -> None:

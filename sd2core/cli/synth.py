@@ -8,15 +8,7 @@ from typing import TYPE_CHECKING
 
 from sd2core.cli.ladder import add_wish, chosen
 from sd2core.cli.options import (
-    add_axis,
     add_command,
-    add_count,
-    add_json,
-    add_limbs,
-    add_map_output,
-    add_mesh_and_sensor,
-    add_mesh_reading,
-    add_method,
     bin_list,
     flag,
     given,
@@ -62,21 +54,21 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
             "  sd2 synth walk.zarr --out map.npz --limbs    (each part of the body apart, too)"
         ),
     )
-    add_mesh_and_sensor(parser)
-    add_map_output(parser)
-    parser.add_argument(
+    parser.add_mesh_and_sensor()
+    parser.add_map_output()
+    parser.add_choice(
         "--preset",
-        choices=("paper", "vid2doppler"),
-        default="paper",
-        help="the paper's chain, or Vid2Doppler's arithmetic to the last digit (default: paper)",
+        ("paper", "vid2doppler"),
+        "the paper's chain, or Vid2Doppler's arithmetic to the last digit",
+        "paper",
     )
-    add_method(parser, "count vertices, or simulate the radar's signal")
+    parser.add_method("count vertices, or simulate the radar's signal")
     add_radar_choice(parser)
     add_wish(parser, "none: what the options say")
-    parser.add_argument(
+    parser.add_choice(
         "--visibility",
-        choices=("none", "facing", "depth", "exact"),
-        help="which vertices count: all, those that face the sensor, or those that nothing hides:"
+        ("none", "facing", "depth", "exact"),
+        "which vertices count: all, those that face the sensor, or those that nothing hides:"
         " by a depth buffer (fast, approximate) or exactly",
     )
     parser.add_argument(
@@ -85,90 +77,86 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         choices=(128, 256),
         help="pixels along each side of the depth buffer (default: 256)",
     )
-    parser.add_argument(
+    parser.add_value(
         "--mask-stride",
-        type=positive_int,
-        metavar="N",
-        help="compute depth or exact visibility for every N-th frame only, and use it for the"
+        positive_int,
+        "N",
+        "compute depth or exact visibility for every N-th frame only, and use it for the"
         " frames nearest to each (default: 1)",
     )
-    parser.add_argument(
+    parser.add_value(
         "--vertices-kept",
-        type=share,
-        metavar="SHARE",
-        help="simplify the surface to this share of its vertices, e.g. 25%% (default: 1, all)",
+        share,
+        "SHARE",
+        "simplify the surface to this share of its vertices, e.g. 25%% (default: 1, all)",
     )
-    parser.add_argument(
+    parser.add_choice(
         "--weight",
-        choices=("count", "area", "projected"),
-        help="a vertex counts as one, by its area, or by the area it turns towards the sensor",
+        ("count", "area", "projected"),
+        "a vertex counts as one, by its area, or by the area it turns towards the sensor",
     )
-    add_count(parser)
-    add_axis(parser)
-    parser.add_argument(
+    parser.add_count()
+    parser.add_axis()
+    parser.add_value(
         "--null-bins",
-        type=bin_list,
-        metavar="LIST",
-        help="bins to empty, as 14,15,16, or none (default: those from -0.25 to 0.125 m/s, which"
+        bin_list,
+        "LIST",
+        "bins to empty, as 14,15,16, or none (default: those from -0.25 to 0.125 m/s, which"
         " the paper's radar cannot tell from a static room; on any axis those at 0 m/s)",
     )
-    parser.add_argument(
+    parser.add_choice(
         "--beyond",
-        choices=("drop", "wrap", "clip"),
-        help="velocities beyond the axis: left out, folded back as a radar does, or counted in"
+        ("drop", "wrap", "clip"),
+        "velocities beyond the axis: left out, folded back as a radar does, or counted in"
         " the last bin",
     )
-    parser.add_argument(
+    parser.add_value(
         "--range-exponent",
-        type=not_negative_float,
-        metavar="N",
-        help="echoes weaken with range to the power of N; 4 is the radar equation, 0 is off",
+        not_negative_float,
+        "N",
+        "echoes weaken with range to the power of N; 4 is the radar equation, 0 is off",
     )
-    parser.add_argument(
+    parser.add_value(
         "--reference-range-m",
-        type=positive_float,
-        metavar="M",
-        help="range at which a vertex counts as one (paper: 2.2)",
+        positive_float,
+        "M",
+        "range at which a vertex counts as one (paper: 2.2)",
     )
-    parser.add_argument(
+    parser.add_choice(
         "--range-law",
-        choices=("vertex", "frame"),
-        help="echoes weaken with the range of each vertex or of the whole frame (default: vertex)",
+        ("vertex", "frame"),
+        "echoes weaken with the range of each vertex or of the whole frame (default: vertex)",
     )
-    parser.add_argument(
+    parser.add_value(
         "--trajectory-smoothing-s",
-        type=not_negative_float,
-        metavar="S",
-        help="smooth the mesh's motion over this many seconds (sigma), without delay",
+        not_negative_float,
+        "S",
+        "smooth the mesh's motion over this many seconds (sigma), without delay",
     )
-    parser.add_argument(
+    parser.add_value(
         "--oversampling",
-        type=positive_int,
-        metavar="N",
-        help="raise the frame rate N times before velocities are taken, and average each frame over"
+        positive_int,
+        "N",
+        "raise the frame rate N times before velocities are taken, and average each frame over"
         " its N moments (default: 1)",
     )
-    parser.add_argument(
+    parser.add_value(
         "--velocity-sigma-bins",
-        type=not_negative_float,
-        metavar="BINS",
-        help="smooth the map along velocity (sigma in bins)",
+        not_negative_float,
+        "BINS",
+        "smooth the map along velocity (sigma in bins)",
     )
-    parser.add_argument(
-        "--time-sigma-s",
-        type=not_negative_float,
-        metavar="S",
-        help="smooth the map along time (sigma in seconds)",
+    parser.add_value(
+        "--time-sigma-s", not_negative_float, "S", "smooth the map along time (sigma in seconds)"
     )
-    parser.add_argument(
+    parser.add_flag(
         "--uncertainty",
-        action="store_true",
-        help="add to the map how well its values are known (arrays sd and expected), which a mesh"
+        "add to the map how well its values are known (arrays sd and expected), which a mesh"
         " from sd2 fit says",
     )
-    add_limbs(parser)
-    add_mesh_reading(parser)
-    add_json(parser)
+    parser.add_limbs()
+    parser.add_mesh_reading()
+    parser.add_json()
 
 
 def _synth(options: argparse.Namespace) -> None:

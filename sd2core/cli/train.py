@@ -10,17 +10,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sd2core.cli.options import (
-    add_command,
-    add_json,
-    add_output,
-    add_people_kept_out,
-    add_value,
-    flag,
-    given,
-    positive_float,
-    positive_int,
-)
+from sd2core.cli.command_parser import Options
+from sd2core.cli.options import add_command, flag, given, positive_float, positive_int
 from sd2core.cli.output import print_facts, print_json
 from sd2core.errors import Sd2Error
 from sd2core.processes import INTERRUPTED
@@ -97,23 +88,19 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         metavar="CONFIG.toml|DATA",
         help="a file with settings, or one or several stores of pairs, which are mixed",
     )
-    add_output(parser, "RUN", "the folder of the run; new", required=False)
-    add_value(parser, "--resume", Path, "RUN", "go on with a run that was stopped or killed")
-    parser.add_argument(
-        "--show-settings", action="store_true", help="print all settings as TOML and train nothing"
-    )
+    parser.add_output("RUN", "the folder of the run; new", required=False)
+    parser.add_value("--resume", Path, "RUN", "go on with a run that was stopped or killed")
+    parser.add_flag("--show-settings", "print all settings as TOML and train nothing")
     _add_learning(parser)
     _add_data(parser)
     _add_machine(parser)
-    add_json(parser)
+    parser.add_json()
 
 
-def _add_learning(parser: argparse.ArgumentParser) -> None:
+def _add_learning(parser: Options) -> None:
     group = parser.add_argument_group("network and training")
-    group.add_argument(
-        "--model",
-        metavar="NAME",
-        help="s4 (the paper's), s4d, s4-serial, gru, unet or swin (default: s4)",
+    group.add_value(
+        "--model", str, "NAME", "s4 (the paper's), s4d, s4-serial, gru, unet or swin (default: s4)"
     )
     group.add_argument(
         "--inputs",
@@ -130,32 +117,32 @@ def _add_learning(parser: argparse.ArgumentParser) -> None:
         metavar="NAME=VALUE",
         help="an option of the model, e.g. channels=64; may be given several times",
     )
-    add_value(group, "--epochs", positive_int, "N", "passes over all segments (default: 500)")
-    group.add_argument(
+    group.add_value("--epochs", positive_int, "N", "passes over all segments (default: 500)")
+    group.add_value(
         "--minutes",
-        type=positive_float,
-        metavar="MIN",
-        help="train for so long instead; the learning rate follows the clock",
+        positive_float,
+        "MIN",
+        "train for so long instead; the learning rate follows the clock",
     )
-    add_value(group, "--batch-size", positive_int, "N", "segments of a batch (default: 64)")
-    add_value(group, "--learning-rate", positive_float, "RATE", "at its highest (default: 0.003)")
-    group.add_argument(
+    group.add_value("--batch-size", positive_int, "N", "segments of a batch (default: 64)")
+    group.add_value("--learning-rate", positive_float, "RATE", "at its highest (default: 0.003)")
+    group.add_value(
         "--ssm-learning-rate",
-        type=positive_float,
-        metavar="RATE",
-        help="the same for the parameters of state spaces (default: 0.001)",
+        positive_float,
+        "RATE",
+        "the same for the parameters of state spaces (default: 0.001)",
     )
-    group.add_argument(
+    group.add_value(
         "--early-stopping",
-        type=positive_int,
-        metavar="N",
-        help="end after N epochs without a better one (default: never)",
+        positive_int,
+        "N",
+        "end after N epochs without a better one (default: never)",
     )
-    group.add_argument(
+    group.add_value(
         "--velocity-weight",
-        type=float,
-        metavar="W",
-        help="learn the mean velocity of a frame beside the map: weight of 1 m/s beside the error"
+        float,
+        "W",
+        "learn the mean velocity of a frame beside the map: weight of 1 m/s beside the error"
         " of the map (default: 0, as in the paper)",
     )
     group.add_argument(
@@ -165,66 +152,57 @@ def _add_learning(parser: argparse.ArgumentParser) -> None:
         help="let frames of rare velocities count more, so that fast movements are not shown too"
         " slow (default: all frames alike, as in the paper)",
     )
-    group.add_argument(
+    group.add_choice(
         "--select-by",
-        choices=("rmse", "mae"),
-        help="what makes an epoch the best: error of the map, or of the peak velocity"
-        " (default: rmse)",
+        ("rmse", "mae"),
+        "what makes an epoch the best: error of the map, or of the peak velocity (default: rmse)",
     )
-    add_value(group, "--seed", int, "N", "seed of all random numbers (default: 0)")
+    group.add_value("--seed", int, "N", "seed of all random numbers (default: 0)")
 
 
-def _add_data(parser: argparse.ArgumentParser) -> None:
+def _add_data(parser: Options) -> None:
     group = parser.add_argument_group("data")
-    add_people_kept_out(
-        group,
+    group.add_people_kept_out(
         "kept out to choose the best epoch by, separated by commas (default: a sixth of all, at"
         " least one, from the end of the list), or none: then the last fifth of everybody's"
         " takes",
         "kept out for `sd2 eval`, or none (default: as many)",
     )
-    add_value(group, "--segment-frames", positive_int, "N", "length of a segment (default: 72)")
-    add_value(group, "--overlap-frames", int, "N", "frames that neighbours share (default: 10)")
-    group.add_argument(
+    group.add_value("--segment-frames", positive_int, "N", "length of a segment (default: 72)")
+    group.add_value("--overlap-frames", int, "N", "frames that neighbours share (default: 10)")
+    group.add_choice(
         "--segments",
-        choices=("shifted", "fixed"),
-        help="cut at other places in every epoch, or always at the same (default: shifted)",
+        ("shifted", "fixed"),
+        "cut at other places in every epoch, or always at the same (default: shifted)",
     )
-    group.add_argument(
+    group.add_choice(
         "--placements",
-        choices=("all", "first"),
-        help="range synthesis: learn from all places of the sensor, or the first only"
-        " (default: all)",
+        ("all", "first"),
+        "range synthesis: learn from all places of the sensor, or the first only (default: all)",
     )
-    group.add_argument(
+    group.add_value(
         "--range-factor",
-        type=positive_float,
-        metavar="FACTOR",
-        help="range synthesis: scale input and target together, as if the person were up to F"
+        positive_float,
+        "FACTOR",
+        "range synthesis: scale input and target together, as if the person were up to F"
         " times nearer or farther (default: 1, off)",
     )
 
 
-def _add_machine(parser: argparse.ArgumentParser) -> None:
+def _add_machine(parser: Options) -> None:
     group = parser.add_argument_group("machine")
-    group.add_argument(
-        "--device",
-        choices=("auto", "cpu", "cuda"),
-        help="where to compute (default: a GPU where there is one)",
+    group.add_choice(
+        "--device", ("auto", "cpu", "cuda"), "where to compute (default: a GPU where there is one)"
     )
-    add_value(group, "--devices", positive_int, "N", "number of GPUs (default: 1)")
-    group.add_argument(
+    group.add_value("--devices", positive_int, "N", "number of GPUs (default: 1)")
+    group.add_choice(
         "--precision",
-        choices=("auto", "32", "bf16"),
-        help="of matrix products (default: bf16 on GPUs that have it, else 32)",
+        ("auto", "32", "bf16"),
+        "of matrix products (default: bf16 on GPUs that have it, else 32)",
     )
-    add_value(group, "--threads", positive_int, "N", "of the CPU")
-    add_value(group, "--nice", int, "N", "lower the priority, 0 to 19")
-    group.add_argument(
-        "--background",
-        action="store_true",
-        help=f"one thread and nice {_BACKGROUND_NICE}, to work beside it",
-    )
+    group.add_value("--threads", positive_int, "N", "of the CPU")
+    group.add_value("--nice", int, "N", "lower the priority, 0 to 19")
+    group.add_flag("--background", f"one thread and nice {_BACKGROUND_NICE}, to work beside it")
     group.add_argument(
         "--deterministic",
         action="store_true",

@@ -12,14 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.classify.data import DATA_HELP, add_sources, clips_of
 from sd2core.cli.classify.train import add_network, network_of
-from sd2core.cli.options import (
-    add_command,
-    add_json_and_progress,
-    add_output,
-    add_value,
-    positive_int,
-    share,
-)
+from sd2core.cli.options import add_command, positive_int, share
 from sd2core.cli.output import finite, print_event, print_json, progress_bar
 
 if TYPE_CHECKING:
@@ -53,29 +46,25 @@ def add_table(kinds: argparse._SubParsersAction) -> None:
         ),
     )
     add_sources(parser)
-    add_output(parser, "FOLDER", "the tables, figures and models to write")
-    add_value(parser, "--seeds", positive_int, "N", "number of repetitions (default: 5; quick: 2)")
-    parser.add_argument(
+    parser.add_output("FOLDER", "the tables, figures and models to write")
+    parser.add_value("--seeds", positive_int, "N", "number of repetitions (default: 5; quick: 2)")
+    parser.add_value(
         "--shares",
-        type=_shares,
-        metavar="LIST",
-        help="shares of the real data for the learning curve (default:"
+        _shares,
+        "LIST",
+        "shares of the real data for the learning curve (default:"
         " 1%%,2%%,5%%,10%%,25%%,50%%,100%%; quick: 10%%,100%%)",
     )
-    parser.add_argument("--quick", action="store_true", help="few trainings, for a first look")
-    parser.add_argument(
-        "--radar-only",
-        action="store_true",
-        help="add no synthetic maps: compare networks and amounts of radar data only",
+    parser.add_flag("--quick", "few trainings, for a first look")
+    parser.add_flag(
+        "--radar-only", "add no synthetic maps: compare networks and amounts of radar data only"
     )
-    parser.add_argument(
-        "--same-people",
-        action="store_true",
-        help="judge other movements of the people trained on, instead of other people",
+    parser.add_flag(
+        "--same-people", "judge other movements of the people trained on, instead of other people"
     )
     add_network(parser)
-    add_value(parser, "--steps", positive_int, "N", "batches per training")
-    add_json_and_progress(parser)
+    parser.add_value("--steps", positive_int, "N", "batches per training")
+    parser.add_json_and_progress()
 
 
 def _shares(text: str) -> tuple[float, ...]:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from sd2core.cli.command_parser import Options
 from sd2core.cli.recording_maps import MAP_NAMES, MapName, maps_of, parsed_maps, usual_maps
 from sd2core.errors import Sd2Error
 
@@ -41,7 +42,7 @@ def source(text: str) -> LabelledSource:
     return LabelledSource(Path(text), "")
 
 
-def add_data(parser: argparse.ArgumentParser) -> None:
+def add_data(parser: Options) -> None:
     """Add the options for data and the choice of their maps."""
     add_sources(parser)
     parser.add_argument(
@@ -52,11 +53,9 @@ def add_data(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_sources(parser: argparse.ArgumentParser) -> None:
+def add_sources(parser: Options) -> None:
     """Add the options for data and the denoiser."""
-    parser.add_argument(
-        "data", nargs="+", type=source, metavar="DATA", help="labelled data, see above"
-    )
+    parser.add_value("data", source, "DATA", "labelled data, see above", nargs="+")
     parser.add_argument(
         "--denoiser",
         metavar="FILE|NAME",

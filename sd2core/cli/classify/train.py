@@ -12,13 +12,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from sd2core.classify.defaults import DELAY_S, MODELS, WIDTH
 from sd2core.cli.classify.data import DATA_HELP, add_data, asked_maps, clips_of, split_of
+from sd2core.cli.command_parser import Options
 from sd2core.cli.options import (
     add_command,
-    add_json_and_progress,
-    add_output,
-    add_people_kept_out,
-    add_placements_used,
-    add_value,
     given,
     not_negative_float,
     positive_float,
@@ -52,25 +48,24 @@ def add_train(kinds: argparse._SubParsersAction) -> None:
         ),
     )
     add_data(parser)
-    add_output(parser, "FILE.safetensors", "the classifier to write")
+    parser.add_output("FILE.safetensors", "the classifier to write")
     add_network(parser)
-    add_placements_used(parser, "range synthesis: train on", "all")
+    parser.add_placements_used("range synthesis: train on", "all")
     otherwise = "(default: as the data set says, or a sixth of all)"
-    add_people_kept_out(
-        parser,
+    parser.add_people_kept_out(
         f"kept out for validation, separated by commas, or none {otherwise}",
         f"kept out for a test, or none {otherwise}",
     )
-    add_value(parser, "--steps", positive_int, "N", "number of training steps")
-    add_value(
-        parser, "--patience", positive_int, "N", "end after so many validations without improvement"
+    parser.add_value("--steps", positive_int, "N", "number of training steps")
+    parser.add_value(
+        "--patience", positive_int, "N", "end after so many validations without improvement"
     )
-    add_value(parser, "--learning-rate", positive_float, "RATE", "peak learning rate")
-    add_value(parser, "--seed", int, "N", "seed of all random numbers", 0)
-    add_json_and_progress(parser)
+    parser.add_value("--learning-rate", positive_float, "RATE", "peak learning rate")
+    parser.add_value("--seed", int, "N", "seed of all random numbers", 0)
+    parser.add_json_and_progress()
 
 
-def add_network(parser: argparse.ArgumentParser) -> None:
+def add_network(parser: Options) -> None:
     """Add model, features, width and delay."""
     group = parser.add_argument_group("network")
     group.add_argument(

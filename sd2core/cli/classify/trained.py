@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sd2core.cli.classify.data import DATA_HELP, add_data, asked_maps, clips_of
+from sd2core.cli.command_parser import Options
 from sd2core.cli.eval import add_judging, named_subjects
 from sd2core.cli.labels.reading import check_label_output, print_lost
 from sd2core.cli.labels.suggest import (
@@ -16,7 +17,7 @@ from sd2core.cli.labels.suggest import (
     spans_data,
     write_found,
 )
-from sd2core.cli.options import add_command, add_json, add_value, not_negative_float
+from sd2core.cli.options import add_command, not_negative_float
 from sd2core.cli.output import counted, print_json, print_rows, progress_bar
 from sd2core.cli.recording_maps import MAP_NAMES
 from sd2core.errors import Sd2Error
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
     from sd2core.classify.metrics import Score
 
 
-def _add_model(parser: argparse.ArgumentParser) -> None:
+def _add_model(parser: Options) -> None:
     parser.add_argument(
         "--model",
         type=Path,
@@ -159,23 +160,21 @@ def add_apply(kinds: argparse._SubParsersAction) -> None:
     )
     add_searched_map(parser, MAP_NAMES)
     _add_model(parser)
-    parser.add_argument(
+    parser.add_value(
         "--probabilities",
-        type=Path,
-        metavar="FILE.npz",
-        help="write `probabilities` (frames, classes), `times_s` and `classes`",
+        Path,
+        "FILE.npz",
+        "write `probabilities` (frames, classes), `times_s` and `classes`",
     )
-    add_value(
-        parser, "--min-duration-s", not_negative_float, "S", "shorter spans are left out", 0.2
-    )
-    parser.add_argument(
+    parser.add_value("--min-duration-s", not_negative_float, "S", "shorter spans are left out", 0.2)
+    parser.add_value(
         "--merge-gap-s",
-        type=not_negative_float,
-        default=0.1,
-        metavar="S",
-        help="merge spans of a class with a shorter gap between them (default: 0.1)",
+        not_negative_float,
+        "S",
+        "merge spans of a class with a shorter gap between them",
+        0.1,
     )
-    add_json(parser)
+    parser.add_json()
 
 
 def _apply(options: argparse.Namespace) -> None:

@@ -16,7 +16,7 @@ from sd2core.cli.info.description import (
     describe_video,
     show,
 )
-from sd2core.cli.options import add_command, add_json, add_mesh_reading, add_value
+from sd2core.cli.options import add_command
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
@@ -28,14 +28,12 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         handler=_info,
         examples="  sd2 info walk.sd2\n  sd2 info walk.npz --json\n  sd2 info walk.zarr --verify",
     )
-    add_value(parser, "path", Path, "PATH", "what to describe")
-    parser.add_argument(
-        "--verify",
-        action="store_true",
-        help="read every chunk and compare it with its checksum; what is damaged is named",
+    parser.add_value("path", Path, "PATH", "what to describe")
+    parser.add_flag(
+        "--verify", "read every chunk and compare it with its checksum; what is damaged is named"
     )
-    add_mesh_reading(parser)
-    add_json(parser)
+    parser.add_mesh_reading()
+    parser.add_json()
 
 
 def _info(options: argparse.Namespace) -> None:

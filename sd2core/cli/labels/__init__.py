@@ -19,7 +19,7 @@ from sd2core.cli.labels.reading import (
 from sd2core.cli.labels.recording import add_cut, add_figure
 from sd2core.cli.labels.recover import add_recover
 from sd2core.cli.labels.suggest import add_suggest
-from sd2core.cli.options import add_command, add_json, add_output
+from sd2core.cli.options import add_command
 from sd2core.cli.output import counted, print_json, print_rows
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         examples="  sd2 labels show walk.sd2\n  sd2 labels show walk.eaf --video walk.mp4 --json",
     )
     add_labels(show)
-    add_json(show)
+    show.add_json()
 
     convert = add_command(
         kinds,
@@ -76,10 +76,10 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         ),
     )
     add_labels(convert)
-    add_output(convert, "FILE", "the file to write")
-    convert.add_argument("--to", metavar="NAME", help="the format of --out, likewise")
+    convert.add_output("FILE", "the file to write")
+    convert.add_value("--to", str, "NAME", "the format of --out, likewise")
     add_replace(convert)
-    add_json(convert)
+    convert.add_json()
 
     _add_statistics(kinds)
     add_set(kinds)
@@ -157,8 +157,8 @@ def _add_statistics(kinds: argparse._SubParsersAction) -> None:
     )
     add_labels(parser)
     form = parser.add_mutually_exclusive_group()
-    form.add_argument("--csv", action="store_true", help="print comma-separated values")
-    add_json(form)
+    form.add_flag("--csv", "print comma-separated values")
+    form.add_json()
 
 
 def _statistics(options: argparse.Namespace) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.labels.reading import add_clock, clock_of, labels_at, needed, with_rate
 from sd2core.cli.labels.suggest import spans_data
-from sd2core.cli.options import add_command, add_json, add_value, share
+from sd2core.cli.options import add_command, share
 from sd2core.cli.output import counted, print_json, print_rows
 
 if TYPE_CHECKING:
@@ -32,14 +32,14 @@ def add_agree(kinds: argparse._SubParsersAction) -> None:
             "  sd2 labels agree walk.sd2 ben.eaf --min-iou 0.3 --track Gestures"
         ),
     )
-    add_value(parser, "a", Path, "A", "labels of one person")
-    add_value(parser, "b", Path, "B", "labels of the other")
-    add_value(
-        parser, "--min-iou", share, "SHARE", "intersection over union that a match must reach", 0.5
+    parser.add_value("a", Path, "A", "labels of one person")
+    parser.add_value("b", Path, "B", "labels of the other")
+    parser.add_value(
+        "--min-iou", share, "SHARE", "intersection over union that a match must reach", 0.5
     )
-    parser.add_argument("--track", metavar="NAME", help="compare this track only")
+    parser.add_value("--track", str, "NAME", "compare this track only")
     add_clock(parser)
-    add_json(parser)
+    parser.add_json()
 
 
 def _agree(options: argparse.Namespace) -> None:

@@ -15,7 +15,7 @@ from sd2core.cli.labels.reading import (
     read_named,
     write,
 )
-from sd2core.cli.options import add_command, add_json, add_output, add_value
+from sd2core.cli.options import add_command
 from sd2core.cli.output import counted, print_json, print_rows
 from sd2core.errors import Sd2Error
 
@@ -45,13 +45,11 @@ def add_set(kinds: argparse._SubParsersAction) -> None:
         ),
     )
     add_labels(parser)
-    add_value(parser, "--export", Path, "FILE.json", "write the set by itself")
-    parser.add_argument(
-        "--use", metavar="FILE.json", help=f"another set; {_USUAL!r} is the program's own"
-    )
-    add_output(parser, "FILE", "where to write the labels with that other set", required=False)
+    parser.add_value("--export", Path, "FILE.json", "write the set by itself")
+    parser.add_value("--use", str, "FILE.json", f"another set; {_USUAL!r} is the program's own")
+    parser.add_output("FILE", "where to write the labels with that other set", required=False)
     add_replace(parser)
-    add_json(parser)
+    parser.add_json()
 
 
 def _set(options: argparse.Namespace) -> None:

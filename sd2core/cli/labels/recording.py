@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sd2core.cli.labels.reading import labels_at, recording_clock
-from sd2core.cli.options import add_command, add_json, add_output, add_value, not_negative_float
+from sd2core.cli.options import add_command, not_negative_float
 from sd2core.cli.output import counted, print_json, progress_bar
 from sd2core.cli.recording_maps import add_labelled_recording, chosen_maps, maps_of
 from sd2core.errors import Sd2Error
@@ -40,9 +40,9 @@ def add_figure(kinds: argparse._SubParsersAction) -> None:
         ),
     )
     add_labelled_recording(parser)
-    add_output(parser, "FILE", "the figure to write (.png, .svg or .pdf)")
-    add_value(parser, "--from-s", not_negative_float, "S", "start of the figure, in seconds")
-    add_value(parser, "--to-s", not_negative_float, "S", "end of the figure, in seconds")
+    parser.add_output("FILE", "the figure to write (.png, .svg or .pdf)")
+    parser.add_value("--from-s", not_negative_float, "S", "start of the figure, in seconds")
+    parser.add_value("--to-s", not_negative_float, "S", "end of the figure, in seconds")
 
 
 def _figure(options: argparse.Namespace) -> None:
@@ -114,7 +114,7 @@ def add_cut(kinds: argparse._SubParsersAction) -> None:
         ),
     )
     add_labelled_recording(parser)
-    add_output(parser, "FOLDER", "where to write a folder for each span")
+    parser.add_output("FOLDER", "where to write a folder for each span")
     parser.add_argument(
         "--label", action="append", metavar="LABEL", help="only spans with this label; may be given"
         " several times",
@@ -122,10 +122,8 @@ def add_cut(kinds: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--parts", default=_PARTS, metavar="LIST", help=f"some of {_PARTS} (default: all)"
     )
-    parser.add_argument(
-        "--replace", action="store_true", help="replace folders that hold something else"
-    )
-    add_json(parser)
+    parser.add_flag("--replace", "replace folders that hold something else")
+    parser.add_json()
 
 
 def _nothing_to_cut(path: Path, labels: Labels, wanted: Sequence[str] | None) -> Sd2Error:

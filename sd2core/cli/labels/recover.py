@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.labels.reading import add_replace, check_label_output
-from sd2core.cli.options import add_command, add_json, add_output
+from sd2core.cli.options import add_command
 from sd2core.cli.output import counted, print_json, print_rows
 from sd2core.errors import Sd2Error
 
@@ -30,16 +30,16 @@ def add_recover(kinds: argparse._SubParsersAction) -> None:
         ),
         examples=("  sd2 labels recover\n  sd2 labels recover walk.sd2 --out found.json"),
     )
-    parser.add_argument(
+    parser.add_value(
         "recording",
-        type=Path,
+        Path,
+        "RECORDING",
+        "the labelled recording, or a video that was not saved as one yet",
         nargs="?",
-        metavar="RECORDING",
-        help="the labelled recording, or a video that was not saved as one yet",
     )
-    add_output(parser, "FILE.json", "write the newest of RECORDING, for `convert`", required=False)
+    parser.add_output("FILE.json", "write the newest of RECORDING, for `convert`", required=False)
     add_replace(parser)
-    add_json(parser)
+    parser.add_json()
 
 
 def _recover(options: argparse.Namespace) -> None:

@@ -7,6 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from sd2core.cli.command_parser import Options
 from sd2core.cli.labels.reading import (
     add_replace,
     check_label_output,
@@ -14,15 +15,7 @@ from sd2core.cli.labels.reading import (
     recording_clock,
     write,
 )
-from sd2core.cli.options import (
-    add_command,
-    add_json,
-    add_output,
-    add_value,
-    flag,
-    given,
-    not_negative_float,
-)
+from sd2core.cli.options import add_command, flag, given, not_negative_float
 from sd2core.cli.output import counted, print_json, print_rows
 from sd2core.cli.recording_maps import MapName, maps_of
 from sd2core.errors import Sd2Error
@@ -66,22 +59,20 @@ def add_suggest(kinds: argparse._SubParsersAction) -> None:
     )
     add_searched_map(parser, ("synthetic", "radar"))
     for name, (metavar, text) in _HELP.items():
-        add_value(parser, flag(name), not_negative_float, metavar, text)
+        parser.add_value(flag(name), not_negative_float, metavar, text)
     parser.add_argument(
         "--label", default="gesture", metavar="LABEL", help="label of the spans (default: gesture)"
     )
-    add_json(parser)
+    parser.add_json()
 
 
-def add_searched_map(parser: argparse.ArgumentParser, kinds: tuple[MapName, ...]) -> None:
+def add_searched_map(parser: Options, kinds: tuple[MapName, ...]) -> None:
     """Add the map in which spans are looked for, and the file for them."""
-    add_value(parser, "map", Path, "MAP", "a map, a recording, or the .h5 of a K60168A")
-    parser.add_argument(
-        "--of",
-        choices=kinds,
-        help="which map of a recording (default: synthetic where there is a mesh)",
+    parser.add_value("map", Path, "MAP", "a map, a recording, or the .h5 of a K60168A")
+    parser.add_choice(
+        "--of", kinds, "which map of a recording (default: synthetic where there is a mesh)"
     )
-    add_output(parser, "FILE", "the labels to write", required=False)
+    parser.add_output("FILE", "the labels to write", required=False)
     add_replace(parser)
 
 
