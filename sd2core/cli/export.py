@@ -23,6 +23,7 @@ from sd2core.cli.output import (
     counted,
     duration,
     listed,
+    picked,
     print_event,
     print_facts,
     print_json,
@@ -271,14 +272,12 @@ def _dry_run(
         print_json(
             {
                 "dataset": str(options.out),
-                "sources": forecast.sources,
-                "segments": forecast.segments,
+                **picked(forecast, "sources", "segments"),
                 "segments_of_subject": forecast.of_subject,
                 "segments_of_label": forecast.of_label,
                 "segments_of_kind": forecast.of_kind,
                 "segments_of_split": forecast.of_split(),
-                "frame_rate_hz": forecast.frame_rate_hz,
-                "total_bytes": forecast.total_bytes,
+                **picked(forecast, "frame_rate_hz", "total_bytes"),
                 "seconds": seconds,
                 "failed": list(forecast.failed),
             }
@@ -312,9 +311,7 @@ def _said(written: Written, sheet: Path) -> dict[str, Any]:
     markdown, as_json, _ = card_paths(written.path)
     return {
         "dataset": str(written.path),
-        "segments": written.segments,
-        "sources": written.sources,
-        "added": written.added,
+        **picked(written, "segments", "sources", "added"),
         "card": str(markdown),
         "card_json": str(as_json),
         "sheet": str(sheet),

@@ -10,7 +10,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.options import add_command, not_negative_float, positive_float
-from sd2core.cli.output import print_event, print_facts, print_json, progress_bar, progress_events
+from sd2core.cli.output import (
+    picked,
+    print_event,
+    print_facts,
+    print_json,
+    progress_bar,
+    progress_events,
+)
 from sd2core.cli.running import explanation
 from sd2core.errors import Sd2Error
 
@@ -259,12 +266,7 @@ def _summary(options: argparse.Namespace, made: FittedVideo, seconds: float) -> 
     about = provenance(made, options.video, _choices(options))
     return about | {
         "out": str(options.out),
-        "frames": made.frames,
-        "frames_per_s": made.frames_per_s,
-        "present": made.present,
-        "bridged": made.bridged,
-        "residual_m": made.residual_m,
-        "quality": made.quality,
+        **picked(made, "frames", "frames_per_s", "present", "bridged", "residual_m", "quality"),
         "seconds": seconds,
     }
 

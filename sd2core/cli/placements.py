@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.ladder import add_wish
 from sd2core.cli.options import add_command, flag, given, positive_int
-from sd2core.cli.output import counted, duration, print_facts, print_json, print_rows, progress_bar
+from sd2core.cli.output import (
+    counted,
+    duration,
+    picked,
+    print_facts,
+    print_json,
+    print_rows,
+    progress_bar,
+)
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
@@ -95,19 +103,9 @@ def _placements(options: argparse.Namespace) -> int:
             {
                 "placements": placements.as_dict(),
                 "target_m": body.target_m,
-                "radar": {
-                    "name": radar.name,
-                    "range_max_m": radar.range_max_m,
-                    "v_max_mps": radar.v_max_mps,
-                },
+                "radar": picked(radar, "name", "range_max_m", "v_max_mps"),
                 "places": _listed(placements, sensors, coverage, radar),
-                "cost": {
-                    "maps": cost.maps,
-                    "frames": cost.frames,
-                    "frame_ms": cost.frame_ms,
-                    "total_s": cost.total_s,
-                    "total_bytes": cost.total_bytes,
-                },
+                "cost": picked(cost, "maps", "frames", "frame_ms", "total_s", "total_bytes"),
                 "choice": choice.to_json(),
             }
         )
@@ -191,9 +189,7 @@ def _listed(
     out_of_range, aliasing = coverage.out_of_range(radar), coverage.aliasing(radar)
     return [
         {
-            "range_m": place.range_m,
-            "azimuth_deg": place.azimuth_deg,
-            "elevation_deg": place.elevation_deg,
+            **picked(place, "range_m", "azimuth_deg", "elevation_deg"),
             "position_m": sensor.position_m,
             "farthest_m": float(coverage.farthest_m[number]),
             "fastest_mps": float(coverage.fastest_mps[number]),

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.command_parser import Options
 from sd2core.cli.options import add_command, flag, given, positive_float, positive_int
-from sd2core.cli.output import print_facts, print_json
+from sd2core.cli.output import picked, print_facts, print_json
 from sd2core.errors import Sd2Error
 from sd2core.processes import INTERRUPTED
 
@@ -22,33 +22,20 @@ if TYPE_CHECKING:
 
 _BACKGROUND_NICE = 10
 
-# Options that are settings: section, name.
+_OPTIONS = {
+    "data": "validation_subjects test_subjects segment_frames overlap_frames placements segments"
+    " range_factor",
+    "model": "model model_inputs",
+    "training": "epochs minutes batch_size learning_rate ssm_learning_rate early_stopping balanced"
+    " velocity_weight select_by seed",
+    "machine": "device devices precision threads nice deterministic",
+}
+"""Options that are settings, by their section."""
+_RENAMED = {"model": "name", "model_inputs": "inputs", "early_stopping": "early_stopping_epochs"}
 _SETTINGS = {
-    "validation_subjects": ("data", "validation_subjects"),
-    "test_subjects": ("data", "test_subjects"),
-    "segment_frames": ("data", "segment_frames"),
-    "overlap_frames": ("data", "overlap_frames"),
-    "placements": ("data", "placements"),
-    "segments": ("data", "segments"),
-    "range_factor": ("data", "range_factor"),
-    "model": ("model", "name"),
-    "model_inputs": ("model", "inputs"),
-    "epochs": ("training", "epochs"),
-    "minutes": ("training", "minutes"),
-    "batch_size": ("training", "batch_size"),
-    "learning_rate": ("training", "learning_rate"),
-    "ssm_learning_rate": ("training", "ssm_learning_rate"),
-    "early_stopping": ("training", "early_stopping_epochs"),
-    "balanced": ("training", "balanced"),
-    "velocity_weight": ("training", "velocity_weight"),
-    "select_by": ("training", "select_by"),
-    "seed": ("training", "seed"),
-    "device": ("machine", "device"),
-    "devices": ("machine", "devices"),
-    "precision": ("machine", "precision"),
-    "threads": ("machine", "threads"),
-    "nice": ("machine", "nice"),
-    "deterministic": ("machine", "deterministic"),
+    option: (section, _RENAMED.get(option, option))
+    for section, options in _OPTIONS.items()
+    for option in options.split()
 }
 
 
@@ -337,10 +324,7 @@ def _say_ending(options: argparse.Namespace, run: Path, ending: Ending) -> int:
         print_json(
             {
                 "run": str(run),
-                "outcome": ending.outcome,
-                "best_epoch": ending.best_epoch,
-                "validation_rmse": ending.validation_rmse,
-                "validation_mae_mps": ending.validation_mae_mps,
+                **picked(ending, "outcome", "best_epoch", "validation_rmse", "validation_mae_mps"),
                 "model": None if ending.model is None else str(ending.model),
             }
         )

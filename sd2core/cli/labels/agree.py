@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from sd2core.cli.labels.reading import add_clock, clock_of, labels_at, needed, with_rate
 from sd2core.cli.labels.suggest import spans_data
 from sd2core.cli.options import add_command, share
-from sd2core.cli.output import counted, print_json, print_rows
+from sd2core.cli.output import counted, picked, print_json, print_rows
 
 if TYPE_CHECKING:
     from sd2core.labels.agreement import Agreement, Answer, Kappa
@@ -120,17 +120,21 @@ def _data(found: Agreement) -> dict[str, Any]:
                 "b": match.b.id,
                 "label_a": match.a.label,
                 "label_b": match.b.label,
-                "iou": match.iou,
-                "start_difference_s": match.start_difference_s,
-                "end_difference_s": match.end_difference_s,
-                "start_difference_frames": match.start_difference_frames,
-                "end_difference_frames": match.end_difference_frames,
+                **picked(match, "iou", *_DIFFERENCES),
             }
             for match in spans.matches
         ],
         "only_a": spans_data(spans.only_a, "label"),
         "only_b": spans_data(spans.only_b, "label"),
     }
+
+
+_DIFFERENCES = (
+    "start_difference_s",
+    "end_difference_s",
+    "start_difference_frames",
+    "end_difference_frames",
+)
 
 
 def _kappa(kappa: Kappa) -> tuple[str, str, str]:

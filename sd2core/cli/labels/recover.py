@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.labels.reading import add_replace, check_label_output
 from sd2core.cli.options import add_command
-from sd2core.cli.output import counted, print_json, print_rows
+from sd2core.cli.output import counted, picked, print_json, print_rows
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
@@ -103,9 +103,7 @@ def _print(offers: tuple[Offer, ...]) -> None:
 def _data(offer: Offer) -> dict[str, Any]:
     return {
         "recording": str(offer.recording),
-        "edits": offer.edits,
-        "last": offer.last,
-        "time_unix_s": offer.time_unix_s,
+        **picked(offer, "edits", "last", "time_unix_s"),
         "spans": len(offer.labels.spans),
         "discarded": offer.declined,
     }

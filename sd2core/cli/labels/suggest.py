@@ -16,7 +16,7 @@ from sd2core.cli.labels.reading import (
     write,
 )
 from sd2core.cli.options import add_command, flag, given, not_negative_float
-from sd2core.cli.output import counted, print_json, print_rows
+from sd2core.cli.output import counted, picked, print_json, print_rows
 from sd2core.cli.recording_maps import MapName, maps_of
 from sd2core.errors import Sd2Error
 
@@ -127,8 +127,7 @@ def write_found(options: argparse.Namespace, spans: tuple[Span, ...], clock: Tim
 
 def spans_data(spans: tuple[Span, ...], *facts: str) -> list[dict[str, Any]]:
     """Number, times and further facts of spans, for JSON."""
-    names = ("id", "start_s", "end_s", *facts)
-    return [{name: getattr(span, name) for name in names} for span in spans]
+    return [picked(span, "id", "start_s", "end_s", *facts) for span in spans]
 
 
 def span_cells(span: Span) -> tuple[str, str, str]:
