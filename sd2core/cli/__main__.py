@@ -19,13 +19,7 @@ _EXAMPLES = "  sd2 demo --out sample.sd2                   a copy of the bundled
 def main() -> int:
     """Run one of the library's commands and return its exit code."""
     parser, commands = build_parser(_EXAMPLES)
-    demo = add_command(
-        commands,
-        "demo",
-        "write a copy of the bundled sample recording",
-        handler=_demo,
-        description="A simulated body makes eight swipes in front of a simulated radar.",
-    )
+    demo = add_command(commands, "demo", handler=_demo)
     demo.add_output("NAME.sd2", "the copy to write", required=False)
     demo.add_argument("--screenshot", type=Path, help=argparse.SUPPRESS)
     for name in _WINDOW_COMMANDS:  # not listed
@@ -40,6 +34,10 @@ def main() -> int:
 
 
 def _demo(options: argparse.Namespace) -> None:
+    """Write a copy of the bundled sample recording.
+
+    A simulated body makes eight swipes in front of a simulated radar.
+    """
     if options.out is None:
         _absent(argparse.Namespace(name="demo"))
     copy_sample(options.out)

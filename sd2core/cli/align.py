@@ -17,23 +17,7 @@ if TYPE_CHECKING:
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``align``."""
-    parser = add_command(
-        commands,
-        "align",
-        "find the time offset of video and radar from what both saw",
-        handler=_align,
-        description=(
-            "Compares mean velocity and motion of the mesh's synthetic map with those of the\n"
-            "radar's map at every offset. Where none stands out, as the motion repeats itself or\n"
-            "the two do not belong together, the recording stays as it is, the reason is printed,\n"
-            "and the exit code is 1."
-        ),
-        examples=(
-            "  sd2 align walk.sd2\n"
-            "  sd2 align anna.sd2 ben.sd2 --save\n"
-            "  sd2 align walk.sd2 --within 20 --json"
-        ),
-    )
+    parser = add_command(commands, "align", handler=_align)
     parser.add_value("recordings", Path, "RECORDING", "with a mesh and a radar", nargs="+")
     parser.add_value(
         "--within",
@@ -46,6 +30,17 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 
 def _align(options: argparse.Namespace) -> int:
+    """Find the time offset of video and radar from what both saw.
+
+    Compares mean velocity and motion of the mesh's synthetic map with those of the
+    radar's map at every offset. Where none stands out, as the motion repeats itself or
+    the two do not belong together, the recording stays as it is, the reason is printed,
+    and the exit code is 1.
+
+      sd2 align walk.sd2
+      sd2 align anna.sd2 ben.sd2 --save
+      sd2 align walk.sd2 --within 20 --json
+    """
     from sd2core.files.resources import is_bundled
     from sd2core.recording.recording import open_recording
 

@@ -21,24 +21,7 @@ _OWN_NAMES = {"mesh.zarr", "mesh.npz"}
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``compare-meshes``."""
-    parser = add_command(
-        commands,
-        "compare-meshes",
-        "compare meshes of one video: joints, velocities along the line of sight, Doppler maps",
-        handler=_compare,
-        description=(
-            "Every mesh is measured against the first (or --reference): mean distance of the\n"
-            "joints, velocity of hands, elbows and torso along the line of sight, jitter, and\n"
-            "the Doppler map that each gives. Any file that `sd2 info` knows as a mesh will do;\n"
-            "one of them at least has to be made by `sd2 fit`, whose joints are known. Joints\n"
-            "of other surfaces follow the vertices nearest to them. Options on how to read a\n"
-            "mesh hold for those that are not made by SD² Studio."
-        ),
-        examples=(
-            "  sd2 compare-meshes fitted.zarr vibe_output.pkl --image-size 640x480\n"
-            "  sd2 compare-meshes ours.zarr wham.pkl --names ours,WHAM --figure both.svg"
-        ),
-    )
+    parser = add_command(commands, "compare-meshes", handler=_compare)
     parser.add_value("meshes", Path, "MESH", "two meshes or more, in one frame", nargs="+")
     parser.add_value("--names", str, "LIST", "what to call them, separated by commas")
     parser.add_value(
@@ -62,6 +45,18 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 
 def _compare(options: argparse.Namespace) -> None:
+    """Compare meshes of one video: joints, velocities along the line of sight, Doppler maps.
+
+    Every mesh is measured against the first (or --reference): mean distance of the
+    joints, velocity of hands, elbows and torso along the line of sight, jitter, and
+    the Doppler map that each gives. Any file that `sd2 info` knows as a mesh will do;
+    one of them at least has to be made by `sd2 fit`, whose joints are known. Joints
+    of other surfaces follow the vertices nearest to them. Options on how to read a
+    mesh hold for those that are not made by SD² Studio.
+
+      sd2 compare-meshes fitted.zarr vibe_output.pkl --image-size 640x480
+      sd2 compare-meshes ours.zarr wham.pkl --names ours,WHAM --figure both.svg
+    """
     from sd2core.cli.reading import check_output
     from sd2core.compare.figure import draw_comparison
     from sd2core.compare.meshes import compare_meshes

@@ -12,22 +12,7 @@ from sd2core.errors import Sd2Error
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``denoise``."""
-    parser = add_command(
-        commands,
-        "denoise",
-        "turn a synthetic Doppler map into what a radar would show",
-        handler=_denoise,
-        description=(
-            "A trained model estimates what a radar would have measured, from the map that\n"
-            "`sd2 synth` counted. The map must be made as those that the model learnt from (same\n"
-            "bins, same emptied bins); `sd2 info MODEL` says how. Another frame rate is brought\n"
-            "to the model's and back. Frames without a person stay empty."
-        ),
-        examples=(
-            "  sd2 denoise map.npz --out denoised.npz\n"
-            "  sd2 denoise map.npz --out denoised.npz --model runs/first/best.safetensors"
-        ),
-    )
+    parser = add_command(commands, "denoise", handler=_denoise)
     parser.add_value("map", Path, "MAP", "a map from `sd2 synth`")
     parser.add_map_output()
     parser.add_argument(
@@ -40,6 +25,16 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 
 def _denoise(options: argparse.Namespace) -> None:
+    """Turn a synthetic Doppler map into what a radar would show.
+
+    A trained model estimates what a radar would have measured, from the map that
+    `sd2 synth` counted. The map must be made as those that the model learnt from (same
+    bins, same emptied bins); `sd2 info MODEL` says how. Another frame rate is brought
+    to the model's and back. Frames without a person stay empty.
+
+      sd2 denoise map.npz --out denoised.npz
+      sd2 denoise map.npz --out denoised.npz --model runs/first/best.safetensors
+    """
     from sd2core.cli.info.description import describe_map, show
     from sd2core.cli.info.model import model_words
     from sd2core.cli.reading import check_map_output

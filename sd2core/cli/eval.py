@@ -17,27 +17,7 @@ if TYPE_CHECKING:
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``eval``."""
-    parser = add_command(
-        commands,
-        "eval",
-        "measure denoisers on people that they have not learnt from",
-        handler=_eval,
-        description=(
-            "Denoises whole takes and compares them with the radar's: the velocity of the\n"
-            "strongest bin per frame (mean absolute error and standard deviation in m/s), the\n"
-            "mean velocity, and the map itself; in all, per gesture and per person. Beside the\n"
-            "models stand `none`, and a median, a Wiener filter and a ridge regression fitted to\n"
-            "the training.\n"
-            "Several models of one architecture, trained with different seeds, make one row:\n"
-            "mean ± standard deviation."
-        ),
-        examples=(
-            "  sd2 eval runs/s4 --data campaign.zarr\n"
-            "  sd2 eval runs/s4-0 runs/s4-1 runs/s4-2 runs/gru-0 --data campaign.zarr\n"
-            "  sd2 eval denoiser --data mars.zarr --subjects subject4 --json\n"
-            "  sd2 eval runs/s4 runs/unet --data campaign.zarr --figure scores.png"
-        ),
-    )
+    parser = add_command(commands, "eval", handler=_eval)
     parser.add_argument(
         "models",
         nargs="+",
@@ -69,6 +49,21 @@ def named_subjects(text: str, everybody: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _eval(options: argparse.Namespace) -> None:
+    """Measure denoisers on people that they have not learnt from.
+
+    Denoises whole takes and compares them with the radar's: the velocity of the
+    strongest bin per frame (mean absolute error and standard deviation in m/s), the
+    mean velocity, and the map itself; in all, per gesture and per person. Beside the
+    models stand `none`, and a median, a Wiener filter and a ridge regression fitted to
+    the training.
+    Several models of one architecture, trained with different seeds, make one row:
+    mean ± standard deviation.
+
+      sd2 eval runs/s4 --data campaign.zarr
+      sd2 eval runs/s4-0 runs/s4-1 runs/s4-2 runs/gru-0 --data campaign.zarr
+      sd2 eval denoiser --data mars.zarr --subjects subject4 --json
+      sd2 eval runs/s4 runs/unet --data campaign.zarr --figure scores.png
+    """
     from sd2core.cli.reading import check_output
     from sd2core.files.atomic import atomic_write_text
     from sd2core.files.figure_files import check_figure, save_figure

@@ -45,25 +45,7 @@ _LINE_EVERY_S = 0.1
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``export``."""
-    parser = add_command(
-        commands,
-        "export",
-        "write a data set to learn from: segments with labels, sensors and provenance",
-        handler=_export,
-        description=(
-            "Cuts maps into segments of 72 frames and writes them with a label per frame and per\n"
-            "segment, subject, sensor, provenance, and a split by subject. Beside the data set\n"
-            "come a card (.card.md, .card.json) and a preview sheet (.png). Inputs are recordings\n"
-            "or folders of them, pairs, and Doppler maps. Sources that are in the\n"
-            "data set already are kept: the same command resumes a stopped export, or adds inputs."
-        ),
-        examples=(
-            "  sd2 export walk.sd2 --out walk.zarr\n"
-            "  sd2 export anna.sd2 ben.sd2 --placements grid.json --out gestures.h5\n"
-            "  sd2 export campaign.zarr --kinds denoised,simulated --out campaign-set.zarr\n"
-            "  sd2 export recordings/ --out set.zarr --dry-run"
-        ),
-    )
+    parser = add_command(commands, "export", handler=_export)
     parser.add_value("inputs", Path, "INPUT", "recordings, pairs, maps, folders", nargs="+")
     parser.add_output("FILE", "the data set to write (.zarr, .h5 or .npz)")
     _add_content(parser)
@@ -171,6 +153,19 @@ def _add_making(parser: Options) -> None:
 
 
 def _export(options: argparse.Namespace) -> int:
+    """Write a data set to learn from: segments with labels, sensors and provenance.
+
+    Cuts maps into segments of 72 frames and writes them with a label per frame and per
+    segment, subject, sensor, provenance, and a split by subject. Beside the data set
+    come a card (.card.md, .card.json) and a preview sheet (.png). Inputs are recordings
+    or folders of them, pairs, and Doppler maps. Sources that are in the
+    data set already are kept: the same command resumes a stopped export, or adds inputs.
+
+      sd2 export walk.sd2 --out walk.zarr
+      sd2 export anna.sd2 ben.sd2 --placements grid.json --out gestures.h5
+      sd2 export campaign.zarr --kinds denoised,simulated --out campaign-set.zarr
+      sd2 export recordings/ --out set.zarr --dry-run
+    """
     try:
         return _exported(options)
     except Sd2Error as error:

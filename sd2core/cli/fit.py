@@ -46,25 +46,7 @@ _BARS = {
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``fit``."""
-    parser = add_command(
-        commands,
-        "fit",
-        "make a moving mesh from a video of a person",
-        handler=_fit,
-        description=(
-            "Finds the person, 33 landmarks in every frame, and the body and motion that fit\n"
-            "them. The size of everything follows from the person's height: say it with\n"
-            "--stature-m where you know it, every velocity is proportional to it. At first use\n"
-            "the landmark models are fetched (77 MB; `sd2 fetch-models`).\n\n"
-            "It can be stopped at any moment: what is done stays in FILE.partial, and the same\n"
-            "command goes on from there."
-        ),
-        examples=(
-            "  sd2 fit walk.mp4 --out walk.zarr --stature-m 1.78\n"
-            "  sd2 fit two.mp4 --out left.zarr --person-box 40,60,180,400 --person-frame 12\n"
-            "  sd2 fit walk.mp4 --out walk.npz --field-of-view 68 --resolution low"
-        ),
-    )
+    parser = add_command(commands, "fit", handler=_fit)
     parser.add_value("video", Path, "VIDEO", "any video that FFmpeg reads")
     parser.add_output("FILE", "the mesh to write (.zarr or .npz)")
     parser.add_value(
@@ -131,6 +113,20 @@ def _frame(text: str) -> int:
 
 
 def _fit(options: argparse.Namespace) -> None:
+    """Make a moving mesh from a video of a person.
+
+    Finds the person, 33 landmarks in every frame, and the body and motion that fit
+    them. The size of everything follows from the person's height: say it with
+    --stature-m where you know it, every velocity is proportional to it. At first use
+    the landmark models are fetched (77 MB; `sd2 fetch-models`).
+
+    It can be stopped at any moment: what is done stays in FILE.partial, and the same
+    command goes on from there.
+
+      sd2 fit walk.mp4 --out walk.zarr --stature-m 1.78
+      sd2 fit two.mp4 --out left.zarr --person-box 40,60,180,400 --person-frame 12
+      sd2 fit walk.mp4 --out walk.npz --field-of-view 68 --resolution low
+    """
     try:
         _make(options)
     except Exception as error:

@@ -12,24 +12,7 @@ from sd2core.errors import Sd2Error
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``import`` and ``relink``."""
-    parser = add_command(
-        commands,
-        "import",
-        "make a recording from a video, a mesh and a radar capture",
-        handler=_import,
-        description=(
-            "A recording is a folder NAME.sd2 that says what belongs together. The files stay\n"
-            "where they are and are referred to by relative paths; --copy copies them into\n"
-            "the folder, which can then be handed on as it is. Every file is opened once, so\n"
-            "that what cannot be read is said here and not later."
-        ),
-        examples=(
-            "  sd2 import --video walk.mkv --mesh walk.npz --out walk.sd2\n"
-            "  sd2 import --radar capture/ --title 'Empty lab' --out lab.sd2\n"
-            "  sd2 import --radar capture/ --receiver 2 --out lab.sd2\n"
-            "  sd2 import --video a.mkv --radar capture/ --radar-offset-s -0.35 --copy --out a.sd2"
-        ),
-    )
+    parser = add_command(commands, "import", handler=_import)
     parser.add_output("NAME.sd2", "the recording to make")
     parser.add_value("--video", Path, "FILE", "video of the person")
     parser.add_value(
@@ -63,18 +46,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     parser.add_flag("--copy", "copy the files into the recording")
     parser.add_json()
 
-    parser = add_command(
-        commands,
-        "relink",
-        "find the missing files of a recording in another folder",
-        handler=_relink,
-        description=(
-            "Files that are not where the recording says are looked for by name in FOLDER and\n"
-            "everything below it. Of several files with the same name, the one whose folders\n"
-            "agree best with the old path is taken; when two agree equally well, neither is."
-        ),
-        examples="  sd2 relink walk.sd2 /media/disk/experiments",
-    )
+    parser = add_command(commands, "relink", handler=_relink)
     parser.add_value("recording", Path, "RECORDING", "a recording (.sd2)")
     parser.add_value("folder", Path, "FOLDER", "where to look, and in all folders below")
     parser.add_json()
@@ -90,6 +62,18 @@ def copy_sample(out: Path) -> None:
 
 
 def _import(options: argparse.Namespace) -> None:
+    """Make a recording from a video, a mesh and a radar capture.
+
+    A recording is a folder NAME.sd2 that says what belongs together. The files stay
+    where they are and are referred to by relative paths; --copy copies them into
+    the folder, which can then be handed on as it is. Every file is opened once, so
+    that what cannot be read is said here and not later.
+
+      sd2 import --video walk.mkv --mesh walk.npz --out walk.sd2
+      sd2 import --radar capture/ --title 'Empty lab' --out lab.sd2
+      sd2 import --radar capture/ --receiver 2 --out lab.sd2
+      sd2 import --video a.mkv --radar capture/ --radar-offset-s -0.35 --copy --out a.sd2
+    """
     from sd2core.cli.info.description import describe_parts, describe_recording, show
     from sd2core.cli.reading import mesh_reading, refuse_unused_mesh_options
     from sd2core.recording.recording import Recording
@@ -125,6 +109,14 @@ def _import(options: argparse.Namespace) -> None:
 
 
 def _relink(options: argparse.Namespace) -> int:
+    """Find the missing files of a recording in another folder.
+
+    Files that are not where the recording says are looked for by name in FOLDER and
+    everything below it. Of several files with the same name, the one whose folders
+    agree best with the old path is taken; when two agree equally well, neither is.
+
+      sd2 relink walk.sd2 /media/disk/experiments
+    """
     from sd2core.recording.recording import open_recording
 
     recording = open_recording(options.recording)

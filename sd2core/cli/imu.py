@@ -18,27 +18,7 @@ if TYPE_CHECKING:
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``imu``."""
-    parser = add_command(
-        commands,
-        "imu",
-        "what an inertial sensor on the body would measure (simulated)",
-        handler=_imu,
-        description=(
-            "Fixes an accelerometer and a gyroscope to the body and writes what they would feel:\n"
-            "m/s² with gravity (at rest 9.81 upwards) and rad/s, along the sensor's own axes. On\n"
-            "meshes of `sd2 fit` places have names: head, chest, pelvis, and left- or right- with\n"
-            "upper-arm, forearm, wrist, hand, thigh, shank, foot. There x runs along the bone,\n"
-            "away from the trunk or up it, and z points out of the body. On a vertex of any other\n"
-            "surface z points out of it, x as near to upwards as lies in it, in the first frame.\n"
-            "y completes them right-handed. Where there is no body for a while, the samples are\n"
-            "empty. See docs/imu.md."
-        ),
-        examples=(
-            "  sd2 imu walk.zarr --at left-wrist --out wrist.csv\n"
-            "  sd2 imu walk.npz --at 4711 --rate 200 --out spot.sto\n"
-            "  sd2 imu walk.sd2 --at right-foot --acc-noise 0.002 --acc-range 20 --out foot.npz"
-        ),
-    )
+    parser = add_command(commands, "imu", handler=_imu)
     parser.add_value("mesh", Path, "MESH", "a mesh, or a recording")
     parser.add_argument(
         "--at", required=True, metavar="PLACE|VERTEX", help="where on the body, or which vertex"
@@ -96,6 +76,21 @@ def _add_errors(parser: Options) -> None:
 
 
 def _imu(options: argparse.Namespace) -> None:
+    """What an inertial sensor on the body would measure (simulated).
+
+    Fixes an accelerometer and a gyroscope to the body and writes what they would feel:
+    m/s² with gravity (at rest 9.81 upwards) and rad/s, along the sensor's own axes. On
+    meshes of `sd2 fit` places have names: head, chest, pelvis, and left- or right- with
+    upper-arm, forearm, wrist, hand, thigh, shank, foot. There x runs along the bone,
+    away from the trunk or up it, and z points out of the body. On a vertex of any other
+    surface z points out of it, x as near to upwards as lies in it, in the first frame.
+    y completes them right-handed. Where there is no body for a while, the samples are
+    empty. See docs/imu.md.
+
+      sd2 imu walk.zarr --at left-wrist --out wrist.csv
+      sd2 imu walk.npz --at 4711 --rate 200 --out spot.sto
+      sd2 imu walk.sd2 --at right-foot --acc-noise 0.002 --acc-range 20 --out foot.npz
+    """
     from sd2core.cli.info.description import signals_data
     from sd2core.cli.reading import mesh_and_sensor
     from sd2core.imu.files import write_signals

@@ -22,26 +22,7 @@ _TOLERANCE = 0.02
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``ladder``."""
-    parser = add_command(
-        commands,
-        "ladder",
-        "measure what accuracy costs on a scene, and say what the scene requires",
-        handler=_ladder,
-        description=(
-            "Tries every sensible way of computing the Doppler of a mesh on some of its frames:\n"
-            "how long it takes on this machine, and how far its map is from the most accurate\n"
-            "one. Then says which is the cheapest that holds a tolerance, and why. A tolerance of\n"
-            "2 % means: the absolute differences between the two smoothed maps add up to 2 % of\n"
-            "the map. What was measured is kept until mesh, sensor or machine change."
-        ),
-        examples=(
-            "  sd2 ladder walk.npz\n"
-            "  sd2 ladder walk.npz --quick --tolerance 1%\n"
-            "  sd2 ladder walk.sd2 --sensor 1.5,0,2 --budget-ms 0.1\n"
-            "  sd2 ladder walk.npz --method fmcw\n"
-            "  sd2 ladder walk.npz --figure accuracy.png --json"
-        ),
-    )
+    parser = add_command(commands, "ladder", handler=_ladder)
     parser.add_mesh_and_sensor()
     add_wish(parser, "2%%")
     parser.add_method("measure counting, or the FMCW signal")
@@ -56,6 +37,20 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 
 def _ladder(options: argparse.Namespace) -> int:
+    """Measure what accuracy costs on a scene, and say what the scene requires.
+
+    Tries every sensible way of computing the Doppler of a mesh on some of its frames:
+    how long it takes on this machine, and how far its map is from the most accurate
+    one. Then says which is the cheapest that holds a tolerance, and why. A tolerance of
+    2 % means: the absolute differences between the two smoothed maps add up to 2 % of
+    the map. What was measured is kept until mesh, sensor or machine change.
+
+      sd2 ladder walk.npz
+      sd2 ladder walk.npz --quick --tolerance 1%
+      sd2 ladder walk.sd2 --sensor 1.5,0,2 --budget-ms 0.1
+      sd2 ladder walk.npz --method fmcw
+      sd2 ladder walk.npz --figure accuracy.png --json
+    """
     from sd2core.accuracy.choosing import check_options
     from sd2core.cli.reading import check_output, mesh_and_sensor
     from sd2core.doppler import PRESETS

@@ -32,25 +32,7 @@ _BAR_DB = 5.0
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``listen``."""
-    parser = add_command(
-        commands,
-        "listen",
-        "record a radar while it runs, and follow its Doppler map",
-        handler=_listen,
-        description=(
-            "Frames go into a recording that can be opened at any moment. The status line shows\n"
-            "the newest column of the Doppler map (receding to approaching), its level, the\n"
-            "classifier's answer, and how many frames were dropped or damaged. Ctrl-C or q stops;\n"
-            "the same command with the same --out goes on. docs/radar-files.md says how to set up\n"
-            "a DCA1000."
-        ),
-        examples=(
-            "  sd2 listen --dca1000 192.168.33.30 --setup profile.cfg --out walk.sd2\n"
-            "  sd2 listen --dca1000 --setup profile.cfg --out walk.sd2    (sent by this computer)\n"
-            "  sd2 listen --replay capture/ --out again.sd2 --seconds 10\n"
-            "  sd2 listen --replay walk.sd2 --out again.sd2 --classifier gestures.safetensors"
-        ),
-    )
+    parser = add_command(commands, "listen", handler=_listen)
     source = parser.add_mutually_exclusive_group(required=True)
     source.add_argument(
         "--dca1000",
@@ -77,6 +59,19 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 
 def _listen(options: argparse.Namespace) -> None:
+    """Record a radar while it runs, and follow its Doppler map.
+
+    Frames go into a recording that can be opened at any moment. The status line shows
+    the newest column of the Doppler map (receding to approaching), its level, the
+    classifier's answer, and how many frames were dropped or damaged. Ctrl-C or q stops;
+    the same command with the same --out goes on. docs/radar-files.md says how to set up
+    a DCA1000.
+
+      sd2 listen --dca1000 192.168.33.30 --setup profile.cfg --out walk.sd2
+      sd2 listen --dca1000 --setup profile.cfg --out walk.sd2    (sent by this computer)
+      sd2 listen --replay capture/ --out again.sd2 --seconds 10
+      sd2 listen --replay walk.sd2 --out again.sd2 --classifier gestures.safetensors
+    """
     from sd2core.live.listening import Listening
     from sd2core.live.recording import GrowingRecording
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import inspect
 import math
 import re
 from collections.abc import Callable, Iterable
@@ -15,13 +16,22 @@ if TYPE_CHECKING:
 def add_command(
     commands: argparse._SubParsersAction,
     name: str,
-    summary: str,
+    summary: str = "",
     *,
     handler: Callable[[argparse.Namespace], int | None] | None = None,
     description: str = "",
     examples: str = "",
 ) -> CommandParser:
-    """Add a subcommand with its help."""
+    """Add a subcommand with its help.
+
+    Without a summary the docstring of the handler is the help: a summary, a description, and
+    examples from the first indented ``sd2`` on.
+    """
+    if not summary:
+        told, start, rest = (inspect.getdoc(handler) or name).partition("\n  sd2 ")
+        summary, _, description = told.partition("\n\n")
+        summary = f"{summary[0].lower()}{summary[1:].removesuffix('.')}"
+        examples = f"{start}{rest}".removeprefix("\n")
     text = f"{summary[0].upper()}{summary[1:]}."
     parser: CommandParser = commands.add_parser(
         name,

@@ -27,20 +27,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 
 def _add_recordings(kinds: argparse._SubParsersAction) -> None:
-    parser = add_command(
-        kinds,
-        "recordings",
-        "pairs from recordings that have a mesh and a radar capture",
-        handler=_recordings,
-        description=(
-            "The synthetic Doppler of each recording's mesh is the input, the Doppler of its\n"
-            "radar capture the target, aligned by the recording's offset. Labels are its spans."
-        ),
-        examples=(
-            "  sd2 pairs recordings anna.sd2 ben.sd2 carla.sd2 --out mine.zarr\n"
-            "  sd2 pairs recordings a1.sd2 a2.sd2 b1.sd2 --subjects anna,anna,ben --out mine.zarr"
-        ),
-    )
+    parser = add_command(kinds, "recordings", handler=_recordings)
     parser.add_value("recordings", Path, "RECORDING", "with a mesh and a radar", nargs="+")
     _add_pairs(parser, "14,15,16 of 32, else none")
     parser.add_count()
@@ -67,23 +54,7 @@ def _add_pairs(parser: Options, usual_null_bins: str) -> None:
 
 
 def _add_mars(kinds: argparse._SubParsersAction) -> None:
-    parser = add_command(
-        kinds,
-        "mars",
-        "pairs from MARS recordings: a Kinect skeleton and a radar's points",
-        handler=_mars,
-        description=(
-            "A body of the person's size moves as the Kinect saw it; its synthetic Doppler is\n"
-            "the input, the Doppler of the radar's points the target. Persons are the subjects.\n"
-            "Where the radar stands beside the Kinect, and how its clock lies, is found by what\n"
-            "makes the mean velocities of both agree best, for each person.\n\n"
-            "It can be stopped at any moment; the same command resumes it."
-        ),
-        examples=(
-            "  sd2 pairs mars mars_subject1 mars_subject4 --out mars.zarr\n"
-            "  sd2 pairs mars mars_subject1 --out nulled.zarr --null-bins 14,15,16"
-        ),
-    )
+    parser = add_command(kinds, "mars", handler=_mars)
     parser.add_value(
         "folders",
         Path,
@@ -139,6 +110,14 @@ def _choices(options: argparse.Namespace) -> MarsChoices:
 
 
 def _recordings(options: argparse.Namespace) -> None:
+    """Pairs from recordings that have a mesh and a radar capture.
+
+    The synthetic Doppler of each recording's mesh is the input, the Doppler of its
+    radar capture the target, aligned by the recording's offset. Labels are its spans.
+
+      sd2 pairs recordings anna.sd2 ben.sd2 carla.sd2 --out mine.zarr
+      sd2 pairs recordings a1.sd2 a2.sd2 b1.sd2 --subjects anna,anna,ben --out mine.zarr
+    """
     from sd2core.cli.reading import chosen_axis
     from sd2core.doppler import PRESETS
     from sd2core.mocap.recording_pairs import make_recording_pairs
@@ -174,6 +153,18 @@ def _recordings(options: argparse.Namespace) -> None:
 
 
 def _mars(options: argparse.Namespace) -> None:
+    """Pairs from MARS recordings: a Kinect skeleton and a radar's points.
+
+    A body of the person's size moves as the Kinect saw it; its synthetic Doppler is
+    the input, the Doppler of the radar's points the target. Persons are the subjects.
+    Where the radar stands beside the Kinect, and how its clock lies, is found by what
+    makes the mean velocities of both agree best, for each person.
+
+    It can be stopped at any moment; the same command resumes it.
+
+      sd2 pairs mars mars_subject1 mars_subject4 --out mars.zarr
+      sd2 pairs mars mars_subject1 --out nulled.zarr --null-bins 14,15,16
+    """
     from sd2core.mocap.mars_pairs import make_mars_pairs
 
     with progress_bar("Making pairs") as progress:

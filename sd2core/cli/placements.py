@@ -37,25 +37,7 @@ _LIMITS = (
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``placements``."""
-    parser = add_command(
-        commands,
-        "placements",
-        "plan sensors around a body, and say what a map from each would cost",
-        handler=_placements,
-        description=(
-            "A grid of every range, azimuth and elevation that is given, or with --cloud as many\n"
-            "random places between them. Ranges are distances from the body's centre; azimuth 0\n"
-            "is between body and camera and grows to the right in the picture, elevation upwards.\n"
-            "A list is 1,2,4 or 1:4:0.5, both ends included. Without any of these options, the\n"
-            "places planned in the recording are listed."
-        ),
-        examples=(
-            "  sd2 placements walk.sd2 --ranges 1:4:1 --azimuths -60:60:30 --out grid.json\n"
-            "  sd2 placements walk.sd2 --cloud 200 --ranges 1:4 --azimuths -60:60"
-            " --elevations -10:40\n"
-            "  sd2 placements walk.sd2 --placements grid.json --json"
-        ),
-    )
+    parser = add_command(commands, "placements", handler=_placements)
     parser.add_value("mesh", Path, "MESH", "a mesh, or a recording")
     parser.add_value("--ranges", str, "LIST", "distances in metres; with --cloud from:to, as 1:4")
     parser.add_value("--azimuths", str, "LIST", "degrees; with --cloud from:to (default: 0)")
@@ -70,6 +52,18 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 
 def _placements(options: argparse.Namespace) -> int:
+    """Plan sensors around a body, and say what a map from each would cost.
+
+    A grid of every range, azimuth and elevation that is given, or with --cloud as many
+    random places between them. Ranges are distances from the body's centre; azimuth 0
+    is between body and camera and grows to the right in the picture, elevation upwards.
+    A list is 1,2,4 or 1:4:0.5, both ends included. Without any of these options, the
+    places planned in the recording are listed.
+
+      sd2 placements walk.sd2 --ranges 1:4:1 --azimuths -60:60:30 --out grid.json
+      sd2 placements walk.sd2 --cloud 200 --ranges 1:4 --azimuths -60:60 --elevations -10:40
+      sd2 placements walk.sd2 --placements grid.json --json
+    """
     from sd2core.cli.reading import (
         check_output,
         load_mesh_from_options,

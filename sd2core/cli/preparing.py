@@ -12,17 +12,7 @@ from sd2core.errors import Sd2Error
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``warm-up`` and ``fetch-models``."""
-    add_command(
-        commands,
-        "warm-up",
-        "compile the numerical kernels once, after installing",
-        handler=_warm_up,
-        description=(
-            "Takes about half a minute the first time and keeps the result on disk. Without\n"
-            "it everything works as well: the kernels are compiled in the background while\n"
-            "a slower form serves."
-        ),
-    )
+    add_command(commands, "warm-up", handler=_warm_up)
     parser = add_command(
         commands,
         "fetch-models",
@@ -68,6 +58,12 @@ def _fetch(options: argparse.Namespace) -> None:
 
 
 def _warm_up(options: argparse.Namespace) -> None:
+    """Compile the numerical kernels once, after installing.
+
+    Takes about half a minute the first time and keeps the result on disk. Without
+    it everything works as well: the kernels are compiled in the background while
+    a slower form serves.
+    """
     from sd2core.numerics.compiled import warm_up
 
     with progress_bar("Compiling", unit="module") as progress:

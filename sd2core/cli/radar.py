@@ -19,28 +19,7 @@ if TYPE_CHECKING:
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``radar``."""
-    parser = add_command(
-        commands,
-        "radar",
-        "turn a raw radar capture into a Doppler map, or say what limits it has",
-        handler=_radar,
-        description=(
-            "Prints the resolution and limits of the radar by its configuration, what was\n"
-            "assumed, and a note if the velocity axis extends beyond the limits. What files\n"
-            "each radar needs is in docs/radar-files.md. `sd2 radar describe FILE` writes a\n"
-            "description of samples of one's own (.npy, .h5, .sigmf-meta), and asks for what\n"
-            "no option says."
-        ),
-        examples=(
-            "  sd2 radar capture/                   (limits, and what was assumed)\n"
-            "  sd2 radar adc_data_Raw_0.bin --out real.npz --receiver 1\n"
-            "  sd2 radar describe walk.npy --carrier-hz 60.5e9 --bandwidth-hz 1e9\n"
-            "  sd2 radar capture/ --out real.npz\n"
-            "  sd2 radar capture/ --out real.npz --clutter mean --range 0.5,4\n"
-            "  sd2 radar walk.sd2 --out real.npz    (the capture of a recording)\n"
-            "  sd2 radar swing.h5 --out real.npz    (a file that holds the map already)"
-        ),
-    )
+    parser = add_command(commands, "radar", handler=_radar)
     parser.add_value(
         "capture",
         Path,
@@ -67,6 +46,22 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 
 def _radar(options: argparse.Namespace) -> None:
+    """Turn a raw radar capture into a Doppler map, or say what limits it has.
+
+    Prints the resolution and limits of the radar by its configuration, what was
+    assumed, and a note if the velocity axis extends beyond the limits. What files
+    each radar needs is in docs/radar-files.md. `sd2 radar describe FILE` writes a
+    description of samples of one's own (.npy, .h5, .sigmf-meta), and asks for what
+    no option says.
+
+      sd2 radar capture/                   (limits, and what was assumed)
+      sd2 radar adc_data_Raw_0.bin --out real.npz --receiver 1
+      sd2 radar describe walk.npy --carrier-hz 60.5e9 --bandwidth-hz 1e9
+      sd2 radar capture/ --out real.npz
+      sd2 radar capture/ --out real.npz --clutter mean --range 0.5,4
+      sd2 radar walk.sd2 --out real.npz    (the capture of a recording)
+      sd2 radar swing.h5 --out real.npz    (a file that holds the map already)
+    """
     if options.file is not None:
         if str(options.capture) != "describe":
             raise Sd2Error(f"Two files are given, {options.capture} and {options.file}", "one")

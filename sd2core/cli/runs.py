@@ -17,24 +17,7 @@ if TYPE_CHECKING:
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``runs``."""
-    parser = add_command(
-        commands,
-        "runs",
-        "list training runs, and pause, stop or cancel one",
-        handler=_runs,
-        description=(
-            "Lists the runs of `sd2 train` in a folder: how far they are, how good, and whether\n"
-            "their process is still there. A run that was stopped or lost its process is gone on\n"
-            "with by `sd2 train --resume RUN`."
-        ),
-        examples=(
-            "  sd2 runs\n"
-            "  sd2 runs runs/ --json\n"
-            "  sd2 runs runs/s4 --pause\n"
-            "  sd2 runs runs/s4 --resume\n"
-            "  sd2 runs runs/s4 --stop"
-        ),
-    )
+    parser = add_command(commands, "runs", handler=_runs)
     parser.add_argument(
         "folder",
         type=Path,
@@ -55,6 +38,18 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 
 def _runs(options: argparse.Namespace) -> None:
+    """List training runs, and pause, stop or cancel one.
+
+    Lists the runs of `sd2 train` in a folder: how far they are, how good, and whether
+    their process is still there. A run that was stopped or lost its process is gone on
+    with by `sd2 train --resume RUN`.
+
+      sd2 runs
+      sd2 runs runs/ --json
+      sd2 runs runs/s4 --pause
+      sd2 runs runs/s4 --resume
+      sd2 runs runs/s4 --stop
+    """
     from sd2core.train.folder import TrainingFolder, runs_in
 
     if options.word is not None:

@@ -39,25 +39,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 
 def _add_radar(kinds: argparse._SubParsersAction) -> None:
-    parser = add_command(
-        kinds,
-        "radar",
-        "compute the raw samples that a radar would record of a moving mesh",
-        handler=_radar,
-        description=(
-            "Sums the echo of every triangle, with its phase, to the beat signal of an FMCW\n"
-            "radar, and writes the samples in the format of a capture, marked as simulated.\n"
-            "The camera is at 0,0,0 and looks along z; x is to its right and y down, in\n"
-            "metres."
-        ),
-        examples=(
-            "  sd2 simulate radar walk.npz --out walk-radar\n"
-            "  sd2 radar walk-radar --out map.npz    (its Doppler map)\n"
-            "  sd2 simulate radar walk.npz --out left --sensor -1,0,0 --snr-db 20 --receivers 3\n"
-            "  sd2 simulate radar walk.npz --out floor --ground 1.1 --beam-width-deg 60\n"
-            "  sd2 simulate radar walk.npz --out like-mine --radar capture/config.json"
-        ),
-    )
+    parser = add_command(kinds, "radar", handler=_radar)
     parser.add_mesh_and_sensor()
     parser.add_output("FOLDER", "the capture to write")
     add_radar_choice(parser)
@@ -181,6 +163,19 @@ def plane_at(text: str) -> tuple[float, ...]:
 
 
 def _radar(options: argparse.Namespace) -> None:
+    """Compute the raw samples that a radar would record of a moving mesh.
+
+    Sums the echo of every triangle, with its phase, to the beat signal of an FMCW
+    radar, and writes the samples in the format of a capture, marked as simulated.
+    The camera is at 0,0,0 and looks along z; x is to its right and y down, in
+    metres.
+
+      sd2 simulate radar walk.npz --out walk-radar
+      sd2 radar walk-radar --out map.npz    (its Doppler map)
+      sd2 simulate radar walk.npz --out left --sensor -1,0,0 --snr-db 20 --receivers 3
+      sd2 simulate radar walk.npz --out floor --ground 1.1 --beam-width-deg 60
+      sd2 simulate radar walk.npz --out like-mine --radar capture/config.json
+    """
     from sd2core.cli.info.description import describe_capture, show
     from sd2core.cli.reading import mesh_and_sensor
     from sd2core.fmcw import LinkBudget, Mirror, SignalOptions, WaveOptions
@@ -236,30 +231,7 @@ def _radar(options: argparse.Namespace) -> None:
 
 
 def _add_campaign(kinds: argparse._SubParsersAction) -> None:
-    parser = add_command(
-        kinds,
-        "campaign",
-        "make pairs of synthetic Doppler and simulated radar to train a denoiser on",
-        handler=_campaign,
-        description=(
-            "People of random shape swipe to the right, left, down and up, or move as real people\n"
-            "were recorded (--movements captured), or both in turn. Varied, they stand\n"
-            "anywhere, turned a little, swipe in random order, rest, and do other things. As in\n"
-            "the paper, they face a radar and a camera 2.2 m ahead, and swipe to and fro in one\n"
-            "take, up and down in another, and rest in a third. Of every take there is the\n"
-            "Doppler map that a simulated radar shows of the true motion, and the synthetic one\n"
-            "of a body that errs as fits of videos err. Stopped and started again it goes on\n"
-            "where it was, and a longer campaign goes on with a shorter one; the same seed makes\n"
-            "the same takes."
-        ),
-        examples=(
-            "  sd2 simulate campaign --out campaign.zarr\n"
-            "  sd2 simulate campaign --people 3 --minutes 5 --seed 1 --out small.zarr\n"
-            "  sd2 simulate campaign --sensors 3 --out ranges.zarr\n"
-            "  sd2 simulate campaign --protocol paper --out as-in-the-paper.zarr\n"
-            "  sd2 simulate campaign --movements both --motions motions --radars drawn --out all"
-        ),
-    )
+    parser = add_command(kinds, "campaign", handler=_campaign)
     parser.add_output("FILE.zarr", "the pairs to write")
     parser.add_value("--people", positive_int, "N", "number of people", 6)
     parser.add_value("--minutes", positive_float, "MIN", "minutes of all people together", 90.0)
@@ -358,6 +330,24 @@ def _protocol(options: argparse.Namespace) -> Protocol:
 
 
 def _campaign(options: argparse.Namespace) -> None:
+    """Make pairs of synthetic Doppler and simulated radar to train a denoiser on.
+
+    People of random shape swipe to the right, left, down and up, or move as real people
+    were recorded (--movements captured), or both in turn. Varied, they stand
+    anywhere, turned a little, swipe in random order, rest, and do other things. As in
+    the paper, they face a radar and a camera 2.2 m ahead, and swipe to and fro in one
+    take, up and down in another, and rest in a third. Of every take there is the
+    Doppler map that a simulated radar shows of the true motion, and the synthetic one
+    of a body that errs as fits of videos err. Stopped and started again it goes on
+    where it was, and a longer campaign goes on with a shorter one; the same seed makes
+    the same takes.
+
+      sd2 simulate campaign --out campaign.zarr
+      sd2 simulate campaign --people 3 --minutes 5 --seed 1 --out small.zarr
+      sd2 simulate campaign --sensors 3 --out ranges.zarr
+      sd2 simulate campaign --protocol paper --out as-in-the-paper.zarr
+      sd2 simulate campaign --movements both --motions motions --radars drawn --out all
+    """
     from sd2core.pairs.store import read_pairs
     from sd2core.simulate.campaign.making import make_campaign
     from sd2core.simulate.campaign.takes import Campaign

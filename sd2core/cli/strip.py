@@ -19,22 +19,7 @@ _DEFAULT_COUNT = 8
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``strip``."""
-    parser = add_command(
-        commands,
-        "strip",
-        "draw frames side by side: the video above its mesh",
-        handler=_strip,
-        description=(
-            "Every column is a moment, with its time and frame number. Colours of velocity are\n"
-            "towards the sensor: red approaches, blue recedes. In SVG and PDF text is text;\n"
-            "pictures and meshes are pictures in it."
-        ),
-        examples=(
-            "  sd2 strip walk.sd2 --out strip.png\n"
-            "  sd2 strip walk.mkv walk.npz --out strip.svg --frames 20:80:10 --dots\n"
-            "  sd2 strip walk.sd2 --out fit.png --rows overlay --colour plain --count 5"
-        ),
-    )
+    parser = add_command(commands, "strip", handler=_strip)
     parser.add_value("paths", Path, "PATH", "a recording, or a video, a mesh, or both", nargs="+")
     parser.add_output("FILE", "the figure to write (.png, .svg or .pdf)")
     chosen = parser.add_mutually_exclusive_group()
@@ -66,6 +51,16 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 
 def _strip(options: argparse.Namespace) -> None:
+    """Draw frames side by side: the video above its mesh.
+
+    Every column is a moment, with its time and frame number. Colours of velocity are
+    towards the sensor: red approaches, blue recedes. In SVG and PDF text is text;
+    pictures and meshes are pictures in it.
+
+      sd2 strip walk.sd2 --out strip.png
+      sd2 strip walk.mkv walk.npz --out strip.svg --frames 20:80:10 --dots
+      sd2 strip walk.sd2 --out fit.png --rows overlay --colour plain --count 5
+    """
     from sd2core.figures.strip import plot_strip, save_strip
     from sd2core.figures.strip_source import StripOptions, parse_frames, spread_frames
     from sd2core.files.figure_files import check_figure

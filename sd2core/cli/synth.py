@@ -30,30 +30,7 @@ if TYPE_CHECKING:
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``synth``."""
-    parser = add_command(
-        commands,
-        "synth",
-        "compute the Doppler that a radar would have measured of a moving mesh",
-        handler=_synth,
-        description=(
-            "Counts the mesh's vertices by their velocity towards the sensor, frame by frame.\n"
-            "The camera is at 0,0,0 and looks along z; x is to its right and y down, in\n"
-            "metres. Positive velocity is approaching. Options that are not given come from\n"
-            "the preset. With --method fmcw the echoes of all triangles are summed to the signal\n"
-            "of a radar, and that is processed like a capture (more: sd2 simulate radar)."
-        ),
-        examples=(
-            "  sd2 synth walk.npz --out map.npz\n"
-            "  sd2 synth walk.npz --out left.npz --sensor -1,0,2\n"
-            "  sd2 synth walk.sd2 --out map.npz    (mesh and sensor of a recording)\n"
-            "  sd2 synth points.npz --out map.npz --visibility none --null-bins none\n"
-            "  sd2 synth walk.npz --out map.npz --preset vid2doppler\n"
-            "  sd2 synth walk.npz --out map.npz --tolerance 2%    (as quick as this allows)\n"
-            "  sd2 synth walk.npz --out map.npz --method fmcw\n"
-            "  sd2 synth walk.zarr --out map.npz --uncertainty    (of a mesh from sd2 fit)\n"
-            "  sd2 synth walk.zarr --out map.npz --limbs    (each part of the body apart, too)"
-        ),
-    )
+    parser = add_command(commands, "synth", handler=_synth)
     parser.add_mesh_and_sensor()
     parser.add_map_output()
     parser.add_choice(
@@ -160,6 +137,24 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 
 def _synth(options: argparse.Namespace) -> None:
+    """Compute the Doppler that a radar would have measured of a moving mesh.
+
+    Counts the mesh's vertices by their velocity towards the sensor, frame by frame.
+    The camera is at 0,0,0 and looks along z; x is to its right and y down, in
+    metres. Positive velocity is approaching. Options that are not given come from
+    the preset. With --method fmcw the echoes of all triangles are summed to the signal
+    of a radar, and that is processed like a capture (more: sd2 simulate radar).
+
+      sd2 synth walk.npz --out map.npz
+      sd2 synth walk.npz --out left.npz --sensor -1,0,2
+      sd2 synth walk.sd2 --out map.npz    (mesh and sensor of a recording)
+      sd2 synth points.npz --out map.npz --visibility none --null-bins none
+      sd2 synth walk.npz --out map.npz --preset vid2doppler
+      sd2 synth walk.npz --out map.npz --tolerance 2%    (as quick as this allows)
+      sd2 synth walk.npz --out map.npz --method fmcw
+      sd2 synth walk.zarr --out map.npz --uncertainty    (of a mesh from sd2 fit)
+      sd2 synth walk.zarr --out map.npz --limbs    (each part of the body apart, too)
+    """
     from sd2core.cli.info.description import describe_map, show
     from sd2core.cli.reading import check_map_output, mesh_and_sensor
     from sd2core.doppler import Synthesizer

@@ -41,33 +41,7 @@ _SETTINGS = {
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``train``."""
-    parser = add_command(
-        commands,
-        "train",
-        "train a denoiser that turns synthetic Doppler into what a radar would show",
-        handler=_train,
-        description=(
-            "Learns from pairs of synthetic and radar Doppler of the same movement, as\n"
-            "`sd2 simulate campaign` and `sd2 pairs` make them. By default as in the paper:\n"
-            "segments of 72 frames that overlap by 10, batches of 64, 500 epochs, root mean\n"
-            "square error. Some people are kept out to choose the best epoch by, some for\n"
-            "`sd2 eval`.\n\n"
-            "RUN is a folder. It can be stopped with Ctrl-C or killed at any moment;\n"
-            "`sd2 train --resume RUN` goes on, with the result that it would have had. `sd2 runs`\n"
-            "shows runs and steers them. RUN/best.safetensors is the model.\n\n"
-            "All settings may stand in a TOML file (docs/formats.md); options go before it.\n"
-            "`--show-settings` prints them."
-        ),
-        examples=(
-            "  sd2 train campaign.zarr --out runs/s4\n"
-            "  sd2 train campaign.zarr --model gru --minutes 30 --out runs/gru\n"
-            "  sd2 train campaign.zarr --inputs limbs --out runs/limbs\n"
-            "  sd2 train campaign.zarr mars.zarr --test-subjects s6 --seed 1 --out runs/both\n"
-            "  sd2 train settings.toml --epochs 100 --out runs/short\n"
-            "  sd2 train --resume runs/s4\n"
-            "  sd2 train campaign.zarr --set channels=64 --set dropout=0.1 --show-settings"
-        ),
-    )
+    parser = add_command(commands, "train", handler=_train)
     parser.add_argument(
         "inputs",
         nargs="*",
@@ -213,6 +187,29 @@ def _option(text: str) -> tuple[str, Any]:
 
 
 def _train(options: argparse.Namespace) -> int:
+    """Train a denoiser that turns synthetic Doppler into what a radar would show.
+
+    Learns from pairs of synthetic and radar Doppler of the same movement, as
+    `sd2 simulate campaign` and `sd2 pairs` make them. By default as in the paper:
+    segments of 72 frames that overlap by 10, batches of 64, 500 epochs, root mean
+    square error. Some people are kept out to choose the best epoch by, some for
+    `sd2 eval`.
+
+    RUN is a folder. It can be stopped with Ctrl-C or killed at any moment;
+    `sd2 train --resume RUN` goes on, with the result that it would have had. `sd2 runs`
+    shows runs and steers them. RUN/best.safetensors is the model.
+
+    All settings may stand in a TOML file (docs/formats.md); options go before it.
+    `--show-settings` prints them.
+
+      sd2 train campaign.zarr --out runs/s4
+      sd2 train campaign.zarr --model gru --minutes 30 --out runs/gru
+      sd2 train campaign.zarr --inputs limbs --out runs/limbs
+      sd2 train campaign.zarr mars.zarr --test-subjects s6 --seed 1 --out runs/both
+      sd2 train settings.toml --epochs 100 --out runs/short
+      sd2 train --resume runs/s4
+      sd2 train campaign.zarr --set channels=64 --set dropout=0.1 --show-settings
+    """
     from sd2core.train.config import config_text
     from sd2core.train.start import begin, check, go_on
 

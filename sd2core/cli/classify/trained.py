@@ -141,23 +141,7 @@ def _say(found: Score, known: ClipSet, subjects: list[str], learnt: list[str]) -
 
 def add_apply(kinds: argparse._SubParsersAction) -> None:
     """Add ``apply``."""
-    parser = add_command(
-        kinds,
-        "apply",
-        "find gestures in a recording or a map",
-        handler=_apply,
-        description=(
-            "Computes the probability of each class in every frame, and spans of the frames in\n"
-            "which a gesture is the most probable class. The confidence of a span is the mean\n"
-            "probability of its class. The map must be on the velocity axis that the classifier\n"
-            "was trained on; another frame rate is resampled to the classifier's and back."
-        ),
-        examples=(
-            "  sd2 classify apply walk.sd2 --model gestures.safetensors\n"
-            "  sd2 classify apply walk.sd2 --of radar --model g.safetensors --out found.json\n"
-            "  sd2 classify apply map.npz --model g.safetensors --probabilities p.npz"
-        ),
-    )
+    parser = add_command(kinds, "apply", handler=_apply)
     add_searched_map(parser, MAP_NAMES)
     _add_model(parser)
     parser.add_value(
@@ -178,6 +162,17 @@ def add_apply(kinds: argparse._SubParsersAction) -> None:
 
 
 def _apply(options: argparse.Namespace) -> None:
+    """Find gestures in a recording or a map.
+
+    Computes the probability of each class in every frame, and spans of the frames in
+    which a gesture is the most probable class. The confidence of a span is the mean
+    probability of its class. The map must be on the velocity axis that the classifier
+    was trained on; another frame rate is resampled to the classifier's and back.
+
+      sd2 classify apply walk.sd2 --model gestures.safetensors
+      sd2 classify apply walk.sd2 --of radar --model g.safetensors --out found.json
+      sd2 classify apply map.npz --model g.safetensors --probabilities p.npz
+    """
     from sd2core.classify.files import describe_classifier, load_classifier
     from sd2core.classify.spans import SpanOptions, predicted_spans
     from sd2core.cli.reading import check_output

@@ -45,36 +45,11 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         ),
     )
     kinds = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    show = add_command(
-        kinds,
-        "show",
-        "print labels with their number and durations",
-        handler=_show,
-        description=(
-            "FILE is a labels.json, a recording, the .h5 of a K60168A, or a file of ELAN, Praat,\n"
-            "BORIS, Audacity, MNE-Python or a table (.csv, .tsv). With frame times the frames of\n"
-            "each span are printed as well: half-open, the second is the first one after it."
-        ),
-        examples="  sd2 labels show walk.sd2\n  sd2 labels show walk.eaf --video walk.mp4 --json",
-    )
+    show = add_command(kinds, "show", handler=_show)
     add_labels(show)
     show.add_json()
 
-    convert = add_command(
-        kinds,
-        "convert",
-        "write labels as another program reads them",
-        handler=_convert,
-        description=(
-            "The suffix of --out says which program: .json for SD² Studio, .csv, .tsv, .eaf,\n"
-            ".TextGrid, .boris; a .txt needs --to. Prints what the file could not hold."
-        ),
-        examples=(
-            "  sd2 labels convert walk.sd2 --out walk.eaf\n"
-            "  sd2 labels convert labels.json --out labels.txt --to audacity --fps 30\n"
-            "  sd2 labels convert walk.eaf --out labels.json"
-        ),
-    )
+    convert = add_command(kinds, "convert", handler=_convert)
     add_labels(convert)
     convert.add_output("FILE", "the file to write")
     convert.add_value("--to", str, "NAME", "the format of --out, likewise")
@@ -91,6 +66,15 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 
 def _show(options: argparse.Namespace) -> None:
+    """Print labels with their number and durations.
+
+    FILE is a labels.json, a recording, the .h5 of a K60168A, or a file of ELAN, Praat,
+    BORIS, Audacity, MNE-Python or a table (.csv, .tsv). With frame times the frames of
+    each span are printed as well: half-open, the second is the first one after it.
+
+      sd2 labels show walk.sd2
+      sd2 labels show walk.eaf --video walk.mp4 --json
+    """
     labels, clock = read_named(options)
     if options.json:
         print_json(_described(labels, clock))
@@ -118,6 +102,15 @@ def _show(options: argparse.Namespace) -> None:
 
 
 def _convert(options: argparse.Namespace) -> None:
+    """Write labels as another program reads them.
+
+    The suffix of --out says which program: .json for SD² Studio, .csv, .tsv, .eaf,
+    .TextGrid, .boris; a .txt needs --to. Prints what the file could not hold.
+
+      sd2 labels convert walk.sd2 --out walk.eaf
+      sd2 labels convert labels.json --out labels.txt --to audacity --fps 30
+      sd2 labels convert walk.eaf --out labels.json
+    """
     there = check_label_output(options.out, replace=options.replace)
     labels, clock = read_named(options)
     lost = write(options.out, labels, clock, options.to, over=there)
@@ -141,20 +134,7 @@ def _described(labels: Labels, clock: Timebase | None) -> dict[str, Any]:
 
 
 def _add_statistics(kinds: argparse._SubParsersAction) -> None:
-    parser = add_command(
-        kinds,
-        "statistics",
-        "count the spans of every label and print their durations",
-        handler=_statistics,
-        description=(
-            "Durations per label, and with frame times the share of the recording that its spans\n"
-            "cover; overlapping spans count once."
-        ),
-        examples=(
-            "  sd2 labels statistics walk.sd2\n"
-            "  sd2 labels statistics walk.eaf --video walk.mp4 --csv"
-        ),
-    )
+    parser = add_command(kinds, "statistics", handler=_statistics)
     add_labels(parser)
     form = parser.add_mutually_exclusive_group()
     form.add_flag("--csv", "print comma-separated values")
@@ -162,6 +142,14 @@ def _add_statistics(kinds: argparse._SubParsersAction) -> None:
 
 
 def _statistics(options: argparse.Namespace) -> None:
+    """Count the spans of every label and print their durations.
+
+    Durations per label, and with frame times the share of the recording that its spans
+    cover; overlapping spans count once.
+
+      sd2 labels statistics walk.sd2
+      sd2 labels statistics walk.eaf --video walk.mp4 --csv
+    """
     from sd2core.labels.statistics import statistics_rows, statistics_text
 
     labels, clock = read_named(options)

@@ -18,20 +18,7 @@ if TYPE_CHECKING:
 
 def add_agree(kinds: argparse._SubParsersAction) -> None:
     """Add ``agree``."""
-    parser = add_command(
-        kinds,
-        "agree",
-        "compare the labels of two people",
-        handler=_agree,
-        description=(
-            "Frame by frame by Cohen's kappa (1 is agreement, 0 is chance), span by span by\n"
-            "one-to-one matches. Differences of edges are B's less A's: positive is later."
-        ),
-        examples=(
-            "  sd2 labels agree anna.json ben.json --video walk.mp4\n"
-            "  sd2 labels agree walk.sd2 ben.eaf --min-iou 0.3 --track Gestures"
-        ),
-    )
+    parser = add_command(kinds, "agree", handler=_agree)
     parser.add_value("a", Path, "A", "labels of one person")
     parser.add_value("b", Path, "B", "labels of the other")
     parser.add_value(
@@ -43,6 +30,14 @@ def add_agree(kinds: argparse._SubParsersAction) -> None:
 
 
 def _agree(options: argparse.Namespace) -> None:
+    """Compare the labels of two people.
+
+    Frame by frame by Cohen's kappa (1 is agreement, 0 is chance), span by span by
+    one-to-one matches. Differences of edges are B's less A's: positive is later.
+
+      sd2 labels agree anna.json ben.json --video walk.mp4
+      sd2 labels agree walk.sd2 ben.eaf --min-iou 0.3 --track Gestures
+    """
     from sd2core.labels.agreement import agreement
 
     clock = clock_of(options, options.a, options.b)

@@ -28,22 +28,7 @@ _USUAL = "usual"
 
 def add_set(kinds: argparse._SubParsersAction) -> None:
     """Add ``set``."""
-    parser = add_command(
-        kinds,
-        "set",
-        "show, share or exchange a label set",
-        handler=_set,
-        description=(
-            "Prints the labels with key, colour, class for the classifier and how many spans have\n"
-            "them, and labels whose colours look alike. With --use spans keep their labels, also\n"
-            "those that the other set does not have."
-        ),
-        examples=(
-            "  sd2 labels set walk.sd2\n"
-            "  sd2 labels set walk.sd2 --export gestures.json\n"
-            "  sd2 labels set walk.sd2 --use gestures.json --out labels.json"
-        ),
-    )
+    parser = add_command(kinds, "set", handler=_set)
     add_labels(parser)
     parser.add_value("--export", Path, "FILE.json", "write the set by itself")
     parser.add_value("--use", str, "FILE.json", f"another set; {_USUAL!r} is the program's own")
@@ -53,6 +38,16 @@ def add_set(kinds: argparse._SubParsersAction) -> None:
 
 
 def _set(options: argparse.Namespace) -> None:
+    """Show, share or exchange a label set.
+
+    Prints the labels with key, colour, class for the classifier and how many spans have
+    them, and labels whose colours look alike. With --use spans keep their labels, also
+    those that the other set does not have.
+
+      sd2 labels set walk.sd2
+      sd2 labels set walk.sd2 --export gestures.json
+      sd2 labels set walk.sd2 --use gestures.json --out labels.json
+    """
     from sd2core.labels import files
     from sd2core.labels.field_edits import set_label_set
 

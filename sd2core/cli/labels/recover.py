@@ -19,17 +19,7 @@ if TYPE_CHECKING:
 
 def add_recover(kinds: argparse._SubParsersAction) -> None:
     """Add ``recover``."""
-    parser = add_command(
-        kinds,
-        "recover",
-        "list labels that were not saved when a window ended, or write them to a file",
-        handler=_recover,
-        description=(
-            "Opening the recording in the window offers them as well. Nothing is deleted here,\n"
-            "and what a window edits now is not listed."
-        ),
-        examples=("  sd2 labels recover\n  sd2 labels recover walk.sd2 --out found.json"),
-    )
+    parser = add_command(kinds, "recover", handler=_recover)
     parser.add_value(
         "recording",
         Path,
@@ -43,6 +33,14 @@ def add_recover(kinds: argparse._SubParsersAction) -> None:
 
 
 def _recover(options: argparse.Namespace) -> None:
+    """List labels that were not saved when a window ended, or write them to a file.
+
+    Opening the recording in the window offers them as well. Nothing is deleted here,
+    and what a window edits now is not listed.
+
+      sd2 labels recover
+      sd2 labels recover walk.sd2 --out found.json
+    """
     from sd2core.labels.recovery import offers_in, recovery_folder
 
     if options.out is not None and options.recording is None:

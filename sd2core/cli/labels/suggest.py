@@ -39,24 +39,7 @@ _HELP = {
 
 def add_suggest(kinds: argparse._SubParsersAction) -> None:
     """Add ``suggest``."""
-    parser = add_command(
-        kinds,
-        "suggest",
-        "find spans in which something moves",
-        handler=_suggest,
-        description=(
-            "Measures the energy of every frame of a Doppler map over the map's own quiet level.\n"
-            "It finds motion, not gestures: raising an arm is suggested as well. The confidence\n"
-            "is how far the high threshold could be raised before the span was lost, 1 from\n"
-            "20 dB on; it is no probability. At least a quarter of the recording must be quiet."
-        ),
-        examples=(
-            "  sd2 labels suggest map.npz\n"
-            "  sd2 labels suggest walk.sd2 --out suggested.json\n"
-            "  sd2 labels suggest walk.sd2 --of radar --out suggested.eaf\n"
-            "  sd2 labels suggest swing.h5 --margin-s 0.1 --out suggested.csv"
-        ),
-    )
+    parser = add_command(kinds, "suggest", handler=_suggest)
     add_searched_map(parser, ("synthetic", "radar"))
     for name, (metavar, text) in _HELP.items():
         parser.add_value(flag(name), not_negative_float, metavar, text)
@@ -77,6 +60,18 @@ def add_searched_map(parser: Options, kinds: tuple[MapName, ...]) -> None:
 
 
 def _suggest(options: argparse.Namespace) -> None:
+    """Find spans in which something moves.
+
+    Measures the energy of every frame of a Doppler map over the map's own quiet level.
+    It finds motion, not gestures: raising an arm is suggested as well. The confidence
+    is how far the high threshold could be raised before the span was lost, 1 from
+    20 dB on; it is no probability. At least a quarter of the recording must be quiet.
+
+      sd2 labels suggest map.npz
+      sd2 labels suggest walk.sd2 --out suggested.json
+      sd2 labels suggest walk.sd2 --of radar --out suggested.eaf
+      sd2 labels suggest swing.h5 --margin-s 0.1 --out suggested.csv
+    """
     from sd2core.labels.suggest import SuggestOptions, motion_energy_db, suggest_spans
 
     if options.out is not None:
