@@ -66,14 +66,11 @@ def export_dataset(folder: BatchFolder, export: Export) -> None:
     out = dataset_path(folder, export)
     note = folder.path / _NOTE
     options = DatasetOptions(
-        kinds=export.kinds,
         length=export.segment_frames,
         overlap=export.overlap_frames,
-        frame_rate_hz=export.frame_rate_hz,
         validation=export.validation_subjects,
         test=export.test_subjects,
-        limbs=export.limbs,
-        title=export.title,
+        **export.model_dump(include={"kinds", "frame_rate_hz", "limbs", "title"}),
     )
     settings = key_of("export", {"settings": export.model_dump(mode="json")})
     if _noted(folder).get("settings") != settings or _is_stale(out, folder, export):

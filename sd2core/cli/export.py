@@ -219,13 +219,9 @@ def _dataset_options(options: argparse.Namespace) -> DatasetOptions:
         overlap=options.overlap_frames,
         frame_rate_hz=options.rate,
         null_bins=options.null_bins,
-        label_rule=options.label_rule,
-        min_share=options.min_share,
         validation=options.validation_subjects,
         test=options.test_subjects,
-        limbs=options.limbs,
-        imu=options.imu,
-        title=options.title,
+        **picked(options, "label_rule", "min_share", "limbs", "imu", "title"),
         provenance={"command": shlex.join(["sd2", *sys.argv[1:]])},
     )
 
@@ -246,9 +242,7 @@ def _making(options: argparse.Namespace) -> Making:
         if options.placements in (None, "planned")
         else read_placements(Path(options.placements)),
         simulation=None if options.simulate is None else Simulation(named_radar(options.simulate)),
-        model=options.model,
-        limbs=options.limbs,
-        imu=options.imu,
+        **picked(options, "model", "limbs", "imu"),
     )
 
 

@@ -187,12 +187,9 @@ def _choices(options: argparse.Namespace) -> FitChoices:
         person = Rectangle(x, y, width, height, options.person_frame or 0)
     return FitChoices(
         person=person,
-        focal_px=options.focal_px,
         field_of_view_deg=options.field_of_view,
-        stature_m=options.stature_m,
         max_gap_s=DEFAULT_MAX_GAP_S if options.max_gap_s is None else options.max_gap_s,
-        resolution=options.resolution,
-        landmark_model=options.landmark_model,
+        **picked(options, "focal_px", "stature_m", "resolution", "landmark_model"),
     )
 
 

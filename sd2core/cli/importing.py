@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from sd2core.cli.options import add_command, finite_float, flag, given
-from sd2core.cli.output import print_json, progress_bar
+from sd2core.cli.output import picked, print_json, progress_bar
 from sd2core.errors import Sd2Error
 
 
@@ -82,17 +82,11 @@ def _import(options: argparse.Namespace) -> None:
     refuse_unused_mesh_options(options, options.out, options.mesh, but=("focal_px",))
     recording = Recording(
         options.out,
-        video=options.video,
-        mesh=options.mesh,
-        faces=options.faces,
-        radar=options.radar,
         mesh_reading=mesh_reading(options),
-        radar_offset_s=options.radar_offset_s,
         radar_receiver=options.receiver,
         radar_transmitter=options.transmitter,
-        imu=options.imu,
-        imu_offset_s=options.imu_offset_s,
-        title=options.title,
+        **picked(options, "video", "mesh", "faces", "radar", "imu", "title"),
+        **picked(options, "radar_offset_s", "imu_offset_s"),
     )
     chosen = given(options, ("receiver", "transmitter"))
     if chosen and (recording.radar is None or recording.holds_radar_map):

@@ -19,19 +19,22 @@ def add_command(
     summary: str = "",
     *,
     handler: Callable[[argparse.Namespace], int | None] | None = None,
+    about: Callable[..., Any] | None = None,
     description: str = "",
     examples: str = "",
 ) -> CommandParser:
     """Add a subcommand with its help.
 
-    Without a summary the docstring of the handler is the help: a summary, a description, and
-    examples from the first indented ``sd2`` on.
+    Without a summary the docstring of the handler, or of what is given in its place (``about``),
+    is the help: a summary, a description, and examples from the first line on that begins with
+    ``sd2``.
     """
     if not summary:
-        told, start, rest = (inspect.getdoc(handler) or name).partition("\n  sd2 ")
-        summary, _, description = told.partition("\n\n")
+        text, *lines = re.split(r"\n+ *(?=sd2 )", inspect.getdoc(about or handler) or f"{name}.")
+        examples = "\n".join(f"  {line}" for line in lines)
+        summary, _, own = text.partition("\n\n")
         summary = f"{summary[0].lower()}{summary[1:].removesuffix('.')}"
-        examples = f"{start}{rest}".removeprefix("\n")
+        description = "\n\n".join(filter(None, (description, own)))
     text = f"{summary[0].upper()}{summary[1:]}."
     parser: CommandParser = commands.add_parser(
         name,

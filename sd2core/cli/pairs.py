@@ -17,10 +17,8 @@ if TYPE_CHECKING:
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
-    """Add ``pairs``."""
-    parser = add_command(
-        commands, "pairs", "make pairs of synthetic and real Doppler to learn from"
-    )
+    """Make pairs of synthetic and real Doppler to learn from."""
+    parser = add_command(commands, "pairs", about=add_commands)
     kinds = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     _add_mars(kinds)
     _add_recordings(kinds)

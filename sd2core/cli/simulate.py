@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 
 from sd2core.cli.command_parser import Options
 from sd2core.cli.options import add_command, finite_float, position, positive_float, positive_int
-from sd2core.cli.output import print_json, progress_bar
+from sd2core.cli.output import picked, print_json, progress_bar
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
@@ -23,16 +23,12 @@ if TYPE_CHECKING:
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
-    """Add ``simulate`` with what it makes."""
-    parser = add_command(
-        commands,
-        "simulate",
-        "make radar samples of any mesh, or pairs of simulated people to train on",
-        examples=(
-            "  sd2 simulate radar walk.npz --out walk-radar\n"
-            "  sd2 simulate campaign --out campaign.zarr"
-        ),
-    )
+    """Make radar samples of any mesh, or pairs of simulated people to train on.
+
+    sd2 simulate radar walk.npz --out walk-radar
+    sd2 simulate campaign --out campaign.zarr
+    """
+    parser = add_command(commands, "simulate", about=add_commands)
     kinds = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     _add_radar(kinds)
     _add_campaign(kinds)
@@ -195,12 +191,10 @@ def _radar(options: argparse.Namespace) -> None:
         mirror = Mirror.wall(*options.wall)
     wave = WaveOptions(
         model=options.method,
-        blocks=options.blocks,
         coherent=not options.incoherent,
-        motion=options.motion,
         receiver_offsets_m=offsets,
-        beam_width_deg=options.beam_width_deg,
         mirror=mirror,
+        **picked(options, "blocks", "motion", "beam_width_deg"),
     )
     mesh, sensor = mesh_and_sensor(options)
     capture = simulate_with_bar(

@@ -24,27 +24,7 @@ if TYPE_CHECKING:
 
 def add_table(kinds: argparse._SubParsersAction) -> None:
     """Add ``table``."""
-    parser = add_command(
-        kinds,
-        "table",
-        "compare trainings with and without synthetic data",
-        handler=_table,
-        description=(
-            f"{DATA_HELP}\n\n"
-            "Trains on the radar's maps alone, and with synthetic maps of other movements added\n"
-            "(0.4 frames for each real one), denoised or not, seen from the radar's own place or\n"
-            "from others too; then with less and less of the real data. Everything is evaluated\n"
-            "on the radar's maps of people not trained on, other ones for each seed. With one\n"
-            "person, movements are kept apart instead.\n\n"
-            "OUT gets table.md, table.json, confusion.png and curve.png, and a small file for\n"
-            "every training: run again, only the missing ones are trained."
-        ),
-        examples=(
-            "  sd2 classify table campaign.zarr --out tables\n"
-            "  sd2 classify table campaign.zarr --out tables --quick\n"
-            "  sd2 classify table anna=a.sd2 ben=b.sd2 --out own --seeds 2"
-        ),
-    )
+    parser = add_command(kinds, "table", handler=_table, description=DATA_HELP)
     add_sources(parser)
     parser.add_output("FOLDER", "the tables, figures and models to write")
     parser.add_value("--seeds", positive_int, "N", "number of repetitions (default: 5; quick: 2)")
@@ -72,6 +52,21 @@ def _shares(text: str) -> tuple[float, ...]:
 
 
 def _table(options: argparse.Namespace) -> None:
+    """Compare trainings with and without synthetic data.
+
+    Trains on the radar's maps alone, and with synthetic maps of other movements added
+    (0.4 frames for each real one), denoised or not, seen from the radar's own place or
+    from others too; then with less and less of the real data. Everything is evaluated
+    on the radar's maps of people not trained on, other ones for each seed. With one
+    person, movements are kept apart instead.
+
+    OUT gets table.md, table.json, confusion.png and curve.png, and a small file for
+    every training: run again, only the missing ones are trained.
+
+      sd2 classify table campaign.zarr --out tables
+      sd2 classify table campaign.zarr --out tables --quick
+      sd2 classify table anna=a.sd2 ben=b.sd2 --out own --seeds 2
+    """
     from sd2core.classify.comparison import make_table
     from sd2core.classify.comparison_report import as_json, as_text
 

@@ -30,23 +30,7 @@ if TYPE_CHECKING:
 
 def add_train(kinds: argparse._SubParsersAction) -> None:
     """Add ``train``."""
-    parser = add_command(
-        kinds,
-        "train",
-        "train a classifier on labelled maps",
-        handler=_train,
-        description=(
-            f"{DATA_HELP}\n\n"
-            "Some people are kept out for validation, some for `sd2 classify eval`.\n"
-            "Ctrl-C ends the training early; the best so far is kept. The file\n"
-            "FILE.json beside it describes the training."
-        ),
-        examples=(
-            "  sd2 classify train campaign.zarr --out gestures.safetensors\n"
-            "  sd2 classify train set.zarr --maps radar,denoised --out both.safetensors\n"
-            "  sd2 classify train anna=a.sd2 anna=b.sd2 ben=c.sd2 --model s4 --out own.safetensors"
-        ),
-    )
+    parser = add_command(kinds, "train", handler=_train, description=DATA_HELP)
     add_data(parser)
     parser.add_output("FILE.safetensors", "the classifier to write")
     add_network(parser)
@@ -105,6 +89,16 @@ def network_of(options: argparse.Namespace) -> Network:
 
 
 def _train(options: argparse.Namespace) -> int:
+    """Train a classifier on labelled maps.
+
+    Some people are kept out for validation, some for `sd2 classify eval`.
+    Ctrl-C ends the training early; the best so far is kept. The file
+    FILE.json beside it describes the training.
+
+      sd2 classify train campaign.zarr --out gestures.safetensors
+      sd2 classify train set.zarr --maps radar,denoised --out both.safetensors
+      sd2 classify train anna=a.sd2 anna=b.sd2 ben=c.sd2 --model s4 --out own.safetensors
+    """
     from sd2core.cli.reading import check_output
 
     check_output(options.out, ".safetensors")

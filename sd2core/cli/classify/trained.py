@@ -43,28 +43,22 @@ def _add_model(parser: Options) -> None:
 
 def add_eval(kinds: argparse._SubParsersAction) -> None:
     """Add ``eval``."""
-    parser = add_command(
-        kinds,
-        "eval",
-        "evaluate a classifier on people it was not trained on",
-        handler=_eval,
-        description=(
-            f"{DATA_HELP}\n\n"
-            "Prints the confusion matrices of frames and of whole gestures, and the latency of a\n"
-            "recognised gesture. Uses the people that the training kept for the test, or those\n"
-            "that are named."
-        ),
-        examples=(
-            "  sd2 classify eval campaign.zarr --model gestures.safetensors\n"
-            "  sd2 classify eval own.sd2 --model g.safetensors --subjects all --figure matrix.png"
-        ),
-    )
+    parser = add_command(kinds, "eval", handler=_eval, description=DATA_HELP)
     add_data(parser)
     _add_model(parser)
     add_judging(parser, "those the training kept for the test", "both matrices")
 
 
 def _eval(options: argparse.Namespace) -> None:
+    """Evaluate a classifier on people it was not trained on.
+
+    Prints the confusion matrices of frames and of whole gestures, and the latency of a
+    recognised gesture. Uses the people that the training kept for the test, or those
+    that are named.
+
+      sd2 classify eval campaign.zarr --model gestures.safetensors
+      sd2 classify eval own.sd2 --model g.safetensors --subjects all --figure matrix.png
+    """
     from sd2core.classify.files import load_classifier
     from sd2core.classify.live import judge
     from sd2core.files.figure_files import check_figure, save_figure

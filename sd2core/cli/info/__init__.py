@@ -21,13 +21,7 @@ from sd2core.cli.options import add_command
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``info``."""
-    parser = add_command(
-        commands,
-        "info",
-        "what is in a recording, video, mesh, radar or IMU file, map, pairs, data set or model",
-        handler=_info,
-        examples="  sd2 info walk.sd2\n  sd2 info walk.npz --json\n  sd2 info walk.zarr --verify",
-    )
+    parser = add_command(commands, "info", handler=_info)
     parser.add_value("path", Path, "PATH", "what to describe")
     parser.add_flag(
         "--verify", "read every chunk and compare it with its checksum; what is damaged is named"
@@ -37,6 +31,12 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 
 def _info(options: argparse.Namespace) -> None:
+    """What is in a recording, video, mesh, radar or IMU file, map, pairs, data set or model.
+
+    sd2 info walk.sd2
+    sd2 info walk.npz --json
+    sd2 info walk.zarr --verify
+    """
     if not options.verify:
         show(describe(options.path, options), as_json=options.json)
         return

@@ -29,21 +29,17 @@ if TYPE_CHECKING:
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
-    """Add ``labels`` and its commands."""
-    parser = add_command(
-        commands,
-        "labels",
-        "show, count, convert, suggest, compare, draw and cut out labelled spans",
-        examples=(
-            "  sd2 labels show walk.sd2\n"
-            "  sd2 labels statistics walk.sd2 --csv\n"
-            "  sd2 labels convert walk.sd2 --out walk.eaf\n"
-            "  sd2 labels suggest walk.sd2 --out suggested.json\n"
-            "  sd2 labels agree anna.json ben.json --video walk.mp4\n"
-            "  sd2 labels figure walk.sd2 --out walk.pdf\n"
-            "  sd2 labels cut walk.sd2 --out cuts"
-        ),
-    )
+    """Show, count, convert, suggest, compare, draw and cut out labelled spans.
+
+    sd2 labels show walk.sd2
+    sd2 labels statistics walk.sd2 --csv
+    sd2 labels convert walk.sd2 --out walk.eaf
+    sd2 labels suggest walk.sd2 --out suggested.json
+    sd2 labels agree anna.json ben.json --video walk.mp4
+    sd2 labels figure walk.sd2 --out walk.pdf
+    sd2 labels cut walk.sd2 --out cuts
+    """
+    parser = add_command(commands, "labels", about=add_commands)
     kinds = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     show = add_command(kinds, "show", handler=_show)
     add_labels(show)
