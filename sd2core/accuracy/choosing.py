@@ -330,10 +330,7 @@ def check_wish(tolerance: float | None, budget_ms: float | None = None) -> None:
 def _by_tolerance(
     survey: Survey, tolerance: float, tried: dict[AccuracyPlan, Errors], progress: Progress
 ) -> tuple[AccuracyPlan, bool, Errors]:
-    """Cheapest tried plan that holds, else the one with the smallest error.
-
-    The errors of what was tried are put into ``tried``.
-    """
+    """Cheapest plan that holds, else the one of smallest error; ``tried`` gets all errors."""
     plans = sorted(_candidates(survey, tolerance), key=lambda plan: _dearness(survey, plan))
     forecast = {plan: survey.forecast_error(plan) for plan in plans}
     safe = [plan for plan in plans if forecast[plan] <= tolerance]

@@ -156,11 +156,7 @@ def _sources(folder: BatchFolder, export: Export) -> Iterator[LazySource]:
 
 
 def _parts(frames: int, export: Export) -> list[tuple[int, int]]:
-    """Return the ranges of frames that are cut into segments together.
-
-    Segments begin every so many frames. Parts begin with one of them and end with another,
-    so that a long recording gives the segments that it would give as a whole.
-    """
+    """Ranges of frames to cut, which give the segments that the recording gives as a whole."""
     step = export.segment_frames - export.overlap_frames
     length = max(LONGEST_FRAMES // step, 1) * step
     starts = range(0, max(frames - export.overlap_frames, 1), length)

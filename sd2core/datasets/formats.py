@@ -191,10 +191,7 @@ def _write_hdf5(
 
 @contextmanager
 def _file_in_place_of(path: Path) -> Iterator[Path]:
-    """Give a temporary path that replaces ``path`` when the block succeeds.
-
-    HDF5 writes to a file of its own, not to an open stream.
-    """
+    """Path that replaces ``path`` in the end: HDF5 writes to a file of its own, not a stream."""
     import os
 
     made = path.with_name(f".sd2-{os.getpid()}-{path.name}")

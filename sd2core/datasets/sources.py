@@ -24,7 +24,6 @@ from sd2core.errors import Sd2Error
 from sd2core.files.digests import cached_digest
 from sd2core.io.kinds import kind_of
 from sd2core.io.radar import holds_map, load_recorded_map
-from sd2core.labels.files import read_labels as read_own
 from sd2core.labels.formats import read_labels
 from sd2core.labels.label_set import GESTURES
 from sd2core.labels.spans import Labels
@@ -155,11 +154,7 @@ def _read_map(path: Path, label_file: Path | None) -> tuple[DopplerMap, Labels]:
     else:
         doppler = DopplerMap.load(path)
     if label_file is not None:
-        labels = (
-            read_own(label_file).labels
-            if label_file.suffix.lower() == ".json"
-            else read_labels(label_file, doppler.timebase)
-        )
+        labels = read_labels(label_file, doppler.timebase)
     return doppler, labels
 
 

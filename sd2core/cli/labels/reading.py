@@ -59,7 +59,6 @@ def labels_at(
 ) -> Labels:
     """Read labels of a ``labels.json``, a recording, a radar file or another program's file."""
     from sd2core.io.radar import holds_map, load_recorded_map
-    from sd2core.labels import files
     from sd2core.labels.formats import read_labels
     from sd2core.recording.recording import is_recording, open_recording
 
@@ -71,8 +70,6 @@ def labels_at(
         return open_recording(path).effective_labels()
     if holds_map(path):
         return load_recorded_map(path).labels
-    if path.suffix.lower() == ".json":
-        return files.read_labels(path).labels
     return read_labels(path, timebase, observation=observation)
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from sd2core.errors import Sd2Error
 from sd2core.files.hdf5_files import member_of, open_hdf5_file, refusing_damage
 from sd2core.files.limits import check_regular
+from sd2core.files.numpy_files import open_npy_file
 from sd2core.io.radar.sigmf import DATA, META, read_sigmf_meta
 
 HDF5_SUFFIXES = (".h5", ".hdf5")
@@ -41,15 +42,8 @@ def open_stored(path: Path, dataset: str | None) -> StoredArray:
 
 
 def _numpy(path: Path) -> StoredArray:
-    try:
-        array = np.load(path, mmap_mode="r", allow_pickle=False)
-        return StoredArray(array.shape, array.dtype, array.__getitem__)
-    except Exception as error:  # a damaged header fails in many ways
-        raise Sd2Error(
-            f"{path} ({path.stat().st_size} bytes) cannot be read as an array ({error})",
-            "a whole .npy of numbers",
-            "It may be cut off: copy it again",
-        ) from error
+    array = open_npy_file(path, "a whole .npy of numbers", "It may be cut off: copy it again")
+    return StoredArray(array.shape, array.dtype, array.__getitem__)
 
 
 def _hdf5(path: Path, dataset: str | None) -> StoredArray:
