@@ -44,20 +44,23 @@ class Options(argparse._ActionsContainer):
         kind: Callable[[str], Any],
         metavar: str,
         text: str,
-        default: float | None = None,
-        nargs: str | None = None,
+        default: Any = None,
+        **more: Any,
     ) -> None:
-        """Add an option or an argument with a value; a default is said after the text."""
-        if default is not None:
+        """Add an option or an argument with a value.
+
+        A number as default is said after the text, unless the text speaks of a default. ``more``
+        is for argparse.
+        """
+        if isinstance(default, int | float) and "(default" not in text:
             text = f"{text} (default: {default:g})"
-        about: dict[str, Any] = {"metavar": metavar, "default": default, "help": text}
-        self.add_argument(name, type=kind, nargs=nargs, **about)
+        self.add_argument(name, type=kind, metavar=metavar, default=default, help=text, **more)
 
     def add_choice(
         self, name: str, choices: Iterable[Any], text: str, default: str | None = None
     ) -> None:
-        """Add an option with one of some values; a default is said after the text."""
-        if default is not None:
+        """Add an option with one of some values; a default is said as by :meth:`add_value`."""
+        if default is not None and "default)" not in text:
             text = f"{text} (default: {default})"
         self.add_argument(name, choices=choices, default=default, help=text)
 

@@ -30,15 +30,9 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     parser.add_value(
         "--sensor", position, "X,Y,Z", "where the radar is, in metres (default: at the camera)"
     )
-    parser.add_argument(
-        "--align",
-        choices=("none", "root"),
-        default="none",
-        help=(
-            "measure joint distances where they are (default), or from the pelvis; velocities"
-            " and maps are never aligned"
-        ),
-    )
+    text = "measure joint distances where they are (default), or from the pelvis; velocities"
+    text += " and maps are never aligned"
+    parser.add_choice("--align", ("none", "root"), text, "none")
     parser.add_figure_output("maps and curves")
     parser.add_mesh_reading()
     parser.add_json()

@@ -18,26 +18,17 @@ if TYPE_CHECKING:
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``eval``."""
     parser = add_command(commands, "eval", handler=_eval)
-    parser.add_argument(
-        "models",
-        nargs="+",
-        metavar="MODEL",
-        help="a run, a model file, or the name of a model that is installed",
-    )
-    parser.add_argument(
-        "--data", type=Path, nargs="+", required=True, metavar="PAIRS", help="stores of pairs"
-    )
+    text = "a run, a model file, or the name of a model that is installed"
+    parser.add_value("models", str, "MODEL", text, nargs="+")
+    parser.add_value("--data", Path, "PAIRS", "stores of pairs", nargs="+", required=True)
     add_judging(parser, "those that the first model's run kept for the test, or all", "the errors")
     parser.add_value("--markdown", Path, "FILE.md", "write the tables")
 
 
 def add_judging(parser: Options, usual_subjects: str, drawn: str) -> None:
     """Add whom an evaluation judges on which maps, and the files of its result."""
-    parser.add_argument(
-        "--subjects",
-        metavar="LIST",
-        help=f"people to evaluate on, separated by commas, or `all` (default: {usual_subjects})",
-    )
+    text = f"people to evaluate on, separated by commas, or `all` (default: {usual_subjects})"
+    parser.add_value("--subjects", str, "LIST", text)
     parser.add_placements_used("evaluate on maps from", "first")
     parser.add_figure_output(drawn)
     parser.add_json()

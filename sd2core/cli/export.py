@@ -56,18 +56,11 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 def _add_content(parser: Options) -> None:
     group = parser.add_argument_group("segments")
-    group.add_argument(
-        "--kinds", default=_KINDS, metavar="LIST", help=f"some of {_KINDS} (default: all)"
-    )
+    group.add_value("--kinds", str, "LIST", f"some of {_KINDS} (default: all)", _KINDS)
     group.add_limbs()
-    group.add_argument(
-        "--imu",
-        type=name_list,
-        default=(),
-        metavar="LIST",
-        help="also keep what inertial sensors there would feel at every frame, e.g."
-        " left-wrist,right-wrist; places as for `sd2 imu`",
-    )
+    text = "also keep what inertial sensors there would feel at every frame, e.g."
+    text += " left-wrist,right-wrist; places as for `sd2 imu`"
+    group.add_value("--imu", name_list, "LIST", text, ())
     group.add_value("--segment-frames", positive_int, "N", "length of a segment", 72)
     group.add_value("--overlap-frames", int, "N", "frames that neighbours share", 10)
     group.add_value(
@@ -83,16 +76,9 @@ def _add_content(parser: Options) -> None:
         " with most frames, background included",
         "foreground",
     )
-    group.add_argument(
-        "--min-share",
-        type=share,
-        default=0.2,
-        metavar="SHARE",
-        help="least share of a segment for foreground (default: 20%%)",
-    )
-    group.add_argument(
-        "--title", default="", metavar="TEXT", help="title of the card and the sheet"
-    )
+    text = "least share of a segment for foreground (default: 20%%)"
+    group.add_value("--min-share", share, "SHARE", text, 0.2)
+    group.add_value("--title", str, "TEXT", "title of the card and the sheet", "")
     people = parser.add_argument_group("people")
     people.add_value(
         "--subjects",
@@ -106,42 +92,26 @@ def _add_content(parser: Options) -> None:
         " chosen by their names, so that adding people does not move others)",
         "kept out to test with, or none (default: likewise)",
     )
-    people.add_argument(
-        "--labels",
-        type=Path,
-        action="append",
-        default=[],
-        metavar="FILE",
-        help="labels of a Doppler map; once for each map, in their order",
-    )
+    text = "labels of a Doppler map; once for each map, in their order"
+    people.add_value("--labels", Path, "FILE", text, [], action="append")
 
 
 def _add_making(parser: Options) -> None:
     group = parser.add_argument_group("maps")
-    group.add_argument(
-        "--placements",
-        metavar="FILE|planned",
-        help="sensors around the body besides the recording's own, as `sd2 placements` writes"
-        " them, or those that each recording plans",
-    )
+    text = "sensors around the body besides the recording's own, as `sd2 placements` writes"
+    text += " them, or those that each recording plans"
+    group.add_value("--placements", str, "FILE|planned", text)
     group.add_value(
         "--tolerance",
         share,
         "SHARE",
         "make synthetic maps as fast as possible within this error, e.g. 2%% (default: exact)",
     )
-    group.add_argument(
-        "--simulate",
-        metavar="NAME|CONFIG.json",
-        help="simulate this radar (see sd2 simulate radar --help) at every place, which takes far"
-        " longer than everything else"
-        " (default: only the maps in radar files)",
-    )
-    group.add_argument(
-        "--model",
-        metavar="FILE|NAME",
-        help="the denoiser (default: that of each recording, or the bundled one)",
-    )
+    text = "simulate this radar (see sd2 simulate radar --help) at every place, which takes far"
+    text += " longer than everything else (default: only the maps in radar files)"
+    group.add_value("--simulate", str, "NAME|CONFIG.json", text)
+    text = "the denoiser (default: that of each recording, or the bundled one)"
+    group.add_value("--model", str, "FILE|NAME", text)
     group.add_count()
     group.add_axis()
     group.add_value(

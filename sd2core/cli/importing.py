@@ -40,9 +40,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         "time in the video, in seconds, of their first sample",
         0.0,
     )
-    parser.add_argument(
-        "--title", default="", metavar="TEXT", help="what to call it (default: its name)"
-    )
+    parser.add_value("--title", str, "TEXT", "what to call it (default: its name)", "")
     parser.add_flag("--copy", "copy the files into the recording")
     parser.add_json()
 

@@ -20,9 +20,8 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``imu``."""
     parser = add_command(commands, "imu", handler=_imu)
     parser.add_value("mesh", Path, "MESH", "a mesh, or a recording")
-    parser.add_argument(
-        "--at", required=True, metavar="PLACE|VERTEX", help="where on the body, or which vertex"
-    )
+    text = "where on the body, or which vertex"
+    parser.add_value("--at", str, "PLACE|VERTEX", text, required=True)
     parser.add_output("FILE", "the samples to write (.csv, .sto or .npz)")
     parser.add_value("--rate", positive_float, "HZ", "samples per second", 100.0)
     parser.add_value(
@@ -32,13 +31,8 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         "where the zero-phase low pass leaves half of the amplitude, in Hz (default: 6, or a"
         " fifth of the mesh's frame rate if that is lower)",
     )
-    parser.add_argument(
-        "--up",
-        type=vector,
-        default=(0.0, -1.0, 0.0),
-        metavar="X,Y,Z",
-        help="upwards in the mesh's frame (default: 0,-1,0, as for a camera held level)",
-    )
+    text = "upwards in the mesh's frame (default: 0,-1,0, as for a camera held level)"
+    parser.add_value("--up", vector, "X,Y,Z", text, (0.0, -1.0, 0.0))
     _add_errors(parser)
     parser.add_mesh_reading()
     parser.add_json()
@@ -51,13 +45,8 @@ def _add_errors(parser: Options) -> None:
         ("acc", "accelerometer", "m/s²"),
         ("gyr", "gyroscope", "rad/s"),
     ):
-        group.add_argument(
-            f"--{short}-bias",
-            type=vector,
-            default=(0.0, 0.0, 0.0),
-            metavar="X,Y,Z",
-            help=f"constant error of the {long}, in {unit}",
-        )
+        text = f"constant error of the {long}, in {unit}"
+        group.add_value(f"--{short}-bias", vector, "X,Y,Z", text, (0.0, 0.0, 0.0))
         group.add_argument(
             f"--{short}-noise",
             type=not_negative_float,

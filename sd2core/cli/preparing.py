@@ -31,13 +31,8 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         examples="  sd2 fetch-models\n  sd2 fetch-models --from mediapipe-0.10.21-….whl\n"
         "  sd2 fetch-models --from mediapipe-pose-0.5.1675469404.tgz",
     )
-    parser.add_argument(
-        "--from",
-        dest="source",
-        type=Path,
-        metavar="PATH",
-        help="the wheel or the npm archive, a model file out of one, or a folder with them",
-    )
+    text = "the wheel or the npm archive, a model file out of one, or a folder with them"
+    parser.add_value("--from", Path, "PATH", text, dest="source")
     parser.add_flag("--if-missing", "do nothing when they are there already")
 
 

@@ -24,11 +24,8 @@ MAP_NAMES: tuple[MapName, ...] = get_args(MapName)
 def add_labelled_recording(parser: Options) -> None:
     """Add a recording, which of its maps, and labels in place of its own."""
     parser.add_value("recording", Path, "RECORDING", "a recording (.sd2)")
-    parser.add_argument(
-        "--maps",
-        metavar="LIST",
-        help=f"some of {', '.join(MAP_NAMES)} (default: those of its mesh and its radar)",
-    )
+    text = f"some of {', '.join(MAP_NAMES)} (default: those of its mesh and its radar)"
+    parser.add_value("--maps", str, "LIST", text)
     parser.add_value("--labels", Path, "FILE", "other labels than the recording's own")
 
 

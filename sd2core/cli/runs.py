@@ -18,14 +18,8 @@ if TYPE_CHECKING:
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``runs``."""
     parser = add_command(commands, "runs", handler=_runs)
-    parser.add_argument(
-        "folder",
-        type=Path,
-        nargs="?",
-        default=Path(),
-        metavar="FOLDER",
-        help="a run, or a folder of runs (default: this one)",
-    )
+    text = "a run, or a folder of runs (default: this one)"
+    parser.add_value("folder", Path, "FOLDER", text, Path(), nargs="?")
     what = parser.add_mutually_exclusive_group()
     for word, about in (
         ("pause", "keep a checkpoint and wait"),

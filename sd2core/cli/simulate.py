@@ -110,13 +110,9 @@ def add_radar_choice(parser: Options) -> None:
     """Add ``--radar``."""
     from sd2core.radar_profiles import RADARS
 
-    parser.add_argument(
-        "--radar",
-        default="paper",
-        metavar="NAME|CONFIG.json",
-        help=f"a radar by its name ({', '.join(RADARS)}; docs/radar-files.md), or that of a"
-        " capture's config.json (default: paper)",
-    )
+    text = f"a radar by its name ({', '.join(RADARS)}; docs/radar-files.md), or that of a"
+    text += " capture's config.json (default: paper)"
+    parser.add_value("--radar", str, "NAME|CONFIG.json", text, "paper")
 
 
 def simulate_with_bar(
@@ -277,14 +273,9 @@ def _add_campaign(kinds: argparse._SubParsersAction) -> None:
         "FILE.json",
         "errors of fits to imitate (default: those measured of `sd2 fit`)",
     )
-    parser.add_argument(
-        "--fit-error-sizes",
-        type=_sizes,
-        default=(1.0, 1.0),
-        metavar="LEAST,MOST",
-        help="how many times as large as those errors are, drawn anew for every take; 0,0: meshes"
-        " without errors (default: 1,1)",
-    )
+    text = "how many times as large as those errors are, drawn anew for every take; 0,0: meshes"
+    text += " without errors (default: 1,1)"
+    parser.add_value("--fit-error-sizes", _sizes, "LEAST,MOST", text, (1.0, 1.0))
     parser.add_json()
 
 

@@ -23,20 +23,14 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     parser.add_value("paths", Path, "PATH", "a recording, or a video, a mesh, or both", nargs="+")
     parser.add_output("FILE", "the figure to write (.png, .svg or .pdf)")
     chosen = parser.add_mutually_exclusive_group()
-    chosen.add_argument(
-        "--frames",
-        metavar="LIST",
-        help="frames such as 0,15,30, or ranges FROM:TO:STEP such as 0:90:15, TO not included",
-    )
+    text = "frames such as 0,15,30, or ranges FROM:TO:STEP such as 0:90:15, TO not included"
+    chosen.add_value("--frames", str, "LIST", text)
     chosen.add_value(
         "--count", positive_int, "N", f"that many frames, spread evenly (default: {_DEFAULT_COUNT})"
     )
-    parser.add_argument(
-        "--rows",
-        metavar="LIST",
-        help="some of video, mesh and overlay (the mesh over the video), in this order"
-        " (default: video,mesh, as far as they are there)",
-    )
+    text = "some of video, mesh and overlay (the mesh over the video), in this order"
+    text += " (default: video,mesh, as far as they are there)"
+    parser.add_value("--rows", str, "LIST", text)
     parser.add_flag("--dots", "draw vertices instead of the surface")
     parser.add_choice(
         "--colour", ("velocity", "plain"), "what the colour of the mesh means", "velocity"

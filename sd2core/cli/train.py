@@ -42,13 +42,8 @@ _SETTINGS = {
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``train``."""
     parser = add_command(commands, "train", handler=_train)
-    parser.add_argument(
-        "inputs",
-        nargs="*",
-        type=Path,
-        metavar="CONFIG.toml|DATA",
-        help="a file with settings, or one or several stores of pairs, which are mixed",
-    )
+    text = "a file with settings, or one or several stores of pairs, which are mixed"
+    parser.add_value("inputs", Path, "CONFIG.toml|DATA", text, nargs="*")
     parser.add_output("RUN", "the folder of the run; new", required=False)
     parser.add_value("--resume", Path, "RUN", "go on with a run that was stopped or killed")
     parser.add_flag("--show-settings", "print all settings as TOML and train nothing")
@@ -70,14 +65,8 @@ def _add_learning(parser: Options) -> None:
         help="learn from the map, from that of each part of the body, or from how its joints move;"
         " the pairs must hold both (--limbs) (default: map)",
     )
-    group.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        type=_option,
-        metavar="NAME=VALUE",
-        help="an option of the model, e.g. channels=64; may be given several times",
-    )
+    text = "an option of the model, e.g. channels=64; may be given several times"
+    group.add_value("--set", _option, "NAME=VALUE", text, [], action="append")
     group.add_value("--epochs", positive_int, "N", "passes over all segments (default: 500)")
     group.add_value(
         "--minutes",

@@ -45,22 +45,15 @@ def source(text: str) -> LabelledSource:
 def add_data(parser: Options) -> None:
     """Add the options for data and the choice of their maps."""
     add_sources(parser)
-    parser.add_argument(
-        "--maps",
-        default="radar",
-        metavar="LIST",
-        help=f"some of {', '.join(MAP_NAMES)}, separated by commas (default: radar)",
-    )
+    text = f"some of {', '.join(MAP_NAMES)}, separated by commas (default: radar)"
+    parser.add_value("--maps", str, "LIST", text, "radar")
 
 
 def add_sources(parser: Options) -> None:
     """Add the options for data and the denoiser."""
     parser.add_value("data", source, "DATA", "labelled data, see above", nargs="+")
-    parser.add_argument(
-        "--denoiser",
-        metavar="FILE|NAME",
-        help="for denoised maps of pairs (default: the one that comes with SD² Studio)",
-    )
+    text = "for denoised maps of pairs (default: the one that comes with SD² Studio)"
+    parser.add_value("--denoiser", str, "FILE|NAME", text)
 
 
 def clips_of(

@@ -52,33 +52,15 @@ def add_train(kinds: argparse._SubParsersAction) -> None:
 def add_network(parser: Options) -> None:
     """Add model, features, width and delay."""
     group = parser.add_argument_group("network")
-    group.add_argument(
-        "--model",
-        choices=MODELS,
-        default=MODELS[0],
-        help=f"two LSTM layers (the paper's), or two S4 layers (default: {MODELS[0]})",
-    )
-    group.add_argument(
-        "--features",
-        choices=("columns", "peak"),
-        default="columns",
-        help="input per frame: whole columns (the default), or the strongest bin (the paper's)",
-    )
-    group.add_argument(
-        "--width",
-        type=positive_int,
-        default=WIDTH,
-        metavar="N",
-        help=f"units or channels of a layer (default: {WIDTH}; the paper's: 16)",
-    )
-    group.add_argument(
-        "--delay-s",
-        type=not_negative_float,
-        default=DELAY_S,
-        metavar="S",
-        help="classify a frame so much later, with the frames after it known (default:"
-        f" {DELAY_S:g}; the paper's: 0, at once)",
-    )
+    text = "two LSTM layers (the paper's), or two S4 layers"
+    group.add_choice("--model", MODELS, text, MODELS[0])
+    text = "input per frame: whole columns (the default), or the strongest bin (the paper's)"
+    group.add_choice("--features", ("columns", "peak"), text, "columns")
+    text = f"units or channels of a layer (default: {WIDTH}; the paper's: 16)"
+    group.add_value("--width", positive_int, "N", text, WIDTH)
+    text = "classify a frame so much later, with the frames after it known (default:"
+    text += f" {DELAY_S:g}; the paper's: 0, at once)"
+    group.add_value("--delay-s", not_negative_float, "S", text, DELAY_S)
 
 
 def network_of(options: argparse.Namespace) -> Network:

@@ -32,13 +32,8 @@ if TYPE_CHECKING:
 
 
 def _add_model(parser: Options) -> None:
-    parser.add_argument(
-        "--model",
-        type=Path,
-        required=True,
-        metavar="FILE",
-        help="classifier from `sd2 classify train`",
-    )
+    text = "classifier from `sd2 classify train`"
+    parser.add_value("--model", Path, "FILE", text, required=True)
 
 
 def add_eval(kinds: argparse._SubParsersAction) -> None:

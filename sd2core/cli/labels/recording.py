@@ -92,13 +92,9 @@ def add_cut(kinds: argparse._SubParsersAction) -> None:
     parser = add_command(kinds, "cut", handler=_cut)
     add_labelled_recording(parser)
     parser.add_output("FOLDER", "where to write a folder for each span")
-    parser.add_argument(
-        "--label", action="append", metavar="LABEL", help="only spans with this label; may be given"
-        " several times",
-    )  # fmt: skip
-    parser.add_argument(
-        "--parts", default=_PARTS, metavar="LIST", help=f"some of {_PARTS} (default: all)"
-    )
+    text = "only spans with this label; may be given several times"
+    parser.add_value("--label", str, "LABEL", text, action="append")
+    parser.add_value("--parts", str, "LIST", f"some of {_PARTS} (default: all)", _PARTS)
     parser.add_flag("--replace", "replace folders that hold something else")
     parser.add_json()
 

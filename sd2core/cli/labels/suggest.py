@@ -43,9 +43,8 @@ def add_suggest(kinds: argparse._SubParsersAction) -> None:
     add_searched_map(parser, ("synthetic", "radar"))
     for name, (metavar, text) in _HELP.items():
         parser.add_value(flag(name), not_negative_float, metavar, text)
-    parser.add_argument(
-        "--label", default="gesture", metavar="LABEL", help="label of the spans (default: gesture)"
-    )
+    text = "label of the spans (default: gesture)"
+    parser.add_value("--label", str, "LABEL", text, "gesture")
     parser.add_json()
 
 
