@@ -19,13 +19,14 @@ from sd2core.accuracy.plans import (
     visibility_plans,
 )
 from sd2core.accuracy.reasons import Chosen, SceneFacts, reasons_for, scene_facts
-from sd2core.accuracy.results import Choice, Errors, relative_l1
+from sd2core.accuracy.results import Choice, Errors
 from sd2core.accuracy.sample import take_sample
 from sd2core.accuracy.trial import Trial
 from sd2core.doppler.options import PRESETS, DepthResolution, SynthesisOptions, Visibility
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics.compiled import worker_count
+from sd2core.numerics.map_accuracy import relative_l1
 from sd2core.progress import Progress, silent
 from sd2core.sensor import VirtualSensor
 
