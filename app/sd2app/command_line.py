@@ -12,8 +12,11 @@ from pathlib import Path
 from sd2app.plain_imports import plain_imports
 from sd2app.system_libraries import explain_missing, missing_libraries
 from sd2core.cli import build_parser, run
+from sd2core.cli.command_parser import add_command
 from sd2core.cli.importing import copy_sample
-from sd2core.cli.options import add_command, add_json
+from sd2core.cli.options import (
+    add_json,
+)
 from sd2core.errors import Sd2Error
 
 _EXAMPLES = """\

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 from PySide6.QtCore import QByteArray, QSettings
 
@@ -14,25 +14,12 @@ _RECENT = 10
 DEFAULT_TOLERANCE = 0.05
 
 
-class Store(Protocol):
-    """Interface of a store of settings: QSettings, or one in memory."""
-
-    def value(self, key: str, default: Any = None, /) -> Any:
-        """Value stored under a key."""
-
-    def setValue(self, key: str, value: Any, /) -> None:
-        """Store a value."""
-
-
 class _Memory:
+    """Stands in for QSettings; nothing of it is kept."""
+
     def __init__(self) -> None:
         self._values: dict[str, Any] = {}
-
-    def value(self, key: str, default: Any = None, /) -> Any:
-        return self._values.get(key, default)
-
-    def setValue(self, key: str, value: Any, /) -> None:
-        self._values[key] = value
+        self.value, self.setValue = self._values.get, self._values.__setitem__
 
 
 class Settings:
@@ -43,8 +30,8 @@ class Settings:
         """Settings that start empty and are not kept."""
         return cls(_Memory())
 
-    def __init__(self, store: Store | None = None) -> None:
-        self._store: Store = store if store is not None else QSettings("SD2 Studio", "SD2 Studio")
+    def __init__(self, store: QSettings | _Memory | None = None) -> None:
+        self._store: Any = QSettings("SD2 Studio", "SD2 Studio") if store is None else store
 
     @property
     def recent(self) -> list[tuple[Path, ...]]:

@@ -19,13 +19,14 @@ from sd2core.accuracy.plans import (
     visibility_plans,
 )
 from sd2core.accuracy.reasons import Chosen, SceneFacts, reasons_for, scene_facts
-from sd2core.accuracy.results import Choice, Errors, relative_l1
+from sd2core.accuracy.results import Choice, Errors
 from sd2core.accuracy.sample import take_sample
 from sd2core.accuracy.trial import Trial
 from sd2core.doppler.options import PRESETS, DepthResolution, SynthesisOptions, Visibility
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics.compiled import worker_count
+from sd2core.numerics.map_accuracy import relative_l1
 from sd2core.progress import Progress, silent
 from sd2core.sensor import VirtualSensor
 
@@ -330,10 +331,7 @@ def check_wish(tolerance: float | None, budget_ms: float | None = None) -> None:
 def _by_tolerance(
     survey: Survey, tolerance: float, tried: dict[AccuracyPlan, Errors], progress: Progress
 ) -> tuple[AccuracyPlan, bool, Errors]:
-    """Cheapest tried plan that holds, else the one with the smallest error.
-
-    The errors of what was tried are put into ``tried``.
-    """
+    """Cheapest plan that holds, else the one of smallest error; ``tried`` gets all errors."""
     plans = sorted(_candidates(survey, tolerance), key=lambda plan: _dearness(survey, plan))
     forecast = {plan: survey.forecast_error(plan) for plan in plans}
     safe = [plan for plan in plans if forecast[plan] <= tolerance]

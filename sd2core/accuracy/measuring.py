@@ -16,7 +16,15 @@ from numpy.typing import NDArray
 from sd2core.accuracy.cache import scene_fingerprint, this_machine
 from sd2core.accuracy.choosing import check_options
 from sd2core.accuracy.plans import AccuracyPlan, Family, compared_plans, reference_plan, wave_plans
-from sd2core.accuracy.results import Cost, Errors, Measurement, PlanResult, Spread, compute_errors
+from sd2core.accuracy.results import (
+    Cost,
+    Errors,
+    Measurement,
+    PlanResult,
+    Spread,
+    compute_errors,
+    shares,
+)
 from sd2core.accuracy.sample import all_frames, take_sample
 from sd2core.accuracy.trial import Trial
 from sd2core.doppler.options import SynthesisOptions
@@ -211,23 +219,23 @@ class WaveTrial:
             time_s = float(self.mesh.times_s[frame])
             found.append(converged_frame(scene, time_s, most_cuts=_MOST_CUTS, go_on=progress))
         signals = np.stack([converged.signal for converged in found])
-        return self._shares(signal_spectra(signals, self.config, axis=self.options.axis)), found
+        power = signal_spectra(signals, self.config, axis=self.options.axis)
+        return shares(power.astype(np.float64)), found
 
     def columns(self, plan: AccuracyPlan, threads: int | None = None) -> NDArray[np.float64]:
         """Columns of a plan, each adding up to 1, (bins, n)."""
         mesh = self.counted(plan)
-        return self._shares(
-            frame_spectra(
-                mesh,
-                self.config,
-                mesh.times_s[list(self.frames)],
-                sensor=self.sensor,
-                visibility=self._visible(plan, threads),
-                wave=plan.wave(self.wave),
-                axis=self.options.axis,
-                threads=1 if threads == 1 else "all",
-            )
+        power = frame_spectra(
+            mesh,
+            self.config,
+            mesh.times_s[list(self.frames)],
+            sensor=self.sensor,
+            visibility=self._visible(plan, threads),
+            wave=plan.wave(self.wave),
+            axis=self.options.axis,
+            threads=1 if threads == 1 else "all",
         )
+        return shares(power.astype(np.float64))
 
     def errors(self, plan: AccuracyPlan, reference: NDArray[np.float64]) -> Errors:
         """Errors of a plan's columns against the reference."""
@@ -268,11 +276,6 @@ class WaveTrial:
         else:
             list(workers().map(fill, self.frames))
         return seen
-
-    def _shares(self, power: NDArray[np.float32]) -> NDArray[np.float64]:
-        values = power.astype(np.float64)
-        total = values.sum(axis=0)
-        return np.divide(values, total, out=np.zeros_like(values), where=total > 0)
 
 
 def measure_waves(

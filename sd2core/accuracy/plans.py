@@ -156,6 +156,18 @@ class AccuracyPlan:
         return cls(**content)
 
 
+CHOSEN = (
+    "visibility",
+    "depth_resolution",
+    "mask_stride",
+    "vertices_kept",
+    "range_law",
+    "beyond",
+    "oversampling",
+)
+"""Options of a synthesis that a counting plan sets."""
+
+
 def reference_plan(
     family: Family, weight: Weight = "count", *, surface: bool = True
 ) -> AccuracyPlan:

@@ -85,41 +85,6 @@ def scene_facts(trial: Trial, progress: Progress = silent) -> SceneFacts:
     )
 
 
-_SENTENCES = {
-    "empty": "this map is empty: nothing that is seen leaves the nulled bins",
-    "some still": "{value} of the vertices never leave the nulled bins: not modelled",
-    "none still": "every vertex leaves the nulled bins: all are modelled",
-    "occlusion exact": "{between}: occlusion is modelled exactly",
-    "occlusion depth": (
-        "{between}: occlusion is modelled by a depth buffer of {pixels} pixels, off by {off}"
-    ),
-    "occlusion facing": "{between}: occlusion is not modelled",
-    "occlusion none": "hidden vertices change this map by {value}: all count",
-    "mask of each frame": (
-        "visibility of every 2nd frame changes the map by {value}: made for each frame"
-    ),
-    "mask of some frames": (
-        "visibility of every {ordinal} frame serves its neighbours: that changes the map by {value}"
-    ),
-    "mask reused": (
-        "a mask kept while the sensor moves {reach_m:g} m changes the map by {value}: {use}"
-    ),
-    "geometry": "{share} of the vertices change the map by {value}: {use}",
-    "range law": (
-        "range varies by {spread} over the body: the range law vertex by vertex changes the map by"
-        " {value}: {use}"
-    ),
-    "no aliasing": "no velocity passes {v_max_mps:g} m/s: aliasing does not matter",
-    "aliasing": (
-        "{beyond} of the velocities pass {v_max_mps:g} m/s and change the map by {value}: {use}"
-    ),
-    "motion": (
-        "velocities change by {bins:.2g} bins from frame to frame, which changes the map by"
-        " {value}: {use}"
-    ),
-}
-
-
 def _because(chosen: Chosen, modelled: bool, value: float, lower: AccuracyPlan | None) -> str:
     """Clause for a change that alone would have decided the other way, else nothing."""
     tolerance = chosen.tolerance
@@ -155,41 +120,48 @@ def reasons_for(
     plan = chosen.plan
 
     def add(
-        setting: str,
-        modelled: bool,
-        value: float,
-        key: str,
-        lower: AccuracyPlan | None = None,
-        **numbers: object,
+        setting: str, modelled: bool, value: float, text: str, lower: AccuracyPlan | None = None
     ) -> None:
-        text = _SENTENCES[key].format(value=percent(value), **numbers)
         text += _because(chosen, modelled, value, lower)
         found.append(Reason(setting, modelled, value, text))
 
     def alone(**setting: Any) -> float:
         return change[replace(base, **setting)]
 
-    still = "empty" if facts.empty else "some still" if facts.still_share > 0 else "none still"
-    add("static", not facts.empty and facts.still_share <= 0, facts.still_share, still)
+    share = facts.still_share
+    still = f"{percent(share)} of the vertices never leave the nulled bins: not modelled"
+    if facts.empty:
+        still = "this map is empty: nothing that is seen leaves the nulled bins"
+    elif share <= 0:
+        still = "every vertex leaves the nulled bins: all are modelled"
+    add("static", not facts.empty and share <= 0, share, still)
     if base.visibility != "none":
         facing, every = alone(visibility="facing"), alone(visibility="none")
         # Inside a body the facing test hides all of it: what no cheaper visibility can do.
         needed = {"none": every, "facing": facing}.get(plan.visibility, min(facing, every))
-        numbers = {"between": f"what stands in between changes this map by {percent(needed)}"}
-        if plan.visibility == "depth":
+        between = f"what stands in between changes this map by {percent(needed)}: occlusion is"
+        if plan.visibility == "none":
+            sight = f"hidden vertices change this map by {percent(needed)}: all count"
+        elif plan.visibility == "facing":
+            sight = f"{between} not modelled"
+        elif plan.visibility == "exact":
+            sight = f"{between} modelled exactly"
+        else:
             pixels = plan.depth_resolution
-            off = alone(visibility="depth", depth_resolution=pixels)
-            numbers |= {"pixels": str(pixels), "off": percent(off)}
+            apart = percent(alone(visibility="depth", depth_resolution=pixels))
+            sight = f"{between} modelled by a depth buffer of {pixels} pixels, off by {apart}"
         occluded = plan.visibility in ("depth", "exact")
         less: Visibility = "facing" if facing <= every else "none"
         lower = replace(plan, visibility=less, mask_stride=1, mask_reuse_m=0.0)
-        add("occlusion", occluded, needed, f"occlusion {plan.visibility}", lower, **numbers)
+        add("occlusion", occluded, needed, sight, lower)
         if occluded and not plan.mask_reuse_m:
-            stride = plan.mask_stride
-            key = "mask of some frames" if stride > 1 else "mask of each frame"
-            off = alone(mask_stride=stride if stride > 1 else 2)
-            lower = replace(plan, mask_stride=max(stride, 2))
-            add("mask_age", stride == 1, off, key, lower, ordinal=_ordinal(stride))
+            stride = max(plan.mask_stride, 2)
+            off = alone(mask_stride=stride)
+            of = f"visibility of every {_ordinal(stride)} frame"
+            age = f"{of} changes the map by {percent(off)}: made for each frame"
+            if plan.mask_stride > 1:
+                age = f"{of} serves its neighbours: that changes the map by {percent(off)}"
+            add("mask_age", plan.mask_stride == 1, off, age, replace(plan, mask_stride=stride))
         reaches_m = [
             other.mask_reuse_m
             for other in change
@@ -198,9 +170,12 @@ def reasons_for(
         if occluded and reaches_m:
             kept = plan.mask_reuse_m
             reach_m = kept if kept in reaches_m else max(reaches_m)
-            use = "kept" if kept else "made again at rest"
             off = alone(mask_reuse_m=reach_m)
-            add("mask_reuse", not kept, off, "mask reused", reach_m=reach_m, use=use)
+            reused = (
+                f"a mask kept while the sensor moves {reach_m:g} m changes the map by"
+                f" {percent(off)}: {'kept' if kept else 'made again at rest'}"
+            )
+            add("mask_reuse", not kept, off, reused)
         shares = [
             other.vertices_kept
             for other in change
@@ -209,30 +184,41 @@ def reasons_for(
         if shares:
             whole = plan.vertices_kept == 1
             share = max(shares) if whole else plan.vertices_kept
-            use = "the full mesh is used" if whole else "they are enough"
             off = alone(vertices_kept=share)
-            lower = replace(plan, vertices_kept=share)
-            add("geometry", whole, off, "geometry", lower, share=percent(share), use=use)
+            fewer = (
+                f"{percent(share)} of the vertices change the map by {percent(off)}:"
+                f" {'the full mesh is used' if whole else 'they are enough'}"
+            )
+            add("geometry", whole, off, fewer, replace(plan, vertices_kept=share))
     if replace(base, range_law="frame") in change:
-        modelled = plan.range_law == "vertex"
-        use = "modelled" if modelled else "one range per frame"
-        spread = percent(facts.range_spread)
-        off, lower = alone(range_law="frame"), replace(plan, range_law="frame")
-        add("range_law", modelled, off, "range law", lower, spread=spread, use=use)
+        modelled, off = plan.range_law == "vertex", alone(range_law="frame")
+        law = (
+            f"range varies by {percent(facts.range_spread)} over the body: the range law vertex by"
+            f" vertex changes the map by {percent(off)}:"
+            f" {'modelled' if modelled else 'one range per frame'}"
+        )
+        add("range_law", modelled, off, law, replace(plan, range_law="frame"))
     if facts.beyond_share <= 0:
-        add("aliasing", False, 0.0, "no aliasing", v_max_mps=v_max_mps)
+        passed = f"no velocity passes {v_max_mps:g} m/s: aliasing does not matter"
+        add("aliasing", False, 0.0, passed)
     else:
-        wrapped = plan.beyond == "wrap"
-        beyond, off = percent(facts.beyond_share), alone(beyond="drop")
+        off = alone(beyond="drop")
         matters = chosen.tolerance is None or off > chosen.tolerance
         use = "aliasing matters, wrapped" if matters else "wrapped, which costs nothing"
-        use = use if wrapped else "aliasing is left out, dropped"
-        add("aliasing", wrapped, off, "aliasing", beyond=beyond, v_max_mps=v_max_mps, use=use)
-    factor = plan.frame_rate_factor
+        if plan.beyond != "wrap":
+            use = "aliasing is left out, dropped"
+        passed = (
+            f"{percent(facts.beyond_share)} of the velocities pass {v_max_mps:g} m/s and change the"
+            f" map by {percent(off)}: {use}"
+        )
+        add("aliasing", plan.beyond == "wrap", off, passed)
+    factor, off = plan.frame_rate_factor, alone(frame_rate_factor=1)
     use = "one moment per frame is enough" if factor == 1 else f"frame rate raised {factor} times"
-    off = alone(frame_rate_factor=1)
-    lower = replace(plan, frame_rate_factor=1)
-    add("motion", factor > 1, off, "motion", lower, bins=facts.motion_bins, use=use)
+    motion = (
+        f"velocities change by {facts.motion_bins:.2g} bins from frame to frame, which changes the"
+        f" map by {percent(off)}: {use}"
+    )
+    add("motion", factor > 1, off, motion, replace(plan, frame_rate_factor=1))
     return tuple(found)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.accuracy.plans import AccuracyPlan, Family
-from sd2core.numerics.map_accuracy import percent
+from sd2core.numerics.map_accuracy import percent, relative_l1
 from sd2core.sensor import VelocityAxis
 
 if TYPE_CHECKING:
@@ -184,17 +184,6 @@ _MOVING = 0.1
 """Frames with less than this share of the mean frame's energy have no figures of their own."""
 
 
-def relative_l1(values: NDArray[np.float64], reference: NDArray[np.float64]) -> float:
-    """Sum of absolute differences over the sum of the reference.
-
-    0 when both are empty, infinite when only the reference is.
-    """
-    difference, total = float(np.abs(values - reference).sum()), float(reference.sum())
-    if total > 0:
-        return difference / total
-    return 0.0 if difference == 0 else float("inf")
-
-
 def compute_errors(
     raw: NDArray[np.float64],
     reference_raw: NDArray[np.float64],
@@ -210,7 +199,7 @@ def compute_errors(
     energy = reference_smooth.sum(axis=0)
     moving = (energy > 0) & (energy >= _MOVING * energy.mean())
     a, b = smooth[:, moving], reference_smooth[:, moving]  # (bins, k)
-    share_a, share_b = _shares(a), _shares(b)
+    share_a, share_b = shares(a), shares(b)
     centres_mps = axis.centres_mps
     mean_mps = np.abs(centres_mps @ share_a - centres_mps @ share_b)
     peak_mps = np.abs(_peaks(a, centres_mps) - _peaks(b, centres_mps))
@@ -236,7 +225,8 @@ def _per_frame(
     return Spread.of(difference[total > 0] / total[total > 0])
 
 
-def _shares(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def shares(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Columns that add up to 1 each; those without energy stay zero."""
     total = values.sum(axis=0)
     return np.divide(values, total, out=np.zeros_like(values), where=total > 0)
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cache, lru_cache, partial
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,12 +23,10 @@ from sd2core.files.paths import remove
 from sd2core.files.texts import parse_json, read_json, whole_lines
 from sd2core.maps import DopplerMap, MapKind, joined
 from sd2core.progress import Progress
-from sd2core.sensor import VirtualSensor
-from sd2core.timebase import Timebase
+from sd2core.sensor import VelocityAxis, VirtualSensor
 
 if TYPE_CHECKING:
     from sd2core.datasets.source import LazySource, Source, SourceKey
-    from sd2core.recording.recording import Recording
 
 Row = dict[str, Any]
 """A line of ``results.jsonl``: one stretch of one map."""
@@ -66,14 +64,11 @@ def export_dataset(folder: BatchFolder, export: Export) -> None:
     out = dataset_path(folder, export)
     note = folder.path / _NOTE
     options = DatasetOptions(
-        kinds=export.kinds,
         length=export.segment_frames,
         overlap=export.overlap_frames,
-        frame_rate_hz=export.frame_rate_hz,
         validation=export.validation_subjects,
         test=export.test_subjects,
-        limbs=export.limbs,
-        title=export.title,
+        **export.model_dump(include={"kinds", "frame_rate_hz", "limbs", "title"}),
     )
     settings = key_of("export", {"settings": export.model_dump(mode="json")})
     if _noted(folder).get("settings") != settings or _is_stale(out, folder, export):
@@ -144,7 +139,7 @@ def rows_of(folder: BatchFolder) -> Iterator[list[Row]]:
 def _sources(folder: BatchFolder, export: Export) -> Iterator[LazySource]:
     from sd2core.datasets.source import LazySource, SourceKey
 
-    opened = _Opened()
+    opened = lru_cache(maxsize=1)(_opened)
     for rows in rows_of(folder):
         parts = _parts(rows[-1]["stop"], export)
         for number, (start, stop) in enumerate(parts):
@@ -159,11 +154,7 @@ def _sources(folder: BatchFolder, export: Export) -> Iterator[LazySource]:
 
 
 def _parts(frames: int, export: Export) -> list[tuple[int, int]]:
-    """Return the ranges of frames that are cut into segments together.
-
-    Segments begin every so many frames. Parts begin with one of them and end with another,
-    so that a long recording gives the segments that it would give as a whole.
-    """
+    """Ranges of frames to cut, which give the segments that the recording gives as a whole."""
     step = export.segment_frames - export.overlap_frames
     length = max(LONGEST_FRAMES // step, 1) * step
     starts = range(0, max(frames - export.overlap_frames, 1), length)
@@ -171,22 +162,27 @@ def _parts(frames: int, export: Export) -> list[tuple[int, int]]:
 
 
 def _loader(
-    folder: BatchFolder, rows: Sequence[Row], key: SourceKey, part: tuple[int, int], opened: _Opened
+    folder: BatchFolder,
+    rows: Sequence[Row],
+    key: SourceKey,
+    part: tuple[int, int],
+    opened: Callable[[Path], Any],
 ) -> Any:
     def load(_: Progress) -> Source:
         from sd2core.datasets.recording_sources import labels_and_classes
         from sd2core.datasets.source import Source, label_per_frame
         from sd2core.labels.spans import Labels
+        from sd2core.mocap.recording_pairs import on_clock
 
         maps: dict[MapKind, DopplerMap] = {}
         kinds: tuple[MapKind, ...] = ("synthetic", "denoised", "simulated")
         for kind in kinds:
             if all(row[kind] is not None for row in rows):
                 maps[kind] = _stretch_of(folder, rows, kind, part)
-        recording = opened.recording(Path(rows[0]["source"]))
+        recording, radar_of = opened(Path(rows[0]["source"]))
         first = next(iter(maps.values()))
         if recording is not None and recording.radar is not None and key.placement == 0:
-            radar = opened.radar(recording, first, first.timebase)
+            radar = on_clock(radar_of(first.axis), first.timebase)
             maps.setdefault(radar.kind, radar)
         labels = Labels() if recording is None else recording.labelled
         names, classes = labels_and_classes(labels)
@@ -225,28 +221,10 @@ def _stretch_of(
     return replace(whole, meta=kept)
 
 
-class _Opened:
-    """Recording used last, kept open, with its radar's map."""
+def _opened(path: Path) -> tuple[Any, Callable[[VelocityAxis], DopplerMap]]:
+    """Open a recording, None for a mesh or a video alone; its radar's map is made once."""
+    from sd2core.datasets.recording_sources import radar_map
+    from sd2core.recording.recording import is_recording, open_recording
 
-    def __init__(self) -> None:
-        self._path: Path | None = None
-        self._recording: Recording | None = None
-        self._radar: DopplerMap | None = None
-
-    def recording(self, path: Path) -> Recording | None:
-        """Open a recording; None for a mesh or a video alone."""
-        from sd2core.recording.recording import is_recording, open_recording
-
-        if path != self._path:
-            self._path, self._radar = path, None
-            self._recording = open_recording(path) if is_recording(path) else None
-        return self._recording
-
-    def radar(self, recording: Recording, like: DopplerMap, timebase: Timebase) -> DopplerMap:
-        """Return the radar's map at these times."""
-        from sd2core.datasets.recording_sources import radar_map
-        from sd2core.mocap.recording_pairs import on_clock
-
-        if self._radar is None:
-            self._radar = radar_map(recording, like.axis)
-        return on_clock(self._radar, timebase)
+    recording: Any = open_recording(path) if is_recording(path) else None
+    return recording, cache(partial(radar_map, recording))

@@ -100,19 +100,14 @@ def status_of(state: State, about: dict[str, Any], events: list[Event]) -> Batch
     events = events[starts[-1] :] if starts else []
     last = last_of([one for one in events if one["event"] in ("progress", "end")], "end")
     last = last or last_of(events, "progress") or {}
+    names = {"total", "done", "there", "failed", "waiting", "elapsed_s"}
+    if state == "running":
+        names |= {"running", "workers", "left_s"}
     error = last.get("error")
     return BatchStatus(
-        state=state,
-        pid=about.get("pid"),
-        started_unix_s=float(about.get("started_unix_s", 0.0)),
-        total=dict(last.get("total", {})),
-        done=dict(last.get("done", {})),
-        there=dict(last.get("there", {})),
-        failed=int(last.get("failed", 0)),
-        waiting=int(last.get("waiting", 0)),
-        running=int(last.get("running", 0)) if state == "running" else 0,
-        workers=int(last.get("workers", 0)) if state == "running" else 0,
-        elapsed_s=last.get("elapsed_s"),
-        left_s=last.get("left_s") if state == "running" else None,
+        state,
+        about.get("pid"),
+        about.get("started_unix_s", 0.0),
+        **{name: last[name] for name in names & last.keys()},
         error=str(Sd2Error(**error)) if isinstance(error, dict) else None,
     )

@@ -163,10 +163,7 @@ def glance(origin: Origin) -> Inspection:
 
 
 class _Look:
-    """Inspection of a recording that notes the files it depends on.
-
-    Without a folder nothing is hashed and nothing written.
-    """
+    """Inspection that notes the files it depends on; without a folder nothing is hashed."""
 
     def __init__(self, folder: BatchFolder | None, digests: Digests) -> None:
         self._folder, self._digests = folder, digests

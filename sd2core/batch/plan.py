@@ -16,6 +16,7 @@ from pydantic import (
     model_validator,
 )
 
+from sd2core.accuracy.plans import CHOSEN
 from sd2core.body.model import Resolution
 from sd2core.datasets.source import KINDS
 from sd2core.doppler.options import (
@@ -113,7 +114,7 @@ class Synthesise(_Section):
     @model_validator(mode="after")
     def _consistent(self) -> Synthesise:
         if self.tolerance is not None:
-            for name in _CHOSEN_BY_TOLERANCE:
+            for name in CHOSEN:
                 if getattr(self, name) is not None:
                     raise ValueError(f"tolerance chooses {name}; give one of the two")
             if PRESETS[self.preset].velocity != "central":
@@ -132,17 +133,6 @@ class Synthesise(_Section):
             if (value := getattr(self, name, None)) is not None
         }
         return chosen_options(self.preset, self.bins, self.v_max_mps, given)
-
-
-_CHOSEN_BY_TOLERANCE = (
-    "vertices_kept",
-    "visibility",
-    "depth_resolution",
-    "mask_stride",
-    "range_law",
-    "beyond",
-    "oversampling",
-)
 
 
 class Denoise(_Section):

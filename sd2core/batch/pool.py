@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.keys import all_code_digest
@@ -53,21 +53,11 @@ class Ending:
     killed: bool = False  # True where it did not return because workers died too often
 
 
-class Pool(Protocol):
-    """Processes that do tasks, and repeat those of a process that died."""
+class Pool:
+    """Processes of a Dask cluster that do tasks, and repeat those of a process that died.
 
-    def workers(self) -> Mapping[str, int]:
-        """Return the addresses of the workers with their numbers of threads."""
-
-    def submit(self, tasks: tuple[Task, ...], worker: str | None) -> None:
-        """Have tasks done one after the other, by this worker if it is there and not busy."""
-
-    def ended(self, timeout_s: float) -> list[Ending]:
-        """Return what has ended since the last call; waits for the first."""
-
-
-class DaskPool:
-    """Tasks on a Dask cluster; one that has ended ``most_deaths`` workers is given up."""
+    A task that has ended ``most_deaths`` workers is given up.
+    """
 
     def __init__(self, client: Any, folder: BatchFolder, most_deaths: int) -> None:
         self._client, self._folder, self._most_deaths = client, folder, most_deaths
@@ -81,7 +71,10 @@ class DaskPool:
         self._looked_s = float("-inf")
 
     def workers(self) -> Mapping[str, int]:
-        """See :class:`Pool`; asked of the scheduler once a second."""
+        """Return the addresses of the workers with their numbers of threads.
+
+        The scheduler is asked once a second.
+        """
         now_s = time.monotonic()
         if now_s - self._looked_s >= _LOOK_EVERY_S or not self._workers:
             self._looked_s = now_s
@@ -89,11 +82,12 @@ class DaskPool:
         return self._workers
 
     def submit(self, tasks: tuple[Task, ...], worker: str | None) -> None:
-        """See :class:`Pool`."""
-        folder = self._folder.path.absolute()
+        """Have tasks done one after the other, by this worker if it is there and not busy."""
         future = self._client.submit(
             _run_here,
-            [task.record(folder, self._most_deaths) for task in tasks],
+            list(tasks),
+            str(self._folder.path.absolute()),
+            self._most_deaths,
             key=f"{tasks[0].step}-{self._name}-{next(self._submissions)}",
             pure=False,
             workers=None if worker is None else [worker],
@@ -105,7 +99,7 @@ class DaskPool:
         future.add_done_callback(lambda ended: self._ended.put((tasks, ended)))
 
     def ended(self, timeout_s: float) -> list[Ending]:
-        """See :class:`Pool`."""
+        """Return what has ended since the last call; waits for the first."""
         endings: list[Ending] = []
         with suppress(queue.Empty):
             endings.append(self._ending(*self._ended.get(timeout=timeout_s)))
@@ -168,11 +162,11 @@ class DaskPool:
         return {one: about for one, about in told.items() if not isinstance(about, gone)}
 
 
-def _run_here(records: Sequence[Mapping[str, Any]]) -> tuple[str, list[Outcome]]:
+def _run_here(tasks: list[Task], folder: str, most_deaths: int) -> tuple[str, list[Outcome]]:
     """Do tasks in a worker; returns its address as well."""
     from distributed import get_worker
 
-    return get_worker().address, run_tasks(records)
+    return get_worker().address, run_tasks(tasks, Path(folder), most_deaths)
 
 
 def dask_setup(worker: Any) -> None:
@@ -205,14 +199,14 @@ def _check_worker(address: str, about: Any, folder: Path) -> None:
 
 
 @contextmanager
-def local_pool(folder: BatchFolder, processes: int) -> Iterator[DaskPool]:
+def local_pool(folder: BatchFolder, processes: int) -> Iterator[Pool]:
     """Start processes on this machine, one thread each, that end with this one.
 
     Reachable on the loopback interface only, with keys of its own, without a
     dashboard.
     """
     with _dask_log(folder), local_client(folder.path / BEGUN, processes) as client:
-        yield DaskPool(client, folder, most_deaths=2)
+        yield Pool(client, folder, most_deaths=2)
 
 
 @contextmanager
@@ -263,7 +257,7 @@ def _security() -> Any:
 
 
 @contextmanager
-def scheduler_pool(folder: BatchFolder, address: str) -> Iterator[DaskPool]:
+def scheduler_pool(folder: BatchFolder, address: str) -> Iterator[Pool]:
     """Open the workers of a running ``dask-scheduler``."""
     from distributed import Client
 
@@ -278,7 +272,7 @@ def scheduler_pool(folder: BatchFolder, address: str) -> Iterator[DaskPool]:
             ) from error
         try:
             # Workers of a cluster may be taken away at any time.
-            yield DaskPool(client, folder, most_deaths=4)
+            yield Pool(client, folder, most_deaths=4)
         finally:
             client.close(timeout=_CLOSE_S)
 

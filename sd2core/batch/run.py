@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 import shutil
 import time
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
+from collections.abc import Callable
+from contextlib import AbstractContextManager, ExitStack, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -20,7 +20,7 @@ from sd2core.batch.plan import BatchPlan
 from sd2core.batch.plan_file import plan_text
 from sd2core.batch.pool import Pool, local_pool, scheduler_pool
 from sd2core.batch.task_graph import TaskGraph
-from sd2core.batch.tasks import BEGUN
+from sd2core.batch.tasks import BEGUN, error_fields
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write, atomic_write_text
 from sd2core.files.paths import remove
@@ -112,7 +112,6 @@ class _Run:
         self._begun_s = time.monotonic()
         self._said_s = float("-inf")
         self._workers = -1
-        self._failures = 0
         self._driver: Driver | None = None
 
     def through(self, pool: AbstractContextManager[Pool], source: Path | None) -> BatchEnd:
@@ -120,7 +119,7 @@ class _Run:
         self._start(source)
         self._folder.report.unlink(missing_ok=True)
         try:
-            with self._failures_file() as failures, ExitStack() as stack:
+            with self._failures_path.open("w", encoding="utf-8") as failures, ExitStack() as stack:
                 self._driver = Driver(
                     self._graph,
                     lambda: stack.enter_context(pool),
@@ -211,16 +210,10 @@ class _Run:
         self._lines.say("failed", **about)
         self._log(f"{about['recording']}: {about['step']}: {Sd2Error(**failure.error)}")
         failures.write(json.dumps(about, ensure_ascii=False) + "\n")
-        self._failures += 1
 
     def _log(self, text: str) -> None:
         with self._folder.log.open("a", encoding="utf-8") as stream:
             stream.write(f"{time.strftime('%Y-%m-%d %H:%M:%S')} {text}\n")
-
-    @contextmanager
-    def _failures_file(self) -> Iterator[Any]:
-        with self._failures_path.open("w+", encoding="utf-8") as stream:
-            yield stream
 
     @property
     def _failures_path(self) -> Path:
@@ -260,7 +253,7 @@ class _Run:
     def _end(self, outcome: str, error: Sd2Error | None) -> dict[str, Any]:
         told = None
         if error is not None:
-            told = {"found": error.found, "expected": error.expected, "remedy": error.remedy}
+            told = error_fields(error)
             self._log(str(error))
         export = self._graph.plan.export
         dataset = None if export is None else dataset_path(self._folder, export)

@@ -44,18 +44,6 @@ class Task:
         mesh: MeshInput | None = self.arguments.get("mesh")
         return max(self.frames, 1) * (1 if mesh is None else mesh.vertices)
 
-    def record(self, folder: Path, most_deaths: int = 2) -> dict[str, Any]:
-        """Return what is sent to a worker."""
-        return {
-            "step": self.step,
-            "key": self.key,
-            "out": self.out,
-            "folder": str(folder),
-            "most_deaths": most_deaths,
-            "origin": self.origin,
-            "arguments": dict(self.arguments),
-        }
-
 
 @dataclass(frozen=True)
 class Outcome:
@@ -88,46 +76,45 @@ def too_many_deaths(deaths: int) -> Outcome:
     )
 
 
-def run_tasks(records: Sequence[Mapping[str, Any]]) -> list[Outcome]:
+def run_tasks(tasks: Sequence[Task], folder: Path, most_deaths: int = 2) -> list[Outcome]:
     """Do tasks in this process, one after the other; after a fatal failure none."""
     outcomes: list[Outcome] = []
-    for record in records:
+    for task in tasks:
         if outcomes and outcomes[-1].fatal:
             outcomes.append(outcomes[-1])
         else:
-            outcomes.append(run_task(record))
+            outcomes.append(run_task(task, BatchFolder(folder), most_deaths))
     return outcomes
 
 
-def run_task(record: Mapping[str, Any]) -> Outcome:
+def run_task(task: Task, folder: BatchFolder, most_deaths: int) -> Outcome:
     """Do a task in this process.
 
     A marker file holds one line per attempt; it stays where an attempt ends the process, so
     the next one knows of it.
     """
-    folder = BatchFolder(Path(record["folder"]))
-    marker = _marker(folder.path, record["key"])
+    marker = _marker(folder.path, task.key)
     begun_s = time.perf_counter()
     try:
-        deaths = deaths_during(folder.path, record["key"])
-        if deaths >= record["most_deaths"]:
+        deaths = deaths_during(folder.path, task.key)
+        if deaths >= most_deaths:
             marker.unlink(missing_ok=True)
             return too_many_deaths(deaths)
         with marker.open("a", encoding="utf-8") as stream:
             stream.write(f"{platform.node()} {os.getpid()}\n")
-        outcome = _attempt(folder, record)
+        outcome = _attempt(folder, task)
         marker.unlink(missing_ok=True)
     except OSError as error:
         return _os_failure(error)
     return replace(outcome, seconds=time.perf_counter() - begun_s, deaths=deaths)
 
 
-def _attempt(folder: BatchFolder, record: Mapping[str, Any]) -> Outcome:
+def _attempt(folder: BatchFolder, task: Task) -> Outcome:
     try:
-        if record["out"] and os.path.exists(record["out"]) and record["step"] in _ONE_FILE:
+        if task.out and os.path.exists(task.out) and task.step in _ONE_FILE:
             return Outcome()  # a worker that was lost had just written it
         _compile_once()
-        _do(record["step"], folder, record["origin"], record["arguments"])
+        _do(task.step, folder, task.origin, task.arguments)
     except Sd2Error as error:
         return Outcome(error=error_fields(error))
     except MemoryError as error:

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import NoReturn
 
 from sd2core.cli import build_parser, run
+from sd2core.cli.command_parser import add_command
 from sd2core.cli.importing import copy_sample
-from sd2core.cli.options import add_command, add_json, add_output
 from sd2core.errors import Sd2Error
 
 _WINDOW_COMMANDS = ("open", "doctor")
@@ -19,19 +19,13 @@ _EXAMPLES = "  sd2 demo --out sample.sd2                   a copy of the bundled
 def main() -> int:
     """Run one of the library's commands and return its exit code."""
     parser, commands = build_parser(_EXAMPLES)
-    demo = add_command(
-        commands,
-        "demo",
-        "write a copy of the bundled sample recording",
-        handler=_demo,
-        description="A simulated body makes eight swipes in front of a simulated radar.",
-    )
-    add_output(demo, "NAME.sd2", "the copy to write", required=False)
+    demo = add_command(commands, "demo", handler=_demo)
+    demo.add_output("NAME.sd2", "the copy to write", required=False)
     demo.add_argument("--screenshot", type=Path, help=argparse.SUPPRESS)
     for name in _WINDOW_COMMANDS:  # not listed
         absent = commands.add_parser(name)
         absent.set_defaults(handler=_absent, name=name)
-        add_json(absent)
+        absent.add_json()
     words = sys.argv[1:]
     if words and words[0] in _WINDOW_COMMANDS:
         # Whatever else is asked of a command that is not there.
@@ -40,6 +34,10 @@ def main() -> int:
 
 
 def _demo(options: argparse.Namespace) -> None:
+    """Write a copy of the bundled sample recording.
+
+    A simulated body makes eight swipes in front of a simulated radar.
+    """
     if options.out is None:
         _absent(argparse.Namespace(name="demo"))
     copy_sample(options.out)

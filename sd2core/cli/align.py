@@ -6,7 +6,10 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sd2core.cli.options import add_command, add_json, positive_float
+from sd2core.cli.command_parser import add_command
+from sd2core.cli.options import (
+    positive_float,
+)
 from sd2core.cli.output import print_facts, print_json
 from sd2core.errors import Sd2Error
 
@@ -17,39 +20,30 @@ if TYPE_CHECKING:
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``align``."""
-    parser = add_command(
-        commands,
-        "align",
-        "find the time offset of video and radar from what both saw",
-        handler=_align,
-        description=(
-            "Compares mean velocity and motion of the mesh's synthetic map with those of the\n"
-            "radar's map at every offset. Where none stands out, as the motion repeats itself or\n"
-            "the two do not belong together, the recording stays as it is, the reason is printed,\n"
-            "and the exit code is 1."
-        ),
-        examples=(
-            "  sd2 align walk.sd2\n"
-            "  sd2 align anna.sd2 ben.sd2 --save\n"
-            "  sd2 align walk.sd2 --within 20 --json"
-        ),
-    )
-    parser.add_argument(
-        "recordings", type=Path, nargs="+", metavar="RECORDING", help="with a mesh and a radar"
-    )
-    parser.add_argument(
+    parser = add_command(commands, "align", handler=_align)
+    parser.add_value("recordings", Path, "RECORDING", "with a mesh and a radar", nargs="+")
+    parser.add_value(
         "--within",
-        type=positive_float,
-        metavar="S",
-        help="search so far before and after the recording's offset, 2 s at least (default: 5)",
+        positive_float,
+        "S",
+        "search so far before and after the recording's offset, 2 s at least (default: 5)",
     )
-    parser.add_argument(
-        "--save", action="store_true", help="write what was found into the recordings"
-    )
-    add_json(parser)
+    parser.add_flag("--save", "write what was found into the recordings")
+    parser.add_json()
 
 
 def _align(options: argparse.Namespace) -> int:
+    """Find the time offset of video and radar from what both saw.
+
+    Compares mean velocity and motion of the mesh's synthetic map with those of the
+    radar's map at every offset. Where none stands out, as the motion repeats itself or
+    the two do not belong together, the recording stays as it is, the reason is printed,
+    and the exit code is 1.
+
+      sd2 align walk.sd2
+      sd2 align anna.sd2 ben.sd2 --save
+      sd2 align walk.sd2 --within 20 --json
+    """
     from sd2core.files.resources import is_bundled
     from sd2core.recording.recording import open_recording
 

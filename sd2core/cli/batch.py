@@ -10,7 +10,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sd2core.cli.options import add_command, add_json_and_progress, add_value, positive_int
+from sd2core.cli.command_parser import add_command
+from sd2core.cli.options import (
+    positive_int,
+)
 from sd2core.cli.output import (
     counted,
     duration,
@@ -35,46 +38,37 @@ _LISTED_UNUSABLE = 5
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``batch``."""
-    parser = add_command(
-        commands,
-        "batch",
-        "fit, synthesise, denoise and export many recordings from many places",
-        handler=_batch,
-        description=(
-            "Runs a plan (TOML, see docs/formats.md) on all cores of this machine, or on the\n"
-            "workers of a dask-scheduler, which must see the same files under the same paths.\n"
-            "Every result is kept under the hash of all that it depends on: the same command\n"
-            "again makes only missing results, after a change those that depend on it, and after\n"
-            "Ctrl-C or a crash the rest. A recording that cannot be used is reported\n"
-            "at the end and does not stop the others; the exit code is then 1."
-        ),
-        examples=(
-            "  sd2 batch plan.toml --dry-run       (how many tasks, what time and bytes)\n"
-            "  sd2 batch plan.toml\n"
-            "  sd2 batch plan.toml --scheduler tcp://10.0.0.5:8786\n"
-            "  sd2 batch --status made"
-        ),
-    )
-    parser.add_argument("plan", type=Path, nargs="?", metavar="PLAN.toml", help="plan of the batch")
+    parser = add_command(commands, "batch", handler=_batch)
+    parser.add_value("plan", Path, "PLAN.toml", "plan of the batch", nargs="?")
     where = parser.add_mutually_exclusive_group()
-    add_value(
-        where, "--workers", positive_int, "N", "processes on this machine (default: one per core)"
+    where.add_value(
+        "--workers", positive_int, "N", "processes on this machine (default: one per core)"
     )
-    where.add_argument(
-        "--scheduler", metavar="ADDRESS", help="use the workers of this dask-scheduler"
-    )
+    where.add_value("--scheduler", str, "ADDRESS", "use the workers of this dask-scheduler")
     what = parser.add_mutually_exclusive_group()
-    what.add_argument(
-        "--dry-run", action="store_true", help="print tasks, time and bytes, and do nothing"
+    what.add_flag("--dry-run", "print tasks, time and bytes, and do nothing")
+    what.add_value("--status", Path, "FOLDER", "print the state of the batch in this folder")
+    what.add_value(
+        "--stop", Path, "FOLDER", "stop the batch in this folder; the same command resumes it"
     )
-    add_value(what, "--status", Path, "FOLDER", "print the state of the batch in this folder")
-    add_value(
-        what, "--stop", Path, "FOLDER", "stop the batch in this folder; the same command resumes it"
-    )
-    add_json_and_progress(parser)
+    parser.add_json_and_progress()
 
 
 def _batch(options: argparse.Namespace) -> int:
+    """Fit, synthesise, denoise and export many recordings from many places.
+
+    Runs a plan (TOML, see docs/formats.md) on all cores of this machine, or on the
+    workers of a dask-scheduler, which must see the same files under the same paths.
+    Every result is kept under the hash of all that it depends on: the same command
+    again makes only missing results, after a change those that depend on it, and after
+    Ctrl-C or a crash the rest. A recording that cannot be used is reported
+    at the end and does not stop the others; the exit code is then 1.
+
+      sd2 batch plan.toml --dry-run       (how many tasks, what time and bytes)
+      sd2 batch plan.toml
+      sd2 batch plan.toml --scheduler tcp://10.0.0.5:8786
+      sd2 batch --status made
+    """
     from sd2core.batch.folder import BatchFolder
 
     if options.plan is not None and (options.status or options.stop):

@@ -3,9 +3,21 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable
+import inspect
+import re
+from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import Any, NoReturn
 
+from sd2core.cli.options import (
+    add_json,
+    finite_float,
+    image_size,
+    name_list,
+    position,
+    positive_float,
+    positive_int,
+)
 from sd2core.errors import Sd2Error
 
 
@@ -13,7 +25,167 @@ class UsageError(Sd2Error):
     """A command line that cannot be understood."""
 
 
-class CommandParser(argparse.ArgumentParser):
+class Options(argparse._ActionsContainer):
+    """What options are added to: a command's parser, or a group of its options."""
+
+    def add_argument_group(self, *args: Any, **kwargs: Any) -> OptionGroup:
+        """Add options under a heading of their own."""
+        group = OptionGroup(self, *args, **kwargs)
+        self._action_groups.append(group)
+        return group
+
+    def add_mutually_exclusive_group(self, *, required: bool = False) -> ExclusiveOptions:
+        """Add options of which one may be given."""
+        group = ExclusiveOptions(self, required=required)
+        self._mutually_exclusive_groups.append(group)
+        return group
+
+    def add_value(
+        self,
+        name: str,
+        kind: Callable[[str], Any],
+        metavar: str,
+        text: str,
+        default: Any = None,
+        **more: Any,
+    ) -> None:
+        """Add an option or an argument with a value.
+
+        A number as default is said after the text, unless the text speaks of a default. ``more``
+        is for argparse.
+        """
+        if isinstance(default, int | float) and "(default" not in text:
+            text = f"{text} (default: {default:g})"
+        self.add_argument(name, type=kind, metavar=metavar, default=default, help=text, **more)
+
+    def add_choice(
+        self, name: str, choices: Iterable[Any], text: str, default: str | None = None
+    ) -> None:
+        """Add an option with one of some values; a default is said as by :meth:`add_value`."""
+        if default is not None and "default)" not in text:
+            text = f"{text} (default: {default})"
+        self.add_argument(name, choices=choices, default=default, help=text)
+
+    def add_flag(self, name: str, text: str) -> None:
+        """Add an option without a value."""
+        self.add_argument(name, action="store_true", help=text)
+
+    def add_json(self) -> None:
+        """Add ``--json``."""
+        add_json(self)
+
+    def add_json_and_progress(self) -> None:
+        """Add ``--json`` and ``--progress-json``, of which one may be given."""
+        group = self.add_mutually_exclusive_group()
+        group.add_json()
+        group.add_flag(
+            "--progress-json",
+            "print progress as JSON lines, for other programs (docs/formats.md)",
+        )
+
+    def add_axis(self) -> None:
+        """Add the velocity axis."""
+        self.add_value("--bins", positive_int, "N", "velocity bins (default: 32)")
+        text = "end of the velocity axis in m/s (default: 2)"
+        self.add_value("--v-max", positive_float, "MPS", text)
+
+    def add_mesh_and_sensor(self) -> None:
+        """Add what is looked at, and from where."""
+        self.add_value("mesh", Path, "MESH", "a mesh, or a recording")
+        self.add_sensor()
+
+    def add_output(self, metavar: str, text: str, *, required: bool = True) -> None:
+        """Add ``--out``."""
+        self.add_argument("--out", type=Path, required=required, metavar=metavar, help=text)
+
+    def add_figure_output(self, drawn: str) -> None:
+        """Add ``--figure``."""
+        self.add_value("--figure", Path, "FILE", f"draw {drawn}, as .png, .svg or .pdf")
+
+    def add_map_output(self, *, required: bool = True) -> None:
+        """Add ``--out`` for a Doppler map."""
+        self.add_output("FILE.npz", "the map to write", required=required)
+
+    def add_sensor(self) -> None:
+        """Add ``--sensor``."""
+        text = "where the radar is, in metres (default: the recording's sensor, or the camera)"
+        self.add_value("--sensor", position, "X,Y,Z", text)
+
+    def add_mesh_reading(self) -> None:
+        """Add what a mesh file may not say about itself."""
+        group = self.add_argument_group("mesh file", "what it may not say about itself")
+        for name, kind, metavar, text in _MESH_READING:
+            group.add_value(name, kind, metavar, text)
+
+    def add_channel(self) -> None:
+        """Add ``--receiver`` and ``--transmitter``."""
+        text = "take this receiver, counted from 1 (default: the mean power of all)"
+        self.add_value("--receiver", positive_int, "N", text)
+        self.add_value("--transmitter", positive_int, "N", "take this transmitter, likewise")
+
+    def add_method(self, text: str) -> None:
+        """Add ``--method``: counting vertices, or the signal of a radar."""
+        self.add_choice("--method", ("histogram", "fmcw"), text, "histogram")
+
+    def add_placements_used(self, what: str, usual: str) -> None:
+        """Add ``--placements``: which places of the sensor are used of data that has several."""
+        text = f"{what} all places of the sensor, or the first only"
+        self.add_choice("--placements", ("all", "first"), text, usual)
+
+    def add_count(self) -> None:
+        """Add ``--count``."""
+        self.add_choice(
+            "--count",
+            ("expected", "plain"),
+            "count a vertex as badly known as its mesh says its velocity to be, or in one bin"
+            " (default: expected)",
+        )
+
+    def add_texture(self) -> None:
+        """Add ``--texture``."""
+        text = "draw denoised maps as a radar would show them, with its speckle and gaps, instead"
+        text += " of the mean (SEED of the random numbers: 0)"
+        self.add_value("--texture", int, "SEED", text, nargs="?", const=0)
+
+    def add_limbs(self) -> None:
+        """Add ``--limbs``."""
+        self.add_flag(
+            "--limbs",
+            "also keep the synthetic map of each part of the body (trunk, upper arms, forearms,"
+            " thighs, lower legs)",
+        )
+
+    def add_people_kept_out(self, validation: str, test: str) -> None:
+        """Add ``--validation-subjects`` and ``--test-subjects``; the texts say who else it is."""
+        self.add_value("--validation-subjects", name_list, "LIST", validation)
+        self.add_value("--test-subjects", name_list, "LIST", test)
+
+
+class OptionGroup(Options, argparse._ArgumentGroup):
+    """Options under a heading of their own."""
+
+
+class ExclusiveOptions(Options, argparse._MutuallyExclusiveGroup):
+    """Options of which one may be given."""
+
+
+_MESH_READING: tuple[tuple[str, Callable[[str], Any], str, str], ...] = (
+    ("--faces", Path, "FILE", "triangles (.npy or .obj) for a mesh that has none of its own"),
+    ("--fps", positive_float, "FPS", "frames per second of a mesh that does not say"),
+    ("--scale", positive_float, "M",
+     "metres per unit of the mesh, e.g. 0.001 for millimetres (default: 1)"),
+    ("--person", str, "ID", "which person of a file of several (default: seen longest)"),
+    ("--distance-m", finite_float, "M",
+     "move a mesh that is centred on the body's root this far forward"),
+    ("--image-size", image_size, "WxH",
+     "size of the video in pixels, to place the output of VIBE (default: that of the recording's"
+     " video)"),
+    ("--focal-px", positive_float, "PX",
+     "focal length of the video in pixels, likewise (default: the diagonal)"),
+)  # fmt: skip
+
+
+class CommandParser(Options, argparse.ArgumentParser):
     """Parser that raises :class:`UsageError`; argparse makes those of subcommands of its kind."""
 
     def error(self, message: str) -> NoReturn:
@@ -43,3 +215,38 @@ class CommandParser(argparse.ArgumentParser):
         near = get_close_matches(typed, names, 1)
         meant = f"Did you mean {wording.format(near[0])}? " if near else ""
         raise UsageError(found, remedy=f"{meant}`{self.prog} --help` lists all")
+
+
+def add_command(
+    commands: argparse._SubParsersAction,
+    name: str,
+    summary: str = "",
+    *,
+    handler: Callable[[argparse.Namespace], int | None] | None = None,
+    about: Callable[..., Any] | None = None,
+    description: str = "",
+    examples: str = "",
+) -> CommandParser:
+    """Add a subcommand with its help.
+
+    Without a summary the docstring of the handler, or of what is given in its place (``about``),
+    is the help: a summary, a description, and examples from the first line on that begins with
+    ``sd2``.
+    """
+    if not summary:
+        text, *lines = re.split(r"\n+ *(?=sd2 )", inspect.getdoc(about or handler) or f"{name}.")
+        examples = "\n".join(f"  {line}" for line in lines)
+        summary, _, own = text.partition("\n\n")
+        summary = f"{summary[0].lower()}{summary[1:].removesuffix('.')}"
+        description = "\n\n".join(filter(None, (description, own)))
+    text = f"{summary[0].upper()}{summary[1:]}."
+    parser: CommandParser = commands.add_parser(
+        name,
+        help=summary,
+        description=f"{text}\n\n{description}".strip(),
+        epilog=f"examples:\n{examples}" if examples else None,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    if handler is not None:
+        parser.set_defaults(handler=handler)
+    return parser

@@ -7,7 +7,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sd2core.cli.options import add_command, add_figure_output, add_json, add_mesh_reading, position
+from sd2core.cli.command_parser import add_command
+from sd2core.cli.options import (
+    position,
+)
 from sd2core.cli.output import print_json, print_rows, progress_bar
 from sd2core.errors import Sd2Error
 
@@ -21,52 +24,36 @@ _OWN_NAMES = {"mesh.zarr", "mesh.npz"}
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``compare-meshes``."""
-    parser = add_command(
-        commands,
-        "compare-meshes",
-        "compare meshes of one video: joints, velocities along the line of sight, Doppler maps",
-        handler=_compare,
-        description=(
-            "Every mesh is measured against the first (or --reference): mean distance of the\n"
-            "joints, velocity of hands, elbows and torso along the line of sight, jitter, and\n"
-            "the Doppler map that each gives. Any file that `sd2 info` knows as a mesh will do;\n"
-            "one of them at least has to be made by `sd2 fit`, whose joints are known. Joints\n"
-            "of other surfaces follow the vertices nearest to them. Options on how to read a\n"
-            "mesh hold for those that are not made by SD² Studio."
-        ),
-        examples=(
-            "  sd2 compare-meshes fitted.zarr vibe_output.pkl --image-size 640x480\n"
-            "  sd2 compare-meshes ours.zarr wham.pkl --names ours,WHAM --figure both.svg"
-        ),
+    parser = add_command(commands, "compare-meshes", handler=_compare)
+    parser.add_value("meshes", Path, "MESH", "two meshes or more, in one frame", nargs="+")
+    parser.add_value("--names", str, "LIST", "what to call them, separated by commas")
+    parser.add_value(
+        "--reference", str, "NAME", "name of the mesh that is right (default: the first)"
     )
-    parser.add_argument(
-        "meshes", type=Path, nargs="+", metavar="MESH", help="two meshes or more, in one frame"
+    parser.add_value(
+        "--sensor", position, "X,Y,Z", "where the radar is, in metres (default: at the camera)"
     )
-    parser.add_argument("--names", metavar="LIST", help="what to call them, separated by commas")
-    parser.add_argument(
-        "--reference", metavar="NAME", help="name of the mesh that is right (default: the first)"
-    )
-    parser.add_argument(
-        "--sensor",
-        type=position,
-        metavar="X,Y,Z",
-        help="where the radar is, in metres (default: at the camera)",
-    )
-    parser.add_argument(
-        "--align",
-        choices=("none", "root"),
-        default="none",
-        help=(
-            "measure joint distances where they are (default), or from the pelvis; velocities"
-            " and maps are never aligned"
-        ),
-    )
-    add_figure_output(parser, "maps and curves")
-    add_mesh_reading(parser)
-    add_json(parser)
+    text = "measure joint distances where they are (default), or from the pelvis; velocities"
+    text += " and maps are never aligned"
+    parser.add_choice("--align", ("none", "root"), text, "none")
+    parser.add_figure_output("maps and curves")
+    parser.add_mesh_reading()
+    parser.add_json()
 
 
 def _compare(options: argparse.Namespace) -> None:
+    """Compare meshes of one video: joints, velocities along the line of sight, Doppler maps.
+
+    Every mesh is measured against the first (or --reference): mean distance of the
+    joints, velocity of hands, elbows and torso along the line of sight, jitter, and
+    the Doppler map that each gives. Any file that `sd2 info` knows as a mesh will do;
+    one of them at least has to be made by `sd2 fit`, whose joints are known. Joints
+    of other surfaces follow the vertices nearest to them. Options on how to read a
+    mesh hold for those that are not made by SD² Studio.
+
+      sd2 compare-meshes fitted.zarr vibe_output.pkl --image-size 640x480
+      sd2 compare-meshes ours.zarr wham.pkl --names ours,WHAM --figure both.svg
+    """
     from sd2core.cli.reading import check_output
     from sd2core.compare.figure import draw_comparison
     from sd2core.compare.meshes import compare_meshes

@@ -5,43 +5,38 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from sd2core.cli.options import add_command, add_json, add_map_output, add_texture, add_value
+from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import progress_bar
 from sd2core.errors import Sd2Error
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``denoise``."""
-    parser = add_command(
-        commands,
-        "denoise",
-        "turn a synthetic Doppler map into what a radar would show",
-        handler=_denoise,
-        description=(
-            "A trained model estimates what a radar would have measured, from the map that\n"
-            "`sd2 synth` counted. The map must be made as those that the model learnt from (same\n"
-            "bins, same emptied bins); `sd2 info MODEL` says how. Another frame rate is brought\n"
-            "to the model's and back. Frames without a person stay empty."
-        ),
-        examples=(
-            "  sd2 denoise map.npz --out denoised.npz\n"
-            "  sd2 denoise map.npz --out denoised.npz --model runs/first/best.safetensors\n"
-            "  sd2 denoise map.npz --out as-the-radar-shows-it.npz --texture"
-        ),
-    )
-    add_value(parser, "map", Path, "MAP", "a map from `sd2 synth`")
-    add_map_output(parser)
+    parser = add_command(commands, "denoise", handler=_denoise)
+    parser.add_value("map", Path, "MAP", "a map from `sd2 synth`")
+    parser.add_map_output()
     parser.add_argument(
         "--model",
         metavar="FILE|NAME",
         help="a model file from `sd2 train`, or the name of one that is installed (default: of"
         " those that come with SD² Studio the one for limb maps, where there are such)",
     )
-    add_texture(parser)
-    add_json(parser)
+    parser.add_texture()
+    parser.add_json()
 
 
 def _denoise(options: argparse.Namespace) -> None:
+    """Turn a synthetic Doppler map into what a radar would show.
+
+    A trained model estimates what a radar would have measured, from the map that
+    `sd2 synth` counted. The map must be made as those that the model learnt from (same
+    bins, same emptied bins); `sd2 info MODEL` says how. Another frame rate is brought
+    to the model's and back. Frames without a person stay empty.
+
+      sd2 denoise map.npz --out denoised.npz
+      sd2 denoise map.npz --out denoised.npz --model runs/first/best.safetensors
+      sd2 denoise map.npz --out as-the-radar-shows-it.npz --texture
+    """
     from sd2core.cli.info.description import describe_map, show
     from sd2core.cli.info.model import model_words
     from sd2core.cli.reading import check_map_output

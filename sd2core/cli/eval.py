@@ -6,13 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sd2core.cli.options import (
-    add_command,
-    add_figure_output,
-    add_json,
-    add_placements_used,
-    add_value,
-)
+from sd2core.cli.command_parser import Options, add_command
 from sd2core.cli.output import print_json, progress_bar
 from sd2core.errors import Sd2Error
 
@@ -22,50 +16,21 @@ if TYPE_CHECKING:
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``eval``."""
-    parser = add_command(
-        commands,
-        "eval",
-        "measure denoisers on people that they have not learnt from",
-        handler=_eval,
-        description=(
-            "Denoises whole takes and compares them with the radar's: the velocity of the\n"
-            "strongest bin per frame (mean absolute error and standard deviation in m/s), the\n"
-            "mean velocity, and the map itself; in all, per gesture and per person. Beside the\n"
-            "models stand `none`, and a median, a Wiener filter and a ridge regression fitted to\n"
-            "the training.\n"
-            "Several models of one architecture, trained with different seeds, make one row:\n"
-            "mean ± standard deviation."
-        ),
-        examples=(
-            "  sd2 eval runs/s4 --data campaign.zarr\n"
-            "  sd2 eval runs/s4-0 runs/s4-1 runs/s4-2 runs/gru-0 --data campaign.zarr\n"
-            "  sd2 eval denoiser --data mars.zarr --subjects subject4 --json\n"
-            "  sd2 eval runs/s4 runs/unet --data campaign.zarr --figure scores.png"
-        ),
-    )
-    parser.add_argument(
-        "models",
-        nargs="+",
-        metavar="MODEL",
-        help="a run, a model file, or the name of a model that is installed",
-    )
-    parser.add_argument(
-        "--data", type=Path, nargs="+", required=True, metavar="PAIRS", help="stores of pairs"
-    )
+    parser = add_command(commands, "eval", handler=_eval)
+    text = "a run, a model file, or the name of a model that is installed"
+    parser.add_value("models", str, "MODEL", text, nargs="+")
+    parser.add_value("--data", Path, "PAIRS", "stores of pairs", nargs="+", required=True)
     add_judging(parser, "those that the first model's run kept for the test, or all", "the errors")
-    add_value(parser, "--markdown", Path, "FILE.md", "write the tables")
+    parser.add_value("--markdown", Path, "FILE.md", "write the tables")
 
 
-def add_judging(parser: argparse.ArgumentParser, usual_subjects: str, drawn: str) -> None:
+def add_judging(parser: Options, usual_subjects: str, drawn: str) -> None:
     """Add whom an evaluation judges on which maps, and the files of its result."""
-    parser.add_argument(
-        "--subjects",
-        metavar="LIST",
-        help=f"people to evaluate on, separated by commas, or `all` (default: {usual_subjects})",
-    )
-    add_placements_used(parser, "evaluate on maps from", "first")
-    add_figure_output(parser, drawn)
-    add_json(parser)
+    text = f"people to evaluate on, separated by commas, or `all` (default: {usual_subjects})"
+    parser.add_value("--subjects", str, "LIST", text)
+    parser.add_placements_used("evaluate on maps from", "first")
+    parser.add_figure_output(drawn)
+    parser.add_json()
 
 
 def named_subjects(text: str, everybody: tuple[str, ...]) -> tuple[str, ...]:
@@ -74,6 +39,21 @@ def named_subjects(text: str, everybody: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _eval(options: argparse.Namespace) -> None:
+    """Measure denoisers on people that they have not learnt from.
+
+    Denoises whole takes and compares them with the radar's: the velocity of the
+    strongest bin per frame (mean absolute error and standard deviation in m/s), the
+    mean velocity, and the map itself; in all, per gesture and per person. Beside the
+    models stand `none`, and a median, a Wiener filter and a ridge regression fitted to
+    the training.
+    Several models of one architecture, trained with different seeds, make one row:
+    mean ± standard deviation.
+
+      sd2 eval runs/s4 --data campaign.zarr
+      sd2 eval runs/s4-0 runs/s4-1 runs/s4-2 runs/gru-0 --data campaign.zarr
+      sd2 eval denoiser --data mars.zarr --subjects subject4 --json
+      sd2 eval runs/s4 runs/unet --data campaign.zarr --figure scores.png
+    """
     from sd2core.cli.reading import check_output
     from sd2core.files.atomic import atomic_write_text
     from sd2core.files.figure_files import check_figure, save_figure

@@ -9,16 +9,8 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from sd2core.cli.command_parser import Options, add_command
 from sd2core.cli.options import (
-    add_axis,
-    add_command,
-    add_count,
-    add_json_and_progress,
-    add_limbs,
-    add_output,
-    add_people_kept_out,
-    add_texture,
-    add_value,
     bin_list,
     given,
     name_list,
@@ -30,6 +22,7 @@ from sd2core.cli.output import (
     counted,
     duration,
     listed,
+    picked,
     print_event,
     print_facts,
     print_json,
@@ -51,138 +44,98 @@ _LINE_EVERY_S = 0.1
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``export``."""
-    parser = add_command(
-        commands,
-        "export",
-        "write a data set to learn from: segments with labels, sensors and provenance",
-        handler=_export,
-        description=(
-            "Cuts maps into segments of 72 frames and writes them with a label per frame and per\n"
-            "segment, subject, sensor, provenance, and a split by subject. Beside the data set\n"
-            "come a card (.card.md, .card.json) and a preview sheet (.png). Inputs are recordings\n"
-            "or folders of them, pairs, and Doppler maps. Sources that are in the\n"
-            "data set already are kept: the same command resumes a stopped export, or adds inputs."
-        ),
-        examples=(
-            "  sd2 export walk.sd2 --out walk.zarr\n"
-            "  sd2 export anna.sd2 ben.sd2 --placements grid.json --out gestures.h5\n"
-            "  sd2 export campaign.zarr --kinds denoised,simulated --out campaign-set.zarr\n"
-            "  sd2 export recordings/ --out set.zarr --dry-run"
-        ),
-    )
-    parser.add_argument(
-        "inputs", type=Path, nargs="+", metavar="INPUT", help="recordings, pairs, maps, folders"
-    )
-    add_output(parser, "FILE", "the data set to write (.zarr, .h5 or .npz)")
+    parser = add_command(commands, "export", handler=_export)
+    parser.add_value("inputs", Path, "INPUT", "recordings, pairs, maps, folders", nargs="+")
+    parser.add_output("FILE", "the data set to write (.zarr, .h5 or .npz)")
     _add_content(parser)
     _add_making(parser)
-    parser.add_argument(
-        "--dry-run", action="store_true", help="print counts, size and time, and write nothing"
-    )
-    add_json_and_progress(parser)
+    parser.add_flag("--dry-run", "print counts, size and time, and write nothing")
+    parser.add_json_and_progress()
 
 
-def _add_content(parser: argparse.ArgumentParser) -> None:
+def _add_content(parser: Options) -> None:
     group = parser.add_argument_group("segments")
-    group.add_argument(
-        "--kinds", default=_KINDS, metavar="LIST", help=f"some of {_KINDS} (default: all)"
-    )
-    add_limbs(group)
-    group.add_argument(
-        "--imu",
-        type=name_list,
-        default=(),
-        metavar="LIST",
-        help="also keep what inertial sensors there would feel at every frame, e.g."
-        " left-wrist,right-wrist; places as for `sd2 imu`",
-    )
-    add_value(group, "--segment-frames", positive_int, "N", "length of a segment", 72)
-    add_value(group, "--overlap-frames", int, "N", "frames that neighbours share", 10)
-    group.add_argument(
+    group.add_value("--kinds", str, "LIST", f"some of {_KINDS} (default: all)", _KINDS)
+    group.add_limbs()
+    text = "also keep what inertial sensors there would feel at every frame, e.g."
+    text += " left-wrist,right-wrist; places as for `sd2 imu`"
+    group.add_value("--imu", name_list, "LIST", text, ())
+    group.add_value("--segment-frames", positive_int, "N", "length of a segment", 72)
+    group.add_value("--overlap-frames", int, "N", "frames that neighbours share", 10)
+    group.add_value(
         "--rate",
-        type=positive_float,
-        metavar="FPS",
-        help="frames per second; other sources are brought to it (default: the first one's)",
+        positive_float,
+        "FPS",
+        "frames per second; other sources are brought to it (default: the first one's)",
     )
-    group.add_argument(
+    group.add_choice(
         "--label-rule",
-        choices=("foreground", "majority"),
-        default="foreground",
-        help="label of a segment: the gesture with most frames, if they are enough, or the label"
-        " with most frames, background included (default: foreground)",
+        ("foreground", "majority"),
+        "label of a segment: the gesture with most frames, if they are enough, or the label"
+        " with most frames, background included",
+        "foreground",
     )
-    group.add_argument(
-        "--min-share",
-        type=share,
-        default=0.2,
-        metavar="SHARE",
-        help="least share of a segment for foreground (default: 20%%)",
-    )
-    group.add_argument(
-        "--title", default="", metavar="TEXT", help="title of the card and the sheet"
-    )
+    text = "least share of a segment for foreground (default: 20%%)"
+    group.add_value("--min-share", share, "SHARE", text, 0.2)
+    group.add_value("--title", str, "TEXT", "title of the card and the sheet", "")
     people = parser.add_argument_group("people")
-    people.add_argument(
+    people.add_value(
         "--subjects",
-        type=name_list,
-        metavar="LIST",
-        help="subject of each recording and map, separated by commas, in their order (default:"
+        name_list,
+        "LIST",
+        "subject of each recording and map, separated by commas, in their order (default:"
         " each recording shows another person)",
     )
-    add_people_kept_out(
-        people,
+    people.add_people_kept_out(
         "kept out to validate with, separated by commas, or none (default: about a sixth of all,"
         " chosen by their names, so that adding people does not move others)",
         "kept out to test with, or none (default: likewise)",
     )
-    people.add_argument(
-        "--labels",
-        type=Path,
-        action="append",
-        default=[],
-        metavar="FILE",
-        help="labels of a Doppler map; once for each map, in their order",
-    )
+    text = "labels of a Doppler map; once for each map, in their order"
+    people.add_value("--labels", Path, "FILE", text, [], action="append")
 
 
-def _add_making(parser: argparse.ArgumentParser) -> None:
+def _add_making(parser: Options) -> None:
     group = parser.add_argument_group("maps")
-    group.add_argument(
-        "--placements",
-        metavar="FILE|planned",
-        help="sensors around the body besides the recording's own, as `sd2 placements` writes"
-        " them, or those that each recording plans",
-    )
-    group.add_argument(
+    text = "sensors around the body besides the recording's own, as `sd2 placements` writes"
+    text += " them, or those that each recording plans"
+    group.add_value("--placements", str, "FILE|planned", text)
+    group.add_value(
         "--tolerance",
-        type=share,
-        metavar="SHARE",
-        help="make synthetic maps as fast as possible within this error, e.g. 2%% (default: exact)",
+        share,
+        "SHARE",
+        "make synthetic maps as fast as possible within this error, e.g. 2%% (default: exact)",
     )
-    group.add_argument(
-        "--simulate",
-        metavar="NAME|CONFIG.json",
-        help="simulate this radar (see sd2 simulate radar --help) at every place, which takes far"
-        " longer than everything else"
-        " (default: only the maps in radar files)",
-    )
-    group.add_argument(
-        "--model",
-        metavar="FILE|NAME",
-        help="the denoiser (default: that of each recording, or the bundled one)",
-    )
-    add_texture(group)
-    add_count(group)
-    add_axis(group)
-    group.add_argument(
+    text = "simulate this radar (see sd2 simulate radar --help) at every place, which takes far"
+    text += " longer than everything else (default: only the maps in radar files)"
+    group.add_value("--simulate", str, "NAME|CONFIG.json", text)
+    text = "the denoiser (default: that of each recording, or the bundled one)"
+    group.add_value("--model", str, "FILE|NAME", text)
+    group.add_texture()
+    group.add_count()
+    group.add_axis()
+    group.add_value(
         "--null-bins",
-        type=bin_list,
-        metavar="LIST",
-        help="bins to set to zero in all kinds (default: those of the synthetic maps)",
+        bin_list,
+        "LIST",
+        "bins to set to zero in all kinds (default: those of the synthetic maps)",
     )
 
 
 def _export(options: argparse.Namespace) -> int:
+    """Write a data set to learn from: segments with labels, sensors and provenance.
+
+    Cuts maps into segments of 72 frames and writes them with a label per frame and per
+    segment, subject, sensor, provenance, and a split by subject. Beside the data set
+    come a card (.card.md, .card.json) and a preview sheet (.png). Inputs are recordings
+    or folders of them, pairs, and Doppler maps. Sources that are in the
+    data set already are kept: the same command resumes a stopped export, or adds inputs.
+
+      sd2 export walk.sd2 --out walk.zarr
+      sd2 export anna.sd2 ben.sd2 --placements grid.json --out gestures.h5
+      sd2 export campaign.zarr --kinds denoised,simulated --out campaign-set.zarr
+      sd2 export recordings/ --out set.zarr --dry-run
+    """
     try:
         return _exported(options)
     except Sd2Error as error:
@@ -236,13 +189,9 @@ def _dataset_options(options: argparse.Namespace) -> DatasetOptions:
         overlap=options.overlap_frames,
         frame_rate_hz=options.rate,
         null_bins=options.null_bins,
-        label_rule=options.label_rule,
-        min_share=options.min_share,
         validation=options.validation_subjects,
         test=options.test_subjects,
-        limbs=options.limbs,
-        imu=options.imu,
-        title=options.title,
+        **picked(options, "label_rule", "min_share", "limbs", "imu", "title"),
         provenance={"command": shlex.join(["sd2", *sys.argv[1:]])},
     )
 
@@ -263,10 +212,7 @@ def _making(options: argparse.Namespace) -> Making:
         if options.placements in (None, "planned")
         else read_placements(Path(options.placements)),
         simulation=None if options.simulate is None else Simulation(named_radar(options.simulate)),
-        model=options.model,
-        texture=options.texture,
-        limbs=options.limbs,
-        imu=options.imu,
+        **picked(options, "model", "texture", "limbs", "imu"),
     )
 
 
@@ -285,14 +231,12 @@ def _dry_run(
         print_json(
             {
                 "dataset": str(options.out),
-                "sources": forecast.sources,
-                "segments": forecast.segments,
+                **picked(forecast, "sources", "segments"),
                 "segments_of_subject": forecast.of_subject,
                 "segments_of_label": forecast.of_label,
                 "segments_of_kind": forecast.of_kind,
                 "segments_of_split": forecast.of_split(),
-                "frame_rate_hz": forecast.frame_rate_hz,
-                "total_bytes": forecast.total_bytes,
+                **picked(forecast, "frame_rate_hz", "total_bytes"),
                 "seconds": seconds,
                 "failed": list(forecast.failed),
             }
@@ -326,9 +270,7 @@ def _said(written: Written, sheet: Path) -> dict[str, Any]:
     markdown, as_json, _ = card_paths(written.path)
     return {
         "dataset": str(written.path),
-        "segments": written.segments,
-        "sources": written.sources,
-        "added": written.added,
+        **picked(written, "segments", "sources", "added"),
         "card": str(markdown),
         "card_json": str(as_json),
         "sheet": str(sheet),

@@ -9,15 +9,19 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from sd2core.cli.command_parser import add_command
 from sd2core.cli.options import (
-    add_command,
-    add_json_and_progress,
-    add_output,
-    add_value,
     not_negative_float,
     positive_float,
 )
-from sd2core.cli.output import print_event, print_facts, print_json, progress_bar, progress_events
+from sd2core.cli.output import (
+    picked,
+    print_event,
+    print_facts,
+    print_json,
+    progress_bar,
+    progress_events,
+)
 from sd2core.cli.running import explanation
 from sd2core.errors import Sd2Error
 
@@ -46,85 +50,52 @@ _BARS = {
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``fit``."""
-    parser = add_command(
-        commands,
-        "fit",
-        "make a moving mesh from a video of a person",
-        handler=_fit,
-        description=(
-            "Finds the person, 33 landmarks in every frame, and the body and motion that fit\n"
-            "them. The size of everything follows from the person's height: say it with\n"
-            "--stature-m where you know it, every velocity is proportional to it. At first use\n"
-            "the landmark models are fetched (77 MB; `sd2 fetch-models`).\n\n"
-            "It can be stopped at any moment: what is done stays in FILE.partial, and the same\n"
-            "command goes on from there."
-        ),
-        examples=(
-            "  sd2 fit walk.mp4 --out walk.zarr --stature-m 1.78\n"
-            "  sd2 fit two.mp4 --out left.zarr --person-box 40,60,180,400 --person-frame 12\n"
-            "  sd2 fit walk.mp4 --out walk.npz --field-of-view 68 --resolution low"
-        ),
-    )
-    add_value(parser, "video", Path, "VIDEO", "any video that FFmpeg reads")
-    add_output(parser, "FILE", "the mesh to write (.zarr or .npz)")
-    parser.add_argument(
+    parser = add_command(commands, "fit", handler=_fit)
+    parser.add_value("video", Path, "VIDEO", "any video that FFmpeg reads")
+    parser.add_output("FILE", "the mesh to write (.zarr or .npz)")
+    parser.add_value(
         "--person-box",
-        type=_rectangle,
-        metavar="X,Y,W,H",
-        help="a rectangle around the person, in pixels (default: who is seen best)",
+        _rectangle,
+        "X,Y,W,H",
+        "a rectangle around the person, in pixels (default: who is seen best)",
     )
-    parser.add_argument(
-        "--person-frame",
-        type=_frame,
-        metavar="N",
-        help="the frame of that rectangle, counted from 0 (default: 0)",
+    parser.add_value(
+        "--person-frame", _frame, "N", "the frame of that rectangle, counted from 0 (default: 0)"
     )
-    parser.add_argument(
-        "--stature-m",
-        type=positive_float,
-        metavar="M",
-        help="how tall the person is, in metres (default: 1.72)",
+    parser.add_value(
+        "--stature-m", positive_float, "M", "how tall the person is, in metres (default: 1.72)"
     )
-    parser.add_argument(
+    parser.add_value(
         "--focal-px",
-        type=positive_float,
-        metavar="PX",
-        help="focal length in pixels (default: as the file says, or 56° across the longer side)",
+        positive_float,
+        "PX",
+        "focal length in pixels (default: as the file says, or 56° across the longer side)",
     )
-    parser.add_argument(
+    parser.add_value(
         "--field-of-view",
-        type=positive_float,
-        metavar="DEG",
-        help="instead of it, the angle across the longer side of the picture",
+        positive_float,
+        "DEG",
+        "instead of it, the angle across the longer side of the picture",
     )
-    parser.add_argument(
+    parser.add_value(
         "--max-gap-s",
-        type=not_negative_float,
-        metavar="S",
-        help="bridge gaps without the person up to this long; longer ones stay empty"
-        " (default: 0.5)",
+        not_negative_float,
+        "S",
+        "bridge gaps without the person up to this long; longer ones stay empty (default: 0.5)",
     )
-    parser.add_argument(
-        "--resolution",
-        choices=("low", "medium", "high"),
-        default="medium",
-        help="1,229, 5,000 or 13,348 vertices (default: medium)",
+    parser.add_choice(
+        "--resolution", ("low", "medium", "high"), "1,229, 5,000 or 13,348 vertices", "medium"
     )
-    parser.add_argument(
+    parser.add_choice(
         "--landmark-model",
-        choices=("full", "heavy"),
-        default="heavy",
-        help="the network that finds the landmarks; full takes half the time and is a little less"
-        " good (default: heavy)",
+        ("full", "heavy"),
+        "the network that finds the landmarks; full takes half the time and is a little less good",
+        "heavy",
     )
-    add_value(parser, "--models", Path, "FOLDER", "a folder with the landmark models")
-    add_value(parser, "--landmarks", Path, "FILE", "keep the landmarks as well (.npz)")
-    parser.add_argument(
-        "--restart",
-        action="store_true",
-        help="start from the beginning, not where a stopped run ended",
-    )
-    add_json_and_progress(parser)
+    parser.add_value("--models", Path, "FOLDER", "a folder with the landmark models")
+    parser.add_value("--landmarks", Path, "FILE", "keep the landmarks as well (.npz)")
+    parser.add_flag("--restart", "start from the beginning, not where a stopped run ended")
+    parser.add_json_and_progress()
 
 
 def _rectangle(text: str) -> tuple[float, float, float, float]:
@@ -146,6 +117,20 @@ def _frame(text: str) -> int:
 
 
 def _fit(options: argparse.Namespace) -> None:
+    """Make a moving mesh from a video of a person.
+
+    Finds the person, 33 landmarks in every frame, and the body and motion that fit
+    them. The size of everything follows from the person's height: say it with
+    --stature-m where you know it, every velocity is proportional to it. At first use
+    the landmark models are fetched (77 MB; `sd2 fetch-models`).
+
+    It can be stopped at any moment: what is done stays in FILE.partial, and the same
+    command goes on from there.
+
+      sd2 fit walk.mp4 --out walk.zarr --stature-m 1.78
+      sd2 fit two.mp4 --out left.zarr --person-box 40,60,180,400 --person-frame 12
+      sd2 fit walk.mp4 --out walk.npz --field-of-view 68 --resolution low
+    """
     try:
         _make(options)
     except Exception as error:
@@ -206,12 +191,9 @@ def _choices(options: argparse.Namespace) -> FitChoices:
         person = Rectangle(x, y, width, height, options.person_frame or 0)
     return FitChoices(
         person=person,
-        focal_px=options.focal_px,
         field_of_view_deg=options.field_of_view,
-        stature_m=options.stature_m,
         max_gap_s=DEFAULT_MAX_GAP_S if options.max_gap_s is None else options.max_gap_s,
-        resolution=options.resolution,
-        landmark_model=options.landmark_model,
+        **picked(options, "focal_px", "stature_m", "resolution", "landmark_model"),
     )
 
 
@@ -281,12 +263,7 @@ def _summary(options: argparse.Namespace, made: FittedVideo, seconds: float) -> 
     about = provenance(made, options.video, _choices(options))
     return about | {
         "out": str(options.out),
-        "frames": made.frames,
-        "frames_per_s": made.frames_per_s,
-        "present": made.present,
-        "bridged": made.bridged,
-        "residual_m": made.residual_m,
-        "quality": made.quality,
+        **picked(made, "frames", "frames_per_s", "present", "bridged", "residual_m", "quality"),
         "seconds": seconds,
     }
 

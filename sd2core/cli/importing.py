@@ -5,89 +5,54 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from sd2core.cli.command_parser import add_command
 from sd2core.cli.options import (
-    add_channel,
-    add_command,
-    add_json,
-    add_mesh_reading,
-    add_output,
-    add_value,
     finite_float,
     flag,
     given,
 )
-from sd2core.cli.output import print_json, progress_bar
+from sd2core.cli.output import picked, print_json, progress_bar
 from sd2core.errors import Sd2Error
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``import`` and ``relink``."""
-    parser = add_command(
-        commands,
-        "import",
-        "make a recording from a video, a mesh and a radar capture",
-        handler=_import,
-        description=(
-            "A recording is a folder NAME.sd2 that says what belongs together. The files stay\n"
-            "where they are and are referred to by relative paths; --copy copies them into\n"
-            "the folder, which can then be handed on as it is. Every file is opened once, so\n"
-            "that what cannot be read is said here and not later."
-        ),
-        examples=(
-            "  sd2 import --video walk.mkv --mesh walk.npz --out walk.sd2\n"
-            "  sd2 import --radar capture/ --title 'Empty lab' --out lab.sd2\n"
-            "  sd2 import --radar capture/ --receiver 2 --out lab.sd2\n"
-            "  sd2 import --video a.mkv --radar capture/ --radar-offset-s -0.35 --copy --out a.sd2"
-        ),
-    )
-    add_output(parser, "NAME.sd2", "the recording to make")
-    add_value(parser, "--video", Path, "FILE", "video of the person")
-    parser.add_argument(
+    parser = add_command(commands, "import", handler=_import)
+    parser.add_output("NAME.sd2", "the recording to make")
+    parser.add_value("--video", Path, "FILE", "video of the person")
+    parser.add_value(
         "--mesh",
-        type=Path,
-        metavar="FILE",
-        help="body mesh fitted to the video (.npz, .zarr, a folder of .obj/.ply/.glb, or the"
+        Path,
+        "FILE",
+        "body mesh fitted to the video (.npz, .zarr, a folder of .obj/.ply/.glb, or the"
         " output of VIBE, WHAM or 4D-Humans)",
     )
-    add_mesh_reading(parser)
-    add_value(parser, "--radar", Path, "CAPTURE", "radar capture of the same scene")
-    parser.add_argument(
+    parser.add_mesh_reading()
+    parser.add_value("--radar", Path, "CAPTURE", "radar capture of the same scene")
+    parser.add_value(
         "--radar-offset-s",
-        type=finite_float,
-        default=0.0,
-        metavar="S",
-        help="time in the video, in seconds, of the first radar frame (default: 0)",
+        finite_float,
+        "S",
+        "time in the video, in seconds, of the first radar frame",
+        0.0,
     )
-    add_channel(parser)
-    add_value(parser, "--imu", Path, "FILE", "samples of an inertial sensor (.csv, .sto, .npz)")
-    parser.add_argument(
+    parser.add_channel()
+    parser.add_value("--imu", Path, "FILE", "samples of an inertial sensor (.csv, .sto, .npz)")
+    parser.add_value(
         "--imu-offset-s",
-        type=finite_float,
-        default=0.0,
-        metavar="S",
-        help="time in the video, in seconds, of their first sample (default: 0)",
+        finite_float,
+        "S",
+        "time in the video, in seconds, of their first sample",
+        0.0,
     )
-    parser.add_argument(
-        "--title", default="", metavar="TEXT", help="what to call it (default: its name)"
-    )
-    parser.add_argument("--copy", action="store_true", help="copy the files into the recording")
-    add_json(parser)
+    parser.add_value("--title", str, "TEXT", "what to call it (default: its name)", "")
+    parser.add_flag("--copy", "copy the files into the recording")
+    parser.add_json()
 
-    parser = add_command(
-        commands,
-        "relink",
-        "find the missing files of a recording in another folder",
-        handler=_relink,
-        description=(
-            "Files that are not where the recording says are looked for by name in FOLDER and\n"
-            "everything below it. Of several files with the same name, the one whose folders\n"
-            "agree best with the old path is taken; when two agree equally well, neither is."
-        ),
-        examples="  sd2 relink walk.sd2 /media/disk/experiments",
-    )
-    add_value(parser, "recording", Path, "RECORDING", "a recording (.sd2)")
-    add_value(parser, "folder", Path, "FOLDER", "where to look, and in all folders below")
-    add_json(parser)
+    parser = add_command(commands, "relink", handler=_relink)
+    parser.add_value("recording", Path, "RECORDING", "a recording (.sd2)")
+    parser.add_value("folder", Path, "FOLDER", "where to look, and in all folders below")
+    parser.add_json()
 
 
 def copy_sample(out: Path) -> None:
@@ -100,6 +65,18 @@ def copy_sample(out: Path) -> None:
 
 
 def _import(options: argparse.Namespace) -> None:
+    """Make a recording from a video, a mesh and a radar capture.
+
+    A recording is a folder NAME.sd2 that says what belongs together. The files stay
+    where they are and are referred to by relative paths; --copy copies them into
+    the folder, which can then be handed on as it is. Every file is opened once, so
+    that what cannot be read is said here and not later.
+
+      sd2 import --video walk.mkv --mesh walk.npz --out walk.sd2
+      sd2 import --radar capture/ --title 'Empty lab' --out lab.sd2
+      sd2 import --radar capture/ --receiver 2 --out lab.sd2
+      sd2 import --video a.mkv --radar capture/ --radar-offset-s -0.35 --copy --out a.sd2
+    """
     from sd2core.cli.info.description import describe_parts, describe_recording, show
     from sd2core.cli.reading import mesh_reading, refuse_unused_mesh_options
     from sd2core.recording.recording import Recording
@@ -108,17 +85,11 @@ def _import(options: argparse.Namespace) -> None:
     refuse_unused_mesh_options(options, options.out, options.mesh, but=("focal_px",))
     recording = Recording(
         options.out,
-        video=options.video,
-        mesh=options.mesh,
-        faces=options.faces,
-        radar=options.radar,
         mesh_reading=mesh_reading(options),
-        radar_offset_s=options.radar_offset_s,
         radar_receiver=options.receiver,
         radar_transmitter=options.transmitter,
-        imu=options.imu,
-        imu_offset_s=options.imu_offset_s,
-        title=options.title,
+        **picked(options, "video", "mesh", "faces", "radar", "imu", "title"),
+        **picked(options, "radar_offset_s", "imu_offset_s"),
     )
     chosen = given(options, ("receiver", "transmitter"))
     if chosen and (recording.radar is None or recording.holds_radar_map):
@@ -135,6 +106,14 @@ def _import(options: argparse.Namespace) -> None:
 
 
 def _relink(options: argparse.Namespace) -> int:
+    """Find the missing files of a recording in another folder.
+
+    Files that are not where the recording says are looked for by name in FOLDER and
+    everything below it. Of several files with the same name, the one whose folders
+    agree best with the old path is taken; when two agree equally well, neither is.
+
+      sd2 relink walk.sd2 /media/disk/experiments
+    """
     from sd2core.recording.recording import open_recording
 
     recording = open_recording(options.recording)

@@ -7,12 +7,8 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from sd2core.cli.command_parser import Options, add_command
 from sd2core.cli.options import (
-    add_command,
-    add_json,
-    add_mesh_reading,
-    add_output,
-    add_value,
     not_negative_float,
     positive_float,
     vector,
@@ -26,66 +22,35 @@ if TYPE_CHECKING:
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``imu``."""
-    parser = add_command(
-        commands,
-        "imu",
-        "what an inertial sensor on the body would measure (simulated)",
-        handler=_imu,
-        description=(
-            "Fixes an accelerometer and a gyroscope to the body and writes what they would feel:\n"
-            "m/s² with gravity (at rest 9.81 upwards) and rad/s, along the sensor's own axes. On\n"
-            "meshes of `sd2 fit` places have names: head, chest, pelvis, and left- or right- with\n"
-            "upper-arm, forearm, wrist, hand, thigh, shank, foot. There x runs along the bone,\n"
-            "away from the trunk or up it, and z points out of the body. On a vertex of any other\n"
-            "surface z points out of it, x as near to upwards as lies in it, in the first frame.\n"
-            "y completes them right-handed. Where there is no body for a while, the samples are\n"
-            "empty. See docs/imu.md."
-        ),
-        examples=(
-            "  sd2 imu walk.zarr --at left-wrist --out wrist.csv\n"
-            "  sd2 imu walk.npz --at 4711 --rate 200 --out spot.sto\n"
-            "  sd2 imu walk.sd2 --at right-foot --acc-noise 0.002 --acc-range 20 --out foot.npz"
-        ),
-    )
-    add_value(parser, "mesh", Path, "MESH", "a mesh, or a recording")
-    parser.add_argument(
-        "--at", required=True, metavar="PLACE|VERTEX", help="where on the body, or which vertex"
-    )
-    add_output(parser, "FILE", "the samples to write (.csv, .sto or .npz)")
-    add_value(parser, "--rate", positive_float, "HZ", "samples per second", 100.0)
-    parser.add_argument(
+    parser = add_command(commands, "imu", handler=_imu)
+    parser.add_value("mesh", Path, "MESH", "a mesh, or a recording")
+    text = "where on the body, or which vertex"
+    parser.add_value("--at", str, "PLACE|VERTEX", text, required=True)
+    parser.add_output("FILE", "the samples to write (.csv, .sto or .npz)")
+    parser.add_value("--rate", positive_float, "HZ", "samples per second", 100.0)
+    parser.add_value(
         "--cutoff",
-        type=positive_float,
-        metavar="HZ",
-        help="where the zero-phase low pass leaves half of the amplitude, in Hz (default: 6, or a"
+        positive_float,
+        "HZ",
+        "where the zero-phase low pass leaves half of the amplitude, in Hz (default: 6, or a"
         " fifth of the mesh's frame rate if that is lower)",
     )
-    parser.add_argument(
-        "--up",
-        type=vector,
-        default=(0.0, -1.0, 0.0),
-        metavar="X,Y,Z",
-        help="upwards in the mesh's frame (default: 0,-1,0, as for a camera held level)",
-    )
+    text = "upwards in the mesh's frame (default: 0,-1,0, as for a camera held level)"
+    parser.add_value("--up", vector, "X,Y,Z", text, (0.0, -1.0, 0.0))
     _add_errors(parser)
-    add_mesh_reading(parser)
-    add_json(parser)
+    parser.add_mesh_reading()
+    parser.add_json()
     parser.set_defaults(sensor=None)
 
 
-def _add_errors(parser: argparse.ArgumentParser) -> None:
+def _add_errors(parser: Options) -> None:
     group = parser.add_argument_group("sensor errors", "none by default")
     for short, long, unit in (
         ("acc", "accelerometer", "m/s²"),
         ("gyr", "gyroscope", "rad/s"),
     ):
-        group.add_argument(
-            f"--{short}-bias",
-            type=vector,
-            default=(0.0, 0.0, 0.0),
-            metavar="X,Y,Z",
-            help=f"constant error of the {long}, in {unit}",
-        )
+        text = f"constant error of the {long}, in {unit}"
+        group.add_value(f"--{short}-bias", vector, "X,Y,Z", text, (0.0, 0.0, 0.0))
         group.add_argument(
             f"--{short}-noise",
             type=not_negative_float,
@@ -100,10 +65,25 @@ def _add_errors(parser: argparse.ArgumentParser) -> None:
             metavar="LARGEST",
             help=f"its range, plus and minus, in {unit}; what is beyond is clipped",
         )
-    add_value(group, "--seed", int, "N", "seed of the noise", 0)
+    group.add_value("--seed", int, "N", "seed of the noise", 0)
 
 
 def _imu(options: argparse.Namespace) -> None:
+    """What an inertial sensor on the body would measure (simulated).
+
+    Fixes an accelerometer and a gyroscope to the body and writes what they would feel:
+    m/s² with gravity (at rest 9.81 upwards) and rad/s, along the sensor's own axes. On
+    meshes of `sd2 fit` places have names: head, chest, pelvis, and left- or right- with
+    upper-arm, forearm, wrist, hand, thigh, shank, foot. There x runs along the bone,
+    away from the trunk or up it, and z points out of the body. On a vertex of any other
+    surface z points out of it, x as near to upwards as lies in it, in the first frame.
+    y completes them right-handed. Where there is no body for a while, the samples are
+    empty. See docs/imu.md.
+
+      sd2 imu walk.zarr --at left-wrist --out wrist.csv
+      sd2 imu walk.npz --at 4711 --rate 200 --out spot.sto
+      sd2 imu walk.sd2 --at right-foot --acc-noise 0.002 --acc-range 20 --out foot.npz
+    """
     from sd2core.cli.info.description import signals_data
     from sd2core.cli.reading import mesh_and_sensor
     from sd2core.imu.files import write_signals

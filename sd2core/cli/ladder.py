@@ -6,15 +6,8 @@ import argparse
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from sd2core.cli.command_parser import Options, add_command
 from sd2core.cli.options import (
-    add_command,
-    add_count,
-    add_figure_output,
-    add_json,
-    add_mesh_and_sensor,
-    add_mesh_reading,
-    add_method,
-    add_value,
     given,
     positive_float,
     positive_int,
@@ -34,49 +27,35 @@ _TOLERANCE = 0.02
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``ladder``."""
-    parser = add_command(
-        commands,
-        "ladder",
-        "measure what accuracy costs on a scene, and say what the scene requires",
-        handler=_ladder,
-        description=(
-            "Tries every sensible way of computing the Doppler of a mesh on some of its frames:\n"
-            "how long it takes on this machine, and how far its map is from the most accurate\n"
-            "one. Then says which is the cheapest that holds a tolerance, and why. A tolerance of\n"
-            "2 % means: the absolute differences between the two smoothed maps add up to 2 % of\n"
-            "the map. What was measured is kept until mesh, sensor or machine change."
-        ),
-        examples=(
-            "  sd2 ladder walk.npz\n"
-            "  sd2 ladder walk.npz --quick --tolerance 1%\n"
-            "  sd2 ladder walk.sd2 --sensor 1.5,0,2 --budget-ms 0.1\n"
-            "  sd2 ladder walk.npz --method fmcw\n"
-            "  sd2 ladder walk.npz --figure accuracy.png --json"
-        ),
-    )
-    add_mesh_and_sensor(parser)
+    parser = add_command(commands, "ladder", handler=_ladder)
+    parser.add_mesh_and_sensor()
     add_wish(parser, "2%%")
-    add_method(parser, "measure counting, or the FMCW signal")
-    parser.add_argument(
-        "--weight",
-        choices=("count", "area", "projected"),
-        default="count",
-        help="what a vertex counts (default: count)",
-    )
-    add_count(parser)
-    parser.add_argument(
-        "--quick", action="store_true", help="only say what the scene requires, without the table"
-    )
-    add_value(parser, "--repeats", positive_int, "N", "how often every plan is timed (default: 5)")
-    parser.add_argument(
-        "--fresh", action="store_true", help="measure again what was measured before"
-    )
-    add_figure_output(parser, "error against cost")
-    add_mesh_reading(parser)
-    add_json(parser)
+    parser.add_method("measure counting, or the FMCW signal")
+    parser.add_choice("--weight", ("count", "area", "projected"), "what a vertex counts", "count")
+    parser.add_count()
+    parser.add_flag("--quick", "only say what the scene requires, without the table")
+    parser.add_value("--repeats", positive_int, "N", "how often every plan is timed (default: 5)")
+    parser.add_flag("--fresh", "measure again what was measured before")
+    parser.add_figure_output("error against cost")
+    parser.add_mesh_reading()
+    parser.add_json()
 
 
 def _ladder(options: argparse.Namespace) -> int:
+    """Measure what accuracy costs on a scene, and say what the scene requires.
+
+    Tries every sensible way of computing the Doppler of a mesh on some of its frames:
+    how long it takes on this machine, and how far its map is from the most accurate
+    one. Then says which is the cheapest that holds a tolerance, and why. A tolerance of
+    2 % means: the absolute differences between the two smoothed maps add up to 2 % of
+    the map. What was measured is kept until mesh, sensor or machine change.
+
+      sd2 ladder walk.npz
+      sd2 ladder walk.npz --quick --tolerance 1%
+      sd2 ladder walk.sd2 --sensor 1.5,0,2 --budget-ms 0.1
+      sd2 ladder walk.npz --method fmcw
+      sd2 ladder walk.npz --figure accuracy.png --json
+    """
     from sd2core.accuracy.choosing import check_options
     from sd2core.cli.reading import check_output, mesh_and_sensor
     from sd2core.doppler import PRESETS
@@ -95,10 +74,7 @@ def _ladder(options: argparse.Namespace) -> int:
     synthesis = check_options(mesh, replace(PRESETS["paper"], **chosen_by_user))
     choice = None
     if options.method == "histogram":
-        tolerance = options.tolerance
-        if tolerance is None and options.budget_ms is None:
-            tolerance = _TOLERANCE
-        choice = chosen(mesh, sensor, synthesis, tolerance, options.budget_ms)
+        choice = chosen(mesh, sensor, synthesis, options)
     measurement = None if options.quick else _measured(mesh, sensor, synthesis, options)
     if options.figure is not None and measurement is not None:
         from sd2core.accuracy.results import plot_cost_and_error
@@ -119,37 +95,36 @@ def _ladder(options: argparse.Namespace) -> int:
     return 0 if choice is None or choice.holds else 1
 
 
-def add_wish(parser: argparse.ArgumentParser, default: str) -> None:
+def add_wish(parser: Options, default: str) -> None:
     """Add ``--tolerance`` and ``--budget-ms``, of which one may be given."""
     wanted = parser.add_mutually_exclusive_group()
-    wanted.add_argument(
+    wanted.add_value(
         "--tolerance",
-        type=share,
-        metavar="SHARE",
-        help=f"the error that is allowed, as 2%% or 0.02: relative L1 of the smoothed map"
+        share,
+        "SHARE",
+        f"the error that is allowed, as 2%% or 0.02: relative L1 of the smoothed map"
         f" (default: {default})",
     )
-    wanted.add_argument(
-        "--budget-ms",
-        type=positive_float,
-        metavar="MS",
-        help="instead, the milliseconds per frame that are allowed",
+    wanted.add_value(
+        "--budget-ms", positive_float, "MS", "instead, the milliseconds per frame that are allowed"
     )
 
 
 def chosen(
     mesh: MeshSequence,
     sensor: VirtualSensor,
-    options: SynthesisOptions,
-    tolerance: float | None,
-    budget_ms: float | None,
+    synthesis: SynthesisOptions,
+    options: argparse.Namespace,
     *,
     dragging: bool = True,
 ) -> Choice:
-    """Choose a plan with progress bars; arguments as for :func:`sd2core.accuracy.choose`."""
+    """Choose a plan as :func:`add_wish` asks for it, with progress bars; without a wish by 2 %."""
     from sd2core.accuracy.choosing import choose
     from sd2core.numerics.compiled import warm_up
 
+    tolerance = options.tolerance
+    if tolerance is None and options.budget_ms is None:
+        tolerance = _TOLERANCE
     with progress_bar("Compiling", "file") as progress:
         warm_up(progress)
     with progress_bar("Choosing", "plan") as progress:
@@ -157,9 +132,9 @@ def chosen(
             mesh,
             sensor,
             tolerance=tolerance,
-            budget_ms=budget_ms,
+            budget_ms=options.budget_ms,
             dragging=dragging,
-            options=options,
+            options=synthesis,
             progress=progress,
         )
 

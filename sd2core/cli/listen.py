@@ -12,7 +12,10 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sd2core.cli.options import add_command, add_json, add_output, add_value, positive_float
+from sd2core.cli.command_parser import add_command
+from sd2core.cli.options import (
+    positive_float,
+)
 from sd2core.cli.output import counted, print_event, print_facts
 from sd2core.errors import Sd2Error
 from sd2core.runs.control import stop_signals
@@ -32,25 +35,7 @@ _BAR_DB = 5.0
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``listen``."""
-    parser = add_command(
-        commands,
-        "listen",
-        "record a radar while it runs, and follow its Doppler map",
-        handler=_listen,
-        description=(
-            "Frames go into a recording that can be opened at any moment. The status line shows\n"
-            "the newest column of the Doppler map (receding to approaching), its level, the\n"
-            "classifier's answer, and how many frames were dropped or damaged. Ctrl-C or q stops;\n"
-            "the same command with the same --out goes on. docs/radar-files.md says how to set up\n"
-            "a DCA1000."
-        ),
-        examples=(
-            "  sd2 listen --dca1000 192.168.33.30 --setup profile.cfg --out walk.sd2\n"
-            "  sd2 listen --dca1000 --setup profile.cfg --out walk.sd2    (sent by this computer)\n"
-            "  sd2 listen --replay capture/ --out again.sd2 --seconds 10\n"
-            "  sd2 listen --replay walk.sd2 --out again.sd2 --classifier gestures.safetensors"
-        ),
-    )
+    parser = add_command(commands, "listen", handler=_listen)
     source = parser.add_mutually_exclusive_group(required=True)
     source.add_argument(
         "--dca1000",
@@ -60,27 +45,36 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         help="listen to a DCA1000 on this address of this computer (default: 127.0.0.1, which"
         " only programs on this computer reach; port 4098)",
     )
-    add_value(
-        source, "--replay", Path, "CAPTURE", "a capture, or the one of a recording, at its own rate"
+    source.add_value(
+        "--replay", Path, "CAPTURE", "a capture, or the one of a recording, at its own rate"
     )
-    parser.add_argument(
-        "--setup",
-        type=Path,
-        metavar="FILE",
-        help="the .cfg or .json that the radar runs with (with --dca1000)",
+    parser.add_value(
+        "--setup", Path, "FILE", "the .cfg or .json that the radar runs with (with --dca1000)"
     )
-    add_output(parser, "NAME.sd2", "the recording to write")
-    add_value(parser, "--classifier", Path, "FILE", "a classifier of `sd2 classify train`")
-    add_value(parser, "--seconds", positive_float, "S", "stop after so long (default: never)")
-    add_json(parser)
-    parser.add_argument(
+    parser.add_output("NAME.sd2", "the recording to write")
+    parser.add_value("--classifier", Path, "FILE", "a classifier of `sd2 classify train`")
+    parser.add_value("--seconds", positive_float, "S", "stop after so long (default: never)")
+    parser.add_json()
+    parser.add_flag(
         "--columns",
-        action="store_true",
-        help="with --json, every column of the Doppler map as it comes, receding to approaching",
+        "with --json, every column of the Doppler map as it comes, receding to approaching",
     )
 
 
 def _listen(options: argparse.Namespace) -> None:
+    """Record a radar while it runs, and follow its Doppler map.
+
+    Frames go into a recording that can be opened at any moment. The status line shows
+    the newest column of the Doppler map (receding to approaching), its level, the
+    classifier's answer, and how many frames were dropped or damaged. Ctrl-C or q stops;
+    the same command with the same --out goes on. docs/radar-files.md says how to set up
+    a DCA1000.
+
+      sd2 listen --dca1000 192.168.33.30 --setup profile.cfg --out walk.sd2
+      sd2 listen --dca1000 --setup profile.cfg --out walk.sd2    (sent by this computer)
+      sd2 listen --replay capture/ --out again.sd2 --seconds 10
+      sd2 listen --replay walk.sd2 --out again.sd2 --classifier gestures.safetensors
+    """
     from sd2core.live.listening import Listening
     from sd2core.live.recording import GrowingRecording
 

@@ -91,6 +91,11 @@ def print_rows(rows: Sequence[Sequence[str]], *, right: Collection[int] = ()) ->
     print(*text_table(rows, right), sep="\n")
 
 
+def picked(thing: object, *names: str) -> dict[str, Any]:
+    """Attributes of a thing by their names, for JSON."""
+    return {name: getattr(thing, name) for name in names}
+
+
 def finite(value: Any) -> Any:
     """Replace NaN and infinities by None, for JSON."""
     if isinstance(value, Mapping):

@@ -7,13 +7,8 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from sd2core.cli.command_parser import Options, add_command
 from sd2core.cli.options import (
-    add_axis,
-    add_command,
-    add_count,
-    add_json,
-    add_limbs,
-    add_output,
     bin_list,
     finite_float,
     given,
@@ -27,111 +22,76 @@ if TYPE_CHECKING:
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
-    """Add ``pairs``."""
-    parser = add_command(
-        commands, "pairs", "make pairs of synthetic and real Doppler to learn from"
-    )
+    """Make pairs of synthetic and real Doppler to learn from."""
+    parser = add_command(commands, "pairs", about=add_commands)
     kinds = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     _add_mars(kinds)
     _add_recordings(kinds)
 
 
 def _add_recordings(kinds: argparse._SubParsersAction) -> None:
-    parser = add_command(
-        kinds,
-        "recordings",
-        "pairs from recordings that have a mesh and a radar capture",
-        handler=_recordings,
-        description=(
-            "The synthetic Doppler of each recording's mesh is the input, the Doppler of its\n"
-            "radar capture the target, aligned by the recording's offset. Labels are its spans."
-        ),
-        examples=(
-            "  sd2 pairs recordings anna.sd2 ben.sd2 carla.sd2 --out mine.zarr\n"
-            "  sd2 pairs recordings a1.sd2 a2.sd2 b1.sd2 --subjects anna,anna,ben --out mine.zarr"
-        ),
-    )
-    parser.add_argument(
-        "recordings", type=Path, nargs="+", metavar="RECORDING", help="with a mesh and a radar"
-    )
+    parser = add_command(kinds, "recordings", handler=_recordings)
+    parser.add_value("recordings", Path, "RECORDING", "with a mesh and a radar", nargs="+")
     _add_pairs(parser, "14,15,16 of 32, else none")
-    add_count(parser)
-    parser.add_argument(
+    parser.add_count()
+    parser.add_value(
         "--subjects",
-        type=lambda text: tuple(text.split(",")),
-        metavar="LIST",
-        help="subject of each recording, separated by commas (default: each shows another person)",
+        lambda text: tuple(text.split(",")),
+        "LIST",
+        "subject of each recording, separated by commas (default: each shows another person)",
     )
 
 
-def _add_pairs(parser: argparse.ArgumentParser, usual_null_bins: str) -> None:
+def _add_pairs(parser: Options, usual_null_bins: str) -> None:
     """Add the store of pairs, and the axis and nulled bins of its maps."""
-    add_output(parser, "FILE.zarr", "the pairs to write")
-    add_axis(parser)
-    parser.add_argument(
+    parser.add_output("FILE.zarr", "the pairs to write")
+    parser.add_axis()
+    parser.add_value(
         "--null-bins",
-        type=bin_list,
-        metavar="LIST",
-        help=f"bins to set to zero in input and target, e.g. 14,15,16 (default: {usual_null_bins})",
+        bin_list,
+        "LIST",
+        f"bins to set to zero in input and target, e.g. 14,15,16 (default: {usual_null_bins})",
     )
-    add_limbs(parser)
-    add_json(parser)
+    parser.add_limbs()
+    parser.add_json()
 
 
 def _add_mars(kinds: argparse._SubParsersAction) -> None:
-    parser = add_command(
-        kinds,
-        "mars",
-        "pairs from MARS recordings: a Kinect skeleton and a radar's points",
-        handler=_mars,
-        description=(
-            "A body of the person's size moves as the Kinect saw it; its synthetic Doppler is\n"
-            "the input, the Doppler of the radar's points the target. Persons are the subjects.\n"
-            "Where the radar stands beside the Kinect, and how its clock lies, is found by what\n"
-            "makes the mean velocities of both agree best, for each person.\n\n"
-            "It can be stopped at any moment; the same command resumes it."
-        ),
-        examples=(
-            "  sd2 pairs mars mars_subject1 mars_subject4 --out mars.zarr\n"
-            "  sd2 pairs mars mars_subject1 --out nulled.zarr --null-bins 14,15,16"
-        ),
-    )
-    parser.add_argument(
+    parser = add_command(kinds, "mars", handler=_mars)
+    parser.add_value(
         "folders",
-        type=Path,
+        Path,
+        "FOLDER",
+        "a person's kinect_data_PART.csv and radar_data_PART.csv",
         nargs="+",
-        metavar="FOLDER",
-        help="a person's kinect_data_PART.csv and radar_data_PART.csv",
     )
     _add_pairs(parser, "none")
-    parser.add_argument(
+    parser.add_choice(
         "--visibility",
-        choices=("none", "facing", "depth", "exact"),
-        help="which vertices count (default: facing)",
+        ("none", "facing", "depth", "exact"),
+        "which vertices count (default: facing)",
     )
-    parser.add_argument(
-        "--weight",
-        choices=("count", "area", "projected"),
-        help="weight of a vertex (default: count)",
+    parser.add_choice(
+        "--weight", ("count", "area", "projected"), "weight of a vertex (default: count)"
     )
-    parser.add_argument(
+    parser.add_value(
         "--sensor",
-        type=position,
-        metavar="X,Y,Z",
-        help="where the radar is beside the Kinect, in metres, right, down and forward (default:"
+        position,
+        "X,Y,Z",
+        "where the radar is beside the Kinect, in metres, right, down and forward (default:"
         " estimated; 0,0,0 where only --radar-offset-s is given)",
     )
-    parser.add_argument(
+    parser.add_value(
         "--radar-offset-s",
-        type=finite_float,
-        metavar="S",
-        help="what the radar shows at a time is the motion so many seconds later (default:"
+        finite_float,
+        "S",
+        "what the radar shows at a time is the motion so many seconds later (default:"
         " estimated; 0 where only --sensor is given)",
     )
-    parser.add_argument(
+    parser.add_choice(
         "--target",
-        choices=("share", "intensity"),
-        help="target of each frame: shares that add up to 1, or intensities (default: share)",
+        ("share", "intensity"),
+        "target of each frame: shares that add up to 1, or intensities (default: share)",
     )
 
 
@@ -153,6 +113,14 @@ def _choices(options: argparse.Namespace) -> MarsChoices:
 
 
 def _recordings(options: argparse.Namespace) -> None:
+    """Pairs from recordings that have a mesh and a radar capture.
+
+    The synthetic Doppler of each recording's mesh is the input, the Doppler of its
+    radar capture the target, aligned by the recording's offset. Labels are its spans.
+
+      sd2 pairs recordings anna.sd2 ben.sd2 carla.sd2 --out mine.zarr
+      sd2 pairs recordings a1.sd2 a2.sd2 b1.sd2 --subjects anna,anna,ben --out mine.zarr
+    """
     from sd2core.cli.reading import chosen_axis
     from sd2core.doppler import PRESETS
     from sd2core.mocap.recording_pairs import make_recording_pairs
@@ -188,6 +156,18 @@ def _recordings(options: argparse.Namespace) -> None:
 
 
 def _mars(options: argparse.Namespace) -> None:
+    """Pairs from MARS recordings: a Kinect skeleton and a radar's points.
+
+    A body of the person's size moves as the Kinect saw it; its synthetic Doppler is
+    the input, the Doppler of the radar's points the target. Persons are the subjects.
+    Where the radar stands beside the Kinect, and how its clock lies, is found by what
+    makes the mean velocities of both agree best, for each person.
+
+    It can be stopped at any moment; the same command resumes it.
+
+      sd2 pairs mars mars_subject1 mars_subject4 --out mars.zarr
+      sd2 pairs mars mars_subject1 --out nulled.zarr --null-bins 14,15,16
+    """
     from sd2core.mocap.mars_pairs import make_mars_pairs
 
     with progress_bar("Making pairs") as progress:

@@ -6,18 +6,22 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from sd2core.cli.command_parser import add_command
 from sd2core.cli.ladder import add_wish
 from sd2core.cli.options import (
-    add_command,
-    add_json,
-    add_mesh_reading,
-    add_output,
-    add_value,
     flag,
     given,
     positive_int,
 )
-from sd2core.cli.output import counted, duration, print_facts, print_json, print_rows, progress_bar
+from sd2core.cli.output import (
+    counted,
+    duration,
+    picked,
+    print_facts,
+    print_json,
+    print_rows,
+    progress_bar,
+)
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
@@ -29,7 +33,6 @@ if TYPE_CHECKING:
     from sd2core.recording.recording import Recording
     from sd2core.sensor import VirtualSensor
 
-_TOLERANCE = 0.02
 _LIMITS = (
     ("inside", "stand in the body"),
     ("out_of_range", "see it beyond the radar's range"),
@@ -39,45 +42,33 @@ _LIMITS = (
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``placements``."""
-    parser = add_command(
-        commands,
-        "placements",
-        "plan sensors around a body, and say what a map from each would cost",
-        handler=_placements,
-        description=(
-            "A grid of every range, azimuth and elevation that is given, or with --cloud as many\n"
-            "random places between them. Ranges are distances from the body's centre; azimuth 0\n"
-            "is between body and camera and grows to the right in the picture, elevation upwards.\n"
-            "A list is 1,2,4 or 1:4:0.5, both ends included. Without any of these options, the\n"
-            "places planned in the recording are listed."
-        ),
-        examples=(
-            "  sd2 placements walk.sd2 --ranges 1:4:1 --azimuths -60:60:30 --out grid.json\n"
-            "  sd2 placements walk.sd2 --cloud 200 --ranges 1:4 --azimuths -60:60"
-            " --elevations -10:40\n"
-            "  sd2 placements walk.sd2 --placements grid.json --json"
-        ),
-    )
-    add_value(parser, "mesh", Path, "MESH", "a mesh, or a recording")
-    parser.add_argument(
-        "--ranges", metavar="LIST", help="distances in metres; with --cloud from:to, as 1:4"
-    )
-    parser.add_argument(
-        "--azimuths", metavar="LIST", help="degrees; with --cloud from:to (default: 0)"
-    )
-    parser.add_argument(
-        "--elevations", metavar="LIST", help="degrees; with --cloud from:to (default: 0)"
-    )
-    add_value(parser, "--cloud", positive_int, "N", "so many random places instead of a grid")
-    add_value(parser, "--seed", int, "N", "seed of the random places (default: 0)")
-    add_value(parser, "--placements", Path, "FILE", "read the places from a file of --out")
-    add_output(parser, "FILE.json", "the plan to write", required=False)
+    parser = add_command(commands, "placements", handler=_placements)
+    parser.add_value("mesh", Path, "MESH", "a mesh, or a recording")
+    parser.add_value("--ranges", str, "LIST", "distances in metres; with --cloud from:to, as 1:4")
+    parser.add_value("--azimuths", str, "LIST", "degrees; with --cloud from:to (default: 0)")
+    parser.add_value("--elevations", str, "LIST", "degrees; with --cloud from:to (default: 0)")
+    parser.add_value("--cloud", positive_int, "N", "so many random places instead of a grid")
+    parser.add_value("--seed", int, "N", "seed of the random places (default: 0)")
+    parser.add_value("--placements", Path, "FILE", "read the places from a file of --out")
+    parser.add_output("FILE.json", "the plan to write", required=False)
     add_wish(parser, "2%%")
-    add_mesh_reading(parser)
-    add_json(parser)
+    parser.add_mesh_reading()
+    parser.add_json()
 
 
 def _placements(options: argparse.Namespace) -> int:
+    """Plan sensors around a body, and say what a map from each would cost.
+
+    A grid of every range, azimuth and elevation that is given, or with --cloud as many
+    random places between them. Ranges are distances from the body's centre; azimuth 0
+    is between body and camera and grows to the right in the picture, elevation upwards.
+    A list is 1,2,4 or 1:4:0.5, both ends included. Without any of these options, the
+    places planned in the recording are listed.
+
+      sd2 placements walk.sd2 --ranges 1:4:1 --azimuths -60:60:30 --out grid.json
+      sd2 placements walk.sd2 --cloud 200 --ranges 1:4 --azimuths -60:60 --elevations -10:40
+      sd2 placements walk.sd2 --placements grid.json --json
+    """
     from sd2core.cli.reading import (
         check_output,
         load_mesh_from_options,
@@ -111,19 +102,9 @@ def _placements(options: argparse.Namespace) -> int:
             {
                 "placements": placements.as_dict(),
                 "target_m": body.target_m,
-                "radar": {
-                    "name": radar.name,
-                    "range_max_m": radar.range_max_m,
-                    "v_max_mps": radar.v_max_mps,
-                },
+                "radar": picked(radar, "name", "range_max_m", "v_max_mps"),
                 "places": _listed(placements, sensors, coverage, radar),
-                "cost": {
-                    "maps": cost.maps,
-                    "frames": cost.frames,
-                    "frame_ms": cost.frame_ms,
-                    "total_s": cost.total_s,
-                    "total_bytes": cost.total_bytes,
-                },
+                "cost": picked(cost, "maps", "frames", "frame_ms", "total_s", "total_bytes"),
                 "choice": choice.to_json(),
             }
         )
@@ -192,10 +173,7 @@ def _cost(
     places = placements.places()
     middle = sorted(range(len(places)), key=lambda number: places[number].range_m)[len(places) // 2]
     synthesis = check_options(mesh, PRESETS["paper"])
-    tolerance = options.tolerance
-    if tolerance is None and options.budget_ms is None:
-        tolerance = _TOLERANCE
-    choice = chosen(mesh, sensors[middle], synthesis, tolerance, options.budget_ms, dragging=False)
+    choice = chosen(mesh, sensors[middle], synthesis, options, dragging=False)
     return choice, PlacementCost(
         len(sensors), mesh.frame_count, choice.cost_ms, synthesis.axis.bins
     )
@@ -210,9 +188,7 @@ def _listed(
     out_of_range, aliasing = coverage.out_of_range(radar), coverage.aliasing(radar)
     return [
         {
-            "range_m": place.range_m,
-            "azimuth_deg": place.azimuth_deg,
-            "elevation_deg": place.elevation_deg,
+            **picked(place, "range_m", "azimuth_deg", "elevation_deg"),
             "position_m": sensor.position_m,
             "farthest_m": float(coverage.farthest_m[number]),
             "fastest_mps": float(coverage.fastest_mps[number]),

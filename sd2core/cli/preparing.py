@@ -5,24 +5,14 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from sd2core.cli.options import add_command
+from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import progress_bar
 from sd2core.errors import Sd2Error
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``warm-up`` and ``fetch-models``."""
-    add_command(
-        commands,
-        "warm-up",
-        "compile the numerical kernels once, after installing",
-        handler=_warm_up,
-        description=(
-            "Takes about half a minute the first time and keeps the result on disk. Without\n"
-            "it everything works as well: the kernels are compiled in the background while\n"
-            "a slower form serves."
-        ),
-    )
+    add_command(commands, "warm-up", handler=_warm_up)
     parser = add_command(
         commands,
         "fetch-models",
@@ -41,16 +31,9 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         examples="  sd2 fetch-models\n  sd2 fetch-models --from mediapipe-0.10.21-….whl\n"
         "  sd2 fetch-models --from mediapipe-pose-0.5.1675469404.tgz",
     )
-    parser.add_argument(
-        "--from",
-        dest="source",
-        type=Path,
-        metavar="PATH",
-        help="the wheel or the npm archive, a model file out of one, or a folder with them",
-    )
-    parser.add_argument(
-        "--if-missing", action="store_true", help="do nothing when they are there already"
-    )
+    text = "the wheel or the npm archive, a model file out of one, or a folder with them"
+    parser.add_value("--from", Path, "PATH", text, dest="source")
+    parser.add_flag("--if-missing", "do nothing when they are there already")
 
 
 def _fetch(options: argparse.Namespace) -> None:
@@ -70,6 +53,12 @@ def _fetch(options: argparse.Namespace) -> None:
 
 
 def _warm_up(options: argparse.Namespace) -> None:
+    """Compile the numerical kernels once, after installing.
+
+    Takes about half a minute the first time and keeps the result on disk. Without
+    it everything works as well: the kernels are compiled in the background while
+    a slower form serves.
+    """
     from sd2core.numerics.compiled import warm_up
 
     with progress_bar("Compiling", unit="module") as progress:

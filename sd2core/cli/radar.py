@@ -7,12 +7,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
+from sd2core.cli.command_parser import add_command
 from sd2core.cli.options import (
-    add_axis,
-    add_channel,
-    add_command,
-    add_json,
-    add_map_output,
     flag,
     given,
     span_m,
@@ -28,59 +24,49 @@ if TYPE_CHECKING:
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``radar``."""
-    parser = add_command(
-        commands,
-        "radar",
-        "turn a raw radar capture into a Doppler map, or say what limits it has",
-        handler=_radar,
-        description=(
-            "Prints the resolution and limits of the radar by its configuration, what was\n"
-            "assumed, and a note if the velocity axis extends beyond the limits. What files\n"
-            "each radar needs is in docs/radar-files.md. `sd2 radar describe FILE` writes a\n"
-            "description of samples of one's own (.npy, .h5, .sigmf-meta), and asks for what\n"
-            "no option says."
-        ),
-        examples=(
-            "  sd2 radar capture/                   (limits, and what was assumed)\n"
-            "  sd2 radar adc_data_Raw_0.bin --out real.npz --receiver 1\n"
-            "  sd2 radar describe walk.npy --carrier-hz 60.5e9 --bandwidth-hz 1e9\n"
-            "  sd2 radar capture/ --out real.npz\n"
-            "  sd2 radar capture/ --out real.npz --clutter mean --range 0.5,4\n"
-            "  sd2 radar walk.sd2 --out real.npz    (the capture of a recording)\n"
-            "  sd2 radar swing.h5 --out real.npz    (a file that holds the map already)"
-        ),
-    )
-    parser.add_argument(
+    parser = add_command(commands, "radar", handler=_radar)
+    parser.add_value(
         "capture",
-        type=Path,
-        metavar="CAPTURE",
-        help="a capture's file or folder, the .h5 of a K60168A, a recording, or the word describe",
+        Path,
+        "CAPTURE",
+        "a capture's file or folder, the .h5 of a K60168A, a recording, or the word describe",
     )
-    parser.add_argument(
-        "file", type=Path, nargs="?", metavar="FILE", help="after describe: the samples"
-    )
-    add_map_output(parser, required=False)
-    add_axis(parser)
-    parser.add_argument(
+    parser.add_value("file", Path, "FILE", "after describe: the samples", nargs="?")
+    parser.add_map_output(required=False)
+    parser.add_axis()
+    parser.add_choice(
         "--clutter",
-        choices=get_args(Clutter),
-        default="none",
-        help="what to subtract as static: nothing; each frame's mean over its chirps; the"
+        get_args(Clutter),
+        "what to subtract as static: nothing; each frame's mean over its chirps; the"
         " parabola that fits its chirps best, which swaying leaves no trace in; or the mean"
-        " averaged over frames, which keeps slow movers (default: none)",
+        " averaged over frames, which keeps slow movers",
+        "none",
     )
-    parser.add_argument(
-        "--range",
-        type=span_m,
-        metavar="LO,HI",
-        help="count only echoes from this range in metres (default: all)",
+    parser.add_value(
+        "--range", span_m, "LO,HI", "count only echoes from this range in metres (default: all)"
     )
-    add_channel(parser)
-    add_json(parser)
+    parser.add_channel()
+    parser.add_json()
     add_description(parser)
 
 
 def _radar(options: argparse.Namespace) -> None:
+    """Turn a raw radar capture into a Doppler map, or say what limits it has.
+
+    Prints the resolution and limits of the radar by its configuration, what was
+    assumed, and a note if the velocity axis extends beyond the limits. What files
+    each radar needs is in docs/radar-files.md. `sd2 radar describe FILE` writes a
+    description of samples of one's own (.npy, .h5, .sigmf-meta), and asks for what
+    no option says.
+
+      sd2 radar capture/                   (limits, and what was assumed)
+      sd2 radar adc_data_Raw_0.bin --out real.npz --receiver 1
+      sd2 radar describe walk.npy --carrier-hz 60.5e9 --bandwidth-hz 1e9
+      sd2 radar capture/ --out real.npz
+      sd2 radar capture/ --out real.npz --clutter mean --range 0.5,4
+      sd2 radar walk.sd2 --out real.npz    (the capture of a recording)
+      sd2 radar swing.h5 --out real.npz    (a file that holds the map already)
+    """
     if options.file is not None:
         if str(options.capture) != "describe":
             raise Sd2Error(f"Two files are given, {options.capture} and {options.file}", "one")

@@ -8,7 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from sd2core.cli.options import add_value, finite_float, flag, positive_float, positive_int
+from sd2core.cli.command_parser import Options
+from sd2core.cli.options import finite_float, flag, positive_float, positive_int
 from sd2core.errors import Sd2Error
 
 
@@ -55,11 +56,11 @@ _ENTRIES = {
 }
 
 
-def add_description(parser: argparse.ArgumentParser) -> None:
+def add_description(parser: Options) -> None:
     """Add the entries of a description."""
     group = parser.add_argument_group("description", "after the word describe; all in SI units")
     for name, entry in _ENTRIES.items():
-        add_value(group, flag(name), entry.parse, entry.metavar, entry.meaning)
+        group.add_value(flag(name), entry.parse, entry.metavar, entry.meaning)
 
 
 def refuse_description(options: argparse.Namespace) -> None:
@@ -73,10 +74,8 @@ def refuse_description(options: argparse.Namespace) -> None:
 
 def describe(options: argparse.Namespace) -> None:
     """Write a description, once the capture opens with it, and describe the capture."""
-    from pydantic import ValidationError
-
     from sd2core.cli.info.description import describe_capture, show
-    from sd2core.files.texts import first_fault
+    from sd2core.files.texts import faults_in
     from sd2core.io.radar.described import (
         RadarDescription,
         capture_of,
@@ -93,12 +92,8 @@ def describe(options: argparse.Namespace) -> None:
     told = _told_by_sigmf(path) | told
     told.setdefault("axes", plain_axes(path, told.get("dataset")))
     _ask(told)
-    try:
+    with faults_in(f"The description of {path}", "all that its radar needs"):
         description = RadarDescription.model_validate(told)
-    except ValidationError as error:
-        raise Sd2Error(
-            f"The description of {path}: {first_fault(error)}", "all that its radar needs"
-        ) from error
     capture = capture_of(path, description)
     written = write_description(description, path)
     shown = describe_capture(path, capture)

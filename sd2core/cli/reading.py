@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sd2core.cli.options import flag, given
-from sd2core.cli.output import progress_bar
+from sd2core.cli.output import picked, progress_bar
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import check_writable
 
@@ -27,14 +27,8 @@ def mesh_reading(options: argparse.Namespace) -> MeshReading:
     """Options for reading a mesh from the command line."""
     from sd2core.recording.recording import MeshReading
 
-    return MeshReading(
-        frames_per_s=options.fps,
-        scale=options.scale,
-        person=options.person,
-        distance_m=options.distance_m,
-        image_size=options.image_size,
-        focal_px=options.focal_px,
-    )
+    alike = picked(options, "scale", "person", "distance_m", "image_size", "focal_px")
+    return MeshReading(frames_per_s=options.fps, **alike)
 
 
 def load_mesh_from_options(path: Path, options: argparse.Namespace) -> MeshSequence:

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
 
-from sd2core.cli.options import add_value
+from sd2core.cli.command_parser import Options
 from sd2core.cli.output import progress_bar
 from sd2core.errors import Sd2Error
 
@@ -21,15 +21,12 @@ MapName = Literal["synthetic", "denoised", "radar"]
 MAP_NAMES: tuple[MapName, ...] = get_args(MapName)
 
 
-def add_labelled_recording(parser: argparse.ArgumentParser) -> None:
+def add_labelled_recording(parser: Options) -> None:
     """Add a recording, which of its maps, and labels in place of its own."""
-    add_value(parser, "recording", Path, "RECORDING", "a recording (.sd2)")
-    parser.add_argument(
-        "--maps",
-        metavar="LIST",
-        help=f"some of {', '.join(MAP_NAMES)} (default: those of its mesh and its radar)",
-    )
-    add_value(parser, "--labels", Path, "FILE", "other labels than the recording's own")
+    parser.add_value("recording", Path, "RECORDING", "a recording (.sd2)")
+    text = f"some of {', '.join(MAP_NAMES)} (default: those of its mesh and its radar)"
+    parser.add_value("--maps", str, "LIST", text)
+    parser.add_value("--labels", Path, "FILE", "other labels than the recording's own")
 
 
 def chosen_maps(options: argparse.Namespace, recording: Recording) -> tuple[MapName, ...]:

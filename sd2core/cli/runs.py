@@ -7,7 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from sd2core.cli.options import add_command, add_json
+from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import duration, print_facts, print_json, print_rows
 from sd2core.errors import Sd2Error
 
@@ -17,32 +17,9 @@ if TYPE_CHECKING:
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``runs``."""
-    parser = add_command(
-        commands,
-        "runs",
-        "list training runs, and pause, stop or cancel one",
-        handler=_runs,
-        description=(
-            "Lists the runs of `sd2 train` in a folder: how far they are, how good, and whether\n"
-            "their process is still there. A run that was stopped or lost its process is gone on\n"
-            "with by `sd2 train --resume RUN`."
-        ),
-        examples=(
-            "  sd2 runs\n"
-            "  sd2 runs runs/ --json\n"
-            "  sd2 runs runs/s4 --pause\n"
-            "  sd2 runs runs/s4 --resume\n"
-            "  sd2 runs runs/s4 --stop"
-        ),
-    )
-    parser.add_argument(
-        "folder",
-        type=Path,
-        nargs="?",
-        default=Path(),
-        metavar="FOLDER",
-        help="a run, or a folder of runs (default: this one)",
-    )
+    parser = add_command(commands, "runs", handler=_runs)
+    text = "a run, or a folder of runs (default: this one)"
+    parser.add_value("folder", Path, "FOLDER", text, Path(), nargs="?")
     what = parser.add_mutually_exclusive_group()
     for word, about in (
         ("pause", "keep a checkpoint and wait"),
@@ -51,10 +28,22 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         ("cancel", "end it, and delete what it made"),
     ):
         what.add_argument(f"--{word}", action="store_const", const=word, dest="word", help=about)
-    add_json(parser)
+    parser.add_json()
 
 
 def _runs(options: argparse.Namespace) -> None:
+    """List training runs, and pause, stop or cancel one.
+
+    Lists the runs of `sd2 train` in a folder: how far they are, how good, and whether
+    their process is still there. A run that was stopped or lost its process is gone on
+    with by `sd2 train --resume RUN`.
+
+      sd2 runs
+      sd2 runs runs/ --json
+      sd2 runs runs/s4 --pause
+      sd2 runs runs/s4 --resume
+      sd2 runs runs/s4 --stop
+    """
     from sd2core.train.folder import TrainingFolder, runs_in
 
     if options.word is not None:

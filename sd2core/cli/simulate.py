@@ -8,20 +8,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from sd2core.cli.command_parser import Options, add_command
 from sd2core.cli.options import (
-    add_command,
-    add_json,
-    add_limbs,
-    add_mesh_and_sensor,
-    add_mesh_reading,
-    add_output,
-    add_value,
     finite_float,
     position,
     positive_float,
     positive_int,
 )
-from sd2core.cli.output import print_json, progress_bar
+from sd2core.cli.output import picked, print_json, progress_bar
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
@@ -34,134 +28,96 @@ if TYPE_CHECKING:
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
-    """Add ``simulate`` with what it makes."""
-    parser = add_command(
-        commands,
-        "simulate",
-        "make radar samples of any mesh, or pairs of simulated people to train on",
-        examples=(
-            "  sd2 simulate radar walk.npz --out walk-radar\n"
-            "  sd2 simulate campaign --out campaign.zarr"
-        ),
-    )
+    """Make radar samples of any mesh, or pairs of simulated people to train on.
+
+    sd2 simulate radar walk.npz --out walk-radar
+    sd2 simulate campaign --out campaign.zarr
+    """
+    parser = add_command(commands, "simulate", about=add_commands)
     kinds = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     _add_radar(kinds)
     _add_campaign(kinds)
 
 
 def _add_radar(kinds: argparse._SubParsersAction) -> None:
-    parser = add_command(
-        kinds,
-        "radar",
-        "compute the raw samples that a radar would record of a moving mesh",
-        handler=_radar,
-        description=(
-            "Sums the echo of every triangle, with its phase, to the beat signal of an FMCW\n"
-            "radar, and writes the samples in the format of a capture, marked as simulated.\n"
-            "The camera is at 0,0,0 and looks along z; x is to its right and y down, in\n"
-            "metres."
-        ),
-        examples=(
-            "  sd2 simulate radar walk.npz --out walk-radar\n"
-            "  sd2 radar walk-radar --out map.npz    (its Doppler map)\n"
-            "  sd2 simulate radar walk.npz --out left --sensor -1,0,0 --snr-db 20 --receivers 3\n"
-            "  sd2 simulate radar walk.npz --out floor --ground 1.1 --beam-width-deg 60\n"
-            "  sd2 simulate radar walk.npz --out like-mine --radar capture/config.json"
-        ),
-    )
-    add_mesh_and_sensor(parser)
-    add_output(parser, "FOLDER", "the capture to write")
+    parser = add_command(kinds, "radar", handler=_radar)
+    parser.add_mesh_and_sensor()
+    parser.add_output("FOLDER", "the capture to write")
     add_radar_choice(parser)
-    parser.add_argument(
+    parser.add_choice(
         "--method",
-        choices=("nufft", "direct"),
-        default="nufft",
-        help="sum by a non-uniform FFT, or triangle by triangle, some hundred times slower"
-        " (default: nufft)",
+        ("nufft", "direct"),
+        "sum by a non-uniform FFT, or triangle by triangle, some hundred times slower",
+        "nufft",
     )
-    parser.add_argument(
-        "--blocks",
-        type=positive_int,
-        metavar="N",
-        default=1,
-        help="parts of a frame that follow the range as it changes (default: 1)",
+    parser.add_value(
+        "--blocks", positive_int, "N", "parts of a frame that follow the range as it changes", 1
     )
-    parser.add_argument(
+    parser.add_choice(
         "--motion",
-        choices=("constant", "interpolated"),
-        default="constant",
-        help="within a frame: constant velocity, or the mesh interpolated at every chirp, which"
-        " takes as many sums as there are chirps (default: constant)",
+        ("constant", "interpolated"),
+        "within a frame: constant velocity, or the mesh interpolated at every chirp, which"
+        " takes as many sums as there are chirps",
+        "constant",
     )
-    parser.add_argument(
-        "--incoherent",
-        action="store_true",
-        help="a rough surface: every triangle has a random phase (default: a smooth one)",
+    parser.add_flag(
+        "--incoherent", "a rough surface: every triangle has a random phase (default: a smooth one)"
     )
-    parser.add_argument(
+    parser.add_choice(
         "--visibility",
-        choices=("facing", "exact"),
-        default="exact",
-        help="which triangles echo: those that face the radar, or those that nothing hides"
-        " (default: exact)",
+        ("facing", "exact"),
+        "which triangles echo: those that face the radar, or those that nothing hides",
+        "exact",
     )
-    parser.add_argument(
+    parser.add_value(
         "--receivers",
-        type=receivers,
-        metavar="N",
-        help="how many, half a wavelength apart; or their places relative to the transmitter,"
+        receivers,
+        "N",
+        "how many, half a wavelength apart; or their places relative to the transmitter,"
         " as X,Y,Z;X,Y,Z in metres to the right, down and ahead (default: the radar's own number)",
     )
-    parser.add_argument(
+    parser.add_value(
         "--beam-width-deg",
-        type=positive_float,
-        metavar="DEG",
-        help="full width of the beam at half power, along where the sensor looks (default: all"
+        positive_float,
+        "DEG",
+        "full width of the beam at half power, along where the sensor looks (default: all"
         " directions alike)",
     )
     plane = parser.add_mutually_exclusive_group()
-    plane.add_argument(
+    plane.add_value(
         "--ground",
-        type=plane_at,
-        metavar="Y[,C]",
-        help="a floor Y metres below the camera reflects; C is its amplitude coefficient"
+        plane_at,
+        "Y[,C]",
+        "a floor Y metres below the camera reflects; C is its amplitude coefficient"
         " (default: concrete, -0.39)",
     )
-    plane.add_argument(
-        "--wall",
-        type=plane_at,
-        metavar="Z[,C]",
-        help="a wall Z metres in front of the camera reflects, likewise",
+    plane.add_value(
+        "--wall", plane_at, "Z[,C]", "a wall Z metres in front of the camera reflects, likewise"
     )
     noise = parser.add_mutually_exclusive_group()
-    noise.add_argument(
+    noise.add_value(
         "--snr-db",
-        type=finite_float,
-        metavar="DB",
-        help="add thermal noise this many decibels below the moving mesh's echo (default: none)",
+        finite_float,
+        "DB",
+        "add thermal noise this many decibels below the moving mesh's echo (default: none)",
     )
-    noise.add_argument(
+    noise.add_flag(
         "--link-budget",
-        action="store_true",
-        help="gain and noise of a 60 GHz radar on one chip, so that what is farther away is weaker"
+        "gain and noise of a 60 GHz radar on one chip, so that what is farther away is weaker"
         " (default: a gain that suits the strongest echo)",
     )
-    add_value(parser, "--seed", int, "N", "seed of noise and random phases", 0)
-    add_mesh_reading(parser)
-    add_json(parser)
+    parser.add_value("--seed", int, "N", "seed of noise and random phases", 0)
+    parser.add_mesh_reading()
+    parser.add_json()
 
 
-def add_radar_choice(parser: argparse.ArgumentParser) -> None:
+def add_radar_choice(parser: Options) -> None:
     """Add ``--radar``."""
     from sd2core.radar_profiles import RADARS
 
-    parser.add_argument(
-        "--radar",
-        default="paper",
-        metavar="NAME|CONFIG.json",
-        help=f"a radar by its name ({', '.join(RADARS)}; docs/radar-files.md), or that of a"
-        " capture's config.json (default: paper)",
-    )
+    text = f"a radar by its name ({', '.join(RADARS)}; docs/radar-files.md), or that of a"
+    text += " capture's config.json (default: paper)"
+    parser.add_value("--radar", str, "NAME|CONFIG.json", text, "paper")
 
 
 def simulate_with_bar(
@@ -204,6 +160,19 @@ def plane_at(text: str) -> tuple[float, ...]:
 
 
 def _radar(options: argparse.Namespace) -> None:
+    """Compute the raw samples that a radar would record of a moving mesh.
+
+    Sums the echo of every triangle, with its phase, to the beat signal of an FMCW
+    radar, and writes the samples in the format of a capture, marked as simulated.
+    The camera is at 0,0,0 and looks along z; x is to its right and y down, in
+    metres.
+
+      sd2 simulate radar walk.npz --out walk-radar
+      sd2 radar walk-radar --out map.npz    (its Doppler map)
+      sd2 simulate radar walk.npz --out left --sensor -1,0,0 --snr-db 20 --receivers 3
+      sd2 simulate radar walk.npz --out floor --ground 1.1 --beam-width-deg 60
+      sd2 simulate radar walk.npz --out like-mine --radar capture/config.json
+    """
     from sd2core.cli.info.description import describe_capture, show
     from sd2core.cli.reading import mesh_and_sensor
     from sd2core.fmcw import LinkBudget, Mirror, SignalOptions, WaveOptions
@@ -223,12 +192,10 @@ def _radar(options: argparse.Namespace) -> None:
         mirror = Mirror.wall(*options.wall)
     wave = WaveOptions(
         model=options.method,
-        blocks=options.blocks,
         coherent=not options.incoherent,
-        motion=options.motion,
         receiver_offsets_m=offsets,
-        beam_width_deg=options.beam_width_deg,
         mirror=mirror,
+        **picked(options, "blocks", "motion", "beam_width_deg"),
     )
     mesh, sensor = mesh_and_sensor(options)
     capture = simulate_with_bar(
@@ -259,104 +226,65 @@ def _radar(options: argparse.Namespace) -> None:
 
 
 def _add_campaign(kinds: argparse._SubParsersAction) -> None:
-    parser = add_command(
-        kinds,
-        "campaign",
-        "make pairs of synthetic Doppler and simulated radar to train a denoiser on",
-        handler=_campaign,
-        description=(
-            "People of random shape swipe to the right, left, down and up, or move as real people\n"
-            "were recorded (--movements captured), or both in turn. Varied, they stand\n"
-            "anywhere, turned a little, swipe in random order, rest, and do other things. As in\n"
-            "the paper, they face a radar and a camera 2.2 m ahead, and swipe to and fro in one\n"
-            "take, up and down in another, and rest in a third. Of every take there is the\n"
-            "Doppler map that a simulated radar shows of the true motion, and the synthetic one\n"
-            "of a body that errs as fits of videos err. Stopped and started again it goes on\n"
-            "where it was, and a longer campaign goes on with a shorter one; the same seed makes\n"
-            "the same takes."
-        ),
-        examples=(
-            "  sd2 simulate campaign --out campaign.zarr\n"
-            "  sd2 simulate campaign --people 3 --minutes 5 --seed 1 --out small.zarr\n"
-            "  sd2 simulate campaign --sensors 3 --out ranges.zarr\n"
-            "  sd2 simulate campaign --protocol paper --out as-in-the-paper.zarr\n"
-            "  sd2 simulate campaign --movements both --motions motions --radars drawn --out all"
-        ),
-    )
-    add_output(parser, "FILE.zarr", "the pairs to write")
-    add_value(parser, "--people", positive_int, "N", "number of people", 6)
-    add_value(parser, "--minutes", positive_float, "MIN", "minutes of all people together", 90.0)
-    parser.add_argument(
-        "--protocol",
-        choices=("paper", "varied"),
-        default="varied",
-        help="what varies from take to take (default: varied)",
-    )
-    parser.add_argument(
+    parser = add_command(kinds, "campaign", handler=_campaign)
+    parser.add_output("FILE.zarr", "the pairs to write")
+    parser.add_value("--people", positive_int, "N", "number of people", 6)
+    parser.add_value("--minutes", positive_float, "MIN", "minutes of all people together", 90.0)
+    parser.add_choice("--protocol", ("paper", "varied"), "what varies from take to take", "varied")
+    parser.add_choice(
         "--order",
-        choices=("to-and-fro", "random"),
-        help="of the paper's swipes: one kind in a take, or all four (default: to-and-fro)",
+        ("to-and-fro", "random"),
+        "of the paper's swipes: one kind in a take, or all four (default: to-and-fro)",
     )
-    parser.add_argument(
+    parser.add_choice(
         "--movements",
-        choices=("swipes", "captured", "both"),
-        default="swipes",
-        help="what people do: swipes, what real people were recorded doing, or both in turn"
-        " (default: swipes)",
+        ("swipes", "captured", "both"),
+        "what people do: swipes, what real people were recorded doing, or both in turn",
+        "swipes",
     )
-    parser.add_argument(
+    parser.add_value(
         "--motions",
-        type=Path,
-        metavar="FOLDER",
-        help="recorded motions, as `python -m tools.motion_capture drive` makes them",
+        Path,
+        "FOLDER",
+        "recorded motions, as `python -m tools.motion_capture drive` makes them",
     )
-    parser.add_argument(
+    parser.add_choice(
         "--motion-role",
-        choices=("learn", "calibrate", "measure"),
-        default="learn",
-        help="people of that folder: those to learn from, or those kept apart (default: learn)",
+        ("learn", "calibrate", "measure"),
+        "people of that folder: those to learn from, or those kept apart",
+        "learn",
     )
-    parser.add_argument(
+    parser.add_choice(
         "--radars",
-        choices=("one", "drawn"),
-        default="one",
-        help="the same radar in all takes, or looks, surface, noise and threshold drawn for each"
-        " (default: one)",
+        ("one", "drawn"),
+        "the same radar in all takes, or looks, surface, noise and threshold drawn for each",
+        "one",
     )
-    add_value(parser, "--seed", _seed, "N", "seed of all random numbers", 0)
-    parser.add_argument(
+    parser.add_value("--seed", _seed, "N", "seed of all random numbers", 0)
+    parser.add_value(
         "--sensors",
-        type=positive_int,
-        default=1,
-        metavar="N",
-        help="sensors that see each take: its own, beside the camera, and N - 1 at other ranges"
-        " and angles (default: 1)",
+        positive_int,
+        "N",
+        "sensors that see each take: its own, beside the camera, and N - 1 at other ranges"
+        " and angles",
+        1,
     )
-    parser.add_argument(
-        "--rate",
-        type=positive_float,
-        metavar="FPS",
-        help="frames per second of the radar, 10 to 120 (default: 30)",
-    )
-    add_value(parser, "--bins", positive_int, "N", "velocity bins, 16 to 128 (default: 32)")
-    add_value(parser, "--take-seconds", positive_float, "S", "length of a take, in seconds", 15.0)
-    add_value(parser, "--workers", positive_int, "N", "worker processes", 2)
-    add_limbs(parser)
-    parser.add_argument(
+    text = "frames per second of the radar, 10 to 120 (default: 30)"
+    parser.add_value("--rate", positive_float, "FPS", text)
+    parser.add_value("--bins", positive_int, "N", "velocity bins, 16 to 128 (default: 32)")
+    parser.add_value("--take-seconds", positive_float, "S", "length of a take, in seconds", 15.0)
+    parser.add_value("--workers", positive_int, "N", "worker processes", 2)
+    parser.add_limbs()
+    parser.add_value(
         "--fit-errors",
-        type=Path,
-        metavar="FILE.json",
-        help="errors of fits to imitate (default: those measured of `sd2 fit`)",
+        Path,
+        "FILE.json",
+        "errors of fits to imitate (default: those measured of `sd2 fit`)",
     )
-    parser.add_argument(
-        "--fit-error-sizes",
-        type=_sizes,
-        default=(1.0, 1.0),
-        metavar="LEAST,MOST",
-        help="how many times as large as those errors are, drawn anew for every take; 0,0: meshes"
-        " without errors (default: 1,1)",
-    )
-    add_json(parser)
+    text = "how many times as large as those errors are, drawn anew for every take; 0,0: meshes"
+    text += " without errors (default: 1,1)"
+    parser.add_value("--fit-error-sizes", _sizes, "LEAST,MOST", text, (1.0, 1.0))
+    parser.add_json()
 
 
 def _sizes(text: str) -> tuple[float, float]:
@@ -395,6 +323,24 @@ def _protocol(options: argparse.Namespace) -> Protocol:
 
 
 def _campaign(options: argparse.Namespace) -> None:
+    """Make pairs of synthetic Doppler and simulated radar to train a denoiser on.
+
+    People of random shape swipe to the right, left, down and up, or move as real people
+    were recorded (--movements captured), or both in turn. Varied, they stand
+    anywhere, turned a little, swipe in random order, rest, and do other things. As in
+    the paper, they face a radar and a camera 2.2 m ahead, and swipe to and fro in one
+    take, up and down in another, and rest in a third. Of every take there is the
+    Doppler map that a simulated radar shows of the true motion, and the synthetic one
+    of a body that errs as fits of videos err. Stopped and started again it goes on
+    where it was, and a longer campaign goes on with a shorter one; the same seed makes
+    the same takes.
+
+      sd2 simulate campaign --out campaign.zarr
+      sd2 simulate campaign --people 3 --minutes 5 --seed 1 --out small.zarr
+      sd2 simulate campaign --sensors 3 --out ranges.zarr
+      sd2 simulate campaign --protocol paper --out as-in-the-paper.zarr
+      sd2 simulate campaign --movements both --motions motions --radars drawn --out all
+    """
     from sd2core.doppler.options import chosen_options
     from sd2core.pairs.store import read_pairs
     from sd2core.simulate.campaign.making import make_campaign

@@ -7,12 +7,8 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from sd2core.cli.command_parser import add_command
 from sd2core.cli.options import (
-    add_command,
-    add_mesh_reading,
-    add_output,
-    add_sensor,
-    add_value,
     positive_float,
     positive_int,
 )
@@ -27,67 +23,42 @@ _DEFAULT_COUNT = 8
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``strip``."""
-    parser = add_command(
-        commands,
-        "strip",
-        "draw frames side by side: the video above its mesh",
-        handler=_strip,
-        description=(
-            "Every column is a moment, with its time and frame number. Colours of velocity are\n"
-            "towards the sensor: red approaches, blue recedes. In SVG and PDF text is text;\n"
-            "pictures and meshes are pictures in it."
-        ),
-        examples=(
-            "  sd2 strip walk.sd2 --out strip.png\n"
-            "  sd2 strip walk.mkv walk.npz --out strip.svg --frames 20:80:10 --dots\n"
-            "  sd2 strip walk.sd2 --out fit.png --rows overlay --colour plain --count 5"
-        ),
-    )
-    parser.add_argument(
-        "paths",
-        nargs="+",
-        type=Path,
-        metavar="PATH",
-        help="a recording, or a video, a mesh, or both",
-    )
-    add_output(parser, "FILE", "the figure to write (.png, .svg or .pdf)")
+    parser = add_command(commands, "strip", handler=_strip)
+    parser.add_value("paths", Path, "PATH", "a recording, or a video, a mesh, or both", nargs="+")
+    parser.add_output("FILE", "the figure to write (.png, .svg or .pdf)")
     chosen = parser.add_mutually_exclusive_group()
-    chosen.add_argument(
-        "--frames",
-        metavar="LIST",
-        help="frames such as 0,15,30, or ranges FROM:TO:STEP such as 0:90:15, TO not included",
+    text = "frames such as 0,15,30, or ranges FROM:TO:STEP such as 0:90:15, TO not included"
+    chosen.add_value("--frames", str, "LIST", text)
+    chosen.add_value(
+        "--count", positive_int, "N", f"that many frames, spread evenly (default: {_DEFAULT_COUNT})"
     )
-    chosen.add_argument(
-        "--count",
-        type=positive_int,
-        metavar="N",
-        help=f"that many frames, spread evenly (default: {_DEFAULT_COUNT})",
+    text = "some of video, mesh and overlay (the mesh over the video), in this order"
+    text += " (default: video,mesh, as far as they are there)"
+    parser.add_value("--rows", str, "LIST", text)
+    parser.add_flag("--dots", "draw vertices instead of the surface")
+    parser.add_choice(
+        "--colour", ("velocity", "plain"), "what the colour of the mesh means", "velocity"
     )
-    parser.add_argument(
-        "--rows",
-        metavar="LIST",
-        help="some of video, mesh and overlay (the mesh over the video), in this order"
-        " (default: video,mesh, as far as they are there)",
+    parser.add_value(
+        "--v-max", positive_float, "MPS", "velocity in m/s at which the colours end", 2.0
     )
-    parser.add_argument("--dots", action="store_true", help="draw vertices instead of the surface")
-    parser.add_argument(
-        "--colour",
-        choices=("velocity", "plain"),
-        default="velocity",
-        help="what the colour of the mesh means (default: velocity)",
-    )
-    add_value(
-        parser, "--v-max", positive_float, "MPS", "velocity in m/s at which the colours end", 2.0
-    )
-    parser.add_argument(
-        "--whole", action="store_true", help="show the whole picture, not what is around the body"
-    )
-    add_value(parser, "--columns", positive_int, "N", "pictures side by side; more go below", 10)
-    add_sensor(parser)
-    add_mesh_reading(parser)
+    parser.add_flag("--whole", "show the whole picture, not what is around the body")
+    parser.add_value("--columns", positive_int, "N", "pictures side by side; more go below", 10)
+    parser.add_sensor()
+    parser.add_mesh_reading()
 
 
 def _strip(options: argparse.Namespace) -> None:
+    """Draw frames side by side: the video above its mesh.
+
+    Every column is a moment, with its time and frame number. Colours of velocity are
+    towards the sensor: red approaches, blue recedes. In SVG and PDF text is text;
+    pictures and meshes are pictures in it.
+
+      sd2 strip walk.sd2 --out strip.png
+      sd2 strip walk.mkv walk.npz --out strip.svg --frames 20:80:10 --dots
+      sd2 strip walk.sd2 --out fit.png --rows overlay --colour plain --count 5
+    """
     from sd2core.figures.strip import plot_strip, save_strip
     from sd2core.figures.strip_source import StripOptions, parse_frames, spread_frames
     from sd2core.files.figure_files import check_figure

@@ -6,17 +6,9 @@ import argparse
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from sd2core.cli.command_parser import add_command
 from sd2core.cli.ladder import add_wish, chosen
 from sd2core.cli.options import (
-    add_axis,
-    add_command,
-    add_count,
-    add_json,
-    add_limbs,
-    add_map_output,
-    add_mesh_and_sensor,
-    add_mesh_reading,
-    add_method,
     bin_list,
     flag,
     given,
@@ -35,75 +27,25 @@ if TYPE_CHECKING:
     from sd2core.mesh.sequence import MeshSequence
     from sd2core.sensor import VirtualSensor
 
-_RUNGS = (
-    "visibility",
-    "depth_resolution",
-    "mask_stride",
-    "vertices_kept",
-    "range_law",
-    "beyond",
-    "oversampling",
-)
-"""Options that a plan sets."""
-
-_COUNTING_ONLY = (
-    "depth_resolution",
-    "mask_stride",
-    "weight",
-    "count",
-    "null_bins",
-    "beyond",
-    "range_exponent",
-    "reference_range_m",
-    "range_law",
-    "trajectory_smoothing_s",
-    "oversampling",
-    "velocity_sigma_bins",
-    "time_sigma_s",
-)
-
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``synth``."""
-    parser = add_command(
-        commands,
-        "synth",
-        "compute the Doppler that a radar would have measured of a moving mesh",
-        handler=_synth,
-        description=(
-            "Counts the mesh's vertices by their velocity towards the sensor, frame by frame.\n"
-            "The camera is at 0,0,0 and looks along z; x is to its right and y down, in\n"
-            "metres. Positive velocity is approaching. Options that are not given come from\n"
-            "the preset. With --method fmcw the echoes of all triangles are summed to the signal\n"
-            "of a radar, and that is processed like a capture (more: sd2 simulate radar)."
-        ),
-        examples=(
-            "  sd2 synth walk.npz --out map.npz\n"
-            "  sd2 synth walk.npz --out left.npz --sensor -1,0,2\n"
-            "  sd2 synth walk.sd2 --out map.npz    (mesh and sensor of a recording)\n"
-            "  sd2 synth points.npz --out map.npz --visibility none --null-bins none\n"
-            "  sd2 synth walk.npz --out map.npz --preset vid2doppler\n"
-            "  sd2 synth walk.npz --out map.npz --tolerance 2%    (as quick as this allows)\n"
-            "  sd2 synth walk.npz --out map.npz --method fmcw\n"
-            "  sd2 synth walk.zarr --out map.npz --uncertainty    (of a mesh from sd2 fit)\n"
-            "  sd2 synth walk.zarr --out map.npz --limbs    (each part of the body apart, too)"
-        ),
-    )
-    add_mesh_and_sensor(parser)
-    add_map_output(parser)
-    parser.add_argument(
+    parser = add_command(commands, "synth", handler=_synth)
+    parser.add_mesh_and_sensor()
+    parser.add_map_output()
+    parser.add_choice(
         "--preset",
-        choices=("paper", "vid2doppler"),
-        default="paper",
-        help="the paper's chain, or Vid2Doppler's arithmetic to the last digit (default: paper)",
+        ("paper", "vid2doppler"),
+        "the paper's chain, or Vid2Doppler's arithmetic to the last digit",
+        "paper",
     )
-    add_method(parser, "count vertices, or simulate the radar's signal")
+    parser.add_method("count vertices, or simulate the radar's signal")
     add_radar_choice(parser)
     add_wish(parser, "none: what the options say")
-    parser.add_argument(
+    parser.add_choice(
         "--visibility",
-        choices=("none", "facing", "depth", "exact"),
-        help="which vertices count: all, those that face the sensor, or those that nothing hides:"
+        ("none", "facing", "depth", "exact"),
+        "which vertices count: all, those that face the sensor, or those that nothing hides:"
         " by a depth buffer (fast, approximate) or exactly",
     )
     parser.add_argument(
@@ -112,93 +54,107 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         choices=(128, 256),
         help="pixels along each side of the depth buffer (default: 256)",
     )
-    parser.add_argument(
+    parser.add_value(
         "--mask-stride",
-        type=positive_int,
-        metavar="N",
-        help="compute depth or exact visibility for every N-th frame only, and use it for the"
+        positive_int,
+        "N",
+        "compute depth or exact visibility for every N-th frame only, and use it for the"
         " frames nearest to each (default: 1)",
     )
-    parser.add_argument(
+    parser.add_value(
         "--vertices-kept",
-        type=share,
-        metavar="SHARE",
-        help="simplify the surface to this share of its vertices, e.g. 25%% (default: 1, all)",
+        share,
+        "SHARE",
+        "simplify the surface to this share of its vertices, e.g. 25%% (default: 1, all)",
     )
-    parser.add_argument(
+    parser.add_choice(
         "--weight",
-        choices=("count", "area", "projected"),
-        help="a vertex counts as one, by its area, or by the area it turns towards the sensor",
+        ("count", "area", "projected"),
+        "a vertex counts as one, by its area, or by the area it turns towards the sensor",
     )
-    add_count(parser)
-    add_axis(parser)
-    parser.add_argument(
+    parser.add_count()
+    parser.add_axis()
+    parser.add_value(
         "--null-bins",
-        type=bin_list,
-        metavar="LIST",
-        help="bins to empty, as 14,15,16, or none (default: those from -0.25 to 0.125 m/s, which"
+        bin_list,
+        "LIST",
+        "bins to empty, as 14,15,16, or none (default: those from -0.25 to 0.125 m/s, which"
         " the paper's radar cannot tell from a static room; on any axis those at 0 m/s)",
     )
-    parser.add_argument(
+    parser.add_choice(
         "--beyond",
-        choices=("drop", "wrap", "clip"),
-        help="velocities beyond the axis: left out, folded back as a radar does, or counted in"
+        ("drop", "wrap", "clip"),
+        "velocities beyond the axis: left out, folded back as a radar does, or counted in"
         " the last bin",
     )
-    parser.add_argument(
+    parser.add_value(
         "--range-exponent",
-        type=not_negative_float,
-        metavar="N",
-        help="echoes weaken with range to the power of N; 4 is the radar equation, 0 is off",
+        not_negative_float,
+        "N",
+        "echoes weaken with range to the power of N; 4 is the radar equation, 0 is off",
     )
-    parser.add_argument(
+    parser.add_value(
         "--reference-range-m",
-        type=positive_float,
-        metavar="M",
-        help="range at which a vertex counts as one (paper: 2.2)",
+        positive_float,
+        "M",
+        "range at which a vertex counts as one (paper: 2.2)",
     )
-    parser.add_argument(
+    parser.add_choice(
         "--range-law",
-        choices=("vertex", "frame"),
-        help="echoes weaken with the range of each vertex or of the whole frame (default: vertex)",
+        ("vertex", "frame"),
+        "echoes weaken with the range of each vertex or of the whole frame (default: vertex)",
     )
-    parser.add_argument(
+    parser.add_value(
         "--trajectory-smoothing-s",
-        type=not_negative_float,
-        metavar="S",
-        help="smooth the mesh's motion over this many seconds (sigma), without delay",
+        not_negative_float,
+        "S",
+        "smooth the mesh's motion over this many seconds (sigma), without delay",
     )
-    parser.add_argument(
+    parser.add_value(
         "--oversampling",
-        type=positive_int,
-        metavar="N",
-        help="raise the frame rate N times before velocities are taken, and average each frame over"
+        positive_int,
+        "N",
+        "raise the frame rate N times before velocities are taken, and average each frame over"
         " its N moments (default: 1)",
     )
-    parser.add_argument(
+    parser.add_value(
         "--velocity-sigma-bins",
-        type=not_negative_float,
-        metavar="BINS",
-        help="smooth the map along velocity (sigma in bins)",
+        not_negative_float,
+        "BINS",
+        "smooth the map along velocity (sigma in bins)",
     )
-    parser.add_argument(
-        "--time-sigma-s",
-        type=not_negative_float,
-        metavar="S",
-        help="smooth the map along time (sigma in seconds)",
+    parser.add_value(
+        "--time-sigma-s", not_negative_float, "S", "smooth the map along time (sigma in seconds)"
     )
-    parser.add_argument(
+    parser.add_flag(
         "--uncertainty",
-        action="store_true",
-        help="add to the map how well its values are known (arrays sd and expected), which a mesh"
+        "add to the map how well its values are known (arrays sd and expected), which a mesh"
         " from sd2 fit says",
     )
-    add_limbs(parser)
-    add_mesh_reading(parser)
-    add_json(parser)
+    parser.add_limbs()
+    parser.add_mesh_reading()
+    parser.add_json()
 
 
 def _synth(options: argparse.Namespace) -> None:
+    """Compute the Doppler that a radar would have measured of a moving mesh.
+
+    Counts the mesh's vertices by their velocity towards the sensor, frame by frame.
+    The camera is at 0,0,0 and looks along z; x is to its right and y down, in
+    metres. Positive velocity is approaching. Options that are not given come from
+    the preset. With --method fmcw the echoes of all triangles are summed to the signal
+    of a radar, and that is processed like a capture (more: sd2 simulate radar).
+
+      sd2 synth walk.npz --out map.npz
+      sd2 synth walk.npz --out left.npz --sensor -1,0,2
+      sd2 synth walk.sd2 --out map.npz    (mesh and sensor of a recording)
+      sd2 synth points.npz --out map.npz --visibility none --null-bins none
+      sd2 synth walk.npz --out map.npz --preset vid2doppler
+      sd2 synth walk.npz --out map.npz --tolerance 2%    (as quick as this allows)
+      sd2 synth walk.npz --out map.npz --method fmcw
+      sd2 synth walk.zarr --out map.npz --uncertainty    (of a mesh from sd2 fit)
+      sd2 synth walk.zarr --out map.npz --limbs    (each part of the body apart, too)
+    """
     from sd2core.cli.info.description import describe_map, show
     from sd2core.cli.reading import check_map_output, mesh_and_sensor
     from sd2core.doppler import Synthesizer
@@ -235,10 +191,12 @@ def _synth(options: argparse.Namespace) -> None:
 
 
 def _check_wish(options: argparse.Namespace) -> None:
+    from sd2core.accuracy.plans import CHOSEN
+
     wish = "--tolerance" if options.tolerance is not None else "--budget-ms"
     if options.method == "fmcw":
         raise Sd2Error(f"{wish} is given with --method fmcw", f"{wish} with the histogram only")
-    for name in given(options, _RUNGS):
+    for name in given(options, CHOSEN):
         raise Sd2Error(
             f"{wish} is given with {flag(name)}",
             f"one of them: with {wish} the plan chooses how",
@@ -252,7 +210,7 @@ def _as_chosen(
     from sd2core.accuracy.trial import synthesizer_for
 
     base = synthesis_options(options)
-    choice = chosen(mesh, sensor, base, options.tolerance, options.budget_ms, dragging=False)
+    choice = chosen(mesh, sensor, base, options, dragging=False)
     if not choice.holds:
         raise Sd2Error(choice.summary, "a tolerance or budget that can be held", "Allow more of it")
     doppler = _counted(options, synthesizer_for(choice.plan, mesh, base), sensor)
@@ -275,7 +233,10 @@ def _counted(
 
 
 def _check_fmcw(options: argparse.Namespace) -> None:
-    unfit = list(given(options, _COUNTING_ONLY))
+    from sd2core.doppler import SynthesisOptions
+
+    counting = SynthesisOptions.__dataclass_fields__.keys() - {"visibility"}
+    unfit = list(given(options, sorted(counting)))
     unfit += ["preset"] * (options.preset != "paper") + ["uncertainty"] * options.uncertainty
     unfit += ["limbs"] * options.limbs
     if unfit:
@@ -305,7 +266,7 @@ def _by_fmcw(options: argparse.Namespace, mesh: MeshSequence, sensor: VirtualSen
 
 def synthesis_options(options: argparse.Namespace) -> SynthesisOptions:
     """The preset, with options of the command line in its place."""
-    from sd2core.doppler.options import chosen_options
+    from sd2core.doppler.options import SynthesisOptions, chosen_options
 
-    chosen = given(options, ("visibility", *_COUNTING_ONLY))
+    chosen = given(options, SynthesisOptions.__dataclass_fields__)
     return chosen_options(options.preset, options.bins, options.v_max, chosen)

@@ -10,18 +10,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from sd2core.cli.command_parser import Options, add_command
 from sd2core.cli.options import (
-    add_command,
-    add_json,
-    add_output,
-    add_people_kept_out,
-    add_value,
     flag,
     given,
     positive_float,
     positive_int,
 )
-from sd2core.cli.output import print_facts, print_json
+from sd2core.cli.output import picked, print_facts, print_json
 from sd2core.errors import Sd2Error
 from sd2core.processes import INTERRUPTED
 
@@ -31,92 +27,46 @@ if TYPE_CHECKING:
 
 _BACKGROUND_NICE = 10
 
-# Options that are settings: section, name.
+_OPTIONS = {
+    "data": "validation_subjects test_subjects segment_frames overlap_frames placements segments"
+    " range_factor",
+    "model": "model model_inputs from frozen",
+    "training": "epochs minutes batch_size learning_rate ssm_learning_rate early_stopping balanced"
+    " velocity_weight select_by seed",
+    "machine": "device devices precision threads nice deterministic",
+}
+"""Options that are settings, by their section."""
+_RENAMED = {
+    "model": "name",
+    "model_inputs": "inputs",
+    "from": "start",
+    "early_stopping": "early_stopping_epochs",
+}
 _SETTINGS = {
-    "validation_subjects": ("data", "validation_subjects"),
-    "test_subjects": ("data", "test_subjects"),
-    "segment_frames": ("data", "segment_frames"),
-    "overlap_frames": ("data", "overlap_frames"),
-    "placements": ("data", "placements"),
-    "segments": ("data", "segments"),
-    "range_factor": ("data", "range_factor"),
-    "model": ("model", "name"),
-    "model_inputs": ("model", "inputs"),
-    "start": ("model", "start"),
-    "frozen": ("model", "frozen"),
-    "epochs": ("training", "epochs"),
-    "minutes": ("training", "minutes"),
-    "batch_size": ("training", "batch_size"),
-    "learning_rate": ("training", "learning_rate"),
-    "ssm_learning_rate": ("training", "ssm_learning_rate"),
-    "early_stopping": ("training", "early_stopping_epochs"),
-    "balanced": ("training", "balanced"),
-    "velocity_weight": ("training", "velocity_weight"),
-    "select_by": ("training", "select_by"),
-    "seed": ("training", "seed"),
-    "device": ("machine", "device"),
-    "devices": ("machine", "devices"),
-    "precision": ("machine", "precision"),
-    "threads": ("machine", "threads"),
-    "nice": ("machine", "nice"),
-    "deterministic": ("machine", "deterministic"),
+    option: (section, _RENAMED.get(option, option))
+    for section, options in _OPTIONS.items()
+    for option in options.split()
 }
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``train``."""
-    parser = add_command(
-        commands,
-        "train",
-        "train a denoiser that turns synthetic Doppler into what a radar would show",
-        handler=_train,
-        description=(
-            "Learns from pairs of synthetic and radar Doppler of the same movement, as\n"
-            "`sd2 simulate campaign` and `sd2 pairs` make them. By default as in the paper:\n"
-            "segments of 72 frames that overlap by 10, batches of 64, 500 epochs, root mean\n"
-            "square error. Some people are kept out to choose the best epoch by, some for\n"
-            "`sd2 eval`.\n\n"
-            "RUN is a folder. It can be stopped with Ctrl-C or killed at any moment;\n"
-            "`sd2 train --resume RUN` goes on, with the result that it would have had. `sd2 runs`\n"
-            "shows runs and steers them. RUN/best.safetensors is the model.\n\n"
-            "All settings may stand in a TOML file (docs/formats.md); options go before it.\n"
-            "`--show-settings` prints them."
-        ),
-        examples=(
-            "  sd2 train campaign.zarr --out runs/s4\n"
-            "  sd2 train campaign.zarr --model gru --minutes 30 --out runs/gru\n"
-            "  sd2 train campaign.zarr --inputs limbs --out runs/limbs\n"
-            "  sd2 train campaign.zarr mars.zarr --test-subjects s6 --seed 1 --out runs/both\n"
-            "  sd2 train settings.toml --epochs 100 --out runs/short\n"
-            "  sd2 train --resume runs/s4\n"
-            "  sd2 train mine.zarr --from denoiser --learning-rate 0.0005 --out runs/mine\n"
-            "  sd2 train campaign.zarr --set channels=64 --set dropout=0.1 --show-settings"
-        ),
-    )
-    parser.add_argument(
-        "inputs",
-        nargs="*",
-        type=Path,
-        metavar="CONFIG.toml|DATA",
-        help="a file with settings, or one or several stores of pairs, which are mixed",
-    )
-    add_output(parser, "RUN", "the folder of the run; new", required=False)
-    add_value(parser, "--resume", Path, "RUN", "go on with a run that was stopped or killed")
-    parser.add_argument(
-        "--show-settings", action="store_true", help="print all settings as TOML and train nothing"
-    )
+    parser = add_command(commands, "train", handler=_train)
+    text = "a file with settings, or one or several stores of pairs, which are mixed"
+    parser.add_value("inputs", Path, "CONFIG.toml|DATA", text, nargs="*")
+    parser.add_output("RUN", "the folder of the run; new", required=False)
+    parser.add_value("--resume", Path, "RUN", "go on with a run that was stopped or killed")
+    parser.add_flag("--show-settings", "print all settings as TOML and train nothing")
     _add_learning(parser)
     _add_data(parser)
     _add_machine(parser)
-    add_json(parser)
+    parser.add_json()
 
 
-def _add_learning(parser: argparse.ArgumentParser) -> None:
+def _add_learning(parser: Options) -> None:
     group = parser.add_argument_group("network and training")
-    group.add_argument(
-        "--model",
-        metavar="NAME",
-        help="s4 (the paper's), s4d, s4-serial, gru, unet or swin (default: s4)",
+    group.add_value(
+        "--model", str, "NAME", "s4 (the paper's), s4d, s4-serial, gru, unet or swin (default: s4)"
     )
     group.add_argument(
         "--inputs",
@@ -125,52 +75,42 @@ def _add_learning(parser: argparse.ArgumentParser) -> None:
         help="learn from the map, from that of each part of the body, or from how its joints move;"
         " the pairs must hold both (--limbs) (default: map)",
     )
-    group.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        type=_option,
-        metavar="NAME=VALUE",
-        help="an option of the model, e.g. channels=64; may be given several times",
-    )
-    group.add_argument(
-        "--from",
-        dest="start",
-        metavar="FILE|NAME",
-        help="go on from a model with pairs of one's own",
-    )
+    text = "an option of the model, e.g. channels=64; may be given several times"
+    group.add_value("--set", _option, "NAME=VALUE", text, [], action="append")
+    text = "go on from a model with pairs of one's own"
+    group.add_value("--from", str, "FILE|NAME", text)
     group.add_argument(
         "--frozen",
         action="store_true",
         default=None,
         help="with --from: let the last layers learn alone, for very few pairs",
     )
-    add_value(group, "--epochs", positive_int, "N", "passes over all segments (default: 500)")
-    group.add_argument(
+    group.add_value("--epochs", positive_int, "N", "passes over all segments (default: 500)")
+    group.add_value(
         "--minutes",
-        type=positive_float,
-        metavar="MIN",
-        help="train for so long instead; the learning rate follows the clock",
+        positive_float,
+        "MIN",
+        "train for so long instead; the learning rate follows the clock",
     )
-    add_value(group, "--batch-size", positive_int, "N", "segments of a batch (default: 64)")
-    add_value(group, "--learning-rate", positive_float, "RATE", "at its highest (default: 0.003)")
-    group.add_argument(
+    group.add_value("--batch-size", positive_int, "N", "segments of a batch (default: 64)")
+    group.add_value("--learning-rate", positive_float, "RATE", "at its highest (default: 0.003)")
+    group.add_value(
         "--ssm-learning-rate",
-        type=positive_float,
-        metavar="RATE",
-        help="the same for the parameters of state spaces (default: 0.001)",
+        positive_float,
+        "RATE",
+        "the same for the parameters of state spaces (default: 0.001)",
     )
-    group.add_argument(
+    group.add_value(
         "--early-stopping",
-        type=int,
-        metavar="N",
-        help="end after N epochs without a better one, 0: never (default: 100)",
+        int,
+        "N",
+        "end after N epochs without a better one, 0: never (default: 100)",
     )
-    group.add_argument(
+    group.add_value(
         "--velocity-weight",
-        type=float,
-        metavar="W",
-        help="learn the mean and the peak velocity of a frame beside the map: weight of 1 m/s"
+        float,
+        "W",
+        "learn the mean and the peak velocity of a frame beside the map: weight of 1 m/s"
         " beside the error of the map (default: 0, as in the paper)",
     )
     group.add_argument(
@@ -181,66 +121,57 @@ def _add_learning(parser: argparse.ArgumentParser) -> None:
         " are not shown too slow, and far ones not too coarsely (default: all frames alike, as in"
         " the paper)",
     )
-    group.add_argument(
+    group.add_choice(
         "--select-by",
-        choices=("rmse", "mae"),
-        help="what makes an epoch the best: error of the map, or of the peak velocity"
-        " (default: rmse)",
+        ("rmse", "mae"),
+        "what makes an epoch the best: error of the map, or of the peak velocity (default: rmse)",
     )
-    add_value(group, "--seed", int, "N", "seed of all random numbers (default: 0)")
+    group.add_value("--seed", int, "N", "seed of all random numbers (default: 0)")
 
 
-def _add_data(parser: argparse.ArgumentParser) -> None:
+def _add_data(parser: Options) -> None:
     group = parser.add_argument_group("data")
-    add_people_kept_out(
-        group,
+    group.add_people_kept_out(
         "kept out to choose the best epoch by, separated by commas (default: a sixth of all, at"
         " least one, from the end of the list), or none: then the last fifth of everybody's"
         " takes",
         "kept out for `sd2 eval`, or none (default: as many)",
     )
-    add_value(group, "--segment-frames", positive_int, "N", "length of a segment (default: 72)")
-    add_value(group, "--overlap-frames", int, "N", "frames that neighbours share (default: 10)")
-    group.add_argument(
+    group.add_value("--segment-frames", positive_int, "N", "length of a segment (default: 72)")
+    group.add_value("--overlap-frames", int, "N", "frames that neighbours share (default: 10)")
+    group.add_choice(
         "--segments",
-        choices=("shifted", "fixed"),
-        help="cut at other places in every epoch, or always at the same (default: shifted)",
+        ("shifted", "fixed"),
+        "cut at other places in every epoch, or always at the same (default: shifted)",
     )
-    group.add_argument(
+    group.add_choice(
         "--placements",
-        choices=("all", "first"),
-        help="range synthesis: learn from all places of the sensor, or the first only"
-        " (default: all)",
+        ("all", "first"),
+        "range synthesis: learn from all places of the sensor, or the first only (default: all)",
     )
-    group.add_argument(
+    group.add_value(
         "--range-factor",
-        type=positive_float,
-        metavar="FACTOR",
-        help="range synthesis: scale input and target together, as if the person were up to F"
+        positive_float,
+        "FACTOR",
+        "range synthesis: scale input and target together, as if the person were up to F"
         " times nearer or farther (default: 1, off)",
     )
 
 
-def _add_machine(parser: argparse.ArgumentParser) -> None:
+def _add_machine(parser: Options) -> None:
     group = parser.add_argument_group("machine")
-    group.add_argument(
-        "--device",
-        choices=("auto", "cpu", "cuda"),
-        help="where to compute (default: a GPU where there is one)",
+    group.add_choice(
+        "--device", ("auto", "cpu", "cuda"), "where to compute (default: a GPU where there is one)"
     )
-    add_value(group, "--devices", positive_int, "N", "number of GPUs (default: 1)")
-    group.add_argument(
+    group.add_value("--devices", positive_int, "N", "number of GPUs (default: 1)")
+    group.add_choice(
         "--precision",
-        choices=("auto", "32", "bf16"),
-        help="of matrix products (default: bf16 on GPUs that have it, else 32)",
+        ("auto", "32", "bf16"),
+        "of matrix products (default: bf16 on GPUs that have it, else 32)",
     )
-    add_value(group, "--threads", positive_int, "N", "of the CPU")
-    add_value(group, "--nice", int, "N", "lower the priority, 0 to 19")
-    group.add_argument(
-        "--background",
-        action="store_true",
-        help=f"one thread and nice {_BACKGROUND_NICE}, to work beside it",
-    )
+    group.add_value("--threads", positive_int, "N", "of the CPU")
+    group.add_value("--nice", int, "N", "lower the priority, 0 to 19")
+    group.add_flag("--background", f"one thread and nice {_BACKGROUND_NICE}, to work beside it")
     group.add_argument(
         "--deterministic",
         action="store_true",
@@ -264,6 +195,30 @@ def _option(text: str) -> tuple[str, Any]:
 
 
 def _train(options: argparse.Namespace) -> int:
+    """Train a denoiser that turns synthetic Doppler into what a radar would show.
+
+    Learns from pairs of synthetic and radar Doppler of the same movement, as
+    `sd2 simulate campaign` and `sd2 pairs` make them. By default as in the paper:
+    segments of 72 frames that overlap by 10, batches of 64, 500 epochs, root mean
+    square error. Some people are kept out to choose the best epoch by, some for
+    `sd2 eval`.
+
+    RUN is a folder. It can be stopped with Ctrl-C or killed at any moment;
+    `sd2 train --resume RUN` goes on, with the result that it would have had. `sd2 runs`
+    shows runs and steers them. RUN/best.safetensors is the model.
+
+    All settings may stand in a TOML file (docs/formats.md); options go before it.
+    `--show-settings` prints them.
+
+      sd2 train campaign.zarr --out runs/s4
+      sd2 train campaign.zarr --model gru --minutes 30 --out runs/gru
+      sd2 train campaign.zarr --inputs limbs --out runs/limbs
+      sd2 train campaign.zarr mars.zarr --test-subjects s6 --seed 1 --out runs/both
+      sd2 train settings.toml --epochs 100 --out runs/short
+      sd2 train --resume runs/s4
+      sd2 train mine.zarr --from denoiser --learning-rate 0.0005 --out runs/mine
+      sd2 train campaign.zarr --set channels=64 --set dropout=0.1 --show-settings
+    """
     from sd2core.train.config import config_text
     from sd2core.train.start import begin, check, go_on, with_start
 
@@ -319,10 +274,11 @@ def _config(options: argparse.Namespace) -> TrainConfig:
             "Make some with `sd2 simulate campaign`",
         )
     values: dict[str, dict[str, Any]] = {}
-    if options.start is not None:
+    start = getattr(options, "from")
+    if start is not None:
         from sd2core.denoise.files import find_model
 
-        options.start = find_model(options.start)
+        setattr(options, "from", find_model(start))
     if options.background:
         values["machine"] = {"threads": 1, "nice": _BACKGROUND_NICE}
     for option, value in given(options, _SETTINGS).items():
@@ -380,10 +336,7 @@ def _say_ending(options: argparse.Namespace, run: Path, ending: Ending) -> int:
         print_json(
             {
                 "run": str(run),
-                "outcome": ending.outcome,
-                "best_epoch": ending.best_epoch,
-                "validation_rmse": ending.validation_rmse,
-                "validation_mae_mps": ending.validation_mae_mps,
+                **picked(ending, "outcome", "best_epoch", "validation_rmse", "validation_mae_mps"),
                 "model": None if ending.model is None else str(ending.model),
             }
         )

@@ -19,6 +19,7 @@ from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import Presence
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.numerics.map_accuracy import relative_l1
 from sd2core.progress import Progress, silent
 from sd2core.scattering.trajectory import cubic_weights
 from sd2core.scattering.velocity import moments, radial_velocity
@@ -185,7 +186,4 @@ def map_l1(
     a, b = (one.values.astype(np.float64) for one in (values, reference))
     if frames is not None:
         a, b = a[:, frames], b[:, frames]
-    difference, total = float(np.abs(a - b).sum()), float(b.sum())
-    if total > 0:
-        return difference / total
-    return 0.0 if difference == 0 else float("inf")
+    return relative_l1(a, b)

@@ -13,7 +13,7 @@ import numpy as np
 from sd2core.datasets.layout import SPLITS
 from sd2core.datasets.reading import Dataset, open_dataset
 from sd2core.datasets.source import KINDS
-from sd2core.datasets.splitting import RULE, borrowed, split_people
+from sd2core.datasets.splitting import RULE, borrowed, named_splits, split_people
 from sd2core.files.atomic import atomic_write_text
 from sd2core.mesh.vertex_parts import QUANTITIES
 from sd2core.numerics.map_accuracy import MapAccuracy
@@ -401,12 +401,7 @@ def _splits(card: dict[str, Any]) -> str:
 def _rule(card: dict[str, Any]) -> str:
     """Explain how the splits were chosen."""
     splits = {name: tuple(people) for name, people in card["splits"].items()}
-    by_name = split_people(card["subjects"])
-    if splits != {
-        "train": by_name.training,
-        "validation": by_name.validation,
-        "test": by_name.test,
-    }:
+    if splits != named_splits(split_people(card["subjects"])):
         return "The people who validate and test were named when the data set was written."
     moved = borrowed(splits)
     if not moved:

@@ -66,10 +66,7 @@ def clips_of_dataset(dataset: Dataset, kind: MapKind) -> ClipSet:
 def _runs(
     belongs: NDArray[np.integer], first_frame: NDArray[np.float64], length: int
 ) -> Iterator[tuple[slice, NDArray[np.int64]]]:
-    """Yield the rows of each clip, and the frame at which each of its segments begins.
-
-    Rows of one clip have the same number in ``belongs``.
-    """
+    """Yield the rows of each clip (one number in ``belongs``), and where its segments begin."""
     apart = np.diff(first_frame)
     steps = np.rint(apart)
     goes_on = (

@@ -8,6 +8,7 @@ is that of the nearest frame, and a map is known where both its neighbours are.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -60,24 +61,17 @@ def clips_of(
     return found
 
 
-def count_segments(
-    outline: Outline, frame_rate_hz: float, options: DatasetOptions
-) -> tuple[int, dict[str, int]]:
-    """Count the segments of a source, in all and by label."""
-    counts: dict[str, int] = {}
-    total = 0
+def count_segments(outline: Outline, frame_rate_hz: float, options: DatasetOptions) -> Counter[str]:
+    """Count the segments of a source by their labels."""
+    counts: Counter[str] = Counter()
     for clip in clips_of(
         outline.times_s, outline.present, frame_rate_hz, options.length, options.overlap
     ):
         label = _label(outline.times_s, outline.label, clip)
         windows = label[clip.starts[:, None] + np.arange(options.length)]
         named, _ = label_of_segments(windows, len(outline.labels), options)
-        for number, count in enumerate(np.bincount(named, minlength=len(outline.labels)).tolist()):
-            if count:
-                name = outline.labels[number]
-                counts[name] = counts.get(name, 0) + count
-        total += len(clip.starts)
-    return total, counts
+        counts.update(outline.labels[number] for number in np.sort(named).tolist())
+    return counts
 
 
 def cut_source(

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from sd2core.datasets.cutting import count_segments
+from sd2core.datasets.index import empty_header
 from sd2core.datasets.layout import bytes_per_segment
 from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.source import KINDS, LazySource, Outline, Source
-from sd2core.datasets.splitting import split_people
+from sd2core.datasets.splitting import named_splits, split_people
 from sd2core.errors import Sd2Error
 from sd2core.maps import MapKind
 from sd2core.progress import Progress, silent
+from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 from sd2core.train.data import Split
 
@@ -34,12 +37,10 @@ class Forecast:
 
     def of_split(self) -> dict[str, int]:
         """Segments of each split."""
-        parts = {
-            "train": self.split.training,
-            "validation": self.split.validation,
-            "test": self.split.test,
+        return {
+            name: sum(self.of_subject[one] for one in people)
+            for name, people in named_splits(self.split).items()
         }
-        return {name: sum(self.of_subject[one] for one in people) for name, people in parts.items()}
 
 
 @dataclass
@@ -71,35 +72,30 @@ class Counting:
             raise Sd2Error(
                 self.failed[0] if self.failed else "There are no sources", "one at least"
             )
-        rate_hz = options.frame_rate_hz or round(
-            Timebase(self.outlines[0][1].times_s).frames_per_s, 3
-        )
-        of_subject: dict[str, int] = {}
-        of_label: dict[str, int] = {}
-        of_kind: dict[MapKind, int] = {}
+        first = Timebase(self.outlines[0][1].times_s)
+        header = empty_header(options, VelocityAxis(bins), first)
+        of_subject: Counter[str] = Counter()
+        of_label: Counter[str] = Counter()
+        of_kind: Counter[MapKind] = Counter()
         for subject, outline in self.outlines:
-            total, labels = count_segments(outline, rate_hz, options)
-            if total:
-                of_subject[subject] = of_subject.get(subject, 0) + total
-            for name, count in labels.items():
-                of_label[name] = of_label.get(name, 0) + count
-            for kind in outline.kinds:
-                if kind in options.kinds:
-                    of_kind[kind] = of_kind.get(kind, 0) + total
-        segments = sum(of_subject.values())
+            labels = count_segments(outline, header.frame_rate_hz, options)
+            of_label.update(labels)
+            total = labels.total()
+            of_subject += Counter({subject: total})
+            of_kind.update({kind: total for kind in outline.kinds if kind in options.kinds})
+        segments = of_label.total()
         split = Split((), (), ())
         if segments:
             split = split_people(list(of_subject), options.validation, options.test)
-        maps = len(of_kind) + len(options.parts)
-        more = len(options.imu), len(options.joints)
+        kinds = tuple(kind for kind in KINDS if kind in of_kind)
         return Forecast(
             sources=len(self.outlines),
             segments=segments,
-            of_subject=of_subject,
-            of_label=of_label,
-            of_kind={kind: of_kind[kind] for kind in KINDS if kind in of_kind},
+            of_subject=dict(of_subject),
+            of_label=dict(of_label),
+            of_kind={kind: of_kind[kind] for kind in kinds},
             split=split,
-            frame_rate_hz=rate_hz,
-            total_bytes=segments * bytes_per_segment(options.length, bins, maps, *more),
+            frame_rate_hz=header.frame_rate_hz,
+            total_bytes=segments * bytes_per_segment(replace(header, kinds=kinds)),
             failed=tuple(self.failed),
         )

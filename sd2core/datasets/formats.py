@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,7 @@ from sd2core.datasets.layout import (
 )
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write, full_disk_named
-from sd2core.files.hdf5_files import member_of, open_hdf5_file, unreadable_hdf5
+from sd2core.files.hdf5_files import member_of, open_hdf5_file, refusing_damage
 from sd2core.files.limits import check_size
 from sd2core.files.numpy_files import open_npz_file
 from sd2core.files.stores import Damage, Depth, unreadable
@@ -39,9 +39,7 @@ _EXPECTED = "a data set that `sd2 export` made"
 
 def refuse_large_npz(out: Path, segments: int, header: Header) -> None:
     """Refuse an NPZ too large to be opened."""
-    maps = len(header.kinds) + len(header.parts)
-    more = len(header.imu), len(header.joints)
-    size = segments * bytes_per_segment(header.length, header.axis.bins, maps, *more)
+    size = segments * bytes_per_segment(header)
     if size > NPZ_LIMIT_BYTES:
         raise Sd2Error(
             f"{out} would hold {segments:,} segments, {size / 1e9:.1f} GB",
@@ -108,7 +106,8 @@ class Hdf5Rows:
 def open_hdf5(path: Path) -> tuple[Header, dict[str, Any], Any]:
     """Open an HDF5 data set: header, arrays and the open file."""
     file = open_hdf5_file(path, _EXPECTED)
-    try:
+    with ExitStack() as stack, refusing_damage(path, _EXPECTED):
+        stack.push(file)
         meta = member_of(file, path, META)
         if meta is None:
             raise Sd2Error(f"{path} holds no data set", "one that `sd2 export` made")
@@ -118,11 +117,7 @@ def open_hdf5(path: Path) -> tuple[Header, dict[str, Any], Any]:
             for name in _whole(header, file.keys(), path)
         }
         check_arrays(header, arrays, path)
-    except Exception as error:  # a damaged file fails in many ways
-        file.close()
-        if isinstance(error, Sd2Error):
-            raise
-        raise unreadable_hdf5(path, error, _EXPECTED) from error
+        stack.pop_all()
     return header, arrays, file
 
 
@@ -141,7 +136,7 @@ def open_npz(path: Path) -> tuple[Header, dict[str, Any], list[dict[str, Any]]]:
 
 def hdf5_sources(file: Any, path: Path) -> Iterator[dict[str, Any]]:
     """Yield the sources of an open HDF5 data set."""
-    try:
+    with refusing_damage(path, _EXPECTED):
         lines = member_of(file, path, SOURCES)
         read_bytes = 0
         for number in range(len(lines)):
@@ -150,10 +145,6 @@ def hdf5_sources(file: Any, path: Path) -> Iterator[dict[str, Any]]:
             read_bytes += len(line)
             check_size(f"{SOURCES} of {path}", read_bytes, path.stat().st_size)
             yield _json(line.decode("utf-8"), path)
-    except Sd2Error:
-        raise
-    except Exception as error:  # a damaged file fails in many ways
-        raise unreadable_hdf5(path, error, _EXPECTED) from error
 
 
 def _write_npz(
@@ -200,10 +191,7 @@ def _write_hdf5(
 
 @contextmanager
 def _file_in_place_of(path: Path) -> Iterator[Path]:
-    """Give a temporary path that replaces ``path`` when the block succeeds.
-
-    HDF5 writes to a file of its own, not to an open stream.
-    """
+    """Path that replaces ``path`` in the end: HDF5 writes to a file of its own, not a stream."""
     import os
 
     made = path.with_name(f".sd2-{os.getpid()}-{path.name}")

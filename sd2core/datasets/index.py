@@ -13,6 +13,8 @@ from sd2core.denoise.resample_to_model import MOST_RESAMPLED
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
 from sd2core.mesh.vertex_parts import KINEMATICS
+from sd2core.sensor import VelocityAxis
+from sd2core.timebase import Timebase
 from sd2core.version import __version__
 
 
@@ -52,12 +54,19 @@ def header_of(source: Source, options: DatasetOptions) -> Header:
     """Return the header of a new data set; its first source fills in open options."""
     first: DopplerMap = next(iter(source.maps.values()))
     nulled = sorted({number for one in source.maps.values() for number in one.null_bins})
+    return empty_header(options, first.axis, first.timebase, tuple(nulled))
+
+
+def empty_header(
+    options: DatasetOptions, axis: VelocityAxis, timebase: Timebase, nulled: tuple[int, ...] = ()
+) -> Header:
+    """Return the header of a data set without segments; what the options leave open is given."""
     return Header(
         length=options.length,
         overlap=options.overlap,
-        axis=first.axis,
-        null_bins=tuple(nulled) if options.null_bins is None else tuple(options.null_bins),
-        frame_rate_hz=options.frame_rate_hz or round(first.timebase.frames_per_s, 3),
+        axis=axis,
+        null_bins=nulled if options.null_bins is None else tuple(options.null_bins),
+        frame_rate_hz=options.frame_rate_hz or round(timebase.frames_per_s, 3),
         label_rule=options.label_rule,
         min_share=options.min_share,
         kinds_wanted=options.kinds,

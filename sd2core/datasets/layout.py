@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -177,17 +178,9 @@ def chunk_of(row: tuple[int, ...]) -> tuple[int, ...]:
     return (CHUNK_SEGMENTS if len(row) >= 2 else CHUNK_ROWS, *row)
 
 
-def bytes_per_segment(
-    header_length: int, bins: int, maps: int, imu: int = 0, joints: int = 0
-) -> int:
-    """Size of a segment in bytes before compression; limb maps are as many maps as parts.
-
-    ``imu`` is the number of inertial sensors, ``joints`` that of joints whose kinematics are kept.
-    """
+def bytes_per_segment(header: Header) -> int:
+    """Size of a segment in bytes before compression."""
     import numpy as np
 
-    columns = sum(
-        np.dtype(kind).itemsize * int(np.prod(row, dtype=int)) for kind, row in COLUMNS.values()
-    )
-    values = bins * maps + len(IMU_CHANNELS) * imu + len(QUANTITIES) * joints
-    return 4 * header_length * values + 2 * header_length + columns
+    rows = row_shapes(header).values()
+    return sum(np.dtype(kind).itemsize * math.prod(row) for kind, row in rows)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from sd2core.datasets.layout import SPLITS, FileFormat, Header, format_of
 from sd2core.errors import Sd2Error
 
 
+@dataclass(eq=False)
 class Dataset:
     """Open data set, whose arrays are read in parts.
 
@@ -22,21 +23,12 @@ class Dataset:
     (10, length, bins); ``docs/formats.md`` lists all names.
     """
 
-    def __init__(
-        self,
-        path: Path,
-        form: FileFormat,
-        header: Header,
-        arrays: dict[str, Any],
-        sources: list[dict[str, Any]] | None = None,
-        file: Any = None,
-    ) -> None:
-        self.path = path
-        self.form = form
-        self.header = header
-        self.arrays = arrays
-        self._sources = sources
-        self._file = file
+    path: Path
+    form: FileFormat
+    header: Header
+    arrays: dict[str, Any]
+    _sources: list[dict[str, Any]] | None = None
+    _file: Any = None
 
     def __len__(self) -> int:
         """Return the number of segments."""
@@ -51,12 +43,7 @@ class Dataset:
     def __enter__(self) -> Dataset:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:
@@ -101,6 +88,6 @@ def open_dataset(path: Path) -> Dataset:
         return Dataset(path, form, header, arrays)
     if form == "hdf5":
         header, arrays, file = formats.open_hdf5(path)
-        return Dataset(path, form, header, arrays, file=file)
+        return Dataset(path, form, header, arrays, _file=file)
     header, arrays, sources = formats.open_npz(path)
     return Dataset(path, form, header, arrays, sources)

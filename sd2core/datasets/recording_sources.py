@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -175,23 +175,21 @@ class _Shared:
 
     def __init__(self, making: Making) -> None:
         self.making = making
-        self._denoising = Denoising(making.texture)
         self._opened: _Opened | None = None
 
     def opened(self, recording: Recording) -> _Opened:
         if self._opened is None or self._opened.recording is not recording:
             self._opened = None  # before the next one takes memory
-            self._opened = _Opened(recording, self.making, self._denoising)
+            self._opened = _Opened(recording, self.making)
         return self._opened
 
 
 class _Opened:
     """Open recording whose placements share mesh, synthesizer and radar map."""
 
-    def __init__(self, recording: Recording, making: Making, denoising: Denoising) -> None:
+    def __init__(self, recording: Recording, making: Making) -> None:
         self.recording = recording
         self._making = making
-        self._denoising = denoising
         self._mesh: MeshSequence | None = None
         if recording.mesh is not None:
             self._mesh = recording.load_mesh()
@@ -237,7 +235,7 @@ class _Opened:
             synthetic = self._counted(sensor, counting, limbs=limbs)
             maps["synthetic"] = synthetic
             if model is not None:
-                maps["denoised"] = self._denoising.denoised(synthetic, model)
+                maps["denoised"] = denoised(synthetic, model, self._making.texture)
         if key.placement == 0 and self.recording.radar is not None and {
             "simulated", "real"
         } & {*wanted}:  # fmt: skip
@@ -414,22 +412,20 @@ def _models_of(recording: Recording, making: Making) -> list[Path]:
     return [find_model(name) for name in ([chosen] if chosen else [MAP_MODEL, LIMBS_MODEL])]
 
 
-class Denoising:
-    """Denoiser of maps that keeps the model used last; with a seed it draws their texture."""
+def denoised(synthetic: DopplerMap, path: Path, texture: int | None = None) -> DopplerMap:
+    """Denoise a synthetic map with a model file; the model used last is kept.
 
-    def __init__(self, texture: int | None) -> None:
-        self._texture = texture
-        self._path: Path | None = None
-        self._model: TrainedDenoiser | None = None
+    With the seed of a texture it is drawn as the radar would show it.
+    """
+    card = describe_model(path)
+    check_map(synthetic, card)  # before torch is loaded: it takes seconds
+    law = None if texture is None else card.needed_texture()
+    made = _loaded(path, path.stat().st_mtime_ns).denoise(synthetic)
+    return made if law is None or texture is None else law.on(made, texture)
 
-    def denoised(self, synthetic: DopplerMap, path: Path) -> DopplerMap:
-        """Denoise a synthetic map with a model file."""
-        if self._model is None or path != self._path:
-            from sd2core.denoise.files import load_model
 
-            check_map(synthetic, describe_model(path))  # before torch is loaded: it takes seconds
-            self._model, self._path = load_model(path), path
-        denoised = self._model.denoise(synthetic)
-        if self._texture is None:
-            return denoised
-        return self._model.card.needed_texture().on(denoised, self._texture)
+@lru_cache(maxsize=1)
+def _loaded(path: Path, changed_ns: int) -> TrainedDenoiser:
+    from sd2core.denoise.files import load_model
+
+    return load_model(path)

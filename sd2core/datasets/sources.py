@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from sd2core.datasets.recording_sources import (
-    Denoising,
     Making,
+    denoised,
     labels_and_classes,
     recording_sources,
 )
@@ -24,7 +24,6 @@ from sd2core.errors import Sd2Error
 from sd2core.files.digests import cached_digest
 from sd2core.io.kinds import kind_of
 from sd2core.io.radar import holds_map, load_recorded_map
-from sd2core.labels.files import read_labels as read_own
 from sd2core.labels.formats import read_labels
 from sd2core.labels.label_set import GESTURES
 from sd2core.labels.spans import Labels
@@ -155,11 +154,7 @@ def _read_map(path: Path, label_file: Path | None) -> tuple[DopplerMap, Labels]:
     else:
         doppler = DopplerMap.load(path)
     if label_file is not None:
-        labels = (
-            read_own(label_file).labels
-            if label_file.suffix.lower() == ".json"
-            else read_labels(label_file, doppler.timebase)
-        )
+        labels = read_labels(label_file, doppler.timebase)
     return doppler, labels
 
 
@@ -214,7 +209,6 @@ class _PairStore:
         self._model: Path | None = None
         if "denoised" in self._kinds:
             self._model = find_model(making.model or default_name(limbs=bool(self.parts)))
-        self._denoising = Denoising(making.texture)
 
     def lazy(self, number: int, subject: str) -> LazySource:
         take = self.takes[number]
@@ -261,7 +255,7 @@ class _PairStore:
             limbs = limbs_between(self._header, self._arrays, take["start"], take["stop"])
             maps["synthetic"] = replace(counted, limbs=limbs)
         if self._model is not None:
-            maps["denoised"] = self._denoising.denoised(maps["synthetic"], self._model)
+            maps["denoised"] = denoised(maps["synthetic"], self._model, self._texture)
         if self._radar in self._kinds:
             maps[self._radar] = as_map("radar", self._radar, "power")
         known = {one.name: one.gesture_class for one in GESTURES.labels}

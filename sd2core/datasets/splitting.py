@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
 
+from sd2core.datasets.layout import SPLITS
 from sd2core.train.data import Split, split_subjects
 
 RULE = (
@@ -34,6 +35,11 @@ def split_people(
     if validation is None:
         validation = _chosen(free, lambda number: (number - _SHARE) % 1.0, min(most, len(free) - 1))
     return split_subjects(subjects, validation, test)
+
+
+def named_splits(split: Split) -> dict[str, tuple[str, ...]]:
+    """People of every split by its name in a data set."""
+    return dict(zip(SPLITS, (split.training, split.validation, split.test), strict=True))
 
 
 def borrowed(splits: Mapping[str, Sequence[str]]) -> list[str]:

@@ -246,10 +246,7 @@ def read_sources(path: Path) -> Iterator[dict[str, Any]]:
 
 @contextmanager
 def _new_group(path: Path, header: Header) -> Iterator[Any]:
-    """Make a group in a folder, in place of what is there but the lock.
-
-    It is a data set once the block has ended: until then :func:`is_begun` says what it is.
-    """
+    """Make a group in place of all but the lock; until the block ends :func:`is_begun` knows it."""
     path.mkdir(exist_ok=True)
     begun = {"zarr_format": 3, "node_type": "group", "attributes": {"format": _BEGUN}}
     atomic_write_text(path / _DESCRIPTION, json.dumps(begun))

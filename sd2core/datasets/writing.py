@@ -19,14 +19,13 @@ from sd2core.datasets.layout import SPLITS, FileFormat, Header, format_of
 from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.source import KINDS, LazySource, Source, SourceKey
-from sd2core.datasets.splitting import split_people
+from sd2core.datasets.splitting import named_splits, split_people
 from sd2core.datasets.store import LOCK_NAME, SOURCES_NAME, SegmentStore, is_begun, open_arrays
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import full_disk_named
 from sd2core.files.lock import FileLock
 from sd2core.io.kinds import is_dataset
 from sd2core.progress import Progress, part_of, silent
-from sd2core.train.data import Split
 
 
 @dataclass(frozen=True)
@@ -281,20 +280,16 @@ class _Writer:
 
     def _final(self, header: Header) -> Header:
         names = self._names
-        split: Split = split_people(
-            list(names.subjects), self._options.validation, self._options.test
-        )
+        people = split_people(list(names.subjects), self._options.validation, self._options.test)
         return replace(
             header,
             kinds=tuple(kind for kind in KINDS if kind in names.kinds),
             labels=tuple(names.labels),
             classes=dict(names.classes),
             subjects=tuple(names.subjects),
-            splits={
-                "train": split.training, "validation": split.validation, "test": split.test
-            },
+            splits=named_splits(people),
             units={kind: tuple(names.units[kind]) for kind in KINDS if kind in names.units},
-        )  # fmt: skip
+        )
 
     def _know(self, entry: dict[str, Any], digest: bytes | None = None) -> None:
         key = SourceKey(entry["subject"], entry["recording"], entry["placement"])

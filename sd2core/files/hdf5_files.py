@@ -6,6 +6,8 @@ import math
 import os
 import struct
 import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -32,17 +34,21 @@ def open_hdf5_file(path: Path, expected: str) -> Any:
     import h5py
 
     check_regular(path)
-    try:
+    with refusing_damage(path, expected):
         return h5py.File(path, "r")
-    except Exception as error:  # a damaged file fails in many ways
-        raise unreadable_hdf5(path, error, expected) from error
 
 
-def unreadable_hdf5(path: Path, error: Exception, expected: str) -> Sd2Error:
-    """Error that an HDF5 file is damaged, for what fails while it is open."""
-    return Sd2Error(
-        f"{path} cannot be read as HDF5 ({error})", expected, "Copy or download it again"
-    )
+@contextmanager
+def refusing_damage(path: Path, expected: str) -> Iterator[None]:
+    """Raise Sd2Error for whatever fails while an HDF5 file is open: a damaged one does so."""
+    try:
+        yield
+    except Sd2Error:
+        raise
+    except Exception as error:  # in many ways
+        raise Sd2Error(
+            f"{path} cannot be read as HDF5 ({error})", expected, "Copy or download it again"
+        ) from error
 
 
 def member_of(file: Any, path: Path, name: str) -> Any:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
-from sd2core.files.limits import check_size, open_regular
+from sd2core.files.limits import check_regular, check_size, open_regular, size_bytes
 
 
 class NpzArrays(Mapping[str, NDArray[Any]]):
@@ -62,6 +62,16 @@ def open_npz_file(path: Path, what: str, expected: str, remedy: str = "") -> Ite
         ) from error
     except Exception as error:  # a damaged archive fails in many ways
         raise Sd2Error(f"{path} cannot be read as {what} ({error})", expected, remedy) from error
+
+
+def open_npy_file(path: Path, expected: str, remedy: str = "") -> NDArray[Any]:
+    """Map the array in an ``.npy``, so that what its header says is compared with its size."""
+    check_regular(path)
+    try:
+        return np.load(path, mmap_mode="r", allow_pickle=False)
+    except Exception as error:  # a damaged header fails in many ways
+        found = f"{path} ({size_bytes(path)} bytes) cannot be read as an array ({error})"
+        raise Sd2Error(found, expected, remedy) from error
 
 
 @contextmanager

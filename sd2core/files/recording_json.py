@@ -13,12 +13,11 @@ from pydantic import (
     FiniteFloat,
     PositiveInt,
     StringConstraints,
-    ValidationError,
     model_validator,
 )
 
 from sd2core.errors import Sd2Error
-from sd2core.files.texts import first_fault, read_json
+from sd2core.files.texts import check_version, faults_in, read_json
 
 FILE_NAME = "recording.json"
 FORMAT: Literal["sd2-recording"] = "sd2-recording"
@@ -144,21 +143,7 @@ def read_document(file: Path) -> Document:
     if not os.path.exists(file):
         raise Sd2Error(f"{file.parent} has no {file.name}", "a recording made by `sd2 import`")
     content = read_json(file)
-    found_format = content.get("format") if isinstance(content, dict) else None
-    if found_format != FORMAT:
-        raise Sd2Error(f"{file} has the format {found_format!r}", f"the format {FORMAT!r}")
-    version = content.get("version")
-    if not isinstance(version, int) or not 1 <= version <= VERSION:
-        raise Sd2Error(
-            f"{file} is of version {version!r}",
-            f"a version from 1 to {VERSION}",
-            "Open it with the version of SD² Studio that wrote it, or a later one",
-        )
-    try:
+    check_version(content, file, FORMAT, VERSION)
+    expected = "what docs/formats.md says of a recording"
+    with faults_in(file, expected, "Correct that entry with a text editor"):
         return Document.model_validate(content)
-    except ValidationError as error:
-        raise Sd2Error(
-            f"{file}: {first_fault(error)}",
-            "what docs/formats.md says of a recording",
-            "Correct that entry with a text editor",
-        ) from error

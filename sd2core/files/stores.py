@@ -225,10 +225,7 @@ class _PackedChunkFiles(_ChunkFiles):
 
 @functools.cache
 def _zarr() -> Any:
-    """Zarr, whose thread is waited for at the end of the process.
-
-    Zarr gives it 0.2 s to stop. On a busy machine that is too little, and a traceback is printed.
-    """
+    """Zarr, whose thread is waited for at exit: the 0.2 s that Zarr gives it may be too few."""
     import zarr
     from zarr.core import sync
 

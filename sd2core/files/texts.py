@@ -138,6 +138,31 @@ def errors_in(path: Path) -> Iterator[None]:
         raise Sd2Error(told.found, told.expected, told.remedy or _REMEDY) from error
 
 
+@contextmanager
+def faults_in(place: str | Path, expected: str, remedy: str = "") -> Iterator[None]:
+    """Say in words what a model of pydantic refuses of the content of a place."""
+    from pydantic import ValidationError
+
+    try:
+        yield
+    except ValidationError as error:
+        raise Sd2Error(f"{place}: {first_fault(error)}", expected, remedy) from error
+
+
+def check_version(content: Any, file: Path, form: str, newest: int) -> None:
+    """Refuse the content of a file of another format, or of a later version than the newest."""
+    found = content.get("format") if isinstance(content, dict) else None
+    if found != form:
+        raise Sd2Error(f"{file} has the format {found!r}", f"the format {form!r}")
+    version = content.get("version")
+    if isinstance(version, bool) or not isinstance(version, int) or not 1 <= version <= newest:
+        raise Sd2Error(
+            f"{file} is of version {version!r}",
+            f"a version from 1 to {newest}",
+            "Open it with the version of SD² Studio that wrote it, or a later one",
+        )
+
+
 def first_fault(error: ValidationError) -> str:
     """Describe the first fault: its place, the value found and the reason."""
     first = error.errors(include_url=False)[0]

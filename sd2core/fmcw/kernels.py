@@ -48,11 +48,7 @@ def _turning(
     place: int,
     amplitude: NDArray[np.complex128],
 ) -> None:
-    """Echo of a facet whose corners recede at different rates, as a parabola in time.
-
-    The difference of the phases of its corners decides between a constant, the tangent, and a
-    parabola through three moments; see docs/decisions/0011 for what that costs.
-    """
+    """Echo of a facet whose corners recede at different rates (docs/decisions/0011)."""
     now, change = _mean_at(phase, turn, weight, bend, 0.0)
     amplitude[0, place] = now
     if amplitude.shape[0] == 1:

@@ -123,10 +123,7 @@ def _fill(
     signal: Signal,
     progress: Progress,
 ) -> tuple[NDArray[np.float64], float]:
-    """Fill in the beat signals of all frames on worker threads; returns mean squares and peak.
-
-    The mean square of a frame is that without what stands still.
-    """
+    """Fill in beat signals on worker threads; mean squares of what moves, and the peak."""
     frames = len(times_s)
     power, peak = np.empty(frames), np.empty(frames)
     stopped = threading.Event()

@@ -37,19 +37,10 @@ RATE_NAMES = ("frames_per_s", "fps")
 COUNT_NAMES = ("vertex_counts",)
 PRESENCE_NAMES = ("present",)
 LIMB_NAMES = ("limbs",)
-UNCERTAINTY_NAMES = (
-    "vertex_limb",
-    "limb_velocity_sigma_mps",
-    "limb_velocity_sigma_across_mps",
-)
+UNCERTAINTY_NAMES = ("vertex_limb", "limb_velocity_sigma_mps", "limb_velocity_sigma_across_mps")
 SMALL_NAMES = (
-    FACE_NAMES
-    + TIME_NAMES
-    + RATE_NAMES
-    + COUNT_NAMES
-    + PRESENCE_NAMES
-    + LIMB_NAMES
-    + UNCERTAINTY_NAMES
+    *(*FACE_NAMES, *TIME_NAMES, *RATE_NAMES, *COUNT_NAMES),
+    *(*PRESENCE_NAMES, *LIMB_NAMES, *UNCERTAINTY_NAMES),
 )
 
 _CHUNK_BYTES = 2 * 2**20

@@ -92,11 +92,7 @@ def read_surface(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64] | N
 
 
 def _geometry_of_obj(content: bytes) -> bytes:
-    """Vertices of an OBJ file and the vertex numbers of its faces, nothing else.
-
-    Materials, groups and texture coordinates would split one surface into
-    several and double, reorder or drop its vertices.
-    """
+    """Vertices and faces of an OBJ file: groups and materials would split one surface."""
     lines = []
     for line in content.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ").splitlines():
         words = line.split()

@@ -309,12 +309,7 @@ def _stated_seconds(container: Any, stream: Any) -> float:
 def _grid(
     times_s: NDArray[np.float64], rates: list[float], tick_s: float
 ) -> tuple[NDArray[np.int64], float] | None:
-    """Place of every frame on a regular clock, and its rate; None when there is none.
-
-    Matroska keeps milliseconds, which turns steps of 1/30 s into 33 and 34 ms
-    and would put 3 % of jitter on every velocity. Where frames are missing the
-    others keep their places.
-    """
+    """Places on a regular clock and its rate, free of jitter by rounded times; None without."""
     for rate in rates:
         places = np.rint(times_s * rate).astype(np.int64)
         steps = np.diff(places)

@@ -12,13 +12,17 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal, Protocol, TypeVar
 
-from pydantic import ValidationError
-
-from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.paths import located_path, plain_path, stored_path
 from sd2core.files.recording_json import Span as InlineSpan
-from sd2core.files.texts import EXPECTED_JSON, errors_in, first_fault, parse_json, read_text
+from sd2core.files.texts import (
+    EXPECTED_JSON,
+    check_version,
+    errors_in,
+    faults_in,
+    parse_json,
+    read_text,
+)
 from sd2core.labels.entries import Entry, LabelsEntry, LabelSetEntry, label_set_entry, labels_entry
 from sd2core.labels.label_set import LONGEST_NAME, LabelSet
 from sd2core.labels.spans import Labels, LabelTrack, Span
@@ -148,25 +152,10 @@ def _one_line(label: str) -> str:
 
 def _read(path: Path, document: type[_Document], expected: str) -> _Document:
     text = read_text(path, f"a file of the format {expected!r}")
-    content = parse_json(text, path, EXPECTED_JSON)
-    found = content.get("format") if isinstance(content, dict) else None
-    if found != expected:
-        raise Sd2Error(f"{path} has the format {found!r}", f"the format {expected!r}")
-    version = content.get("version")
-    if isinstance(version, bool) or not isinstance(version, int) or not 1 <= version <= VERSION:
-        raise Sd2Error(
-            f"{path} is of version {version!r}",
-            f"a version from 1 to {VERSION}",
-            "Open it with the version of SD² Studio that wrote it, or a later one",
-        )
-    try:
+    check_version(parse_json(text, path, EXPECTED_JSON), path, expected, VERSION)
+    allowed = "what docs/formats.md says of labels"
+    with faults_in(path, allowed, "Correct that entry with a text editor"):
         return document.model_validate_json(text)
-    except ValidationError as error:
-        raise Sd2Error(
-            f"{path}: {first_fault(error)}",
-            "what docs/formats.md says of labels",
-            "Correct that entry with a text editor",
-        ) from error
 
 
 def _made(path: Path, document: _Makes[_Made]) -> _Made:

@@ -280,16 +280,8 @@ class Journal:
         self._close_stream()
         self._part += 1
         path = self._folder / f"{self._session:06d}-{self._part:06d}{SUFFIX}"
-        record = packed(
-            head(
-                str(self._recording),
-                self._labels,
-                self._unsaved,
-                self._last,
-                time.time(),
-                self._others,
-            )
-        )
+        begun = str(self._recording), self._labels, self._unsaved, self._last
+        record = packed(head(*begun, time.time(), self._others))
         with atomic_write(path, mode=0o600) as stream:
             stream.write(record)
         self._parts.append(path)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import numpy as np
 
@@ -60,25 +60,13 @@ def label_statistics(
 
 def statistics_rows(found: Iterable[LabelStatistics]) -> list[tuple[str, ...]]:
     """Format a row of text per label, in the order of :data:`HEADINGS`."""
-    return [
-        (
-            one.label,
-            str(one.count),
-            *(
-                NO_NUMBER if seconds is None else f"{seconds:.3f}"
-                for seconds in (
-                    one.total_s,
-                    one.mean_s,
-                    one.sd_s,
-                    one.median_s,
-                    one.shortest_s,
-                    one.longest_s,
-                )
-            ),
-            NO_NUMBER if one.share is None else f"{100 * one.share:.1f}",
-        )
-        for one in found
-    ]
+    rows = []
+    for one in found:
+        label, count, *seconds, share = astuple(one)
+        cells = [NO_NUMBER if value is None else f"{value:.3f}" for value in seconds]
+        percent = NO_NUMBER if share is None else f"{100 * share:.1f}"
+        rows.append((label, str(count), *cells, percent))
+    return rows
 
 
 def statistics_text(rows: Iterable[Sequence[str]], separator: str = ",") -> str:

@@ -23,7 +23,7 @@ from sd2core.mesh.presence import Presence, runs
 from sd2core.timebase import Timebase
 
 TRACK = "Suggestions"
-"""Name of the track that suggestions stand on unless another is asked for."""
+"""Name of the track that suggestions stand on."""
 LABEL = "gesture"
 """Label of suggestions: energy shows that something moves, not what."""
 SURE_DB = 20.0
@@ -138,8 +138,6 @@ def suggest_spans(
     options: SuggestOptions | None = None,
     *,
     label: str = LABEL,
-    track: str = TRACK,
-    first_id: int = 1,
 ) -> tuple[Span, ...]:
     """Find spans in which something moves, in order; edges are those of frames.
 
@@ -148,10 +146,8 @@ def suggest_spans(
     doppler : DopplerMap
         Synthetic, denoised, simulated or real. At least a quarter of its frames with a
         person must be quiet: what moves all the time is not told from what never does.
-    label, track : str
+    label : str
         The same for all spans.
-    first_id : int
-        Id of the first span; the others count on.
 
     Returns
     -------
@@ -185,8 +181,8 @@ def suggest_spans(
     )
     return tuple(
         Span(
-            id=first_id + number,
-            track=track,
+            id=number,
+            track=TRACK,
             start_s=float(starts_s[start]),
             end_s=float(ends_s[stop - 1]),
             label=label,
@@ -194,7 +190,9 @@ def suggest_spans(
             confidence=_confidence(peak_db, options.high_db),
             origin="suggestion",
         )
-        for number, ((start, stop), (_, peak_db)) in enumerate(zip(wider, kept, strict=True))
+        for number, ((start, stop), (_, peak_db)) in enumerate(
+            zip(wider, kept, strict=True), start=1
+        )
     )
 
 

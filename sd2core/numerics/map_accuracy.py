@@ -7,6 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 _LEAST_PERCENT = 1e-3
 
 
@@ -69,3 +72,14 @@ def percent(share: float) -> str:
     if value < _LEAST_PERCENT:
         return f"<{_LEAST_PERCENT:g} %"
     return f"{value:.0f} %" if value >= 9.95 else f"{value:.2g} %"
+
+
+def relative_l1(values: NDArray[np.float64], reference: NDArray[np.float64]) -> float:
+    """Sum of absolute differences over the sum of the reference.
+
+    0 when both are empty, infinite when only the reference is.
+    """
+    difference, total = float(np.abs(values - reference).sum()), float(reference.sum())
+    if total > 0:
+        return difference / total
+    return 0.0 if difference == 0 else float("inf")

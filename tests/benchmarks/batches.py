@@ -21,7 +21,7 @@ from scaling import body
 
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.plan_file import plan_from_text
-from sd2core.batch.pool import DaskPool, local_client
+from sd2core.batch.pool import Pool, local_client
 from sd2core.batch.run import BatchEnd, run_batch
 from sd2core.files.atomic import atomic_write_text
 from sd2core.io.mesh import save_mesh
@@ -62,7 +62,7 @@ def run(
     out = out or tempfile.mkdtemp(prefix="out-", dir=folder)
     text = _PLAN.format(out=out, files=files, places=where, how=how) + more
     plan = plan_from_text(text, folder)
-    pool = DaskPool(client, BatchFolder(Path(plan.out)), most_deaths=2)
+    pool = Pool(client, BatchFolder(Path(plan.out)), most_deaths=2)
     begun_s, own_s = time.perf_counter(), time.process_time()
     end = run_batch(plan, pool=nullcontext(pool))
     assert end.outcome == "finished"
@@ -205,7 +205,7 @@ def _in_this_process(bodies: Path, how: str) -> None:
             return {"here": 1}
 
         def submit(self, tasks: tuple[Any, ...], worker: str | None) -> None:
-            outcomes = run_tasks([task.record(out) for task in tasks])
+            outcomes = run_tasks(tasks, out)
             peaks[tasks[0].step] = peak_mb()
             self._ended.append(Ending(tasks, outcomes, "here"))
 

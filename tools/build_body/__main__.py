@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from sd2core.cli.options import add_command
+from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import progress_bar
 from sd2core.cli.reading import check_output
 from tools.build_body.export_body import export_body

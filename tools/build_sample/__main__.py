@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from sd2core.cli.options import add_command
+from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import progress_bar
 from tools.build_sample.sample import make_sample
 from tools.command_line import run_tool

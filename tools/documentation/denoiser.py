@@ -183,7 +183,7 @@ def main() -> None:
         live=live,
         mars=_mars_table(mars),
         gain=_gain(mars),
-        long=long_sequences(folder / "long", options.minutes / 2),
+        long=long_sequences(folder / "long", 0.4 * options.minutes),
         texture=texture_table(
             {
                 "simulated radar, the paper's protocol": (folder / "s4-0", paper, None),

@@ -9,7 +9,11 @@ from contextlib import nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from sd2core.cli.options import add_command, add_json, positive_int
+from sd2core.cli.command_parser import add_command
+from sd2core.cli.options import (
+    add_json,
+    positive_int,
+)
 from sd2core.cli.output import print_json, progress_bar
 from sd2core.cli.reading import check_output
 from sd2core.errors import Sd2Error

@@ -8,7 +8,10 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from sd2core.cli.options import add_command, positive_int
+from sd2core.cli.command_parser import add_command
+from sd2core.cli.options import (
+    positive_int,
+)
 from sd2core.cli.output import progress_bar
 from tools.command_line import run_tool
 from tools.motion_capture.bodies import drive_bodies, load_motions, minutes

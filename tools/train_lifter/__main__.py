@@ -12,7 +12,11 @@ from typing import get_args
 from sd2core.body.landmark_models import DEFAULT_MODEL, LandmarkModel
 from sd2core.body.lifter import Lifter
 from sd2core.body.track import LANDMARKS
-from sd2core.cli.options import add_command, add_json, positive_int
+from sd2core.cli.command_parser import add_command
+from sd2core.cli.options import (
+    add_json,
+    positive_int,
+)
 from sd2core.cli.output import print_json, progress_bar
 from sd2core.cli.reading import check_output
 from sd2core.errors import Sd2Error

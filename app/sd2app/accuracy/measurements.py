@@ -29,7 +29,6 @@ class MeasuredModel(BackgroundModel):
     """
 
     changed = Signal()
-    failed = Signal(str)
 
     def __init__(self, jobs: TaskList, library: AccuracyLibrary, parent: QObject) -> None:
         super().__init__(parent)
@@ -38,12 +37,10 @@ class MeasuredModel(BackgroundModel):
         self._scene: tuple[MeshSequence, SynthesisOptions] | None = None
         self._place: VirtualSensor | None = None
         self._known: dict[Family, Measurement] = {}
-        self._meter = ListedRunner("measure", jobs, self, self._receive)
+        self._meter = ListedRunner("measure", jobs, self, self._receive, self._fail)
         for signal in (self._meter.partial, self._meter.idle_changed):
             signal.connect(self.changed)
-        self._memory = LatestRunner("remember", self, self._receive_remembered)
-        for runner in (self._meter, self._memory):
-            runner.failed.connect(lambda error: self.failed.emit(str(error)))
+        self._memory = LatestRunner("remember", self, self._receive_remembered, self._fail)
 
     # --- what is known --------------------------------------------------------------------
 

@@ -9,7 +9,7 @@ from PySide6.QtCore import QObject, Signal
 from sd2app.accuracy.library import AccuracyLibrary
 from sd2app.accuracy.measurements import MeasuredModel, serves_at_rest
 from sd2app.accuracy.text import InUse
-from sd2app.background.latest import Emit
+from sd2app.background.latest import BackgroundModel, Emit
 from sd2app.session.tasks import ListedRunner, TaskList
 from sd2app.settings import Settings
 from sd2core.doppler.options import SynthesisOptions
@@ -40,7 +40,7 @@ class _Surveyed(NamedTuple):
     survey: Survey
 
 
-class AccuracyModel(QObject):
+class AccuracyModel(BackgroundModel):
     """Chooses a plan for the open scene in the background; the newest request wins.
 
     At rest the tolerance rules, unless the user clicked a point: then that plan
@@ -53,7 +53,6 @@ class AccuracyModel(QObject):
     wished = Signal()  # another tolerance; the receiver asks for a choice if the sensor rests
     changed = Signal()
     noted = Signal(str)
-    failed = Signal(str)
 
     def __init__(
         self, jobs: TaskList, settings: Settings, library: AccuracyLibrary, parent: QObject
@@ -224,11 +223,6 @@ class AccuracyModel(QObject):
         self.plan_changed.emit()
         self.changed.emit()
 
-    def close(self) -> None:
-        """Stop every thread."""
-        self._runner.close()
-        self.measured.close()
-
     # --- choosing -------------------------------------------------------------------------
 
     def _compute(
@@ -283,7 +277,7 @@ class AccuracyModel(QObject):
 
     def _fail(self, error: Exception) -> None:
         self._decide()
-        self.failed.emit(str(error))
+        super()._fail(error)
 
     def _follow_measured(self) -> None:
         """Keep the plan of a clicked point, with figures for this sensor once measured."""

@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QGridLayout, QLabel, QSizePolicy, QToolButton, QWidget
+from PySide6.QtWidgets import QLabel, QSizePolicy, QToolButton, QWidget
 
 from sd2app.accuracy.model import PRESETS, AccuracyModel
 from sd2app.accuracy.plot import AccuracyPlot
 from sd2app.accuracy.text import chosen_sentence, legend
 from sd2app.session.display import DisplayModel
 from sd2app.widgets.inputs import Choice, NumberBox
-from sd2app.widgets.layouts import STRETCH, column_of, pane, row_of
+from sd2app.widgets.layouts import STRETCH, column_of, grid_of, pane, row_of
 from sd2app.widgets.panel import Fold, outlined, rule, say, sentence, show_words, title
 from sd2app.widgets.progress_bar import ProgressBar
 from sd2app.widgets.text import milliseconds, number
@@ -165,11 +165,8 @@ class ReasonList(QWidget):
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
         self._shown: tuple[Reason, ...] = ()
-        self._grid = QGridLayout(self)
-        self._grid.setContentsMargins(0, 0, 0, 0)
-        self._grid.setHorizontalSpacing(6)
-        self._grid.setVerticalSpacing(4)
-        self._grid.setColumnStretch(1, 1)
+        self._grid = grid_of(gaps_px=(6, 4))
+        self.setLayout(self._grid)
 
     def show_reasons(self, reasons: tuple[Reason, ...]) -> None:
         """Replace what is listed; what is modelled comes first."""

@@ -11,9 +11,10 @@ from sd2app.agreement.model import AgreementModel
 from sd2app.agreement.panel import AgreementPanel
 from sd2app.agreement.timeline import OtherTimeline
 from sd2app.feature import Action, Feature, Shell
+from sd2app.labels.import_dialog import LABEL_FILES
 from sd2app.labels.model import LabelsModel
 from sd2app.session.session import Session
-from sd2app.widgets.dialogs import LABEL_FILES, ask_file
+from sd2app.widgets.dialogs import ask_file
 
 
 class AgreementFeature(Feature):

@@ -26,7 +26,6 @@ class AgreementModel(BackgroundModel):
     """
 
     changed = Signal()
-    failed = Signal(str)  # reason why a file could not be read
 
     def __init__(self, session: Session, labels: LabelsModel, parent: QObject) -> None:
         super().__init__(parent)
@@ -36,10 +35,8 @@ class AgreementModel(BackgroundModel):
         self.left_out = 0  # spans of theirs outside the recording
         self.found: Agreement | None = None  # until it is computed
         self.disagreements: tuple[Disagreement, ...] = ()  # in order
-        self._reader = LatestRunner("labels", self, self._receive)
-        self._comparer = LatestRunner("agreement", self, self._take)
-        for runner in (self._reader, self._comparer):
-            runner.failed.connect(lambda error: self.failed.emit(str(error)))
+        self._reader = LatestRunner("labels", self, self._receive, self._fail)
+        self._comparer = LatestRunner("agreement", self, self._take, self._fail)
         labels.changed.connect(self._compare)
 
     # --- what is there --------------------------------------------------------------------

@@ -8,28 +8,27 @@ from PySide6.QtWidgets import QSizePolicy
 
 from sd2app.agreement.model import AgreementModel
 from sd2app.labels.painting import LabelRows, paint_tracks
+from sd2app.maps.track_mouse import SessionPlot
 from sd2app.session.session import Session
-from sd2app.widgets.canvas import TimePlot, clipped
+from sd2app.widgets.canvas import clipped
 from sd2app.widgets.time_axis import GUTTER_PX, paint_cursor
 
 _MARKS_PX = 7.0
 
 
-class OtherTimeline(TimePlot):
+class OtherTimeline(SessionPlot):
     """Hatched rows, as they cannot be edited; a line over them marks differences.
 
     A click goes to that time.
     """
 
     def __init__(self, session: Session, model: AgreementModel) -> None:
-        super().__init__(session.span)
-        self._session, self._model = session, model
+        super().__init__(session)
+        self._model = model
         self._rows = LabelRows((), ())
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         model.changed.connect(self._follow)
-        self.follow(
-            session.span.changed, session.playback.frame_changed, session.display.theme_changed
-        )
+        self.follow(session.span.changed)
         self._follow()
 
     def sizeHint(self) -> QSize:

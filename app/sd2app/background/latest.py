@@ -7,7 +7,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from PySide6.QtCore import QObject, Qt, QTimer, Signal
+from PySide6.QtCore import QObject, QTimer, Signal
 
 from sd2core.progress import Cancelled
 
@@ -141,17 +141,22 @@ class LatestRunner(QObject):
 
 
 class BackgroundModel(QObject):
-    """Model that works in the background, by runners that are its children."""
+    """Model that works in the background, by runners and other such models: its children."""
+
+    failed = Signal(str)
+
+    def _fail(self, error: Exception) -> None:
+        self.failed.emit(str(error))
 
     @property
     def busy(self) -> bool:
-        """True while one of its runners works."""
-        return any(runner.busy for runner in self._runners())
+        """True while one of them works."""
+        return any(worker.busy for worker in self._workers())
 
     def close(self) -> None:
         """Stop all work for good, and wait until it has ended."""
-        for runner in self._runners():
-            runner.close()
+        for worker in self._workers():
+            worker.close()
 
-    def _runners(self) -> list[LatestRunner]:
-        return self.findChildren(LatestRunner, options=Qt.FindChildOption.FindDirectChildrenOnly)
+    def _workers(self) -> list[LatestRunner | BackgroundModel]:
+        return [one for one in self.children() if isinstance(one, LatestRunner | BackgroundModel)]

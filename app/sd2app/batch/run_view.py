@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
 from sd2app.batch.model import BatchModel
 from sd2app.batch.questions import BatchQuestions
 from sd2app.batch.text import failure_text, headline, step_facts, time_text
-from sd2app.widgets.layouts import STRETCH, column_of, pane, row_of
+from sd2app.widgets.layouts import STRETCH, column_of, grid_of, pane, row_of
 from sd2app.widgets.pages import InnerPage, InnerPages
 from sd2app.widgets.panel import ElidedLabel, outlined, sentence, show_words, side_by_side, title
 from sd2app.widgets.progress_bar import ProgressBar
@@ -50,18 +50,12 @@ class BatchRunView(QWidget):
     # --- building -------------------------------------------------------------------------
 
     def _bars(self) -> QGridLayout:
-        grid = QGridLayout()
-        grid.setHorizontalSpacing(12)
-        grid.setVerticalSpacing(4)
-        grid.setColumnStretch(1, 1)
         self._steps: list[tuple[QLabel, ProgressBar, QLabel]] = []
-        for row in range(_MOST_STEPS):
+        for _ in range(_MOST_STEPS):
             widgets = (QLabel(self), ProgressBar("", height_px=12), sentence(""))
             widgets[2].setWordWrap(False)
-            for column, widget in enumerate(widgets):
-                grid.addWidget(widget, row, column)
             self._steps.append(widgets)
-        return grid
+        return grid_of(*self._steps, gaps_px=(12, 4))
 
     def _button_row(self) -> QHBoxLayout:
         asks, batch = self._asks, self._batch

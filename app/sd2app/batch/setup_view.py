@@ -85,8 +85,7 @@ class BatchSetupView(QWidget):
         self._placements.activated.connect(self._asks.choose_placements)
         self._steps: dict[OptionalStep, CheckBox] = {}
         for step, (text, tip) in _STEP_TEXT.items():
-            box = self._steps[step] = CheckBox(text, self, partial(set_value, step), tip)
-            box.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+            self._steps[step] = CheckBox(text, self, partial(set_value, step), tip)
         self._accuracy = Choice("How exactly", self, _ACCURACY_TEXT, partial(set_value, "accuracy"))
         self._model = Choice("Model to denoise with", self)
         self._model.textActivated.connect(self._asks.choose_model)
@@ -114,8 +113,8 @@ class BatchSetupView(QWidget):
     def _buttons(self) -> QHBoxLayout:
         asks = self._asks
         self._save = outlined("Save plan…", "As a file for sd2 batch", asks.save_plan, self)
-        self._start = outlined("Start", "In background processes", asks.start, self)
-        self._start.setObjectName("primary")
+        tip = "In background processes"
+        self._start = outlined("Start", tip, asks.start, self, look="primary")
         return row_of(STRETCH, self._save, self._start, spacing_px=6)
 
     # --- showing --------------------------------------------------------------------------

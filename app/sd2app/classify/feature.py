@@ -11,7 +11,6 @@ from PySide6.QtWidgets import QMenu, QWidget
 
 from sd2app.background.model_worker.library import ClassifierLibrary
 from sd2app.classify.dialogs import ClassifyDialogs
-from sd2app.classify.finder import GestureFinder
 from sd2app.classify.model import ClassifyModel
 from sd2app.classify.panel import ClassPanel
 from sd2app.classify.strip import ClassStrip
@@ -49,13 +48,12 @@ class ClassifyFeature(Feature):
         labels: LabelsModel,
         edits: LabelEdits,
         library: ClassifierLibrary,
-        suggest: Callable[[GestureFinder], object],
+        suggest: Callable[[ClassifyModel], object],
         parent: QObject,
     ) -> None:
         self._session, self._shell, self._suggest = session, shell, suggest
         self._labels, self._edits = labels, edits
         self.model = ClassifyModel(session, standing, labels, library, parent)
-        self.gestures = GestureFinder(self.model)
         self.training = ClassTraining(session.settings, self.model.use, parent)
         self.dialogs = ClassifyDialogs(shell, self.model, self.training, session)
         self.model.failed.connect(shell.warn)
@@ -67,7 +65,7 @@ class ClassifyFeature(Feature):
 
     def actions(self) -> Sequence[Action]:
         """Classifier, its probabilities, gestures as suggestions, training."""
-        model, gestures = self.model, self.gestures
+        model = self.model
         return (
             *editing(
                 self._edits,
@@ -75,8 +73,8 @@ class ClassifyFeature(Feature):
                     "find_gestures", "Labels", "Find gestures", ("Shift+G",),
                     "Suggest what the classifier takes for gestures; each is then accepted or"
                     " rejected",
-                    lambda: self._suggest(gestures), lambda: not gestures.why_not,
-                    why_not=lambda: gestures.why_not,
+                    lambda: self._suggest(model), lambda: not model.why_not,
+                    why_not=lambda: model.why_not,
                 ),
             ),
             Action(

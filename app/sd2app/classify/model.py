@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QObject, Signal, SignalInstance
 
 from sd2app.background.latest import LatestRunner, delayed
 from sd2app.background.model_worker.client import RemoteClassifier
@@ -16,9 +17,9 @@ from sd2app.denoise.validity import MapValidity
 from sd2app.labels.model import LabelsModel
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
-
-if TYPE_CHECKING:
-    from sd2core.classify.card import ClassifierCard
+from sd2app.suggestions.finders import Found, Threshold
+from sd2core.classify.card import ClassifierCard
+from sd2core.classify.spans import SpanOptions, predicted_spans
 
 _PATIENCE_MS = 1500
 """Delay after the first map before the last session's classifier is loaded."""
@@ -32,7 +33,15 @@ class _Loaded(NamedTuple):
 
 
 class ClassifyModel(QObject):
-    """The chosen classifier, remembered and used for all recordings, and the map that it reads."""
+    """The chosen classifier, remembered and used for all recordings, and the map that it reads.
+
+    It is a finder of suggestions too: of spans that it recognises as gestures.
+    """
+
+    title = "classifier"
+    threshold = Threshold(
+        0.0, 100.0, 50.0, 5.0, 0, " %", "How sure the classifier must be of a span on average"
+    )
 
     changed = Signal()  # the classifier, the map that it reads, or its visibility
     moved = Signal()  # probabilities of frames, or the frame on screen
@@ -135,6 +144,47 @@ class ClassifyModel(QObject):
     def describe(self, path: Path) -> ClassifierCard:
         """Card of a file; raises where it is no classifier."""
         return self._library.describe(path)
+
+    # --- finding gestures -----------------------------------------------------------------
+
+    @property
+    def why_not(self) -> str:
+        """Reason why no gestures can be found; empty where they can."""
+        if self.path is None:
+            return "Choose a classifier first, under Model"
+        if not self.sources:
+            return "There is no map to look in"
+        return self.problem
+
+    @property
+    def signals(self) -> tuple[SignalInstance, ...]:
+        """Signals after which a search may become possible."""
+        return (self.track.changed, self.changed)
+
+    @property
+    def ready(self) -> bool:
+        """True once every frame of the map is classified."""
+        return self.track.complete
+
+    def look(self, threshold: float) -> Callable[[], Found]:
+        """Make the search, to be run in the background."""
+        source, card = self.source, self.track.card
+        assert source is not None
+        assert source.map is not None
+        assert card is not None
+        doppler, shares = source.map, self.track.shares.copy()
+        timebase = doppler.timebase.shifted(source.offset_s)
+        options = SpanOptions(min_confidence=threshold / 100.0)
+        names = {name: self.label_of(name) for name in card.classes}
+
+        def look() -> Found:
+            spans = predicted_spans(
+                shares, timebase, card.classes, options, present=doppler.present
+            )
+            named = tuple(replace(span, label=names[span.label]) for span in spans)
+            return Found(named, "" if named else "Nothing: no gesture is that sure")
+
+        return look
 
     # --- requests -------------------------------------------------------------------------
 

@@ -5,16 +5,155 @@ from __future__ import annotations
 from collections.abc import Collection
 from functools import partial
 
+from PySide6.QtWidgets import QLabel, QWidget
+
 from sd2app.background.run_monitor import UNDER_WAY
 from sd2app.classify.dialogs import ClassifyDialogs
 from sd2app.classify.run import CheckPoint, ClassHistory, ClassRun
-from sd2app.classify.setup_view import ClassSetupView
-from sd2app.classify.text import note, run_headline, run_time_text
+from sd2app.classify.setup import MAPS, DataSource
+from sd2app.classify.text import FEATURE_WORDS, MODEL_WORDS, note, run_headline, run_time_text
 from sd2app.classify.training import ClassTraining
 from sd2app.session.display import DisplayModel
+from sd2app.training.text import division_text
 from sd2app.widgets.chart import Chart, ChartView, Curve, Mark, Scale
-from sd2app.widgets.panel import FactRows, sentence
+from sd2app.widgets.inputs import CheckBox, TypedLine
+from sd2app.widgets.layouts import grid_of, row_of
+from sd2app.widgets.panel import FactRows, outlined, rule, sentence, side_by_side, title
 from sd2app.widgets.run_panel import Button, RunPanel, RunView
+from sd2app.widgets.text import counted
+from sd2app.widgets.training_form import Field, TrainingForm, labelled
+from sd2core.classify.defaults import LONGEST_DELAY_S
+
+_MAP_TIPS = {
+    "radar": "What a radar saw, simulated or real",
+    "synthetic": "Counted from the mesh",
+    "denoised": "The synthetic ones, as the bundled denoiser makes them a radar's",
+}
+_FIELDS = (
+    Field(
+        "delay_s", "Answers", 0, LONGEST_DELAY_S, 0.1,
+        "A frame is answered so much later, when what follows it has been seen; the paper's: 0,"
+        " at once",
+        decimals=2, suffix=" s late",
+    ),
+    Field("width", "Width", 1, 512, 8, "Units of every layer; the paper's: 16"),
+    Field("steps", "Steps", 1, 100_000, 50, "Batches that are learnt from"),
+    Field("seed", "Seed", 0, 2**31 - 1, 1, "Of weights, order and dropout"),
+)  # fmt: skip
+_COMPARISON = (
+    "Trains again and again on the radar's maps alone and with synthetic ones added, and with less"
+    " and less of the radar's; judged on people who were not learnt from."
+)
+
+
+class ClassSetupView(TrainingForm):
+    """A form over :class:`ClassSetup`."""
+
+    def __init__(self, training: ClassTraining, dialogs: ClassifyDialogs) -> None:
+        super().__init__(training.setup, dialogs.shell)
+        self._training, self._labelled, self._dialogs = training, training.setup, dialogs
+        self._add_labelled_data()
+        self._add_network()
+        self.add_start(training.train, lambda: training.command)
+        self.column.addWidget(rule())
+        self._add_comparison()
+        training.changed.connect(self._refresh)
+        self._refresh()
+
+    def _add_labelled_data(self) -> None:
+        menu = self.add_data(
+            "Labelled data",
+            "Add data",
+            "Choose labelled data to learn from",
+            "A classifier learns from labelled maps: of a simulated campaign, of an exported data"
+            " set, or of recordings and radar files in which gestures are labelled.",
+        )
+        folder = menu.addAction("Folder…")
+        folder.setToolTip("A campaign or pairs, a data set (.zarr), a recording, or several")
+        folder.triggered.connect(self._dialogs.add_folder)
+        file = menu.addAction("File…")
+        file.setToolTip("A data set (.h5, .npz), or a labelled radar file (.h5)")
+        file.triggered.connect(self._dialogs.add_file)
+        this = menu.addAction("This recording")
+        this.triggered.connect(self._dialogs.add_this)
+        menu.aboutToShow.connect(lambda: this.setEnabled(self._dialogs.has_this()))
+
+    def _add_network(self) -> None:
+        self._boxes: dict[str, CheckBox] = {}
+        for name in MAPS:
+            chosen = partial(self._labelled.set_map, name)
+            self._boxes[name] = CheckBox(name, self, chosen, _MAP_TIPS[name])
+        grid = grid_of(gaps_px=(8, 4), wide=(1, 3))
+        grid.addWidget(QLabel("Maps", self), 0, 0)
+        grid.addLayout(side_by_side(*self._boxes.values()), 0, 1, 1, 3)
+        for row, (text, choice) in enumerate(
+            (
+                ("Network", self.choice("model", "Kind of network", MODEL_WORDS)),
+                ("Shown", self.choice("features", "What it is shown of each frame", FEATURE_WORDS)),
+            ),
+            start=1,
+        ):
+            grid.addWidget(QLabel(text, self), row, 0)
+            grid.addWidget(choice, row, 1, 1, 3)
+        for number, field in enumerate(_FIELDS):
+            row, column = divmod(number, 2)
+            labelled(grid, (3 + row, 2 * column), field, self.number(field))
+        self.column.addLayout(grid)
+
+    def _add_comparison(self) -> None:
+        self._quick = CheckBox(
+            "Quick: fewer trainings, to see how it looks",
+            self,
+            lambda on: self._labelled.set_value("quick", "yes" if on else "no"),
+            "Two seeds instead of five, and fewer shares of the radar's data",
+        )
+        tip = "Train and compare in the background"
+        self._compare = outlined(
+            "Compare", tip, partial(self._shell.attempt, self._training.compare), self
+        )
+        tip = "Show a table of sd2 classify table, or a matrix of sd2 classify eval"
+        show = outlined("Open a result…", tip, self._dialogs.open_result, self)
+        for widget in (title("Does synthetic data help?"), sentence(_COMPARISON), self._quick):
+            self.column.addWidget(widget)
+        self.column.addLayout(side_by_side(self._compare, show, spacing_px=6))
+
+    def _refresh(self) -> None:
+        training, setup = self._training, self._labelled
+        if training.run is not None:
+            return
+        self.show_setup(
+            ""
+            if setup.division is None
+            else division_text(
+                setup.division, "judging, with sd2 classify eval", "some of the movements"
+            )
+        )
+        for name, box in self._boxes.items():
+            box.show_checked(name in setup.maps)
+        self._quick.show_checked(setup.value("quick") == "yes")
+        steps = 0 if setup.problem else setup.value("steps")
+        count = f"The data is read first; then {counted(steps, 'step')}"
+        self.show_estimate(count, steps, setup.step_s)
+        self.show_start(training.why_not_train, can_copy=not setup.train_problem)
+        self._compare.setEnabled(not training.why_not_compare)
+        self._compare.setToolTip(training.why_not_compare or "Train and compare in the background")
+
+    def below_row(self, one: DataSource) -> QWidget | None:
+        """Make the field for the name of the person, where the user can name one."""
+        if not one.nameable:
+            return None
+        line = TypedLine(
+            f"Who {one.path.name} is of",
+            "Who it is of: whoever is learnt from is neither chosen by nor judged on.\nThe same"
+            " name for everything of one person.",
+        )
+        line.setText(one.person)
+        itself = one.people[0] if len(one.people) == 1 else "each a different person"
+        line.setPlaceholderText("" if one.person else itself)
+        line.ended.connect(lambda: self._labelled.name_person(one.path, line.text()))
+        field = QWidget(self)
+        field.setLayout(row_of(QLabel("Person"), (line, 1), spacing_px=8, margins_px=(0, 2, 0, 2)))
+        return field
 
 
 class ClassPanel(RunPanel):

@@ -7,13 +7,14 @@ from collections.abc import Sequence
 
 from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPen
-from PySide6.QtWidgets import QDialog, QDialogButtonBox, QLabel, QSizePolicy, QWidget
+from PySide6.QtWidgets import QDialog, QLabel, QSizePolicy, QWidget
 
 from sd2app.classify.result import ClassResult, Matrix
 from sd2app.manual.help import help_button
 from sd2app.session.display import DisplayModel
 from sd2app.widgets.canvas import AT_RIGHT, Canvas
 from sd2app.widgets.chart import Chart, ChartView, Curve, Mark, Scale
+from sd2app.widgets.dialogs import closing
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import sentence, title
@@ -135,9 +136,7 @@ class ClassResultDialog(QDialog):
             layout.addSpacing(8)
             curves = _LearningCurves(display, "Learning curve", learning_chart(result))
             layout.addWidget(curves, 1)
-        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close, self)
-        buttons.rejected.connect(self.reject)
-        layout.addWidget(buttons)
+        layout.addWidget(closing(self))
         self.resize(_WIDTH_PX, self.sizeHint().height())
 
     def _what_else(self, matrices: Sequence[Matrix]) -> QWidget:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QRectF, QSize, Qt
-from PySide6.QtGui import QBrush, QColor, QFont, QFontMetrics, QImage, QMouseEvent, QPainter
+from PySide6.QtGui import QBrush, QColor, QFont, QFontMetrics, QImage, QPainter
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from sd2app.classify.model import ClassifyModel
@@ -13,6 +13,7 @@ from sd2app.classify.text import ago_text, delay_text, reading_text
 from sd2app.classify.track import ClassReading
 from sd2app.labels.arrays import UNKNOWN_COLOUR
 from sd2app.labels.model import LabelsModel
+from sd2app.maps.track_mouse import SeekingPlot
 from sd2app.session.display import DisplayModel
 from sd2app.session.session import Session
 from sd2app.widgets.canvas import AT_RIGHT, Canvas, ZoomedPlot, clipped, image_of
@@ -166,16 +167,14 @@ class ClassReadout(Canvas):
             x += _BAR_PX[0] + _GAP_PX
 
 
-class ClassPlot(ZoomedPlot):
+class ClassPlot(ZoomedPlot, SeekingPlot):
     """Probabilities over time, stacked: the background at the bottom. Click or drag seeks."""
 
     TOP_PX, BOTTOM_PX = 1, 3
 
     def __init__(self, session: Session, classify: ClassifyModel, labels: LabelsModel) -> None:
-        super().__init__(session.span)
+        super().__init__(session)
         self._classify, self._labels = classify, labels
-        self._span, self._playback = session.span, session.playback
-        self._display = session.display
         self.setFixedHeight(_PLOT_PX)
         self.setAccessibleName("Probability of each gesture over time")
         for signal in (
@@ -184,10 +183,8 @@ class ClassPlot(ZoomedPlot):
             classify.changed,
             labels.changed,
             self._span.changed,
-            self._display.theme_changed,
         ):
             signal.connect(self.redraw)
-        self.follow(self._playback.frame_changed)
 
     def paint(self, painter: QPainter) -> None:
         """Paint the strip and the cursor."""
@@ -232,15 +229,6 @@ class ClassPlot(ZoomedPlot):
         frames = np.searchsorted(timebase.times_s, middles_s, side="right") - 1
         outside = (middles_s < timebase.start_s) | (middles_s >= timebase.end_s)
         return np.where(outside, -1, np.clip(frames, 0, len(timebase) - 1))
-
-    # --- the hand -------------------------------------------------------------------------
-
-    def mousePressEvent(self, event: QMouseEvent) -> None:
-        """Seek while the button is down."""
-        if event.buttons() & Qt.MouseButton.LeftButton:
-            self._playback.seek(self.scale.time_of(event.position().x()))
-
-    mouseMoveEvent = mousePressEvent
 
 
 def stacked_image(

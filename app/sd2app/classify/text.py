@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
+from sd2app.classify.run import ClassRun
+from sd2app.classify.track import ClassReading
 from sd2app.widgets.model_page import ModelPage, about_sections, map_and_file_rows, model_title
 from sd2app.widgets.text import about, exact_text
-
-if TYPE_CHECKING:
-    from sd2app.classify.run import ClassRun
-    from sd2app.classify.track import ClassReading
-    from sd2core.classify.card import ClassifierCard
+from sd2core.classify.card import ClassifierCard
 
 MODEL_WORDS = {"lstm": "LSTM (the paper's)", "s4": "S4"}
 FEATURE_WORDS = {"columns": "whole columns", "peak": "strongest bin (the paper's)"}

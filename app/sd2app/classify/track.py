@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +14,11 @@ from sd2app.background.latest import Emit, LatestRunner, delayed
 from sd2app.background.model_worker.client import RemoteClasses, RemoteClassifier
 from sd2app.denoise.map import AT_ONCE, cut_out
 from sd2app.session.maps import MapModel
+from sd2core.classify.card import ClassifierCard
 from sd2core.denoise.resample_to_model import check_bins, is_regular, stretches
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
 from sd2core.timebase import Timebase
-
-if TYPE_CHECKING:
-    from sd2core.classify.card import ClassifierCard
 
 _LATE_S = 0.2
 """Largest accepted lag behind the clock while a map grows frame by frame."""

@@ -111,8 +111,8 @@ class ExportDialog(QDialog):
         self._picture.setAlignment(Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft)
         self._bar = QProgressBar(self)
         self._bar.setAccessibleName("How far the export is")
-        self._export = outlined("Export…", "Choose a name and write", self._ask_out, self)
-        self._export.setObjectName("primary")
+        tip = "Choose a name and write"
+        self._export = outlined("Export…", tip, self._ask_out, self, look="primary")
         self._stop = outlined(
             "Stop", "What is complete stays; the same export goes on there", self._model.stop, self
         )

@@ -11,6 +11,7 @@ from sd2app.figures.dialogs import MapFigureDialog, StripDialog
 from sd2app.figures.model import DrawnFigure, MapFigure, StripModel
 from sd2app.maps.difference import DifferenceModel
 from sd2app.session.session import Session
+from sd2app.widgets.dialogs import accepted
 from sd2core.labels.spans import Labels
 
 
@@ -62,7 +63,6 @@ class FiguresFeature(Feature):
 
     @staticmethod
     def _ask(dialog: QDialog, model: DrawnFigure) -> None:
-        dialog.exec()
+        accepted(dialog)
         model.close()
         model.deleteLater()
-        dialog.deleteLater()

@@ -4,18 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from PySide6.QtWidgets import QFrame, QLabel, QToolButton
+from PySide6.QtWidgets import QLabel
 
 from sd2app.fit.model import FitModel
 from sd2app.fit.on_screen import FitOnScreen
-from sd2app.widgets.layouts import row_of
 from sd2app.widgets.notices import Notice
-from sd2app.widgets.panel import ElidedLabel, outlined, sentence
+from sd2app.widgets.panel import ElidedLabel, StateBar, sentence
 from sd2app.widgets.progress_bar import ProgressBar
 from sd2app.widgets.text import about
-
-_HEIGHT = 40
-"""Height in all states, so that the view below does not move."""
 
 
 class FitOffer(Notice):
@@ -37,7 +33,7 @@ class FitOffer(Notice):
             self.show_words(f"{video.name} has no mesh", text)
 
 
-class FitBar(QFrame):
+class FitBar(StateBar):
     """Progress and end of a fit; hidden otherwise.
 
     ``change`` asks again for what a fit needs, ``open_result`` opens the recording of a finished
@@ -53,10 +49,7 @@ class FitBar(QFrame):
         resume: Callable[[], None],
         discard: Callable[[], None],
     ) -> None:
-        super().__init__()
-        self.setObjectName("panel")
-        self.setAccessibleName("Fit of a body")
-        self.setMinimumHeight(_HEIGHT)
+        super().__init__("Fit of a body")
         self._fit, self._on_screen = fit, on_screen
         self._title = ElidedLabel(self, "title")
         self._stage = ElidedLabel(self, "muted")
@@ -65,29 +58,21 @@ class FitBar(QFrame):
         self._left = QLabel(self)
         self._left.setObjectName("muted")
         self._left.setMinimumWidth(self._left.fontMetrics().horizontalAdvance("about 55 min left"))
-        self._buttons = {
+        buttons = {
             # First, so that it never comes to where another button was.
-            "discard": self._button("Discard…", "Delete what was done", discard),
-            "change": self._button("Change…", "Choose person, height and place again", change),
-            "follow": self._button("Follow", "Show each frame as it is worked on", self._toggle),
-            "cancel": self._button("Cancel", "Stop; what is done can be continued", fit.cancel),
-            "resume": self._button("Resume", "Continue where it stopped", resume),
-            "open": self._button("Open", "Open the new recording", open_result),
-            "close": self._button("✕", "Close this message", fit.dismiss),
+            "discard": ("Discard…", "Delete what was done", discard),
+            "change": ("Change…", "Choose person, height and place again", change),
+            "follow": ("Follow", "Show each frame as it is worked on", self._toggle),
+            "cancel": ("Cancel", "Stop; what is done can be continued", fit.cancel),
+            "resume": ("Resume", "Continue where it stopped", resume),
+            "open": ("Open", "Open the new recording", open_result),
+            "close": ("✕", "Close this message", fit.dismiss),
         }
-        self._buttons["follow"].setCheckable(True)
         parts = (self._title, (self._reason, 1), (self._stage, 1), self._bar, self._left)
-        buttons = self._buttons.values()
-        self.setLayout(row_of(*parts, *buttons, spacing_px=8, margins_px=(12, 4, 4, 4)))
+        self.lay_out(parts, buttons, spacing_px=8)
+        self._buttons["follow"].setCheckable(True)
         on_screen.changed.connect(self._refresh)
         self._refresh()
-
-    def _button(self, text: str, tip: str, run: Callable[[], object]) -> QToolButton:
-        button = outlined(text, tip, run, self)
-        button.setAccessibleName(tip)
-        if text == "✕":
-            button.setObjectName("")
-        return button
 
     # --- following the models -------------------------------------------------------------
 
@@ -103,8 +88,7 @@ class FitBar(QFrame):
             "failed": {"change", "resume", "close"},
             "finished": {"open", "close"},
         }[state]
-        for name, button in self._buttons.items():
-            button.setVisible(name in shown)
+        self.show_buttons(shown)
         self._buttons["resume"].setText("Try again" if state == "failed" else "Resume")
         self._bar.setVisible(self._fit.busy)
         self._left.setVisible(self._fit.busy)

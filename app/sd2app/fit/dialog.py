@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from PySide6.QtCore import QPointF, QRectF, QSignalBlocker, Qt
+from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPainterPath, QPen
+from PySide6.QtWidgets import QDialog, QLabel, QSizePolicy, QSlider, QWidget
 
-from PySide6.QtCore import QSignalBlocker, Qt
-from PySide6.QtWidgets import QDialog, QLabel, QSlider, QToolButton, QWidget
-
-from sd2app.fit.person_picker import PersonPicker
 from sd2app.fit.setup import ANGLES_DEG, DEFAULT_STATURE_M, STATURES_M, FitSetupModel
 from sd2app.manual.help import with_help
 from sd2app.palette import Palette
+from sd2app.widgets.canvas import Canvas
 from sd2app.widgets.dialogs import accepting, ask_file, ask_new
 from sd2app.widgets.inputs import CheckBox, Choice, NumberBox
 from sd2app.widgets.layouts import STRETCH, column_of, form_of, row_of
+from sd2app.widgets.mesh_painting import paint_picture
 from sd2app.widgets.panel import ElidedLabel, outlined, say, sentence, side_by_side
 from sd2app.widgets.time_axis import clock_text
 
@@ -23,6 +23,115 @@ _CAMERAS = {
     "angle": "field of view",
     "focal": "focal length",
 }
+_DIMMED = 110
+
+
+class PersonPicker(Canvas):
+    """Picture on which a drag draws a rectangle and a click removes it."""
+
+    USUAL_PX = 560, 420
+
+    def __init__(self, setup: FitSetupModel, palette: Palette, parent: QWidget) -> None:
+        super().__init__(parent)
+        self._setup = setup
+        self._colours = palette
+        self._from: QPointF | None = None
+        self._to = QPointF()
+        self.setMinimumSize(320, 240)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self.setCursor(Qt.CursorShape.CrossCursor)
+        self.setAccessibleName("Drag a rectangle around the person")
+        self.follow(setup.changed, setup.picture_changed)
+
+    @property
+    def box(self) -> QRectF:
+        """Rectangle of the picture."""
+        size = self._setup.size
+        if size is None:
+            return QRectF()
+        scale = min(self.width() / size[0], self.height() / size[1])
+        box = QRectF(0, 0, size[0] * scale, size[1] * scale)
+        box.moveCenter(QRectF(self.rect()).center())
+        return box
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """Set a corner of the rectangle."""
+        if event.button() == Qt.MouseButton.LeftButton and self._setup.picture is not None:
+            self._from = self._to = event.position()
+            self.update()
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        """Move the opposite corner."""
+        if self._from is not None:
+            self._to = event.position()
+            self.update()
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        """Take the rectangle, or remove it where nothing was drawn."""
+        if self._from is None or event.button() != Qt.MouseButton.LeftButton:
+            return
+        corner, self._from = self._from, None
+        end = event.position()
+        self.update()
+        box, size = self.box, self._setup.size
+        if size is None:
+            return
+        if (end - corner).manhattanLength() < 6:
+            self._setup.change(person=None)
+            return
+        scale = size[0] / box.width()
+        (x0, y0), (x1, y1) = (
+            ((point.x() - box.x()) * scale, (point.y() - box.y()) * scale)
+            for point in (corner, end)
+        )
+        self._setup.set_person(x0, y0, x1, y1)
+
+    def paint(self, painter: QPainter) -> None:
+        """Paint the picture, dimmed outside the rectangle."""
+        painter.fillRect(self.rect(), QColor(self._colours.well))
+        picture = self._setup.picture
+        if picture is None:
+            painter.setPen(QColor(self._colours.muted))
+            text = "Reading the video…" if self._setup.reading else ""
+            painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, text)
+            return
+        paint_picture(painter, self.rect(), picture)
+        rectangle = self._rectangle()
+        if rectangle is None:
+            return
+        person = self._setup.choices.person
+        drawn_here = self._from is not None or (
+            person is not None and person.frame == self._setup.frame
+        )
+        if drawn_here:
+            self._dim_around(painter, rectangle)
+        pen = QPen(QColor(self._colours.overlay), 2)
+        # In another frame the person is elsewhere.
+        pen.setStyle(Qt.PenStyle.SolidLine if drawn_here else Qt.PenStyle.DotLine)
+        painter.setPen(pen)
+        painter.drawRect(rectangle)
+
+    def _dim_around(self, painter: QPainter, inside: QRectF) -> None:
+        around = QPainterPath()  # odd-even: what both rectangles have stays as it is
+        around.addRect(self.box)
+        around.addRect(inside)
+        painter.fillPath(around, QColor(0, 0, 0, _DIMMED))
+
+    def _rectangle(self) -> QRectF | None:
+        """Rectangle on the widget: the one being drawn, else the chosen one."""
+        if self._from is not None:
+            return QRectF(self._from, self._to).normalized().intersected(self.box)
+        person, size = self._setup.choices.person, self._setup.size
+        if person is None or size is None:
+            return None
+        box = self.box
+        scale = box.width() / size[0]
+        return QRectF(
+            box.x() + person.x * scale,
+            box.y() + person.y * scale,
+            person.width * scale,
+            person.height * scale,
+        )
 
 
 class NewFromVideoDialog(QDialog):
@@ -57,13 +166,13 @@ class NewFromVideoDialog(QDialog):
         setup = self._setup
         self._video = ElidedLabel(self)
         self._folder = ElidedLabel(self)
-        self._other_video = self._button("Choose…", "Take another video", self._ask_video)
-        self._other_folder = self._button("Choose…", "Save elsewhere", self._ask_folder)
+        other, elsewhere = "Take another video", "Save elsewhere"
+        self._other_video = outlined("Choose…", other, self._ask_video, self, name=other)
+        self._other_folder = outlined("Choose…", elsewhere, self._ask_folder, self, name=elsewhere)
         self._person = QLabel(self)
         self._person.setWordWrap(True)
-        self._clear = self._button(
-            "Clear", "Have the person chosen", lambda: setup.change(person=None)
-        )
+        tip = "Have the person chosen"
+        self._clear = outlined("Clear", tip, lambda: setup.change(person=None), self, name=tip)
         self._stature = NumberBox(*STATURES_M, " m", "Height of the person", step=0.01)
         self._stature.setValue(DEFAULT_STATURE_M)
         self._stature.valueChanged.connect(lambda value_m: setup.change(stature_m=value_m))
@@ -88,11 +197,6 @@ class NewFromVideoDialog(QDialog):
         )
         self._focal.valueChanged.connect(setup.set_focal)
         self._message = sentence("")
-
-    def _button(self, text: str, tip: str, run: Callable[[], object]) -> QToolButton:
-        button = outlined(text, tip, run, self)
-        button.setAccessibleName(tip)
-        return button
 
     def _lay_out(self) -> None:
         form = form_of(

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QObject, SignalInstance
-from PySide6.QtWidgets import QDialog, QWidget
+from PySide6.QtCore import QObject
+from PySide6.QtWidgets import QWidget
 
 from sd2app.feature import Action, Feature, Shell
 from sd2app.fit.bar import FitBar, FitOffer
@@ -18,7 +18,7 @@ from sd2app.fit.on_screen import FitOnScreen
 from sd2app.fit.request import FitRequest
 from sd2app.fit.setup import FitSetupModel
 from sd2app.session.session import Session
-from sd2app.widgets.dialogs import Answer, ask_file, confirmed, may_delete
+from sd2app.widgets.dialogs import Answer, accepted, ask_file, confirmed, may_delete
 from sd2app.widgets.notices import Notice
 from sd2core.runs.command_folder import COMMAND_IN_FOLDER
 
@@ -35,11 +35,6 @@ class FitFeature(Feature):
         self.on_screen.noted.connect(shell.note)
         self.changing = (self.model.state_changed,)
         self.closing = self.running = (self.model,)  # a fit stops, and can be continued
-
-    @property
-    def landmarks_changed(self) -> tuple[SignalInstance, ...]:
-        """Signals after which there are other landmarks."""
-        return self.model.advanced, self.model.changed
 
     def landmarks_at(self, frame: int) -> NDArray[np.float32] | None:
         """Landmarks that the fit has found in a frame of the video on screen."""
@@ -95,11 +90,9 @@ class FitFeature(Feature):
         setup = FitSetupModel(window)
         setup.choose_video(video, self._session.document.recording)
         dialog = NewFromVideoDialog(setup, self._session.display.palette, window)
-        accepted = dialog.exec() == QDialog.DialogCode.Accepted
-        request = setup.request() if accepted and setup.ready else None
+        request = setup.request() if accepted(dialog) and setup.ready else None
         setup.close()
         setup.deleteLater()
-        dialog.deleteLater()
         if request is not None:
             self._begin(request)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -29,23 +28,10 @@ def place_words(place: str) -> str:
     return f"vertex {place}" if place.isdecimal() else place.replace("-", " ")
 
 
-@dataclass(frozen=True)
-class _Seats:
-    """Vertices on which sensors sit, by their places."""
-
-    vertices: Mapping[str, int]
-
-
 class _Wish(NamedTuple):
     mesh: MeshSequence | None
     places: tuple[str, ...]
     current: str | None
-
-
-class _Added(NamedTuple):
-    recording: Recording
-    path: Path
-    signals: InertialSignals
 
 
 class ImuModel(BackgroundModel):
@@ -56,7 +42,6 @@ class ImuModel(BackgroundModel):
 
     changed = Signal()  # sensors, signals, or what is known of them
     noted = Signal(str)
-    failed = Signal(str)
 
     def __init__(self, session: Session, parent: QObject) -> None:
         super().__init__(parent)
@@ -70,16 +55,14 @@ class ImuModel(BackgroundModel):
         self._wish = _Wish(None, (), None)
         self._known: dict[str, InertialSignals] = {}
         self._read: tuple[Path, InertialSignals | None] | None = None  # None: being read, or not
-        self._runner = ListedRunner(
-            "inertial sensor", session.jobs, self, self._receive, self._refuse
-        )
+        self._runner = ListedRunner("inertial sensor", session.jobs, self, self._receive)
+        self._runner.failed.connect(lambda error: self._say_problem(str(error)))
         self._runner.partial.connect(self._take_seats)
         self._runner.cancelled.connect(lambda: self._say_problem(_STOPPED))
         self._reader = LatestRunner("inertial file", self, self._take_file, self._refuse_file)
         self._adder = LatestRunner("added inertial file", self, self._add, self._fail)
-        self._writer = ListedRunner(
-            "inertial samples", session.jobs, self, self._say_written, self._fail
-        )
+        self._writer = ListedRunner("inertial samples", session.jobs, self, refuse=self._fail)
+        self._writer.finished.connect(lambda path: self.noted.emit(f"The samples are in {path}."))
         self._document.opened.connect(session.placing.end)
         self._document.opened.connect(self._follow)
         self._document.changed.connect(self._follow)
@@ -177,7 +160,7 @@ class ImuModel(BackgroundModel):
         """Read a real sensor's samples, and add them to the recording."""
         recording = self._document.recording
         if recording is not None:
-            self._adder.submit(lambda emit: _Added(recording, path, read_signals(path)))
+            self._adder.submit(lambda emit: (recording, path, read_signals(path)))
 
     def remove_file(self) -> None:
         """Show no real sensor."""
@@ -217,17 +200,14 @@ class ImuModel(BackgroundModel):
         self.changed.emit()
 
     def _take_seats(self, result: object) -> None:
-        if isinstance(result, _Seats):
-            self.vertices = result.vertices
+        if isinstance(result, dict):
+            self.vertices = result
             self.changed.emit()
 
     def _receive(self, signals: InertialSignals) -> None:
         if self._wish.current is not None:
             self._known[self._wish.current] = self.signals = signals
             self.changed.emit()
-
-    def _refuse(self, error: Exception) -> None:
-        self._say_problem(str(error))
 
     def _say_problem(self, problem: str) -> None:
         self.problem = problem
@@ -261,27 +241,22 @@ class ImuModel(BackgroundModel):
         self._fail(error)
         self.changed.emit()
 
-    def _add(self, added: _Added) -> None:
-        if added.recording is not self._document.recording:
+    def _add(self, added: tuple[Recording, Path, InertialSignals]) -> None:
+        recording, path, signals = added
+        if recording is not self._document.recording:
             return
         self._reader.cancel()
-        self._take_file((added.path, added.signals))
-        first_s, last_s = map(float, added.signals.times_s[[0, -1]])
+        self._take_file((path, signals))
+        first_s, last_s = map(float, signals.times_s[[0, -1]])
         clock = self._session.playback.timebase
         if last_s >= clock.start_s and first_s < clock.end_s:
-            self._session.edits.add_inertial_file(added.path, first_s)
+            self._session.edits.add_inertial_file(path, first_s)
             return
-        self._session.edits.add_inertial_file(added.path, clock.start_s)
+        self._session.edits.add_inertial_file(path, clock.start_s)
         self.noted.emit(
-            f"{added.path.name} has a clock of its own: its first sample is put at the start of the"
+            f"{path.name} has a clock of its own: its first sample is put at the start of the"
             " recording. Drag the title of its track to align it."
         )
-
-    def _say_written(self, path: Path) -> None:
-        self.noted.emit(f"The samples are in {path}.")
-
-    def _fail(self, error: Exception) -> None:
-        self.failed.emit(str(error))
 
 
 def _feel(
@@ -294,7 +269,7 @@ def _feel(
             vertices[place] = mounted(mesh, place).vertex
         except Sd2Error:
             continue  # said once it is the current one
-    emit(_Seats(vertices))
+    emit(vertices)
     if known is not None:
         return known
     assert wish.current is not None

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPen, QResizeEvent
+from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPen
 
 from sd2app.imu.curves import curve_lines, extent, scale_marks
 from sd2app.imu.model import ImuModel, place_words
@@ -53,21 +53,14 @@ class InertialTrack(TrackMouse):
     TOP_PX, BOTTOM_PX = HEADER_PX, BELOW_PX
 
     def __init__(self, session: Session, model: ImuModel, overlays: Sequence[Overlay]) -> None:
-        super().__init__(session.span)
-        self._session, self._model, self._overlays = session, model, tuple(overlays)
-        self._span, self._playback, self._pointer = session.span, session.playback, session.pointer
-        self._display = session.display
+        super().__init__(session, overlays)
+        self._model = model
         self._followed: list[InertialSignals] = []
         self._extents: dict[str, tuple[float, float]] = {}  # of the lanes, by what they show
-        self._grab: tuple[str, float] | None = None  # what is dragged, and from which pixel
         self.setMouseTracking(True)
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
-        for signal in (self._span.changed, self._display.theme_changed):
-            signal.connect(self.redraw)
-        for overlay in self._overlays:
-            for signal in overlay.changed:
-                signal.connect(self.redraw)
-        self.follow(self._playback.frame_changed, self._pointer.changed)
+        self._span.changed.connect(self.redraw)
+        self.follow(self._pointer.changed)
         model.changed.connect(self._follow)
         self._follow()
 
@@ -77,14 +70,10 @@ class InertialTrack(TrackMouse):
             self._followed = signals
             self._extents = {lane.name: extent(signals, lane.name) for lane in LANES}
         self.setVisible(model.visible)
-        height_px = HEADER_PX if model.folded else self._open_px
-        self.setFixedHeight(height_px)
+        lanes_px = len(LANES) * (_LANE_PX + _GAP_PX) - _GAP_PX + BELOW_PX
+        self.setFixedHeight(HEADER_PX + (0 if model.folded else lanes_px))
         self.setAccessibleName(f"{self.title}: {' · '.join(status_parts(model))}")
         self.redraw()
-
-    @property
-    def _open_px(self) -> int:
-        return HEADER_PX + len(LANES) * _LANE_PX + (len(LANES) - 1) * _GAP_PX + BELOW_PX
 
     @property
     def title(self) -> str:
@@ -252,10 +241,6 @@ class InertialTrack(TrackMouse):
         super().mouseDoubleClickEvent(event)
         if event.position().y() < HEADER_PX:
             self.mousePressEvent(event)
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        """Draw again for the new width."""
-        self.redraw()
 
     def point_at(self, place: QPointF) -> None:
         """Read the signals under the pointer."""

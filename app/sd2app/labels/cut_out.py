@@ -15,7 +15,7 @@ from sd2app.labels.model import LabelsModel
 from sd2app.manual.help import with_help
 from sd2app.session.session import Session
 from sd2app.session.tasks import ListedRunner
-from sd2app.widgets.dialogs import accepting, ask_folder
+from sd2app.widgets.dialogs import accepted, accepting, ask_folder
 from sd2app.widgets.inputs import CheckBox, Choice
 from sd2app.widgets.layouts import STRETCH, column_of, form_of
 from sd2app.widgets.panel import sentence, side_by_side
@@ -47,14 +47,12 @@ class CutOutModel(BackgroundModel):
 
     asked = Signal(int, str)  # number of occupied folders, one of them; answer: go_on or give_up
     noted = Signal(str)
-    failed = Signal(str)
 
     def __init__(self, session: Session, parent: QObject) -> None:
         super().__init__(parent)
         self._session = session
         self._plan: _Plan | None = None
-        self._runner = ListedRunner("cut", session.jobs, self, self._receive)
-        self._runner.failed.connect(lambda error: self.failed.emit(str(error)))
+        self._runner = ListedRunner("cut", session.jobs, self, self._receive, self._fail)
 
     def source(self, parts: Iterable[Part] = ("video", "mesh", "maps")) -> CutSource | None:
         """Return the parts of the recording, without maps that are still computed."""
@@ -137,11 +135,9 @@ def ask_for_cut_outs(shell: Shell, labels: LabelsModel, model: CutOutModel) -> N
         shell.warn("There is nothing to cut out: accept the suggestions first.")
         return
     dialog = CutOutDialog(groups, source, shell.dialog_parent)
-    accepted = dialog.exec() == QDialog.DialogCode.Accepted
-    spans, parts = dialog.spans, dialog.parts
-    dialog.deleteLater()
-    if not accepted:
+    if not accepted(dialog):
         return
+    spans, parts = dialog.spans, dialog.parts
     if folder := ask_folder(shell.dialog_parent, "Folder for the cut-outs"):
         model.start(spans, parts, folder)
 

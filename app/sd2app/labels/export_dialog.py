@@ -13,7 +13,7 @@ from sd2app.feature import Shell
 from sd2app.labels.model import LabelsModel
 from sd2app.manual.help import with_help
 from sd2app.session.session import Session
-from sd2app.widgets.dialogs import ExportButtons, ask_new
+from sd2app.widgets.dialogs import ExportButtons, accepted, ask_new
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.layouts import STRETCH, column_of, form_of
 from sd2app.widgets.panel import rule, say, sentence
@@ -37,9 +37,8 @@ def export_labels(shell: Shell, session: Session, labels: LabelsModel) -> None:
         shell.dialog_parent,
     )
     dialog.written.connect(lambda _, text: shell.note(text))
-    dialog.exec()
+    accepted(dialog)
     dialog.finish()
-    dialog.deleteLater()
 
 
 class _Written(NamedTuple):

@@ -12,7 +12,7 @@ from sd2app.background.latest import Emit, LatestRunner
 from sd2app.feature import Shell
 from sd2app.labels.edits import LabelEdits
 from sd2app.manual.help import with_help
-from sd2app.widgets.dialogs import LABEL_FILES, LABEL_SUFFIXES, accepting, ask_file
+from sd2app.widgets.dialogs import accepted, accepting, ask_file
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.layouts import column_of, form_of
 from sd2app.widgets.panel import FactRows, rule, say, sentence, title
@@ -24,6 +24,8 @@ from sd2core.labels.import_labels import Incoming, Way, set_after, take_in
 from sd2core.labels.spans import Labels
 from sd2core.timebase import Timebase
 
+LABEL_SUFFIXES = tuple(dict.fromkeys(suffix for one in FORMATS for suffix in one.suffixes))
+LABEL_FILES = f"Labels ({' '.join(f'*{suffix}' for suffix in LABEL_SUFFIXES)});;All files (*)"
 _WAYS: dict[Way, str] = {
     "add": "on tracks of their own",
     "replace": "instead of all labels of this recording",
@@ -50,11 +52,9 @@ def import_labels(shell: Shell, edits: LabelEdits, path: Path | None = None) -> 
         if path is None:
             return
     dialog = LabelImportDialog(path, edits.labels.labels, edits.playback.timebase, parent)
-    accepted = dialog.exec() == QDialog.DialogCode.Accepted
-    incoming, way, name = dialog.incoming, dialog.way, path.stem
+    taken, incoming, way, name = accepted(dialog), dialog.incoming, dialog.way, path.stem
     dialog.finish()
-    dialog.deleteLater()
-    if accepted and incoming is not None:
+    if taken and incoming is not None:
         edits.apply(lambda labels, _: take_in(labels, incoming, way, name))
 
 

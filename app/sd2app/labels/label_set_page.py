@@ -20,7 +20,6 @@ from PySide6.QtWidgets import (
     QLineEdit,
     QMenu,
     QStyleOptionViewItem,
-    QToolButton,
     QWidget,
 )
 
@@ -56,9 +55,8 @@ class LabelSetPage(QWidget):
         self._less = outlined("Remove", "Remove the label of the current row", self._remove, self)
         self._up = outlined("Up", "Offer it earlier", lambda: self._move(-1), self)
         self._down = outlined("Down", "Offer it later", lambda: self._move(1), self)
-        file = outlined("File", "Share the set as a file, or take another", None, self)
-        file.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
-        file.setMenu(self._file_menu())
+        tip = "Share the set as a file, or take another"
+        file = outlined("File", tip, self._file_menu(), self)
         top = row_of((self._name, 1), file, spacing_px=6)
         below = row_of(self._add, self._less, self._up, self._down, STRETCH, spacing_px=6)
         parts = top, (table, 1), self._warning, below

@@ -18,7 +18,7 @@ from sd2app.labels.autosave import LabelAutosave
 from sd2app.labels.edits import LabelEdits
 from sd2app.manual.help import with_help
 from sd2app.session.document import DocumentModel
-from sd2app.widgets.dialogs import ask_new, may_delete
+from sd2app.widgets.dialogs import accepted, ask_new, closing, may_delete
 from sd2app.widgets.layouts import column_of
 from sd2app.widgets.notices import Notice
 from sd2app.widgets.panel import sentence, show_words
@@ -111,10 +111,7 @@ class LabelNotice(Notice):
 def recover(autosave: LabelAutosave, document: DocumentModel, shell: Shell) -> None:
     """List what was not saved, and open the recording of what is chosen."""
     dialog = RecoverLabelsDialog(autosave, shell.dialog_parent)
-    accepted = dialog.exec() == QDialog.DialogCode.Accepted
-    offer = dialog.offer
-    dialog.deleteLater()
-    if not accepted or offer is None:
+    if not accepted(dialog) or (offer := dialog.offer) is None:
         return
     if autosave.is_of_open(offer):
         autosave.ask_for(offer)
@@ -140,7 +137,7 @@ class RecoverLabelsDialog(QDialog):
         self._list.setAllColumnsShowFocus(True)
         self._list.header().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         self._list.currentItemChanged.connect(self._follow)
-        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close, self)
+        buttons = closing(self)
         roles = QDialogButtonBox.ButtonRole
         self._open = buttons.addButton("Open recording", roles.AcceptRole)
         self._write = buttons.addButton("Write to file…", roles.ActionRole)
@@ -149,7 +146,6 @@ class RecoverLabelsDialog(QDialog):
         self._open.clicked.connect(self.accept)
         self._write.clicked.connect(self._write_file)
         self._discard.clicked.connect(self._give_up)
-        buttons.rejected.connect(self.reject)
         foot = with_help("Recover labels", buttons)
         self.setLayout(column_of(self._said, self._list, self._notes, foot))
         self.resize(800, 320)

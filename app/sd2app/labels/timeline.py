@@ -14,6 +14,7 @@ from sd2app.labels.loop import SpanLoop
 from sd2app.labels.model import LabelsModel
 from sd2app.labels.painting import ROW_PX, LabelRows, lane_box, paint_span, paint_tracks
 from sd2app.labels.span_buttons import Decision, SpanButtons
+from sd2app.maps.track_mouse import SessionPlot
 from sd2app.session.session import Session
 from sd2app.widgets.canvas import AT_LEFT, ZoomedPlot
 from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, paint_cursor
@@ -43,7 +44,7 @@ def _tip_of(target: HitTarget) -> str:
 _SCROLL_MS, _SCROLL_SHARE = 30, 0.03
 
 
-class LabelTimeline(ZoomedPlot):
+class LabelTimeline(ZoomedPlot, SessionPlot):
     """A row per track. Drag an empty place, a span or an edge of it; with Alt nothing snaps.
 
     With Shift a new span is drawn over others, which it cuts. A click selects a span and goes to
@@ -60,10 +61,9 @@ class LabelTimeline(ZoomedPlot):
         loop: SpanLoop,
         buttons: SpanButtons,
     ) -> None:
-        super().__init__(session.span)
-        self._session, self._edits, self._dragging, self._loop = session, edits, dragging, loop
+        super().__init__(session)
+        self._edits, self._dragging, self._loop = edits, dragging, loop
         self._labels = labels = edits.labels
-        self._span, self._playback = session.span, session.playback
         self._buttons = buttons
         self._pressed: Decision | None = None
         self._target: HitTarget | None = None
@@ -79,14 +79,8 @@ class LabelTimeline(ZoomedPlot):
         for signal in (labels.changed, labels.marks_changed):
             signal.connect(self._follow)
         dragging.changed.connect(self._let_go)
-        for signal in (
-            labels.selection_changed,
-            loop.changed,
-            session.span.changed,
-            session.display.theme_changed,
-        ):
+        for signal in (labels.selection_changed, loop.changed, session.span.changed):
             signal.connect(self.redraw)
-        self.follow(session.playback.frame_changed)
         self._follow()
 
     def sizeHint(self) -> QSize:

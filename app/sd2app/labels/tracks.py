@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
 from sd2app.feature import Shell
 from sd2app.labels.edits import LabelEdits
 from sd2app.labels.model import LabelsModel
-from sd2app.widgets.dialogs import accepting
+from sd2app.widgets.dialogs import accepted, accepting
 from sd2app.widgets.text import counted
 from sd2core.labels import field_edits
 from sd2core.labels.spans import LabelTrack, Overlap
@@ -49,9 +49,8 @@ class LabelTracks:
         names = (f"Track {number}" for number in range(len(taken) + 1, 2 * len(taken) + 3))
         new_name = next(name for name in names if name not in taken)
         dialog = TrackDialog(new_name, self._shell.dialog_parent)
-        if dialog.exec() == QDialog.DialogCode.Accepted:
+        if accepted(dialog):
             self.add(dialog.name, dialog.overlap)
-        dialog.deleteLater()
 
     def add(self, name: str, overlap: Overlap) -> bool:
         """Add a track for new spans; False where it was refused."""

@@ -4,50 +4,34 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from PySide6.QtWidgets import QFrame, QLabel, QToolButton
+from PySide6.QtWidgets import QLabel
 
 from sd2app.live.model import LiveModel
 from sd2app.live.text import frames_text, latency_text, level_text, title_text
-from sd2app.widgets.layouts import row_of
-from sd2app.widgets.panel import ElidedLabel, outlined, say
-
-_HEIGHT = 40
+from sd2app.widgets.panel import ElidedLabel, StateBar, say
 
 
-class LiveBar(QFrame):
+class LiveBar(StateBar):
     """Hidden until something is listened to; ``go_on`` and ``show_again`` ask before they act."""
 
     def __init__(
         self, live: LiveModel, go_on: Callable[[], None], show_again: Callable[[], None]
     ) -> None:
-        super().__init__()
-        self.setObjectName("panel")
-        self.setAccessibleName("Radar that is listened to")
-        self.setMinimumHeight(_HEIGHT)
+        super().__init__("Radar that is listened to")
         self._live = live
         self._title = ElidedLabel(self, "title")
         self._frames = QLabel(self)
         self._numbers = ElidedLabel(self, "muted")
-        self._buttons = {
-            "show": self._button("Show", "Show this recording again", show_again),
-            "stop": self._button("Stop", "Stop, and keep all that was received", live.stop),
-            "go_on": self._button(
-                "Continue", "Listen again, into the same recording: the pause is a gap", go_on
-            ),
-            "close": self._button("✕", "Close this message", live.dismiss),
+        gap = "Listen again, into the same recording: the pause is a gap"
+        buttons = {
+            "show": ("Show", "Show this recording again", show_again),
+            "stop": ("Stop", "Stop, and keep all that was received", live.stop),
+            "go_on": ("Continue", gap, go_on),
+            "close": ("✕", "Close this message", live.dismiss),
         }
-        self._buttons["close"].setObjectName("")
-        parts = (self._title, (self._frames, 0), (self._numbers, 1))
-        self.setLayout(
-            row_of(*parts, *self._buttons.values(), spacing_px=12, margins_px=(12, 4, 4, 4))
-        )
+        self.lay_out((self._title, self._frames, (self._numbers, 1)), buttons, spacing_px=12)
         live.changed.connect(self._refresh)
         self._refresh()
-
-    def _button(self, text: str, tip: str, run: Callable[[], object]) -> QToolButton:
-        button = outlined(text, tip, run, self)
-        button.setAccessibleName(tip)
-        return button
 
     def _refresh(self) -> None:
         live = self._live
@@ -68,6 +52,5 @@ class LiveBar(QFrame):
             "show": live.can_be_shown,
             "close": not live.busy,
         }
-        for name, visible in shown.items():
-            self._buttons[name].setVisible(visible)
+        self.show_buttons([name for name, visible in shown.items() if visible])
         self._buttons["stop"].setEnabled(live.state != "stopping")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from PySide6.QtCore import QObject
-from PySide6.QtWidgets import QDialog, QWidget
+from PySide6.QtWidgets import QWidget
 
 from sd2app.feature import Action, Feature, Shell
 from sd2app.live.bar import LiveBar
@@ -13,7 +13,7 @@ from sd2app.live.dialog import ListenDialog
 from sd2app.live.model import COMMAND, LiveModel
 from sd2app.live.setup import ListenSetup
 from sd2app.session.session import Session
-from sd2app.widgets.dialogs import Answer, confirmed
+from sd2app.widgets.dialogs import Answer, accepted, confirmed
 
 
 class LiveFeature(Feature):
@@ -47,11 +47,9 @@ class LiveFeature(Feature):
     def _ask(self) -> None:
         window = self._shell.dialog_parent
         setup = ListenSetup(self._session.settings, window)
-        dialog = ListenDialog(setup, window)
-        accepted = dialog.exec() == QDialog.DialogCode.Accepted and not setup.problem
-        dialog.deleteLater()
+        listens = accepted(ListenDialog(setup, window)) and not setup.problem
         setup.deleteLater()
-        if accepted and self._shell.may_discard():
+        if listens and self._shell.may_discard():
             self.model.start(setup.request())
 
     def _go_on(self) -> None:

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from sd2app.live.model import LiveModel
 from sd2app.widgets.text import counted
 from sd2core.live.counts import Counts
-
-if TYPE_CHECKING:
-    from sd2app.live.model import LiveModel
 
 
 def title_text(live: LiveModel) -> str:

@@ -45,9 +45,8 @@ def show_help(topic: str) -> None:
 def help_button(topic: str | Callable[[], str], parent: QWidget, key: str = "F1") -> QToolButton:
     """A small "?" that opens the manual about a row of the table, which may change."""
     topic_now = topic if callable(topic) else lambda: topic
-    button = outlined("?", "Help on this panel", lambda: show_help(topic_now()), parent)
-    button.setObjectName("")
-    button.setAccessibleName("Help on this panel")
+    tip = "Help on this panel"
+    button = outlined("?", tip, lambda: show_help(topic_now()), parent, name=tip, look="")
     QShortcut(QKeySequence(key), button).activated.connect(button.click)
     return button
 

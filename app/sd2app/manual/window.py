@@ -55,9 +55,7 @@ class ManualWindow(QWidget):
     def _button(
         self, text: str, name: str, run: Callable[[], None], possible: SignalInstance
     ) -> QToolButton:
-        button = outlined(text, name, run, self)
-        button.setObjectName("")
-        button.setAccessibleName(name)
+        button = outlined(text, name, run, self, name=name, look="")
         button.setEnabled(False)
         possible.connect(button.setEnabled)
         return button

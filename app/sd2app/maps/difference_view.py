@@ -9,7 +9,7 @@ from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QImage, QPainter
 
 from sd2app.maps.difference import DifferenceModel
-from sd2app.maps.heatmap import HeatmapView
+from sd2app.maps.heatmap import BinMarks, HeatmapView
 from sd2app.maps.heatmap_image import difference_image
 from sd2app.session.maps import Reading
 from sd2app.session.session import Session
@@ -44,19 +44,12 @@ class DifferenceView(HeatmapView):
             self._difference, levels, start_s, end_s, columns, self._table(), background
         )
 
-    def null_colour(self) -> QColor:
-        """Colour of no difference."""
-        return QColor.fromRgb(int(self._table()[127]))
-
-    def hatch_colour(self) -> QColor:
-        """Colour that is legible on that of no difference, which follows the theme."""
-        colour = QColor(self._display.palette.hatch)
-        colour.setAlpha(150)
-        return colour
-
-    def marked_bins(self) -> tuple[tuple[tuple[int, ...], Qt.BrushStyle], ...]:
-        """Bins in which one of the two has no information."""
-        return ((self._difference.blank_bins, Qt.BrushStyle.BDiagPattern),)
+    def bin_marks(self) -> BinMarks:
+        """Bins in which one of the two has no information, over the colour of no difference."""
+        hatch = QColor(self._display.palette.hatch)  # legible on that colour in either theme
+        hatch.setAlpha(150)
+        marked = ((self._difference.blank_bins, Qt.BrushStyle.BDiagPattern),)
+        return QColor.fromRgb(int(self._table()[127])), hatch, marked
 
     def read(self, time_s: float, velocity_mps: float) -> Reading | None:
         """Text of both levels and their difference."""

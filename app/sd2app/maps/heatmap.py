@@ -32,8 +32,8 @@ from sd2app.widgets.time_axis import (
 )
 from sd2core.maps import DopplerMap
 
-_HATCH = QColor(255, 255, 255, 80)
-"""Colour of the hatching over bins without information."""
+BinMarks = tuple[QColor, QColor, Sequence[tuple[Sequence[int], Qt.BrushStyle]]]
+"""Colour of zero, colour of hatching, and bins without information with their hatching."""
 
 
 def velocity_labels(
@@ -86,7 +86,6 @@ class HeatmapView(TrackMouse, MapWidget):
         alignable: bool = False,
     ) -> None:
         super().__init__(track, session, overlays)
-        self._pointer = session.pointer
         self.setAccessibleName(f"{track.title} map")
         self.alignable = alignable
         self.folded = self.enlarged = False
@@ -129,6 +128,17 @@ class HeatmapView(TrackMouse, MapWidget):
     def title(self) -> str:
         """Title of the map, with the part of the body that is shown alone."""
         return title_of(self._track)
+
+    def bin_marks(self) -> BinMarks:
+        """Look of bins without information."""
+        return (
+            QColor.fromRgb(int(lookup_table(self._display.levels.colour_map)[0])),
+            QColor(255, 255, 255, 80),
+            (
+                (self._map.null_bins, Qt.BrushStyle.BDiagPattern),
+                (self._map.unseen_bins, Qt.BrushStyle.DiagCrossPattern),
+            ),
+        )
 
     @property
     def _map(self) -> DopplerMap:
@@ -243,11 +253,7 @@ class HeatmapView(TrackMouse, MapWidget):
             (self.scale.x_of(start_s), self.scale.x_of(end_s))
             for start_s, end_s in self._track.covered_s
         ]
-        nothing = QColor.fromRgb(int(lookup_table(self._display.levels.colour_map)[0]))
-        marked = (
-            (self._map.null_bins, Qt.BrushStyle.BDiagPattern),
-            (self._map.unseen_bins, Qt.BrushStyle.DiagCrossPattern),
-        )
+        nothing, hatch, marked = self.bin_marks()
         with clipped(painter, plot):
             painter.setPen(Qt.PenStyle.NoPen)
             for bins, pattern in marked:
@@ -256,7 +262,7 @@ class HeatmapView(TrackMouse, MapWidget):
                     for left, right in stretches:
                         band = QRectF(left, top, right - left, bottom - top)
                         painter.fillRect(band, nothing)
-                        painter.fillRect(band, QBrush(_HATCH, pattern))
+                        painter.fillRect(band, QBrush(hatch, pattern))
 
     def _paint_axis(self, painter: QPainter, plot: QRectF) -> None:
         colours, v_max = self._display.palette, self._map.axis.v_max_mps

@@ -12,10 +12,11 @@ from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QBrush, QColor, QImage, QPainter, QResizeEvent
 
 from sd2app.maps.difference import DifferenceModel
+from sd2app.maps.track_mouse import SessionPlot
 from sd2app.session.display import HeatmapLevels
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
-from sd2app.widgets.canvas import Overlay, TimePlot, clipped, image_of
+from sd2app.widgets.canvas import Overlay, clipped, image_of
 from sd2app.widgets.colour_maps import lookup_table, uncertain_table
 from sd2app.widgets.time_axis import TimeScale
 
@@ -168,27 +169,18 @@ def _strongest_columns(
     return values, filled
 
 
-class MapWidget(TimePlot):
+class MapWidget(SessionPlot):
     """Keeps the picture of a map until map, stretch, levels, theme or size change."""
 
     BOTTOM_PX = 4
 
     def __init__(self, track: MapModel, session: Session, overlays: Sequence[Overlay] = ()) -> None:
-        super().__init__(session.span)
+        super().__init__(session, overlays)
         self._track = track
-        self._session = session
-        self._span, self._playback = session.span, session.playback
-        self._display = display = session.display
-        self._overlays = tuple(overlays)
         self._image: QImage | None = None
-        self._grab: tuple[str, float] | None = None  # what is dragged, and from which pixel
         self.setMouseTracking(True)
-        for signal in (track.changed, display.levels_changed, display.theme_changed):
+        for signal in (track.changed, self._display.levels_changed, self._display.theme_changed):
             signal.connect(self.invalidate)
-        self.follow(self._playback.frame_changed)
-        for overlay in overlays:
-            for signal in overlay.changed:
-                signal.connect(self.redraw)
 
     def invalidate(self) -> None:
         """Draw the map again, and all that is around it."""

@@ -39,11 +39,8 @@ class FrameReader:
 
     def index(self) -> int | None:
         """Frame of the mesh on screen, None where there is no person."""
-        mesh, time_s = self._document.mesh, self._playback.time_s
-        if mesh is None or not mesh.timebase.covers(time_s):
-            return None
-        frame = mesh.timebase.frame_at(time_s)
-        return frame if mesh.presence.there[frame] else None
+        mesh = self._document.mesh
+        return None if mesh is None else mesh.person_at(self._playback.time_s)
 
     def torso_m(self) -> Vector | None:
         """Median vertex: inside the torso whatever the limbs do."""
@@ -108,10 +105,8 @@ def reading_lines(reading: Reading) -> tuple[str, ...]:
 def body_range_m(session: Session, time_s: float) -> float | None:
     """Distance from the virtual sensor to the torso at a time, None without a person then."""
     mesh = session.document.mesh
-    if mesh is None or not mesh.timebase.covers(time_s):
-        return None
-    frame = mesh.timebase.frame_at(time_s)
-    if not mesh.presence.there[frame]:
+    frame = None if mesh is None else mesh.person_at(time_s)
+    if mesh is None or frame is None:
         return None
     torso_m = np.median(mesh.frame(frame), axis=0)
     return float(np.linalg.norm(torso_m - session.sensor.sensor.position_m))

@@ -1,7 +1,8 @@
-"""Mouse of a map or track under its title: seek, pan, zoom, and drag what was measured in time."""
+"""Plots over the time axis of a session, and the mouse of maps and tracks under their titles."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import ClassVar
 
 from PySide6.QtCore import QPointF, Qt
@@ -10,7 +11,7 @@ from PySide6.QtGui import QMouseEvent
 from sd2app.maps.arrangement import HEADER_PX
 from sd2app.session.session import Session
 from sd2app.session.undo import Offset
-from sd2app.widgets.canvas import ZoomedPlot
+from sd2app.widgets.canvas import Overlay, TimePlot, ZoomedPlot
 
 _CURSORS = {
     "seek": Qt.CursorShape.CrossCursor,
@@ -20,7 +21,33 @@ _CURSORS = {
 }
 
 
-class TrackMouse(ZoomedPlot):
+class SessionPlot(TimePlot):
+    """Plot that follows the clock, the theme, and what other features draw over it."""
+
+    def __init__(self, session: Session, overlays: Sequence[Overlay] = ()) -> None:
+        super().__init__(session.span)
+        self._session, self._overlays = session, tuple(overlays)
+        self._span, self._playback, self._pointer = session.span, session.playback, session.pointer
+        self._display = session.display
+        self._grab: tuple[str, float] | None = None  # what is dragged, and from which pixel
+        self.follow(self._playback.frame_changed)
+        drawn = [signal for overlay in overlays for signal in overlay.changed]
+        for signal in (self._display.theme_changed, *drawn):
+            signal.connect(self.redraw)
+
+
+class SeekingPlot(SessionPlot):
+    """Plot on which a click or drag seeks."""
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """Seek while the left button is down."""
+        if event.buttons() & Qt.MouseButton.LeftButton:
+            self._playback.seek(self.scale.time_of(event.position().x()))
+
+    mouseMoveEvent = mousePressEvent
+
+
+class TrackMouse(ZoomedPlot, SessionPlot):
     """Click or drag seeks, the middle button and the wheel move and scale the time axis.
 
     A drag from where :meth:`use_of` says ``"offset"`` moves what was measured in time.
@@ -28,8 +55,6 @@ class TrackMouse(ZoomedPlot):
 
     OFFSET: ClassVar[Offset]
     """What such a drag moves."""
-    _session: Session
-    _grab: tuple[str, float] | None  # what is dragged, and from which pixel
 
     def use_of(self, place: QPointF) -> str:
         """Use of the left button at a place: a key of the cursors."""

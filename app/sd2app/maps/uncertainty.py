@@ -24,7 +24,6 @@ class UncertaintyModel(BackgroundModel):
     """
 
     changed = Signal()
-    failed = Signal(str)
 
     def __init__(
         self, session: Session, synthesis: SynthesisModel, accuracy: AccuracyModel, parent: QObject
@@ -34,8 +33,7 @@ class UncertaintyModel(BackgroundModel):
         self._track = session.maps.synthetic
         self.shown = session.settings.flag(_SHOWN, False)  # the user wants uncertain cells marked
         self._of: DopplerMap | None = None  # what the body's share is of
-        self._runner = ListedRunner("uncertainty", session.jobs, self, self._take)
-        self._runner.failed.connect(lambda error: self.failed.emit(str(error)))
+        self._runner = ListedRunner("uncertainty", session.jobs, self, self._take, self._fail)
         self._runner.cancelled.connect(lambda: self.set_shown(False))
         self._track.changed.connect(self._follow)
         synthesis.completed.connect(self._follow)

@@ -6,14 +6,15 @@ import math
 
 import numpy as np
 from PySide6.QtCore import QPointF, QRect, QRectF, QSignalBlocker, Qt
-from PySide6.QtGui import QBrush, QColor, QMouseEvent, QPainter, QPen
+from PySide6.QtGui import QBrush, QColor, QPainter, QPen
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableWidget, QTableWidgetItem
 
+from sd2app.maps.track_mouse import SeekingPlot
 from sd2app.mesh_comparison.model import ComparisonModel, JointRow, joint_words
 from sd2app.session.display import DisplayModel
 from sd2app.session.session import Session
 from sd2app.video.overlay_settings import OverlayModel
-from sd2app.widgets.canvas import AT_RIGHT, Canvas, TimePlot
+from sd2app.widgets.canvas import AT_RIGHT, Canvas
 from sd2app.widgets.mesh_painting import draw_mesh, paint_picture
 from sd2app.widgets.plot import paint_axes
 from sd2app.widgets.time_axis import paint_title, signed_text, ticks
@@ -79,31 +80,18 @@ class ComparedPicture(Canvas):
         draw_mesh(painter, box, comparison.mesh(self._number), time_s, camera, colour, opacity)
 
 
-class JointCurves(TimePlot):
+class JointCurves(SeekingPlot):
     """Velocity of one joint towards the sensor, from both meshes; click or drag seeks."""
 
     TOP_PX, BOTTOM_PX = _TITLE_PX, 4
     USUAL_PX = 640, 140
 
     def __init__(self, comparison: ComparisonModel, session: Session) -> None:
-        super().__init__(session.span)
+        super().__init__(session)
         self._comparison = comparison
-        self._playback, self._display = session.playback, session.display
         self.setMinimumHeight(96)
         self.setCursor(Qt.CursorShape.CrossCursor)
-        self.follow(
-            comparison.changed,
-            session.span.changed,
-            session.playback.frame_changed,
-            session.display.theme_changed,
-        )
-
-    def mousePressEvent(self, event: QMouseEvent) -> None:
-        """Seek."""
-        if event.buttons() & Qt.MouseButton.LeftButton:
-            self._playback.seek(self.scale.time_of(event.position().x()))
-
-    mouseMoveEvent = mousePressEvent
+        self.follow(comparison.changed, session.span.changed)
 
     def paint(self, painter: QPainter) -> None:
         """Title, axis, lines, cursor."""

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from PySide6.QtCore import QPointF, QRectF, QSignalBlocker, Qt
-from PySide6.QtGui import QAction, QColor, QMouseEvent, QPainter, QPen
+from PySide6.QtGui import QAction, QColor, QPainter, QPen
 from PySide6.QtWidgets import QLabel, QSlider, QToolButton, QWidget
 
 from sd2app.labels.loop import SpanLoop
+from sd2app.maps.track_mouse import SeekingPlot
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.session import Session
-from sd2app.widgets.canvas import TimePlot
 from sd2app.widgets.layouts import Part, row_of
 from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, TimeScale, clock_text, tick_step, ticks
 
@@ -88,20 +88,13 @@ class TransportBar(QWidget):
             self._stretch.setAccessibleName(f"End the loop of {span.label}, {stretch}")
 
 
-class TimeRuler(TimePlot):
+class TimeRuler(SeekingPlot):
     """Seconds under the tracks; click or drag seeks."""
 
     def __init__(self, session: Session) -> None:
-        super().__init__(session.span)
-        self._span, self._playback = session.span, session.playback
-        self._display = session.display
+        super().__init__(session)
         self.setFixedHeight(24)
-        self.follow(
-            self._span.changed,
-            self._playback.frame_changed,
-            self._playback.stretch_changed,
-            self._display.theme_changed,
-        )
+        self.follow(self._span.changed, self._playback.stretch_changed)
 
     def paint(self, painter: QPainter) -> None:
         """Ticks with times, and the cursor."""
@@ -139,10 +132,3 @@ class TimeRuler(TimePlot):
         for x, inner in ((left + 1, left + 5), (right - 1, right - 5)):
             corners = ((inner, 1), (x, 1), (x, bottom), (inner, bottom))
             painter.drawPolyline([QPointF(*corner) for corner in corners])
-
-    def mousePressEvent(self, event: QMouseEvent) -> None:
-        """Seek with the left button."""
-        if event.buttons() & Qt.MouseButton.LeftButton:
-            self._playback.seek(self.scale.time_of(event.position().x()))
-
-    mouseMoveEvent = mousePressEvent

@@ -2,27 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QPointF
-from PySide6.QtWidgets import QMenu, QWidget
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QLabel, QMenu, QWidget
 
 from sd2app.feature import Action, Feature, Shell
 from sd2app.imu.model import ImuModel
 from sd2app.maps.model import SynthesisModel
-from sd2app.scene.bar import SceneBar
 from sd2app.scene.camera import Preset
 from sd2app.sensor.placements import PlacementsModel
-from sd2app.session.display import MeshColour
+from sd2app.session.display import DisplayModel, MeshColour
 from sd2app.session.session import Session
-from sd2app.widgets.layouts import pane
+from sd2app.widgets.canvas import MenuPart
+from sd2app.widgets.inputs import Choice, action_button
+from sd2app.widgets.layouts import STRETCH, pane, row_of
+from sd2app.widgets.panel import outlined, title
 
 if TYPE_CHECKING:
     from sd2app.scene.view import SceneView
-    from sd2app.widgets.picture import MenuPart
-
 
 _COLOURS: tuple[tuple[MeshColour, str, str], ...] = (
     ("velocity", "Colour by radial velocity",
@@ -38,6 +39,31 @@ _VIEWS: tuple[tuple[str, Preset, str, str], ...] = (
     ("view_side", "side", "from the side", "See sensor and body sideways"),
     ("view_top", "top", "from above", "See sensor and body from above"),
 )
+
+_SHORT = {
+    "velocity": "radial velocity",
+    "range": "range",
+    "visibility": "visibility",
+    "plain": "plain",
+}
+
+
+class SceneBar(QWidget):
+    """Bar over the 3D view: colour of the mesh, dots and ready-made views."""
+
+    def __init__(self, display: DisplayModel, action: Callable[[str], QAction]) -> None:
+        super().__init__()
+        colour = Choice(
+            "What the colour of the mesh means (1 to 4)", self, _SHORT, display.set_mesh_colour
+        )
+        views = QMenu(self)
+        views.addActions([action(name) for name, *_ in _VIEWS])
+        look = outlined("Look from", "Where to look at the scene from", views, self, look="")
+        dots = action_button(action("dots"), "Dots")
+        parts = (title("Scene"), 8, QLabel("colour", self), colour, dots, STRETCH, look)
+        self.setLayout(row_of(*parts, spacing_px=4, margins_px=(8, 2, 4, 2)))
+        display.mesh_changed.connect(lambda: colour.show_value(display.mesh_colour))
+        colour.show_value(display.mesh_colour)
 
 
 class SceneFeature(Feature):

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtWidgets import QMenu
 
 from sd2app.imu.model import ImuModel, place_words
 from sd2app.scene.scene import Scene
-
-if TYPE_CHECKING:
-    from sd2app.session.session import Session
+from sd2app.session.session import Session
 
 PLACING_HINT = "A click on the body places an inertial sensor  ·  Esc cancels"
 _REACH_PX = 9.0

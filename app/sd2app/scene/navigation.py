@@ -8,16 +8,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from PySide6.QtCore import Qt
 
 from sd2app.scene.camera import Vector, drag_along, drag_in_view, triple
 from sd2app.scene.scene import Scene
-
-if TYPE_CHECKING:
-    from sd2app.session.undo import Edits
+from sd2app.session.undo import Edits
 
 _BUTTONS = (Qt.MouseButton.LeftButton, Qt.MouseButton.MiddleButton, Qt.MouseButton.RightButton)
 Constraint = Literal["view", "vertical", "sight"]

@@ -20,10 +20,12 @@ from sd2app.scene.inertial import PLACING_HINT, InertialHand
 from sd2app.scene.navigation import Navigator
 from sd2app.scene.overlay import Overlay
 from sd2app.scene.scene import Scene
-from sd2app.widgets.picture import MenuPart, picture_menu
+from sd2app.widgets.canvas import MenuPart
+from sd2app.widgets.picture import picture_menu
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
+    # The view alone loads no kernels.
     from sd2app.imu.model import ImuModel
     from sd2app.maps.model import SynthesisModel
     from sd2app.sensor.placements import PlacementsModel
@@ -81,11 +83,11 @@ class SceneView(QWidget):
         self._planned: object = None
         self._backend.widget.installEventFilter(self)
         self._followed = (
+            (session.display.theme_changed, self._follow_theme),
+            (session.display.mesh_changed, self._follow_colour),
             (session.document.opened, self._take_over),
             (session.playback.time_changed, self._follow_clock),
             (session.sensor.changed, self._follow_sensor),
-            (session.display.mesh_changed, self._follow_colour),
-            (session.display.theme_changed, self._follow_theme),
             (synthesis.frame_changed, self._follow_scattering),
             (placements.changed, self._follow_placements),
             (inertial.changed, self._follow_inertial),
@@ -93,12 +95,7 @@ class SceneView(QWidget):
         )
         for signal, slot in self._followed:
             signal.connect(slot)
-        self._follow_theme()
-        self._follow_colour()
-        self._take_over()
-        self._follow_placements()
-        self._follow_inertial()
-        self._follow_placing()
+            slot()
         self._lay_out()
         self._backend.start(self._prepare)
 

@@ -16,6 +16,7 @@ from sd2app.sensor.panel import SensorPanel
 from sd2app.sensor.placements import PlacementsModel
 from sd2app.sensor.placements_page import PlacementsPage
 from sd2app.session.session import Session
+from sd2app.widgets.dialogs import accepted
 from sd2app.widgets.pages import InnerPage, paged_panel
 
 
@@ -81,10 +82,8 @@ class SensorFeature(Feature):
             self._session.edits.aim_sensor(self._synthesis.torso_m)
 
     def _align(self) -> None:
-        shell, display = self._shell, self._session.display
-        dialog = AlignmentDialog(self.alignment, display, shell.dialog_parent)
-        dialog.exec()
-        dialog.deleteLater()
+        parent, display = self._shell.dialog_parent, self._session.display
+        accepted(AlignmentDialog(self.alignment, display, parent))
 
     def panels(self) -> Mapping[str, QWidget]:
         """The panel at the side, of two pages."""

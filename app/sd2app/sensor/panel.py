@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QComboBox, QFormLayout, QGridLayout, QLabel, QWidg
 from sd2app.maps.model import SynthesisModel
 from sd2app.session.session import Session
 from sd2app.widgets.inputs import CheckBox, Choice, NumberBox
-from sd2app.widgets.layouts import STRETCH, column_of, form_of, pane, row_of
+from sd2app.widgets.layouts import STRETCH, column_of, form_of, grid_of, pane, row_of
 from sd2app.widgets.panel import outlined, rule, sentence, show_words, title
 from sd2core.radar_config import RadarConfig, range_in_words
 from sd2core.sensor import aimed_at, position_from_spherical, spherical_from_position
@@ -89,9 +89,7 @@ class SensorPanel(QWidget):
         return button
 
     def _placement_form(self) -> QGridLayout:
-        grid = QGridLayout()
-        grid.setHorizontalSpacing(6)
-        grid.setVerticalSpacing(3)
+        grid = grid_of(gaps_px=(6, 3), wide=(1, 3))
         self._xyz = [
             NumberBox(-100.0, 100.0, " m", f"Sensor position, {axis}: {meaning}")
             for axis, meaning in (("x", "to the right"), ("y", "down"), ("z", "forward"))
@@ -112,7 +110,6 @@ class SensorPanel(QWidget):
             (0, ("x", "y", "z"), self._xyz, self._place_by_xyz),
             (2, ("range", "azim.", "elev."), self._spherical, self._place_by_angles),
         ):
-            grid.setColumnStretch(left + 1, 1)
             for line, (name, box) in enumerate(zip(names, boxes, strict=True)):
                 label = QLabel(name, self)
                 label.setObjectName("muted")
@@ -176,15 +173,12 @@ class SensorPanel(QWidget):
             ("Receiver", self._receiver),
             ("Transmitter", self._transmitter),
         )
-        limits = QGridLayout()
-        limits.setHorizontalSpacing(12)
-        limits.setVerticalSpacing(3)
+        limits = grid_of(gaps_px=(12, 3), wide=(1, 3))
         self._limits = {name: _value(self, tip) for name, (tip, _) in _LIMITS.items()}
         for place, (name, label) in enumerate(self._limits.items()):
             line, left = divmod(place, 2)
             limits.addWidget(QLabel(name, self), line, 2 * left)
             limits.addWidget(label, line, 2 * left + 1)
-            limits.setColumnStretch(2 * left + 1, 1)
         self._warning = sentence("", "warning")
         return pane(
             *(rule(), self._capture_title, self._radar_name, form, limits, self._warning),

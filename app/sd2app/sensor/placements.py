@@ -41,7 +41,6 @@ class PlacementsModel(BackgroundModel):
 
     changed = Signal()  # places, their coverage or their cost
     current_changed = Signal()  # the sensor is at another of them, or elsewhere
-    failed = Signal(str)
 
     def __init__(self, session: Session, accuracy: AccuracyModel, parent: QObject) -> None:
         super().__init__(parent)
@@ -145,7 +144,7 @@ class PlacementsModel(BackgroundModel):
 
     def _fail(self, error: Exception) -> None:
         self.planned = Planned()
-        self.failed.emit(str(error))
+        super()._fail(error)
         self.changed.emit()
 
 

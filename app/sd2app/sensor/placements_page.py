@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtCore import QRectF, QSize
 from PySide6.QtGui import QColor, QImage, QPainter
 from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 
@@ -25,7 +25,7 @@ from sd2app.sensor.placements import (
 from sd2app.widgets.canvas import AT_LEFT, AT_RIGHT, Canvas
 from sd2app.widgets.dialogs import ask_file, ask_new
 from sd2app.widgets.inputs import CheckBox, Choice, TypedLine
-from sd2app.widgets.layouts import STRETCH, column_of, pane, row_of
+from sd2app.widgets.layouts import STRETCH, column_of, grid_of, pane, row_of
 from sd2app.widgets.panel import FactRows, outlined, rule, sentence, show_words, title
 from sd2core.figures.colours import SEQUENTIAL
 from sd2core.placements.placements import read_placements, write_placements
@@ -102,7 +102,6 @@ class PlacementsPage(QWidget):
         self._limits = FactRows(3, at_the_edge=True, parent=self)
         self._radar, self._source = sentence(""), sentence("")
         self._shown = CheckBox("In the scene", self, model.set_shown, "Draw them in the scene")
-        self._shown.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self._current = sentence("", "plain")
         back, on = (
             outlined(text, "Put the sensor there", partial(model.step, by), self)
@@ -125,22 +124,16 @@ class PlacementsPage(QWidget):
         )
 
     def _form(self) -> QGridLayout:
-        grid = QGridLayout()
-        grid.setHorizontalSpacing(8)
-        grid.setVerticalSpacing(3)
-        grid.setColumnStretch(1, 1)
         self._rows: dict[Name, tuple[QLabel, TypedLine]] = {}
-        for number, name in enumerate(NAMES):
+        for name in NAMES:
             text, meaning = _FIELDS[name]
             label, line = QLabel(text, self), TypedLine(text, meaning, self)
             label.setObjectName("muted")
             label.setToolTip(meaning)
             line.typed.connect(lambda text, name=name: self._fields.set_text(name, text))
             line.ended.connect(self._fields.end)
-            grid.addWidget(label, number, 0)
-            grid.addWidget(line, number, 1)
             self._rows[name] = (label, line)
-        return grid
+        return grid_of(*self._rows.values(), gaps_px=(8, 3))
 
     # --- files ----------------------------------------------------------------------------
 

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from sd2core.files.resources import is_bundled
-
-if TYPE_CHECKING:
-    from sd2core.recording.recording import Recording
+from sd2core.recording.recording import Recording
 
 
 @dataclass(frozen=True)

@@ -5,20 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from PySide6.QtGui import QUndoCommand
 
 from sd2app.session.denoiser_choice import DenoiserChoice
 from sd2app.session.document import DocumentModel
 from sd2app.session.sensor import SensorModel
+from sd2core.doppler.options import Count
 from sd2core.placements.placements import Placements
+from sd2core.radar_config import Clutter
+from sd2core.recording.recording import Recording
 from sd2core.sensor import Vector, VirtualSensor, aimed_at
-
-if TYPE_CHECKING:
-    from sd2core.doppler.options import Count
-    from sd2core.radar_config import Clutter
-    from sd2core.recording.recording import Recording
 
 Offset = Literal["radar_offset_s", "imu_offset_s"]
 """Time on the recording's clock at which something measured begins."""

@@ -17,7 +17,6 @@ class VideoModel(BackgroundModel):
     """Follows the clock: one picture at a time is decoded, then the newest wanted one."""
 
     frame_changed = Signal()
-    failed = Signal(str)
 
     def __init__(self, playback: PlaybackModel, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -26,7 +25,7 @@ class VideoModel(BackgroundModel):
         self.picture: NDArray[np.uint8] | None = None  # RGB picture on screen, (H, W, 3)
         self.shown_frame = -1  # frame of the video that the picture is; -1 for none
         self._wanted = -1
-        self._runner = LatestRunner("video", self, self._receive, self._report)
+        self._runner = LatestRunner("video", self, self._receive, self._fail)
         playback.frame_changed.connect(self._follow)
 
     def set_reader(self, reader: VideoReader | None) -> None:
@@ -65,6 +64,3 @@ class VideoModel(BackgroundModel):
         self.frame_changed.emit()
         if self._wanted != self.shown_frame and self.reader is not None:
             self._request(self._wanted)
-
-    def _report(self, error: Exception) -> None:
-        self.failed.emit(str(error))

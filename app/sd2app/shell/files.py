@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
-from PySide6.QtWidgets import QMenu, QMessageBox
+from PySide6.QtWidgets import QMenu, QMessageBox, QPushButton, QWidget
 
 from sd2app.feature import Action, Drop, Feature, Shell
 from sd2app.fit.model import FitModel
@@ -15,15 +16,21 @@ from sd2app.labels.edits import LabelEdits
 from sd2app.session.content import recording_of
 from sd2app.session.session import Session
 from sd2app.shell.open_dialog import ask_to_open
-from sd2app.shell.saving import ask_what_is_kept
 from sd2app.widgets.dialogs import Answer, ask_folder, ask_new, confirmed
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import plain_path
 from sd2core.files.resources import resource_path
 from sd2core.io.imu_columns import holds_inertial_signals
+from sd2core.recording.divergence import Divergence
 from sd2core.recording.recording import GoneError, SavedElsewhereError
 from sd2core.recording.relinking import Role, role_words
 
+Kept = Literal["mine", "theirs", "merge"]
+_SAID = (
+    "{title} was saved by another window or program since it was opened here: {changes}.\n\n"
+    "Merge keeps what both changed, and can be undone. Take theirs gives up what is not saved"
+    " here; undo brings it back. Keep mine writes over theirs."
+)
 _PARTS: tuple[Role, ...] = ("video", "mesh", "radar", "imu")
 
 
@@ -266,3 +273,23 @@ class FilesFeature(Feature):
 def _is_inertial(paths: Sequence[Path]) -> bool:
     """True for one file of an inertial sensor's samples."""
     return len(paths) == 1 and paths[0].is_file() and holds_inertial_signals(paths[0])
+
+
+def ask_what_is_kept(parent: QWidget, title: str, divergence: Divergence) -> Kept | None:
+    """Ask whose changes are kept; None where the user cancels."""
+    box = QMessageBox(parent)
+    box.setIcon(QMessageBox.Icon.Question)
+    box.setWindowTitle("Saved elsewhere as well")
+    box.setText(_SAID.format(title=title, changes=", ".join(divergence.changes)))
+    roles = QMessageBox.ButtonRole
+    offered: dict[QPushButton, Kept] = {
+        box.addButton("Merge", roles.AcceptRole): "merge",
+        box.addButton("Take theirs", roles.DestructiveRole): "theirs",
+        box.addButton("Keep mine", roles.DestructiveRole): "mine",
+    }
+    box.setDefaultButton(next(iter(offered)))
+    box.addButton(QMessageBox.StandardButton.Cancel)
+    box.exec()
+    pressed = box.clickedButton()
+    box.deleteLater()
+    return next((kept for button, kept in offered.items() if button is pressed), None)

@@ -7,6 +7,7 @@ from pathlib import Path
 from PySide6.QtWidgets import QDialog, QFileDialog, QWidget
 
 from sd2app.fit.request import REQUEST_NAME
+from sd2app.widgets.dialogs import accepted
 from sd2core.errors import Sd2Error
 from sd2core.io.kinds import MESH_SUFFIXES, RADAR_SUFFIXES, VIDEO_SUFFIXES, kind_of
 
@@ -71,6 +72,5 @@ def can_be_opened(path: Path) -> bool:
 def ask_to_open(parent: QWidget, title: str, folder: Path | None) -> list[Path]:
     """Let the user choose files and folders; none where the dialog is cancelled."""
     dialog = OpenDialog(parent, title, folder)
-    dialog.exec()
-    dialog.deleteLater()
+    accepted(dialog)
     return dialog.paths

@@ -14,6 +14,7 @@ from sd2app.session.session import Session
 from sd2app.shell.keys.bindings import KeyBindings
 from sd2app.shell.keys.dialog import KeysDialog
 from sd2app.shell.keys.model import KeyListModel
+from sd2app.widgets.dialogs import accepted
 from sd2core.version import __version__
 
 MOUSE = (
@@ -115,9 +116,7 @@ class ProgramFeature(Feature):
         bindings = self._shell.keys
         assert isinstance(bindings, KeyBindings)
         model = KeyListModel(bindings, self._labels.model, MOUSE, self._labels.edits.apply)
-        dialog = KeysDialog(model, bindings, self._shell.dialog_parent)
-        dialog.exec()
-        dialog.deleteLater()
+        accepted(KeysDialog(model, bindings, self._shell.dialog_parent))
 
     def _show_about(self) -> None:
         QMessageBox.about(

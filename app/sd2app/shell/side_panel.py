@@ -48,9 +48,8 @@ class SidePanel(QFrame):
         self._pages = dict(pages)
         self._stack = QStackedWidget(self)
         self._title = title("", "Open panel")
-        self._fold = outlined("»", "Fold the panel away", lambda: self.set_folded(True), self)
-        self._fold.setObjectName("")
-        self._fold.setAccessibleName("Fold the panel away")
+        tip = "Fold the panel away"
+        fold = outlined("»", tip, lambda: self.set_folded(True), self, name=tip, look="")
         self._icons = [RailButton(name, self) for name in pages]
         for place, (icon, page) in enumerate(zip(self._icons, pages.values(), strict=True)):
             icon.clicked.connect(partial(self._click, place))
@@ -58,7 +57,7 @@ class SidePanel(QFrame):
             self._stack.addWidget(_scrolled(page))
         # Elsewhere in the window its key opens the first page.
         guide = help_button(self._topic, self, key="")
-        head = row_of((self._title, 1), guide, self._fold, spacing_px=2, margins_px=(8, 4, 4, 0))
+        head = row_of((self._title, 1), guide, fold, spacing_px=2, margins_px=(8, 4, 4, 0))
         self._open = QWidget(self)
         self._open.setLayout(column_of(head, (self._stack, 1), spacing_px=2, margins_px=0))
         rail = QFrame(self)

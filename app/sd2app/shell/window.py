@@ -29,6 +29,7 @@ from sd2app.shell.messages.views import MessageNotice, MessagesDialog
 from sd2app.shell.parts import Parts
 from sd2app.shell.side_panel import PageWidths, SidePanel
 from sd2app.shell.tab_order import controls_of
+from sd2app.widgets.dialogs import accepted
 from sd2app.widgets.inputs import claims
 from sd2app.widgets.layouts import column_of
 from sd2app.widgets.notices import Notice, NoticeStack
@@ -265,9 +266,7 @@ class MainWindow(QMainWindow):
 
     def show_messages(self) -> None:
         """Show what was said so far."""
-        dialog = MessagesDialog(self.messages, self)
-        dialog.exec()
-        dialog.deleteLater()
+        accepted(MessagesDialog(self.messages, self))
 
     def attempt(self, work: Callable[[], T]) -> T | None:
         """Result of ``work``; an error is told to the user, and None returned."""

@@ -62,7 +62,8 @@ class Features:
         self.video = VideoFeature(
             session,
             shell,
-            self.fit,
+            self.fit.landmarks_at,
+            (self.fit.model.advanced, self.fit.model.changed),
             lambda menu, place: self.labels.offer_frame(menu, place),
             parent,
         )
@@ -92,7 +93,7 @@ class Features:
             lambda finder: self.suggestions.model.start(finder),
             parent,
         )
-        finders = (self.classify.gestures,)
+        finders = (self.classify.model,)
         self.suggestions = SuggestionsFeature(session, shell, labels.edits, finders, parent)
         self.agreement = AgreementFeature(session, shell, labels.model, parent)
         self.mesh_comparison = MeshComparisonFeature(

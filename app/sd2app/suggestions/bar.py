@@ -49,10 +49,8 @@ class SuggestionBar(QWidget):
         self._layout.setContentsMargins(*_MARGINS_PX)
         self.setLayout(self._layout)
         # The last one for the keyboard too.
-        close = outlined("✕", "Close; the suggestions stay", model.stop, self)
-        close.setObjectName("")
-        close.setAccessibleName("Close the suggestions")
-        self._rows[1].addWidget(close)
+        tip, name = "Close; the suggestions stay", "Close the suggestions"
+        self._rows[1].addWidget(outlined("✕", tip, model.stop, self, name=name, look=""))
         model.changed.connect(self._refresh)
         self._refresh()
 

@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QObject
+from PySide6.QtCore import QObject, SignalInstance
 from PySide6.QtWidgets import QWidget
 
 from sd2app.feature import Action, Feature, Shell
 from sd2app.session.session import Session
 from sd2app.video.overlay_settings import OverlayModel
-from sd2app.video.view import Landmarks, VideoBar, VideoView
+from sd2app.video.view import LandmarksAt, VideoBar, VideoView
+from sd2app.widgets.canvas import MenuPart
 from sd2app.widgets.layouts import pane
-
-if TYPE_CHECKING:
-    from sd2app.widgets.picture import MenuPart
 
 
 class VideoFeature(Feature):
-    """The picture with mesh and landmarks over it.
+    """The picture with mesh and landmarks over it, which may differ after ``found``.
 
     ``offer_frame`` adds to its context menu what can be done with the frame on screen.
     """
@@ -28,11 +25,13 @@ class VideoFeature(Feature):
         self,
         session: Session,
         shell: Shell,
-        landmarks: Landmarks,
+        landmarks_at: LandmarksAt,
+        found: Sequence[SignalInstance],
         offer_frame: MenuPart,
         parent: QObject,
     ) -> None:
-        self._session, self._shell, self._landmarks = session, shell, landmarks
+        self._session, self._shell = session, shell
+        self._landmarks_at, self._found = landmarks_at, found
         self._offer_frame = offer_frame
         self.overlay = OverlayModel(session.settings, parent)
         session.video.failed.connect(shell.warn)
@@ -58,7 +57,7 @@ class VideoFeature(Feature):
 
     def panels(self) -> Mapping[str, QWidget]:
         """The video under its bar."""
-        view = VideoView(self._session, self.overlay, self._landmarks)
+        view = VideoView(self._session, self.overlay, self._landmarks_at, self._found)
         export = self._shell.action("export_strip")
         view.menu_parts = (self._offer_frame, lambda menu, _: menu.addAction(export))
         return {"video": pane(VideoBar(self.overlay, self._shell.action), (view, 1))}

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Protocol
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,15 +22,8 @@ from sd2app.widgets.panel import title
 _OPACITY_STEPS = 20
 
 
-class Landmarks(Protocol):
-    """Landmarks of the person in the picture, while they are being found."""
-
-    @property
-    def landmarks_changed(self) -> tuple[SignalInstance, ...]:
-        """Signals after which landmarks may have changed."""
-
-    def landmarks_at(self, frame: int) -> NDArray[np.float32] | None:
-        """Landmarks of a frame, or None where none are to be shown."""
+LandmarksAt = Callable[[int], NDArray[np.float32] | None]
+"""Landmarks of the person in a frame, while they are being found; None: none are shown."""
 
 
 class VideoView(Canvas):
@@ -39,17 +31,23 @@ class VideoView(Canvas):
 
     USUAL_PX = 427, 320
 
-    def __init__(self, session: Session, overlay: OverlayModel, landmarks: Landmarks) -> None:
+    def __init__(
+        self,
+        session: Session,
+        overlay: OverlayModel,
+        landmarks_at: LandmarksAt,
+        found: Sequence[SignalInstance],
+    ) -> None:
         super().__init__()
         self.setAccessibleName("Video")
-        self._session, self._overlay, self._found = session, overlay, landmarks
+        self._session, self._overlay, self._landmarks_at = session, overlay, landmarks_at
         self.setMinimumSize(200, 150)
         self.follow(
             session.video.frame_changed,
             session.display.theme_changed,
             session.document.changed,
             overlay.changed,
-            *landmarks.landmarks_changed,
+            *found,
         )
 
     def paint(self, painter: QPainter) -> None:
@@ -66,7 +64,7 @@ class VideoView(Canvas):
             self._paint_mesh(painter, box)
         # Landmarks of this frame, until the mesh takes their place.
         if self._session.document.mesh is None:
-            landmarks = self._found.landmarks_at(video.shown_frame)
+            landmarks = self._landmarks_at(video.shown_frame)
             if landmarks is not None:
                 draw_landmarks(painter, landmarks, box, (width, height))
 

@@ -15,11 +15,8 @@ from PySide6.QtWidgets import (
 )
 
 from sd2core.files.figure_files import SUFFIXES
-from sd2core.labels.formats import FORMATS
 
 Answer = QMessageBox.StandardButton
-LABEL_SUFFIXES = tuple(dict.fromkeys(suffix for one in FORMATS for suffix in one.suffixes))
-LABEL_FILES = f"Labels ({' '.join(f'*{suffix}' for suffix in LABEL_SUFFIXES)});;All files (*)"
 FIGURES = ";;".join(f"{suffix[1:].upper()} (*{suffix})" for suffix in SUFFIXES)
 
 
@@ -44,6 +41,20 @@ def accepting(dialog: QDialog, text: str) -> tuple[QDialogButtonBox, QPushButton
     buttons.accepted.connect(dialog.accept)
     buttons.rejected.connect(dialog.reject)
     return buttons, accept
+
+
+def accepted(dialog: QDialog) -> bool:
+    """Show a dialog until it ends, and let go of it; True if it was accepted."""
+    result = dialog.exec()
+    dialog.deleteLater()
+    return bool(result == QDialog.DialogCode.Accepted)
+
+
+def closing(dialog: QDialog) -> QDialogButtonBox:
+    """Row of buttons that ends a dialog by Close alone."""
+    buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close, dialog)
+    buttons.rejected.connect(dialog.reject)
+    return buttons
 
 
 class ExportButtons(QDialogButtonBox):

@@ -214,6 +214,7 @@ class CheckBox(QCheckBox):
         self, text: str, parent: QWidget, chosen: Callable[[bool], object], tip: str = ""
     ) -> None:
         super().__init__(text, parent)
+        self.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self.setToolTip(tip)
         self.toggled.connect(chosen)
 

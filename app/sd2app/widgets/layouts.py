@@ -2,7 +2,17 @@
 
 from __future__ import annotations
 
-from PySide6.QtWidgets import QBoxLayout, QFormLayout, QHBoxLayout, QLayout, QVBoxLayout, QWidget
+from collections.abc import Sequence
+
+from PySide6.QtWidgets import (
+    QBoxLayout,
+    QFormLayout,
+    QGridLayout,
+    QHBoxLayout,
+    QLayout,
+    QVBoxLayout,
+    QWidget,
+)
 
 Part = QWidget | QLayout | int | tuple[QWidget | QLayout | None, int]
 """A widget or a layout, perhaps with its share of what room is left over; or pixels of a gap."""
@@ -41,6 +51,22 @@ def form_of(
     for name, field in rows:
         form.addRow(name, field)
     return form
+
+
+def grid_of(
+    *rows: Sequence[QWidget], gaps_px: tuple[int, int], wide: Sequence[int] = (1,)
+) -> QGridLayout:
+    """Rows of widgets in columns, of which the ``wide`` ones share what room is left over."""
+    grid = QGridLayout()
+    grid.setContentsMargins(0, 0, 0, 0)
+    grid.setHorizontalSpacing(gaps_px[0])
+    grid.setVerticalSpacing(gaps_px[1])
+    for column in wide:
+        grid.setColumnStretch(column, 1)
+    for line, row in enumerate(rows):
+        for column, widget in enumerate(row):
+            grid.addWidget(widget, line, column)
+    return grid
 
 
 def pane(*parts: Part, spacing_px: int = 0) -> QWidget:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QDialog, QDialogButtonBox, QFormLayout, QLabel, QScrollArea, QWidget
+from PySide6.QtWidgets import QDialog, QFormLayout, QLabel, QScrollArea, QWidget
 
+from sd2app.widgets.dialogs import closing
 from sd2app.widgets.layouts import column_of
 from sd2app.widgets.model_page import ModelPage
 from sd2app.widgets.panel import sentence, side_by_side, title
@@ -43,7 +44,5 @@ class ModelCardDialog(QDialog):
         scroll = QScrollArea(self)
         scroll.setWidget(inside)
         scroll.setWidgetResizable(True)
-        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close, self)
-        buttons.rejected.connect(self.reject)
-        self.setLayout(column_of(scroll, buttons))
+        self.setLayout(column_of(scroll, closing(self)))
         self.resize(640, 560)

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
-if TYPE_CHECKING:
-    from sd2core.sensor import VelocityAxis
-
+from sd2core.sensor import VelocityAxis
 
 _UNITS = {"mps": "m/s", "db": "dB", "s": "s", "hz": "Hz"}
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 from PySide6.QtCore import QEvent, QObject, QPoint, QRect, Qt, Signal
 from PySide6.QtGui import QAccessible, QAccessibleEvent, QCursor
-from PySide6.QtWidgets import QFrame, QSizePolicy, QToolButton, QWidget
+from PySide6.QtWidgets import QFrame, QSizePolicy, QWidget
 
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import outlined, say, sentence, show_words, title
@@ -38,12 +38,8 @@ class Notice(QFrame):
         self._text.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.buttons = {id: outlined(text, tip, run, self) for id, text, tip, run in buttons}
         self._close = close
-        cross = QToolButton(self)
-        cross.setText("✕")
-        cross.setToolTip("Close this message")
-        cross.setAccessibleName("Close this message")
-        cross.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-        cross.clicked.connect(self._dismiss)
+        tip = "Close this message"
+        cross = outlined("✕", tip, self._dismiss, self, name=tip, look="")
         words = column_of(self._title, self._text, spacing_px=2, margins_px=(0, 5, 0, 0))
         top = row_of((words, 1), spacing_px=8)
         top.addWidget(cross, 0, Qt.AlignmentFlag.AlignTop)

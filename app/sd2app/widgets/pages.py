@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QButtonGroup, QSizePolicy, QStackedWidget, QToolButton, QWidget
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QButtonGroup, QSizePolicy, QStackedWidget, QWidget
 
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
+from sd2app.widgets.panel import outlined
 
 
 class InnerPage(NamedTuple):
@@ -34,7 +35,8 @@ class InnerPages(QWidget):
         self._buttons = QButtonGroup(self)
         for place, page in enumerate(pages):
             self._pages.addWidget(page.page)
-            button = self._button(page)
+            button = outlined(page.name, page.tip, None, self, look="")
+            button.setCheckable(True)
             button.setChecked(place == 0)
             self._buttons.addButton(button, place)
         self._buttons.idClicked.connect(self._pages.setCurrentIndex)
@@ -76,16 +78,6 @@ class InnerPages(QWidget):
             page = self._pages.widget(place)
             assert page is not None
             page.setSizePolicy(policy.Preferred, kept)
-
-    def _button(self, page: InnerPage) -> QToolButton:
-        button = QToolButton(self)
-        button.setText(page.name)
-        button.setToolTip(page.tip)
-        button.setAccessibleName(page.name)
-        button.setAccessibleDescription(page.tip)
-        button.setCheckable(True)
-        button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-        return button
 
 
 def paged_panel(*pages: InnerPage) -> InnerPages:

@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import Literal
 
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import (
     QFrame,
-    QGridLayout,
     QHBoxLayout,
     QLabel,
     QLayout,
+    QMenu,
     QSizePolicy,
     QSplitter,
     QToolButton,
     QWidget,
 )
 
-from sd2app.widgets.layouts import STRETCH, column_of, row_of
+from sd2app.widgets.layouts import STRETCH, Part, column_of, grid_of, row_of
 
 
 def title(text: str, name: str = "") -> QLabel:
@@ -62,18 +63,61 @@ def rule() -> QFrame:
     return line
 
 
-def outlined(text: str, tip: str, run: Callable[[], object] | None, parent: QWidget) -> QToolButton:
-    """A button with a border."""
+def outlined(
+    text: str,
+    tip: str,
+    run: Callable[[], object] | QMenu | None,
+    parent: QWidget,
+    *,
+    name: str = "",
+    look: Literal["outlined", "primary", ""] = "outlined",
+) -> QToolButton:
+    """A button that does something or opens a menu, by its look with a border, filled or bare.
+
+    A text that is only a sign has a ``name`` for screen readers.
+    """
     button = QToolButton(parent)
-    button.setObjectName("outlined")
+    button.setObjectName(look)
     button.setText(text)
     button.setToolTip(tip)
-    button.setAccessibleName(text)
+    button.setAccessibleName(name or text)
     button.setAccessibleDescription(tip)
     button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-    if run is not None:
+    if isinstance(run, QMenu):
+        button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        button.setMenu(run)
+    elif run is not None:
         button.clicked.connect(lambda: run())
     return button
+
+
+class StateBar(QFrame):
+    """Line over the content about work under way; as high in all states, so that nothing moves."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__()
+        self.setObjectName("panel")
+        self.setAccessibleName(name)
+        self.setMinimumHeight(40)
+
+    def lay_out(
+        self,
+        parts: Sequence[Part],
+        buttons: Mapping[str, tuple[str, str, Callable[[], object]]],
+        spacing_px: int,
+    ) -> None:
+        """Put parts before the buttons, each a text, a tip that is its name too, and its use."""
+        self._buttons = {
+            id: outlined(text, tip, run, self, name=tip, look="" if text == "✕" else "outlined")
+            for id, (text, tip, run) in buttons.items()
+        }
+        made = (*parts, *self._buttons.values())
+        self.setLayout(row_of(*made, spacing_px=spacing_px, margins_px=(12, 4, 4, 4)))
+
+    def show_buttons(self, shown: Collection[str]) -> None:
+        """Show the buttons of these names."""
+        for name, button in self._buttons.items():
+            button.setVisible(name in shown)
 
 
 class Fold(QToolButton):
@@ -110,20 +154,15 @@ class FactRows(QWidget):
 
     def __init__(self, most: int, at_the_edge: bool, parent: QWidget) -> None:
         super().__init__(parent)
-        grid = QGridLayout(self)
-        grid.setContentsMargins(0, 0, 0, 0)
-        grid.setHorizontalSpacing(12)
-        grid.setVerticalSpacing(2)
-        grid.setColumnStretch(0 if at_the_edge else 1, 1)
         self._cells: list[tuple[QLabel, QLabel]] = []
-        for row in range(most):
+        for _ in range(most):
             name, value = sentence(""), QLabel(self)
             name.setWordWrap(at_the_edge)
             if at_the_edge:
                 value.setAlignment(Qt.AlignmentFlag.AlignRight)
-            grid.addWidget(name, row, 0)
-            grid.addWidget(value, row, 1)
             self._cells.append((name, value))
+        wide = 0 if at_the_edge else 1
+        self.setLayout(grid_of(*self._cells, gaps_px=(12, 2), wide=(wide,)))
 
     def show_facts(self, facts: Sequence[tuple[str, str]]) -> None:
         """Show facts, and nothing where there are none."""

@@ -14,9 +14,6 @@ from sd2app.widgets.dialogs import ask_new
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
 
-MenuPart = Callable[[QMenu, QPointF], None]
-"""Adds to the context menu of a widget what concerns a place in it."""
-
 _KINDS = "Picture (*.png);;Drawing (*.svg)"
 
 
@@ -69,7 +66,9 @@ def save_picture(widget: QWidget, name: str) -> None:
         QMessageBox.warning(widget.window(), "Save picture", str(error))
 
 
-def picture_menu(widget: QWidget, parts: Sequence[MenuPart], place: QPointF) -> QMenu:
+def picture_menu(
+    widget: QWidget, parts: Sequence[Callable[[QMenu, QPointF], None]], place: QPointF
+) -> QMenu:
     """Context menu of a widget: what its parts add for a place, then its picture."""
     menu = QMenu(widget)
     menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)

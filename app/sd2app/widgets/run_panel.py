@@ -114,10 +114,10 @@ class RunView(QWidget, Generic[Run]):
         self._bar = ProgressBar("Progress of the training")
         self._time, self._reason = sentence(""), sentence("", "warning")
         self._note = sentence("")
-        self._buttons = {one.name: outlined(one.text, one.tip, one.run, self) for one in buttons}
-        for one in buttons:
-            if one.primary:
-                self._buttons[one.name].setObjectName("primary")
+        self._buttons = {
+            name: outlined(text, tip, run, self, look="primary" if primary else "outlined")
+            for name, text, tip, run, primary in buttons
+        }
         *harmless, delete = self._buttons.values()
         # At the top, where no text above moves them; the one that deletes stands below, so that it
         # never comes to where another one was.

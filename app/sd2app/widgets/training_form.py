@@ -7,15 +7,7 @@ from functools import partial
 from typing import Any, NamedTuple
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import (
-    QApplication,
-    QGridLayout,
-    QLabel,
-    QMenu,
-    QSizePolicy,
-    QToolButton,
-    QWidget,
-)
+from PySide6.QtWidgets import QApplication, QGridLayout, QLabel, QMenu, QSizePolicy, QWidget
 
 from sd2app.background.run_setup import RunSetup
 from sd2app.feature import Shell
@@ -54,11 +46,9 @@ class TrainingForm(QWidget):
 
     def add_data(self, heading: str, add: str, tip: str, nothing: str) -> QMenu:
         """Add the list of data and who is learnt from; returns the menu for more."""
-        button = outlined(add, tip, None, self)
-        button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
-        menu = QMenu(button)
+        menu = QMenu(self)
         menu.setToolTipsVisible(True)
-        button.setMenu(menu)
+        button = outlined(add, tip, menu, self)
         self.nothing, self._division = sentence(nothing), sentence("")
         self._rows = column_of(spacing_px=6)
         self.column.addLayout(row_of(title(heading), STRETCH, button))
@@ -94,8 +84,7 @@ class TrainingForm(QWidget):
         for label in (self._time, self._basis, self._problem):
             self.column.addWidget(label)
         attempt, tip = self._shell.attempt, "Train in a background process"
-        self._start = outlined("Start training", tip, lambda: attempt(start), self)
-        self._start.setObjectName("primary")
+        self._start = outlined("Start training", tip, partial(attempt, start), self, look="primary")
         self._copy = outlined(
             "Copy command",
             "The same as a command for a terminal",
@@ -160,12 +149,8 @@ class TrainingForm(QWidget):
         heading.setText(one.path.name)
         heading.setToolTip(str(one.path))
         facts = sentence(one.problem or one.text, "warning" if one.problem else "muted")
-        button = QToolButton(row)
-        button.setText("✕")
-        button.setToolTip(f"Do not learn from {one.path.name}")
-        button.setAccessibleName(button.toolTip())
-        button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-        button.clicked.connect(lambda: self._setup.remove(one.path))
+        tip, remove = f"Do not learn from {one.path.name}", partial(self._setup.remove, one.path)
+        button = outlined("✕", tip, remove, row, name=tip, look="")
         grid = QGridLayout(row)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setSpacing(0)

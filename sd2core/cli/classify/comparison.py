@@ -12,11 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.classify.data import DATA_HELP, add_sources, clips_of
 from sd2core.cli.classify.train import add_network, network_of
+from sd2core.cli.command_parser import add_command
 from sd2core.cli.options import (
-    add_command,
-    add_json_and_progress,
-    add_output,
-    add_value,
     positive_int,
     share,
 )
@@ -31,51 +28,27 @@ if TYPE_CHECKING:
 
 def add_table(kinds: argparse._SubParsersAction) -> None:
     """Add ``table``."""
-    parser = add_command(
-        kinds,
-        "table",
-        "compare trainings with and without synthetic data",
-        handler=_table,
-        description=(
-            f"{DATA_HELP}\n\n"
-            "Trains on the radar's maps alone, and with synthetic maps of other movements added\n"
-            "(0.4 frames for each real one), denoised or not, seen from the radar's own place or\n"
-            "from others too; then with less and less of the real data. Everything is evaluated\n"
-            "on the radar's maps of people not trained on, other ones for each seed. With one\n"
-            "person, movements are kept apart instead.\n\n"
-            "OUT gets table.md, table.json, confusion.png and curve.png, and a small file for\n"
-            "every training: run again, only the missing ones are trained."
-        ),
-        examples=(
-            "  sd2 classify table campaign.zarr --out tables\n"
-            "  sd2 classify table campaign.zarr --out tables --quick\n"
-            "  sd2 classify table anna=a.sd2 ben=b.sd2 --out own --seeds 2"
-        ),
-    )
+    parser = add_command(kinds, "table", handler=_table, description=DATA_HELP)
     add_sources(parser)
-    add_output(parser, "FOLDER", "the tables, figures and models to write")
-    add_value(parser, "--seeds", positive_int, "N", "number of repetitions (default: 5; quick: 2)")
-    parser.add_argument(
+    parser.add_output("FOLDER", "the tables, figures and models to write")
+    parser.add_value("--seeds", positive_int, "N", "number of repetitions (default: 5; quick: 2)")
+    parser.add_value(
         "--shares",
-        type=_shares,
-        metavar="LIST",
-        help="shares of the real data for the learning curve (default:"
+        _shares,
+        "LIST",
+        "shares of the real data for the learning curve (default:"
         " 1%%,2%%,5%%,10%%,25%%,50%%,100%%; quick: 10%%,100%%)",
     )
-    parser.add_argument("--quick", action="store_true", help="few trainings, for a first look")
-    parser.add_argument(
-        "--radar-only",
-        action="store_true",
-        help="add no synthetic maps: compare networks and amounts of radar data only",
+    parser.add_flag("--quick", "few trainings, for a first look")
+    parser.add_flag(
+        "--radar-only", "add no synthetic maps: compare networks and amounts of radar data only"
     )
-    parser.add_argument(
-        "--same-people",
-        action="store_true",
-        help="judge other movements of the people trained on, instead of other people",
+    parser.add_flag(
+        "--same-people", "judge other movements of the people trained on, instead of other people"
     )
     add_network(parser)
-    add_value(parser, "--steps", positive_int, "N", "batches per training")
-    add_json_and_progress(parser)
+    parser.add_value("--steps", positive_int, "N", "batches per training")
+    parser.add_json_and_progress()
 
 
 def _shares(text: str) -> tuple[float, ...]:
@@ -83,6 +56,21 @@ def _shares(text: str) -> tuple[float, ...]:
 
 
 def _table(options: argparse.Namespace) -> None:
+    """Compare trainings with and without synthetic data.
+
+    Trains on the radar's maps alone, and with synthetic maps of other movements added
+    (0.4 frames for each real one), denoised or not, seen from the radar's own place or
+    from others too; then with less and less of the real data. Everything is evaluated
+    on the radar's maps of people not trained on, other ones for each seed. With one
+    person, movements are kept apart instead.
+
+    OUT gets table.md, table.json, confusion.png and curve.png, and a small file for
+    every training: run again, only the missing ones are trained.
+
+      sd2 classify table campaign.zarr --out tables
+      sd2 classify table campaign.zarr --out tables --quick
+      sd2 classify table anna=a.sd2 ben=b.sd2 --out own --seeds 2
+    """
     from sd2core.classify.comparison import make_table
     from sd2core.classify.comparison_report import as_json, as_text
 

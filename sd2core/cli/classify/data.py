@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from sd2core.cli.command_parser import Options
 from sd2core.cli.recording_maps import MAP_NAMES, MapName, maps_of, parsed_maps, usual_maps
 from sd2core.errors import Sd2Error
 
@@ -41,27 +42,18 @@ def source(text: str) -> LabelledSource:
     return LabelledSource(Path(text), "")
 
 
-def add_data(parser: argparse.ArgumentParser) -> None:
+def add_data(parser: Options) -> None:
     """Add the options for data and the choice of their maps."""
     add_sources(parser)
-    parser.add_argument(
-        "--maps",
-        default="radar",
-        metavar="LIST",
-        help=f"some of {', '.join(MAP_NAMES)}, separated by commas (default: radar)",
-    )
+    text = f"some of {', '.join(MAP_NAMES)}, separated by commas (default: radar)"
+    parser.add_value("--maps", str, "LIST", text, "radar")
 
 
-def add_sources(parser: argparse.ArgumentParser) -> None:
+def add_sources(parser: Options) -> None:
     """Add the options for data and the denoiser."""
-    parser.add_argument(
-        "data", nargs="+", type=source, metavar="DATA", help="labelled data, see above"
-    )
-    parser.add_argument(
-        "--denoiser",
-        metavar="FILE|NAME",
-        help="for denoised maps of pairs (default: the one that comes with SD² Studio)",
-    )
+    parser.add_value("data", source, "DATA", "labelled data, see above", nargs="+")
+    text = "for denoised maps of pairs (default: the one that comes with SD² Studio)"
+    parser.add_value("--denoiser", str, "FILE|NAME", text)
 
 
 def clips_of(

@@ -12,13 +12,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from sd2core.classify.defaults import DELAY_S, MODELS, WIDTH
 from sd2core.cli.classify.data import DATA_HELP, add_data, asked_maps, clips_of, split_of
+from sd2core.cli.command_parser import Options, add_command
 from sd2core.cli.options import (
-    add_command,
-    add_json_and_progress,
-    add_output,
-    add_people_kept_out,
-    add_placements_used,
-    add_value,
     given,
     not_negative_float,
     positive_float,
@@ -34,72 +29,37 @@ if TYPE_CHECKING:
 
 def add_train(kinds: argparse._SubParsersAction) -> None:
     """Add ``train``."""
-    parser = add_command(
-        kinds,
-        "train",
-        "train a classifier on labelled maps",
-        handler=_train,
-        description=(
-            f"{DATA_HELP}\n\n"
-            "Some people are kept out for validation, some for `sd2 classify eval`.\n"
-            "Ctrl-C ends the training early; the best so far is kept. The file\n"
-            "FILE.json beside it describes the training."
-        ),
-        examples=(
-            "  sd2 classify train campaign.zarr --out gestures.safetensors\n"
-            "  sd2 classify train set.zarr --maps radar,denoised --out both.safetensors\n"
-            "  sd2 classify train anna=a.sd2 anna=b.sd2 ben=c.sd2 --model s4 --out own.safetensors"
-        ),
-    )
+    parser = add_command(kinds, "train", handler=_train, description=DATA_HELP)
     add_data(parser)
-    add_output(parser, "FILE.safetensors", "the classifier to write")
+    parser.add_output("FILE.safetensors", "the classifier to write")
     add_network(parser)
-    add_placements_used(parser, "range synthesis: train on", "all")
+    parser.add_placements_used("range synthesis: train on", "all")
     otherwise = "(default: as the data set says, or a sixth of all)"
-    add_people_kept_out(
-        parser,
+    parser.add_people_kept_out(
         f"kept out for validation, separated by commas, or none {otherwise}",
         f"kept out for a test, or none {otherwise}",
     )
-    add_value(parser, "--steps", positive_int, "N", "number of training steps")
-    add_value(
-        parser, "--patience", positive_int, "N", "end after so many validations without improvement"
+    parser.add_value("--steps", positive_int, "N", "number of training steps")
+    parser.add_value(
+        "--patience", positive_int, "N", "end after so many validations without improvement"
     )
-    add_value(parser, "--learning-rate", positive_float, "RATE", "peak learning rate")
-    add_value(parser, "--seed", int, "N", "seed of all random numbers", 0)
-    add_json_and_progress(parser)
+    parser.add_value("--learning-rate", positive_float, "RATE", "peak learning rate")
+    parser.add_value("--seed", int, "N", "seed of all random numbers", 0)
+    parser.add_json_and_progress()
 
 
-def add_network(parser: argparse.ArgumentParser) -> None:
+def add_network(parser: Options) -> None:
     """Add model, features, width and delay."""
     group = parser.add_argument_group("network")
-    group.add_argument(
-        "--model",
-        choices=MODELS,
-        default=MODELS[0],
-        help=f"two LSTM layers (the paper's), or two S4 layers (default: {MODELS[0]})",
-    )
-    group.add_argument(
-        "--features",
-        choices=("columns", "peak"),
-        default="columns",
-        help="input per frame: whole columns (the default), or the strongest bin (the paper's)",
-    )
-    group.add_argument(
-        "--width",
-        type=positive_int,
-        default=WIDTH,
-        metavar="N",
-        help=f"units or channels of a layer (default: {WIDTH}; the paper's: 16)",
-    )
-    group.add_argument(
-        "--delay-s",
-        type=not_negative_float,
-        default=DELAY_S,
-        metavar="S",
-        help="classify a frame so much later, with the frames after it known (default:"
-        f" {DELAY_S:g}; the paper's: 0, at once)",
-    )
+    text = "two LSTM layers (the paper's), or two S4 layers"
+    group.add_choice("--model", MODELS, text, MODELS[0])
+    text = "input per frame: whole columns (the default), or the strongest bin (the paper's)"
+    group.add_choice("--features", ("columns", "peak"), text, "columns")
+    text = f"units or channels of a layer (default: {WIDTH}; the paper's: 16)"
+    group.add_value("--width", positive_int, "N", text, WIDTH)
+    text = "classify a frame so much later, with the frames after it known (default:"
+    text += f" {DELAY_S:g}; the paper's: 0, at once)"
+    group.add_value("--delay-s", not_negative_float, "S", text, DELAY_S)
 
 
 def network_of(options: argparse.Namespace) -> Network:
@@ -110,6 +70,16 @@ def network_of(options: argparse.Namespace) -> Network:
 
 
 def _train(options: argparse.Namespace) -> int:
+    """Train a classifier on labelled maps.
+
+    Some people are kept out for validation, some for `sd2 classify eval`.
+    Ctrl-C ends the training early; the best so far is kept. The file
+    FILE.json beside it describes the training.
+
+      sd2 classify train campaign.zarr --out gestures.safetensors
+      sd2 classify train set.zarr --maps radar,denoised --out both.safetensors
+      sd2 classify train anna=a.sd2 anna=b.sd2 ben=c.sd2 --model s4 --out own.safetensors
+    """
     from sd2core.cli.reading import check_output
 
     check_output(options.out, ".safetensors")

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sd2core.cli.classify.data import DATA_HELP, add_data, asked_maps, clips_of
+from sd2core.cli.command_parser import Options, add_command
 from sd2core.cli.eval import add_judging, named_subjects
 from sd2core.cli.labels.reading import check_label_output, print_lost
 from sd2core.cli.labels.suggest import (
@@ -16,7 +17,9 @@ from sd2core.cli.labels.suggest import (
     spans_data,
     write_found,
 )
-from sd2core.cli.options import add_command, add_json, add_value, not_negative_float
+from sd2core.cli.options import (
+    not_negative_float,
+)
 from sd2core.cli.output import counted, print_json, print_rows, progress_bar
 from sd2core.cli.recording_maps import MAP_NAMES
 from sd2core.errors import Sd2Error
@@ -30,40 +33,29 @@ if TYPE_CHECKING:
     from sd2core.classify.metrics import Score
 
 
-def _add_model(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--model",
-        type=Path,
-        required=True,
-        metavar="FILE",
-        help="classifier from `sd2 classify train`",
-    )
+def _add_model(parser: Options) -> None:
+    text = "classifier from `sd2 classify train`"
+    parser.add_value("--model", Path, "FILE", text, required=True)
 
 
 def add_eval(kinds: argparse._SubParsersAction) -> None:
     """Add ``eval``."""
-    parser = add_command(
-        kinds,
-        "eval",
-        "evaluate a classifier on people it was not trained on",
-        handler=_eval,
-        description=(
-            f"{DATA_HELP}\n\n"
-            "Prints the confusion matrices of frames and of whole gestures, and the latency of a\n"
-            "recognised gesture. Uses the people that the training kept for the test, or those\n"
-            "that are named."
-        ),
-        examples=(
-            "  sd2 classify eval campaign.zarr --model gestures.safetensors\n"
-            "  sd2 classify eval own.sd2 --model g.safetensors --subjects all --figure matrix.png"
-        ),
-    )
+    parser = add_command(kinds, "eval", handler=_eval, description=DATA_HELP)
     add_data(parser)
     _add_model(parser)
     add_judging(parser, "those the training kept for the test", "both matrices")
 
 
 def _eval(options: argparse.Namespace) -> None:
+    """Evaluate a classifier on people it was not trained on.
+
+    Prints the confusion matrices of frames and of whole gestures, and the latency of a
+    recognised gesture. Uses the people that the training kept for the test, or those
+    that are named.
+
+      sd2 classify eval campaign.zarr --model gestures.safetensors
+      sd2 classify eval own.sd2 --model g.safetensors --subjects all --figure matrix.png
+    """
     from sd2core.classify.files import load_classifier
     from sd2core.classify.live import judge
     from sd2core.files.figure_files import check_figure, save_figure
@@ -140,45 +132,38 @@ def _say(found: Score, known: ClipSet, subjects: list[str], learnt: list[str]) -
 
 def add_apply(kinds: argparse._SubParsersAction) -> None:
     """Add ``apply``."""
-    parser = add_command(
-        kinds,
-        "apply",
-        "find gestures in a recording or a map",
-        handler=_apply,
-        description=(
-            "Computes the probability of each class in every frame, and spans of the frames in\n"
-            "which a gesture is the most probable class. The confidence of a span is the mean\n"
-            "probability of its class. The map must be on the velocity axis that the classifier\n"
-            "was trained on; another frame rate is resampled to the classifier's and back."
-        ),
-        examples=(
-            "  sd2 classify apply walk.sd2 --model gestures.safetensors\n"
-            "  sd2 classify apply walk.sd2 --of radar --model g.safetensors --out found.json\n"
-            "  sd2 classify apply map.npz --model g.safetensors --probabilities p.npz"
-        ),
-    )
+    parser = add_command(kinds, "apply", handler=_apply)
     add_searched_map(parser, MAP_NAMES)
     _add_model(parser)
-    parser.add_argument(
+    parser.add_value(
         "--probabilities",
-        type=Path,
-        metavar="FILE.npz",
-        help="write `probabilities` (frames, classes), `times_s` and `classes`",
+        Path,
+        "FILE.npz",
+        "write `probabilities` (frames, classes), `times_s` and `classes`",
     )
-    add_value(
-        parser, "--min-duration-s", not_negative_float, "S", "shorter spans are left out", 0.2
-    )
-    parser.add_argument(
+    parser.add_value("--min-duration-s", not_negative_float, "S", "shorter spans are left out", 0.2)
+    parser.add_value(
         "--merge-gap-s",
-        type=not_negative_float,
-        default=0.1,
-        metavar="S",
-        help="merge spans of a class with a shorter gap between them (default: 0.1)",
+        not_negative_float,
+        "S",
+        "merge spans of a class with a shorter gap between them",
+        0.1,
     )
-    add_json(parser)
+    parser.add_json()
 
 
 def _apply(options: argparse.Namespace) -> None:
+    """Find gestures in a recording or a map.
+
+    Computes the probability of each class in every frame, and spans of the frames in
+    which a gesture is the most probable class. The confidence of a span is the mean
+    probability of its class. The map must be on the velocity axis that the classifier
+    was trained on; another frame rate is resampled to the classifier's and back.
+
+      sd2 classify apply walk.sd2 --model gestures.safetensors
+      sd2 classify apply walk.sd2 --of radar --model g.safetensors --out found.json
+      sd2 classify apply map.npz --model g.safetensors --probabilities p.npz
+    """
     from sd2core.classify.files import describe_classifier, load_classifier
     from sd2core.classify.spans import SpanOptions, predicted_spans
     from sd2core.cli.reading import check_output

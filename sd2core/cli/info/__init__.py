@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from sd2core.cli.command_parser import add_command
 from sd2core.cli.info.description import (
     Description,
     describe_imu,
@@ -16,29 +17,26 @@ from sd2core.cli.info.description import (
     describe_video,
     show,
 )
-from sd2core.cli.options import add_command, add_json, add_mesh_reading, add_value
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``info``."""
-    parser = add_command(
-        commands,
-        "info",
-        "what is in a recording, video, mesh, radar or IMU file, map, pairs, data set or model",
-        handler=_info,
-        examples="  sd2 info walk.sd2\n  sd2 info walk.npz --json\n  sd2 info walk.zarr --verify",
+    parser = add_command(commands, "info", handler=_info)
+    parser.add_value("path", Path, "PATH", "what to describe")
+    parser.add_flag(
+        "--verify", "read every chunk and compare it with its checksum; what is damaged is named"
     )
-    add_value(parser, "path", Path, "PATH", "what to describe")
-    parser.add_argument(
-        "--verify",
-        action="store_true",
-        help="read every chunk and compare it with its checksum; what is damaged is named",
-    )
-    add_mesh_reading(parser)
-    add_json(parser)
+    parser.add_mesh_reading()
+    parser.add_json()
 
 
 def _info(options: argparse.Namespace) -> None:
+    """What is in a recording, video, mesh, radar or IMU file, map, pairs, data set or model.
+
+    sd2 info walk.sd2
+    sd2 info walk.npz --json
+    sd2 info walk.zarr --verify
+    """
     if not options.verify:
         show(describe(options.path, options), as_json=options.json)
         return

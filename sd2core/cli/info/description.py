@@ -7,7 +7,7 @@ from pathlib import Path
 from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
-from sd2core.cli.output import print_facts, print_json, progress_bar
+from sd2core.cli.output import picked, print_facts, print_json, progress_bar
 
 if TYPE_CHECKING:
     import numpy as np
@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from sd2core.recording.recording import Recording
     from sd2core.sensor import VelocityAxis
     from sd2core.timebase import Timebase
+
+
+_SPAN = ("start_s", "end_s", "label")
 
 
 @dataclass
@@ -57,21 +60,14 @@ def describe_recording(recording: Recording, parts: list[Description]) -> Descri
     data = {
         "kind": "recording",
         "path": str(recording.folder),
-        "title": recording.title,
-        "simulated": recording.simulated,
-        "radar_offset_s": recording.radar_offset_s,
-        "radar_receiver": recording.radar_receiver,
-        "radar_transmitter": recording.radar_transmitter,
-        "imu_offset_s": recording.imu_offset_s,
+        **picked(recording, "title", "simulated", "radar_offset_s"),
+        **picked(recording, "radar_receiver", "radar_transmitter", "imu_offset_s"),
         "imu_places": list(recording.imu_places),
         "camera": None if recording.camera is None else recording.camera.model_dump(mode="json"),
         "sensor_position_m": [x, y, z],
         "denoiser": None if recording.denoiser is None else str(recording.denoiser),
         "bundled_denoiser": recording.bundled_denoiser,
-        "spans": [
-            {"start_s": span.start_s, "end_s": span.end_s, "label": span.label}
-            for span in recording.labelled.spans
-        ],
+        "spans": [picked(span, *_SPAN) for span in recording.labelled.spans],
         "missing": {role: str(path) for role, path in missing.items()},
         "notes": list(recording.notes),
     }
@@ -120,8 +116,7 @@ def describe_video(path: Path, video: VideoReader) -> Description:
     data = {
         "kind": "video",
         "path": str(path),
-        "width": video.width,
-        "height": video.height,
+        **picked(video, "width", "height"),
         **_clock_data(video.timebase),
         "notes": list(video.notes),
     }
@@ -181,9 +176,7 @@ def describe_recorded_map(path: Path, recorded: RecordedMap) -> Description:
         "kind": "radar",
         "simulated": False,
         "gesture": recorded.gesture,
-        "labels": [
-            {"start_s": span.start_s, "end_s": span.end_s, "label": span.label} for span in spans
-        ],
+        "labels": [picked(span, *_SPAN) for span in spans],
         "notes": list(recorded.notes),
     }
     labelled = ", ".join(f"{span.start_s:.3f} to {span.end_s:.3f} s" for span in spans)
@@ -255,12 +248,9 @@ def describe_capture(path: Path, capture: RadarCapture) -> Description:
         "path": str(path),
         "simulated": capture.simulated,
         "radar": config.name,
-        "receivers": config.receivers,
-        "transmitters": config.transmitters,
-        "sampling": config.sampling,
+        **picked(config, "receivers", "transmitters", "sampling"),
         "carrier_hz": config.centre_frequency_hz,
-        "chirps_per_frame": config.chirps_per_frame,
-        "samples_per_chirp": config.samples_per_chirp,
+        **picked(config, "chirps_per_frame", "samples_per_chirp"),
         **limits(config),
         **_clock_data(capture.timebase),
         "start_unix_s": capture.start_unix_s,
@@ -284,8 +274,7 @@ def describe_map(path: Path, doppler: DopplerMap) -> Description:
         "path": str(path),
         "map_kind": doppler.kind,
         "unit": doppler.unit,
-        "bins": doppler.axis.bins,
-        "v_max_mps": doppler.axis.v_max_mps,
+        **picked(doppler.axis, "bins", "v_max_mps"),
         "null_bins": list(doppler.null_bins),
         "unseen_bins": list(doppler.unseen_bins),
         **_clock_data(doppler.timebase),
@@ -429,7 +418,5 @@ def _clock(timebase: Timebase) -> str:
 def _clock_data(timebase: Timebase) -> dict[str, float]:
     return {
         "frames": len(timebase),
-        "start_s": timebase.start_s,
-        "duration_s": timebase.duration_s,
-        "frames_per_s": timebase.frames_per_s,
+        **picked(timebase, "start_s", "duration_s", "frames_per_s"),
     }

@@ -6,6 +6,7 @@ import argparse
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
+from sd2core.cli.command_parser import add_command
 from sd2core.cli.labels.agree import add_agree
 from sd2core.cli.labels.label_set import add_set
 from sd2core.cli.labels.reading import (
@@ -19,7 +20,6 @@ from sd2core.cli.labels.reading import (
 from sd2core.cli.labels.recording import add_cut, add_figure
 from sd2core.cli.labels.recover import add_recover
 from sd2core.cli.labels.suggest import add_suggest
-from sd2core.cli.options import add_command, add_json, add_output
 from sd2core.cli.output import counted, print_json, print_rows
 
 if TYPE_CHECKING:
@@ -29,57 +29,28 @@ if TYPE_CHECKING:
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
-    """Add ``labels`` and its commands."""
-    parser = add_command(
-        commands,
-        "labels",
-        "show, count, convert, suggest, compare, draw and cut out labelled spans",
-        examples=(
-            "  sd2 labels show walk.sd2\n"
-            "  sd2 labels statistics walk.sd2 --csv\n"
-            "  sd2 labels convert walk.sd2 --out walk.eaf\n"
-            "  sd2 labels suggest walk.sd2 --out suggested.json\n"
-            "  sd2 labels agree anna.json ben.json --video walk.mp4\n"
-            "  sd2 labels figure walk.sd2 --out walk.pdf\n"
-            "  sd2 labels cut walk.sd2 --out cuts"
-        ),
-    )
-    kinds = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    show = add_command(
-        kinds,
-        "show",
-        "print labels with their number and durations",
-        handler=_show,
-        description=(
-            "FILE is a labels.json, a recording, the .h5 of a K60168A, or a file of ELAN, Praat,\n"
-            "BORIS, Audacity, MNE-Python or a table (.csv, .tsv). With frame times the frames of\n"
-            "each span are printed as well: half-open, the second is the first one after it."
-        ),
-        examples="  sd2 labels show walk.sd2\n  sd2 labels show walk.eaf --video walk.mp4 --json",
-    )
-    add_labels(show)
-    add_json(show)
+    """Show, count, convert, suggest, compare, draw and cut out labelled spans.
 
-    convert = add_command(
-        kinds,
-        "convert",
-        "write labels as another program reads them",
-        handler=_convert,
-        description=(
-            "The suffix of --out says which program: .json for SD² Studio, .csv, .tsv, .eaf,\n"
-            ".TextGrid, .boris; a .txt needs --to. Prints what the file could not hold."
-        ),
-        examples=(
-            "  sd2 labels convert walk.sd2 --out walk.eaf\n"
-            "  sd2 labels convert labels.json --out labels.txt --to audacity --fps 30\n"
-            "  sd2 labels convert walk.eaf --out labels.json"
-        ),
-    )
+    sd2 labels show walk.sd2
+    sd2 labels statistics walk.sd2 --csv
+    sd2 labels convert walk.sd2 --out walk.eaf
+    sd2 labels suggest walk.sd2 --out suggested.json
+    sd2 labels agree anna.json ben.json --video walk.mp4
+    sd2 labels figure walk.sd2 --out walk.pdf
+    sd2 labels cut walk.sd2 --out cuts
+    """
+    parser = add_command(commands, "labels", about=add_commands)
+    kinds = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    show = add_command(kinds, "show", handler=_show)
+    add_labels(show)
+    show.add_json()
+
+    convert = add_command(kinds, "convert", handler=_convert)
     add_labels(convert)
-    add_output(convert, "FILE", "the file to write")
-    convert.add_argument("--to", metavar="NAME", help="the format of --out, likewise")
+    convert.add_output("FILE", "the file to write")
+    convert.add_value("--to", str, "NAME", "the format of --out, likewise")
     add_replace(convert)
-    add_json(convert)
+    convert.add_json()
 
     _add_statistics(kinds)
     add_set(kinds)
@@ -91,6 +62,15 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 
 def _show(options: argparse.Namespace) -> None:
+    """Print labels with their number and durations.
+
+    FILE is a labels.json, a recording, the .h5 of a K60168A, or a file of ELAN, Praat,
+    BORIS, Audacity, MNE-Python or a table (.csv, .tsv). With frame times the frames of
+    each span are printed as well: half-open, the second is the first one after it.
+
+      sd2 labels show walk.sd2
+      sd2 labels show walk.eaf --video walk.mp4 --json
+    """
     labels, clock = read_named(options)
     if options.json:
         print_json(_described(labels, clock))
@@ -118,6 +98,15 @@ def _show(options: argparse.Namespace) -> None:
 
 
 def _convert(options: argparse.Namespace) -> None:
+    """Write labels as another program reads them.
+
+    The suffix of --out says which program: .json for SD² Studio, .csv, .tsv, .eaf,
+    .TextGrid, .boris; a .txt needs --to. Prints what the file could not hold.
+
+      sd2 labels convert walk.sd2 --out walk.eaf
+      sd2 labels convert labels.json --out labels.txt --to audacity --fps 30
+      sd2 labels convert walk.eaf --out labels.json
+    """
     there = check_label_output(options.out, replace=options.replace)
     labels, clock = read_named(options)
     lost = write(options.out, labels, clock, options.to, over=there)
@@ -141,27 +130,22 @@ def _described(labels: Labels, clock: Timebase | None) -> dict[str, Any]:
 
 
 def _add_statistics(kinds: argparse._SubParsersAction) -> None:
-    parser = add_command(
-        kinds,
-        "statistics",
-        "count the spans of every label and print their durations",
-        handler=_statistics,
-        description=(
-            "Durations per label, and with frame times the share of the recording that its spans\n"
-            "cover; overlapping spans count once."
-        ),
-        examples=(
-            "  sd2 labels statistics walk.sd2\n"
-            "  sd2 labels statistics walk.eaf --video walk.mp4 --csv"
-        ),
-    )
+    parser = add_command(kinds, "statistics", handler=_statistics)
     add_labels(parser)
     form = parser.add_mutually_exclusive_group()
-    form.add_argument("--csv", action="store_true", help="print comma-separated values")
-    add_json(form)
+    form.add_flag("--csv", "print comma-separated values")
+    form.add_json()
 
 
 def _statistics(options: argparse.Namespace) -> None:
+    """Count the spans of every label and print their durations.
+
+    Durations per label, and with frame times the share of the recording that its spans
+    cover; overlapping spans count once.
+
+      sd2 labels statistics walk.sd2
+      sd2 labels statistics walk.eaf --video walk.mp4 --csv
+    """
     from sd2core.labels.statistics import statistics_rows, statistics_text
 
     labels, clock = read_named(options)

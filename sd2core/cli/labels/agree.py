@@ -7,10 +7,13 @@ from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, Any
 
+from sd2core.cli.command_parser import add_command
 from sd2core.cli.labels.reading import add_clock, clock_of, labels_at, needed, with_rate
 from sd2core.cli.labels.suggest import spans_data
-from sd2core.cli.options import add_command, add_json, add_value, share
-from sd2core.cli.output import counted, print_json, print_rows
+from sd2core.cli.options import (
+    share,
+)
+from sd2core.cli.output import counted, picked, print_json, print_rows
 
 if TYPE_CHECKING:
     from sd2core.labels.agreement import Agreement, Answer, Kappa
@@ -18,31 +21,26 @@ if TYPE_CHECKING:
 
 def add_agree(kinds: argparse._SubParsersAction) -> None:
     """Add ``agree``."""
-    parser = add_command(
-        kinds,
-        "agree",
-        "compare the labels of two people",
-        handler=_agree,
-        description=(
-            "Frame by frame by Cohen's kappa (1 is agreement, 0 is chance), span by span by\n"
-            "one-to-one matches. Differences of edges are B's less A's: positive is later."
-        ),
-        examples=(
-            "  sd2 labels agree anna.json ben.json --video walk.mp4\n"
-            "  sd2 labels agree walk.sd2 ben.eaf --min-iou 0.3 --track Gestures"
-        ),
+    parser = add_command(kinds, "agree", handler=_agree)
+    parser.add_value("a", Path, "A", "labels of one person")
+    parser.add_value("b", Path, "B", "labels of the other")
+    parser.add_value(
+        "--min-iou", share, "SHARE", "intersection over union that a match must reach", 0.5
     )
-    add_value(parser, "a", Path, "A", "labels of one person")
-    add_value(parser, "b", Path, "B", "labels of the other")
-    add_value(
-        parser, "--min-iou", share, "SHARE", "intersection over union that a match must reach", 0.5
-    )
-    parser.add_argument("--track", metavar="NAME", help="compare this track only")
+    parser.add_value("--track", str, "NAME", "compare this track only")
     add_clock(parser)
-    add_json(parser)
+    parser.add_json()
 
 
 def _agree(options: argparse.Namespace) -> None:
+    """Compare the labels of two people.
+
+    Frame by frame by Cohen's kappa (1 is agreement, 0 is chance), span by span by
+    one-to-one matches. Differences of edges are B's less A's: positive is later.
+
+      sd2 labels agree anna.json ben.json --video walk.mp4
+      sd2 labels agree walk.sd2 ben.eaf --min-iou 0.3 --track Gestures
+    """
     from sd2core.labels.agreement import agreement
 
     clock = clock_of(options, options.a, options.b)
@@ -120,17 +118,21 @@ def _data(found: Agreement) -> dict[str, Any]:
                 "b": match.b.id,
                 "label_a": match.a.label,
                 "label_b": match.b.label,
-                "iou": match.iou,
-                "start_difference_s": match.start_difference_s,
-                "end_difference_s": match.end_difference_s,
-                "start_difference_frames": match.start_difference_frames,
-                "end_difference_frames": match.end_difference_frames,
+                **picked(match, "iou", *_DIFFERENCES),
             }
             for match in spans.matches
         ],
         "only_a": spans_data(spans.only_a, "label"),
         "only_b": spans_data(spans.only_b, "label"),
     }
+
+
+_DIFFERENCES = (
+    "start_difference_s",
+    "end_difference_s",
+    "start_difference_frames",
+    "end_difference_frames",
+)
 
 
 def _kappa(kappa: Kappa) -> tuple[str, str, str]:

@@ -7,6 +7,7 @@ from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from sd2core.cli.command_parser import add_command
 from sd2core.cli.labels.reading import (
     add_labels,
     add_replace,
@@ -15,7 +16,6 @@ from sd2core.cli.labels.reading import (
     read_named,
     write,
 )
-from sd2core.cli.options import add_command, add_json, add_output, add_value
 from sd2core.cli.output import counted, print_json, print_rows
 from sd2core.errors import Sd2Error
 
@@ -28,33 +28,26 @@ _USUAL = "usual"
 
 def add_set(kinds: argparse._SubParsersAction) -> None:
     """Add ``set``."""
-    parser = add_command(
-        kinds,
-        "set",
-        "show, share or exchange a label set",
-        handler=_set,
-        description=(
-            "Prints the labels with key, colour, class for the classifier and how many spans have\n"
-            "them, and labels whose colours look alike. With --use spans keep their labels, also\n"
-            "those that the other set does not have."
-        ),
-        examples=(
-            "  sd2 labels set walk.sd2\n"
-            "  sd2 labels set walk.sd2 --export gestures.json\n"
-            "  sd2 labels set walk.sd2 --use gestures.json --out labels.json"
-        ),
-    )
+    parser = add_command(kinds, "set", handler=_set)
     add_labels(parser)
-    add_value(parser, "--export", Path, "FILE.json", "write the set by itself")
-    parser.add_argument(
-        "--use", metavar="FILE.json", help=f"another set; {_USUAL!r} is the program's own"
-    )
-    add_output(parser, "FILE", "where to write the labels with that other set", required=False)
+    parser.add_value("--export", Path, "FILE.json", "write the set by itself")
+    parser.add_value("--use", str, "FILE.json", f"another set; {_USUAL!r} is the program's own")
+    parser.add_output("FILE", "where to write the labels with that other set", required=False)
     add_replace(parser)
-    add_json(parser)
+    parser.add_json()
 
 
 def _set(options: argparse.Namespace) -> None:
+    """Show, share or exchange a label set.
+
+    Prints the labels with key, colour, class for the classifier and how many spans have
+    them, and labels whose colours look alike. With --use spans keep their labels, also
+    those that the other set does not have.
+
+      sd2 labels set walk.sd2
+      sd2 labels set walk.sd2 --export gestures.json
+      sd2 labels set walk.sd2 --use gestures.json --out labels.json
+    """
     from sd2core.labels import files
     from sd2core.labels.field_edits import set_label_set
 

@@ -7,7 +7,8 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sd2core.cli.options import add_value, positive_float
+from sd2core.cli.command_parser import Options
+from sd2core.cli.options import positive_float
 from sd2core.errors import Sd2Error
 from sd2core.files.digests import cached_digest
 
@@ -20,23 +21,21 @@ _MOST_FRAMES = 100_000_000
 _FORMATS = "sd2, csv, audacity, elan, textgrid, boris or mne"
 
 
-def add_clock(parser: argparse.ArgumentParser) -> None:
+def add_clock(parser: Options) -> None:
     """Add the options that give the times of frames."""
     group = parser.add_argument_group("frame times", "one of these; a recording brings its own")
     choice = group.add_mutually_exclusive_group()
-    add_value(choice, "--recording", Path, "RECORDING", "those of a recording")
-    add_value(choice, "--video", Path, "FILE", "those of a video")
-    add_value(choice, "--mesh", Path, "FILE", "those of a mesh")
-    add_value(choice, "--fps", positive_float, "FPS", "so many per second from 0 s on")
+    choice.add_value("--recording", Path, "RECORDING", "those of a recording")
+    choice.add_value("--video", Path, "FILE", "those of a video")
+    choice.add_value("--mesh", Path, "FILE", "those of a mesh")
+    choice.add_value("--fps", positive_float, "FPS", "so many per second from 0 s on")
 
 
-def add_labels(parser: argparse.ArgumentParser) -> None:
+def add_labels(parser: Options) -> None:
     """Add a file with labels, how to read it, and the times of frames; see :func:`read_named`."""
-    add_value(parser, "file", Path, "FILE", "the file with labels")
-    parser.add_argument("--format", metavar="NAME", help=f"the format of FILE: {_FORMATS}")
-    parser.add_argument(
-        "--observation", metavar="NAME", help="which one of a BORIS project with several"
-    )
+    parser.add_value("file", Path, "FILE", "the file with labels")
+    parser.add_value("--format", str, "NAME", f"the format of FILE: {_FORMATS}")
+    parser.add_value("--observation", str, "NAME", "which one of a BORIS project with several")
     add_clock(parser)
 
 
@@ -47,9 +46,9 @@ def read_named(options: argparse.Namespace) -> tuple[Labels, Timebase | None]:
     return labels, with_rate(options, clock, labels)
 
 
-def add_replace(parser: argparse.ArgumentParser) -> None:
+def add_replace(parser: Options) -> None:
     """Add ``--replace``."""
-    parser.add_argument("--replace", action="store_true", help="replace the file where it exists")
+    parser.add_flag("--replace", "replace the file where it exists")
 
 
 def labels_at(
@@ -60,7 +59,6 @@ def labels_at(
 ) -> Labels:
     """Read labels of a ``labels.json``, a recording, a radar file or another program's file."""
     from sd2core.io.radar import holds_map, load_recorded_map
-    from sd2core.labels import files
     from sd2core.labels.formats import read_labels
     from sd2core.recording.recording import is_recording, open_recording
 
@@ -72,8 +70,6 @@ def labels_at(
         return open_recording(path).effective_labels()
     if holds_map(path):
         return load_recorded_map(path).labels
-    if path.suffix.lower() == ".json":
-        return files.read_labels(path).labels
     return read_labels(path, timebase, observation=observation)
 
 

@@ -7,8 +7,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from sd2core.cli.command_parser import add_command
 from sd2core.cli.labels.reading import labels_at, recording_clock
-from sd2core.cli.options import add_command, add_json, add_output, add_value, not_negative_float
+from sd2core.cli.options import (
+    not_negative_float,
+)
 from sd2core.cli.output import counted, print_json, progress_bar
 from sd2core.cli.recording_maps import add_labelled_recording, chosen_maps, maps_of
 from sd2core.errors import Sd2Error
@@ -23,29 +26,23 @@ if TYPE_CHECKING:
 
 def add_figure(kinds: argparse._SubParsersAction) -> None:
     """Add ``figure``."""
-    parser = add_command(
-        kinds,
-        "figure",
-        "draw the Doppler maps of a recording with its labels",
-        handler=_figure,
-        description=(
-            "Maps one above the other on one time axis, the labels below them with names and a\n"
-            "hatch for each, and their edges on the maps. 0 dB is the strongest bin of a map.\n"
-            "Suggestions that were not accepted are not drawn."
-        ),
-        examples=(
-            "  sd2 labels figure walk.sd2 --out walk.pdf\n"
-            "  sd2 labels figure walk.sd2 --out detail.png --maps synthetic,denoised --from-s 2"
-            " --to-s 6"
-        ),
-    )
+    parser = add_command(kinds, "figure", handler=_figure)
     add_labelled_recording(parser)
-    add_output(parser, "FILE", "the figure to write (.png, .svg or .pdf)")
-    add_value(parser, "--from-s", not_negative_float, "S", "start of the figure, in seconds")
-    add_value(parser, "--to-s", not_negative_float, "S", "end of the figure, in seconds")
+    parser.add_output("FILE", "the figure to write (.png, .svg or .pdf)")
+    parser.add_value("--from-s", not_negative_float, "S", "start of the figure, in seconds")
+    parser.add_value("--to-s", not_negative_float, "S", "end of the figure, in seconds")
 
 
 def _figure(options: argparse.Namespace) -> None:
+    """Draw the Doppler maps of a recording with its labels.
+
+    Maps one above the other on one time axis, the labels below them with names and a
+    hatch for each, and their edges on the maps. 0 dB is the strongest bin of a map.
+    Suggestions that were not accepted are not drawn.
+
+      sd2 labels figure walk.sd2 --out walk.pdf
+      sd2 labels figure walk.sd2 --out detail.png --maps synthetic,denoised --from-s 2 --to-s 6
+    """
     from sd2core.figures.maps import Levels, MapRow, draw_maps, save_maps
     from sd2core.files.figure_files import check_figure
     from sd2core.recording.recording import open_recording
@@ -95,37 +92,14 @@ _PARTS = "video,mesh,maps"
 
 def add_cut(kinds: argparse._SubParsersAction) -> None:
     """Add ``cut``."""
-    parser = add_command(
-        kinds,
-        "cut",
-        "cut labelled spans out: video, mesh and maps of each",
-        handler=_cut,
-        description=(
-            "Makes a folder per span with video.mp4 (its very frames, encoded again), mesh.zarr,\n"
-            "a map file each, and span.json; index.csv and index.json list them all. In each\n"
-            "folder 0 s is the span's first frame. Folders that are there already and the same\n"
-            "are kept; a folder has its name only once it is complete. Suggestions that were not\n"
-            "accepted are left out."
-        ),
-        examples=(
-            "  sd2 labels cut walk.sd2 --out cuts\n"
-            "  sd2 labels cut walk.sd2 --out swipes --label up-to-down --label down-to-up"
-            " --parts video,maps"
-        ),
-    )
+    parser = add_command(kinds, "cut", handler=_cut)
     add_labelled_recording(parser)
-    add_output(parser, "FOLDER", "where to write a folder for each span")
-    parser.add_argument(
-        "--label", action="append", metavar="LABEL", help="only spans with this label; may be given"
-        " several times",
-    )  # fmt: skip
-    parser.add_argument(
-        "--parts", default=_PARTS, metavar="LIST", help=f"some of {_PARTS} (default: all)"
-    )
-    parser.add_argument(
-        "--replace", action="store_true", help="replace folders that hold something else"
-    )
-    add_json(parser)
+    parser.add_output("FOLDER", "where to write a folder for each span")
+    text = "only spans with this label; may be given several times"
+    parser.add_value("--label", str, "LABEL", text, action="append")
+    parser.add_value("--parts", str, "LIST", f"some of {_PARTS} (default: all)", _PARTS)
+    parser.add_flag("--replace", "replace folders that hold something else")
+    parser.add_json()
 
 
 def _nothing_to_cut(path: Path, labels: Labels, wanted: Sequence[str] | None) -> Sd2Error:
@@ -145,6 +119,17 @@ def _nothing_to_cut(path: Path, labels: Labels, wanted: Sequence[str] | None) ->
 
 
 def _cut(options: argparse.Namespace) -> None:
+    """Cut labelled spans out: video, mesh and maps of each.
+
+    Makes a folder per span with video.mp4 (its very frames, encoded again), mesh.zarr,
+    a map file each, and span.json; index.csv and index.json list them all. In each
+    folder 0 s is the span's first frame. Folders that are there already and the same
+    are kept; a folder has its name only once it is complete. Suggestions that were not
+    accepted are left out.
+
+      sd2 labels cut walk.sd2 --out cuts
+      sd2 labels cut walk.sd2 --out swipes --label up-to-down --label down-to-up --parts video,maps
+    """
     from sd2core.cutouts.cutting import cut_out, plan_cuts
     from sd2core.recording.recording import open_recording
 

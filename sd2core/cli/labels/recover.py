@@ -8,9 +8,9 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from sd2core.cli.command_parser import add_command
 from sd2core.cli.labels.reading import add_replace, check_label_output
-from sd2core.cli.options import add_command, add_json, add_output
-from sd2core.cli.output import counted, print_json, print_rows
+from sd2core.cli.output import counted, picked, print_json, print_rows
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
@@ -19,30 +19,28 @@ if TYPE_CHECKING:
 
 def add_recover(kinds: argparse._SubParsersAction) -> None:
     """Add ``recover``."""
-    parser = add_command(
-        kinds,
-        "recover",
-        "list labels that were not saved when a window ended, or write them to a file",
-        handler=_recover,
-        description=(
-            "Opening the recording in the window offers them as well. Nothing is deleted here,\n"
-            "and what a window edits now is not listed."
-        ),
-        examples=("  sd2 labels recover\n  sd2 labels recover walk.sd2 --out found.json"),
-    )
-    parser.add_argument(
+    parser = add_command(kinds, "recover", handler=_recover)
+    parser.add_value(
         "recording",
-        type=Path,
+        Path,
+        "RECORDING",
+        "the labelled recording, or a video that was not saved as one yet",
         nargs="?",
-        metavar="RECORDING",
-        help="the labelled recording, or a video that was not saved as one yet",
     )
-    add_output(parser, "FILE.json", "write the newest of RECORDING, for `convert`", required=False)
+    parser.add_output("FILE.json", "write the newest of RECORDING, for `convert`", required=False)
     add_replace(parser)
-    add_json(parser)
+    parser.add_json()
 
 
 def _recover(options: argparse.Namespace) -> None:
+    """List labels that were not saved when a window ended, or write them to a file.
+
+    Opening the recording in the window offers them as well. Nothing is deleted here,
+    and what a window edits now is not listed.
+
+      sd2 labels recover
+      sd2 labels recover walk.sd2 --out found.json
+    """
     from sd2core.labels.recovery import offers_in, recovery_folder
 
     if options.out is not None and options.recording is None:
@@ -103,9 +101,7 @@ def _print(offers: tuple[Offer, ...]) -> None:
 def _data(offer: Offer) -> dict[str, Any]:
     return {
         "recording": str(offer.recording),
-        "edits": offer.edits,
-        "last": offer.last,
-        "time_unix_s": offer.time_unix_s,
+        **picked(offer, "edits", "last", "time_unix_s"),
         "spans": len(offer.labels.spans),
         "discarded": offer.declined,
     }

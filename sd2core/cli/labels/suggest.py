@@ -7,6 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from sd2core.cli.command_parser import Options, add_command
 from sd2core.cli.labels.reading import (
     add_replace,
     check_label_output,
@@ -15,15 +16,11 @@ from sd2core.cli.labels.reading import (
     write,
 )
 from sd2core.cli.options import (
-    add_command,
-    add_json,
-    add_output,
-    add_value,
     flag,
     given,
     not_negative_float,
 )
-from sd2core.cli.output import counted, print_json, print_rows
+from sd2core.cli.output import counted, picked, print_json, print_rows
 from sd2core.cli.recording_maps import MapName, maps_of
 from sd2core.errors import Sd2Error
 
@@ -46,46 +43,38 @@ _HELP = {
 
 def add_suggest(kinds: argparse._SubParsersAction) -> None:
     """Add ``suggest``."""
-    parser = add_command(
-        kinds,
-        "suggest",
-        "find spans in which something moves",
-        handler=_suggest,
-        description=(
-            "Measures the energy of every frame of a Doppler map over the map's own quiet level.\n"
-            "It finds motion, not gestures: raising an arm is suggested as well. The confidence\n"
-            "is how far the high threshold could be raised before the span was lost, 1 from\n"
-            "20 dB on; it is no probability. At least a quarter of the recording must be quiet."
-        ),
-        examples=(
-            "  sd2 labels suggest map.npz\n"
-            "  sd2 labels suggest walk.sd2 --out suggested.json\n"
-            "  sd2 labels suggest walk.sd2 --of radar --out suggested.eaf\n"
-            "  sd2 labels suggest swing.h5 --margin-s 0.1 --out suggested.csv"
-        ),
-    )
+    parser = add_command(kinds, "suggest", handler=_suggest)
     add_searched_map(parser, ("synthetic", "radar"))
     for name, (metavar, text) in _HELP.items():
-        add_value(parser, flag(name), not_negative_float, metavar, text)
-    parser.add_argument(
-        "--label", default="gesture", metavar="LABEL", help="label of the spans (default: gesture)"
-    )
-    add_json(parser)
+        parser.add_value(flag(name), not_negative_float, metavar, text)
+    text = "label of the spans (default: gesture)"
+    parser.add_value("--label", str, "LABEL", text, "gesture")
+    parser.add_json()
 
 
-def add_searched_map(parser: argparse.ArgumentParser, kinds: tuple[MapName, ...]) -> None:
+def add_searched_map(parser: Options, kinds: tuple[MapName, ...]) -> None:
     """Add the map in which spans are looked for, and the file for them."""
-    add_value(parser, "map", Path, "MAP", "a map, a recording, or the .h5 of a K60168A")
-    parser.add_argument(
-        "--of",
-        choices=kinds,
-        help="which map of a recording (default: synthetic where there is a mesh)",
+    parser.add_value("map", Path, "MAP", "a map, a recording, or the .h5 of a K60168A")
+    parser.add_choice(
+        "--of", kinds, "which map of a recording (default: synthetic where there is a mesh)"
     )
-    add_output(parser, "FILE", "the labels to write", required=False)
+    parser.add_output("FILE", "the labels to write", required=False)
     add_replace(parser)
 
 
 def _suggest(options: argparse.Namespace) -> None:
+    """Find spans in which something moves.
+
+    Measures the energy of every frame of a Doppler map over the map's own quiet level.
+    It finds motion, not gestures: raising an arm is suggested as well. The confidence
+    is how far the high threshold could be raised before the span was lost, 1 from
+    20 dB on; it is no probability. At least a quarter of the recording must be quiet.
+
+      sd2 labels suggest map.npz
+      sd2 labels suggest walk.sd2 --out suggested.json
+      sd2 labels suggest walk.sd2 --of radar --out suggested.eaf
+      sd2 labels suggest swing.h5 --margin-s 0.1 --out suggested.csv
+    """
     from sd2core.labels.suggest import SuggestOptions, motion_energy_db, suggest_spans
 
     if options.out is not None:
@@ -136,8 +125,7 @@ def write_found(options: argparse.Namespace, spans: tuple[Span, ...], clock: Tim
 
 def spans_data(spans: tuple[Span, ...], *facts: str) -> list[dict[str, Any]]:
     """Number, times and further facts of spans, for JSON."""
-    names = ("id", "start_s", "end_s", *facts)
-    return [{name: getattr(span, name) for name in names} for span in spans]
+    return [picked(span, "id", "start_s", "end_s", *facts) for span in spans]
 
 
 def span_cells(span: Span) -> tuple[str, str, str]:

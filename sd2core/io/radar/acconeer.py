@@ -21,11 +21,11 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from sd2core.errors import Sd2Error
-from sd2core.files.hdf5_files import member_of, open_hdf5_file, text_of, unreadable_hdf5
-from sd2core.files.texts import errors_in, first_fault, parse_json
+from sd2core.files.hdf5_files import member_of, open_hdf5_file, refusing_damage, text_of
+from sd2core.files.texts import errors_in, faults_in, parse_json
 from sd2core.io.radar.capture import LazySamples, RadarCapture
 from sd2core.radar_config import SPEED_OF_LIGHT_MPS, RadarConfig
 from sd2core.timebase import Timebase
@@ -96,13 +96,8 @@ def load_acconeer(path: Path) -> RadarCapture:
     say what else there is. Raises Sd2Error if the file is damaged, of another sensor, or
     contradicts itself.
     """
-    with open_hdf5_file(path, _EXPECTED) as file:
-        try:
-            return _read(file, path)
-        except Sd2Error:
-            raise
-        except Exception as error:  # a damaged file fails in many ways
-            raise unreadable_hdf5(path, error, _EXPECTED) from error
+    with open_hdf5_file(path, _EXPECTED) as file, refusing_damage(path, _EXPECTED):
+        return _read(file, path)
 
 
 def _read(file: h5py.File, path: Path) -> RadarCapture:
@@ -177,11 +172,8 @@ def _read(file: h5py.File, path: Path) -> RadarCapture:
     place = f"{entry}/result/frame"
 
     def read(some: slice) -> NDArray[Any]:
-        with open_hdf5_file(path, _EXPECTED) as again:
-            try:
-                parts = again[place][some]
-            except Exception as error:  # a damaged chunk fails in many ways
-                raise unreadable_hdf5(path, error, _EXPECTED) from error
+        with open_hdf5_file(path, _EXPECTED) as again, refusing_damage(path, _EXPECTED):
+            parts = again[place][some]
         signal = np.empty((len(parts), 1, *shape[2:]), np.complex64)
         signal.real[:, 0], signal.imag[:, 0] = parts["real"], parts["imag"]
         signal /= _FULL
@@ -282,8 +274,5 @@ def _text(file: h5py.File, path: Path, place: str) -> str:
 
 def _parsed(model: type[Model], file: h5py.File, path: Path, place: str) -> Model:
     where = f"{place} of {path}"
-    content = parse_json(_text(file, path, place), where, _EXPECTED)
-    try:
-        return model.model_validate(content)
-    except ValidationError as error:
-        raise Sd2Error(f"{where}: {first_fault(error)}", _EXPECTED) from error
+    with faults_in(where, _EXPECTED):
+        return model.model_validate(parse_json(_text(file, path, place), where, _EXPECTED))

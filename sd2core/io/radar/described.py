@@ -14,11 +14,11 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_folder, atomic_write, atomic_write_text
-from sd2core.files.texts import errors_in, first_fault, read_json, read_toml
+from sd2core.files.texts import errors_in, faults_in, read_json, read_toml
 from sd2core.files.toml import toml_lines
 from sd2core.io.radar.capture import LazySamples, RadarCapture
 from sd2core.io.radar.infineon import check_replaceable
@@ -97,11 +97,8 @@ def is_described(path: Path) -> bool:
 
 def read_description(path: Path) -> RadarDescription:
     """Read a description; Sd2Error if it is damaged."""
-    content = read_toml(path, _EXPECTED)
-    try:
-        return RadarDescription.model_validate(content)
-    except ValidationError as error:
-        raise Sd2Error(f"{path}: {first_fault(error)}", _EXPECTED) from error
+    with faults_in(path, _EXPECTED):
+        return RadarDescription.model_validate(read_toml(path, _EXPECTED))
 
 
 def write_description(description: RadarDescription, data: Path) -> Path:

@@ -13,11 +13,11 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from sd2core.errors import Sd2Error
 from sd2core.files.limits import check_regular
-from sd2core.files.texts import errors_in, first_fault, read_json
+from sd2core.files.texts import errors_in, faults_in, read_json
 from sd2core.io.radar.capture import LazySamples, RadarCapture
 from sd2core.radar_config import RadarConfig
 from sd2core.timebase import Timebase
@@ -133,10 +133,8 @@ def read_head(folder: Path) -> GrowingHead:
     """Read ``live.json``; Sd2Error if it is damaged."""
     path = folder / HEAD_NAME
     with errors_in(path):
-        try:
+        with faults_in(path, _EXPECTED):
             head = GrowingHead.model_validate(read_json(path, _EXPECTED))
-        except ValidationError as error:
-            raise Sd2Error(first_fault(error), _EXPECTED) from error
         if head.frame_bytes > _MOST_FRAME_BYTES or head.radar.adc_bits > _MOST_BITS:
             raise Sd2Error(
                 f"Frames have {head.frame_bytes:,} bytes, of {head.radar.adc_bits} bits",

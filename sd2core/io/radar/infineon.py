@@ -18,11 +18,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AliasPath, BaseModel, ConfigDict, Field, ValidationError
 
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_folder, atomic_write, atomic_write_text
-from sd2core.files.limits import check_regular, open_regular
+from sd2core.files.limits import open_regular
+from sd2core.files.numpy_files import open_npy_file
 from sd2core.files.texts import errors_in, lines_of, read_json
 from sd2core.io.radar.capture import RadarCapture, Samples, by_transmitter, check_cube
 from sd2core.radar_config import RadarConfig
@@ -61,12 +62,8 @@ class _Shape(BaseModel):
     sample_rate_Hz: float = Field(gt=0)
 
 
-class _Device(BaseModel):
-    fmcw_single_shape: _Shape
-
-
 class _Config(BaseModel):
-    device_config: _Device
+    shape: _Shape = Field(validation_alias=AliasPath("device_config", "fmcw_single_shape"))
 
 
 class _Meta(BaseModel):
@@ -213,13 +210,17 @@ def _json(content: dict[str, Any]) -> str:
     return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
 
 
-def _read_json(path: Path) -> Any:
+def _check_there(path: Path) -> None:
     if not path.exists():
         raise Sd2Error(
             f"{path} is missing",
             f"{_DATA}, {_CONFIG} and {_TIMES} in one folder",
             "Copy the whole recording folder",
         )
+
+
+def _read_json(path: Path) -> Any:
+    _check_there(path)
     return read_json(path, "a JSON text")
 
 
@@ -248,7 +249,7 @@ def _read_meta(path: Path) -> _Meta:
 
 def _read_config(path: Path, meta: _Meta) -> RadarConfig:
     try:
-        shape = _Config.model_validate(_read_json(path)).device_config.fmcw_single_shape
+        shape = _Config.model_validate(_read_json(path)).shape
     except ValidationError as error:
         raise _explain(path, error) from error
     mode = (shape.mimo_mode or "off").lower()
@@ -308,23 +309,9 @@ def _in_turns(
 
 
 def _open_samples(path: Path) -> NDArray[np.uint16]:
-    check_regular(path)
-    try:
-        # Mapped, so that what its header says is compared with its size.
-        return np.load(path, mmap_mode="r", allow_pickle=False)
-    except FileNotFoundError as error:
-        raise Sd2Error(
-            f"{path} is missing",
-            f"{_DATA}, {_CONFIG} and {_TIMES} in one folder",
-            "Copy the whole recording folder",
-        ) from error
-    except Exception as error:  # a damaged header fails in many ways
-        size = path.stat().st_size
-        raise Sd2Error(
-            f"{path} ({size} bytes) cannot be read as an array ({error})",
-            "the whole radar.npy as recorded, uint16 (frames, receivers, chirps, samples)",
-            "It may be cut off: copy it again",
-        ) from error
+    _check_there(path)
+    expected = "the whole radar.npy as recorded, uint16 (frames, receivers, chirps, samples)"
+    return open_npy_file(path, expected, "It may be cut off: copy it again")
 
 
 def _read_times(

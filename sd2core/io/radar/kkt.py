@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
-from sd2core.files.hdf5_files import member_of, open_hdf5_file, unreadable_hdf5
+from sd2core.files.hdf5_files import member_of, open_hdf5_file, refusing_damage
 from sd2core.files.limits import check_regular
 from sd2core.labels.label_set import LONGEST_NAME, Label, LabelSet
 from sd2core.labels.spans import Labels, LabelTrack, Span
@@ -79,16 +79,11 @@ def load_kkt(path: Path | str) -> RecordedMap:
     if not path.is_file():
         raise Sd2Error(f"There is no file {path}", "a gesture recording (.h5)", "Check the path")
     expected = "a complete gesture recording (.h5)"
-    with open_hdf5_file(path, expected) as file:
-        try:
-            values = _values(file, path)  # (ranges, Dopplers, T)
-            marks = _marks(file, path, values.shape[2])  # (T,)
-            counts = _counts(file, path, values.shape[2])  # (T,) or None
-            attributes = _attributes(file, path)
-        except Sd2Error:
-            raise
-        except Exception as error:  # a damaged file fails in many ways
-            raise unreadable_hdf5(path, error, expected) from error
+    with open_hdf5_file(path, expected) as file, refusing_damage(path, expected):
+        values = _values(file, path)  # (ranges, Dopplers, T)
+        marks = _marks(file, path, values.shape[2])  # (T,)
+        counts = _counts(file, path, values.shape[2])  # (T,) or None
+        attributes = _attributes(file, path)
     timebase, notes = _clock(counts, values.shape[2])
     gesture = attributes.get(_NAME, "")
     if not (gesture.strip() and gesture.isprintable() and len(gesture) <= LONGEST_NAME):

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from sd2core.errors import Sd2Error
-from sd2core.files.texts import first_fault, read_json
+from sd2core.files.texts import faults_in, read_json
 
 META, DATA = ".sigmf-meta", ".sigmf-data"
 
@@ -55,10 +55,8 @@ class _Meta(BaseModel):
 def read_sigmf_meta(path: Path) -> SigmfMeta:
     """Read the metadata that belong to a file of either suffix; Sd2Error if they are damaged."""
     path = path.with_suffix(META)
-    try:
+    with faults_in(path, _EXPECTED):
         meta = _Meta.model_validate(read_json(path, _EXPECTED))
-    except ValidationError as error:
-        raise Sd2Error(f"{path}: {first_fault(error)}", _EXPECTED) from error
     kind = meta.told.datatype
     found = re.fullmatch(r"([cr])([fiu])(8|16|32|64)(?:_([lb])e)?", kind)
     if found is None or (found[2] == "f" and found[3] in ("8", "16")):

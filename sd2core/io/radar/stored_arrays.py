@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
-from sd2core.files.hdf5_files import member_of, open_hdf5_file, unreadable_hdf5
+from sd2core.files.hdf5_files import member_of, open_hdf5_file, refusing_damage
 from sd2core.files.limits import check_regular
+from sd2core.files.numpy_files import open_npy_file
 from sd2core.io.radar.sigmf import DATA, META, read_sigmf_meta
 
 HDF5_SUFFIXES = (".h5", ".hdf5")
@@ -41,41 +42,27 @@ def open_stored(path: Path, dataset: str | None) -> StoredArray:
 
 
 def _numpy(path: Path) -> StoredArray:
-    try:
-        array = np.load(path, mmap_mode="r", allow_pickle=False)
-        return StoredArray(array.shape, array.dtype, array.__getitem__)
-    except Exception as error:  # a damaged header fails in many ways
-        raise Sd2Error(
-            f"{path} ({path.stat().st_size} bytes) cannot be read as an array ({error})",
-            "a whole .npy of numbers",
-            "It may be cut off: copy it again",
-        ) from error
+    array = open_npy_file(path, "a whole .npy of numbers", "It may be cut off: copy it again")
+    return StoredArray(array.shape, array.dtype, array.__getitem__)
 
 
 def _hdf5(path: Path, dataset: str | None) -> StoredArray:
     import h5py
 
     expected = "samples of a radar (.h5)"
-    with open_hdf5_file(path, expected) as file:
-        try:
-            if dataset is None:
-                names = [
-                    name for name in file if isinstance(member_of(file, path, name), h5py.Dataset)
-                ]
-                if len(names) != 1:
-                    raise Sd2Error(
-                        f"{path} holds {len(names)} datasets ({', '.join(names[:6]) or 'none'})",
-                        "the name of one, as dataset",
-                    )
-                dataset = names[0]
-            found = member_of(file, path, dataset)
-            if not isinstance(found, h5py.Dataset) or found.shape is None:
-                raise Sd2Error(f"{path} has no dataset {dataset!r}", "the name of one, as dataset")
-            shape, dtype = found.shape, found.dtype
-        except Sd2Error:
-            raise
-        except Exception as error:  # a damaged file fails in many ways
-            raise unreadable_hdf5(path, error, expected) from error
+    with open_hdf5_file(path, expected) as file, refusing_damage(path, expected):
+        if dataset is None:
+            names = [name for name in file if isinstance(member_of(file, path, name), h5py.Dataset)]
+            if len(names) != 1:
+                raise Sd2Error(
+                    f"{path} holds {len(names)} datasets ({', '.join(names[:6]) or 'none'})",
+                    "the name of one, as dataset",
+                )
+            dataset = names[0]
+        found = member_of(file, path, dataset)
+        if not isinstance(found, h5py.Dataset) or found.shape is None:
+            raise Sd2Error(f"{path} has no dataset {dataset!r}", "the name of one, as dataset")
+        shape, dtype = found.shape, found.dtype
     if dtype.fields is not None and set(dtype.fields) == {"real", "imag"}:
         if any(dtype[part].kind not in "iuf" for part in ("real", "imag")):
             raise Sd2Error(f"{dataset} of {path} is of {dtype}", "numbers")
@@ -83,11 +70,8 @@ def _hdf5(path: Path, dataset: str | None) -> StoredArray:
     name = dataset
 
     def read(place: tuple[slice, ...]) -> NDArray[Any]:
-        with open_hdf5_file(path, expected) as file:
-            try:
-                values = file[name][place]
-            except Exception as error:  # a damaged chunk fails in many ways
-                raise unreadable_hdf5(path, error, expected) from error
+        with open_hdf5_file(path, expected) as file, refusing_damage(path, expected):
+            values = file[name][place]
         if values.dtype.fields is None:
             return np.asarray(values)
         return values["real"] + np.complex64(1j) * values["imag"].astype(np.float32)

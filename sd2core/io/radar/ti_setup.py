@@ -9,12 +9,12 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AliasGenerator, AliasPath, BaseModel, ConfigDict, Field
 
 from sd2core.errors import Sd2Error
-from sd2core.files.texts import errors_in, first_fault, read_json, read_text
+from sd2core.files.texts import errors_in, faults_in, read_json, read_text
 from sd2core.radar_config import RadarConfig, Sampling
 
 _SAMPLINGS: dict[int, Sampling] = {0: "real", 1: "complex", 2: "complex with image band"}
@@ -160,20 +160,20 @@ class _Part(BaseModel):
     model_config = ConfigDict(extra="ignore", allow_inf_nan=False)
 
 
-class _Channels(_Part):
-    rxChannelEn: str
+def _inside(name: str) -> ConfigDict:
+    """Configuration of a part that is alone in a table, under this name."""
+    generator = AliasGenerator(validation_alias=lambda entry: AliasPath(name, entry))
+    return ConfigDict(alias_generator=generator)
 
 
-class _Format(_Part):
-    b2AdcBits: int
-    b2AdcOutFmt: int
+def _at(*names: str, **how: Any) -> Any:
+    """Entry deeper within a part, in tables of these names."""
+    return Field(validation_alias=AliasPath(*names), **how)
 
 
-class _AdcOut(_Part):
-    fmt: _Format
+class _Profile(_Part):
+    model_config = _inside("rlProfileCfg_t")
 
-
-class _ProfileCfg(_Part):
     profileId: int
     startFreqConst_GHz: float
     idleTimeConst_usec: float
@@ -184,11 +184,9 @@ class _ProfileCfg(_Part):
     digOutSampleRate: float
 
 
-class _ProfileEntry(_Part):
-    rlProfileCfg_t: _ProfileCfg
+class _Chirp(_Part):
+    model_config = _inside("rlChirpCfg_t")
 
-
-class _ChirpCfg(_Part):
     chirpStartIdx: int
     chirpEndIdx: int
     profileId: int
@@ -196,11 +194,7 @@ class _ChirpCfg(_Part):
     txEnable: str
 
 
-class _ChirpEntry(_Part):
-    rlChirpCfg_t: _ChirpCfg
-
-
-class _FrameCfg(_Part):
+class _Frame(_Part):
     chirpStartIdx: int
     chirpEndIdx: int
     numLoops: int
@@ -208,31 +202,16 @@ class _FrameCfg(_Part):
     framePeriodicity_msec: float
 
 
-class _Rf(_Part):
-    rlChanCfg_t: _Channels
-    rlAdcOutCfg_t: _AdcOut
-    rlProfiles: list[_ProfileEntry] = Field(min_length=1)
-    rlChirps: list[_ChirpEntry] = Field(min_length=1)
-    rlFrameCfg_t: _FrameCfg
-
-
-class _DataFormat(_Part):
-    iqSwapSel: int = 0
-    chInterleave: int
-
-
-class _Lanes(_Part):
-    laneEn: str
-
-
-class _Capture(_Part):
-    rlDevDataFmtCfg_t: _DataFormat
-    rlDevLaneEnable_t: _Lanes
-
-
 class _Device(_Part):
-    rfConfig: _Rf
-    rawDataCaptureConfig: _Capture
+    receivers: str = _at("rfConfig", "rlChanCfg_t", "rxChannelEn")
+    bits: int = _at("rfConfig", "rlAdcOutCfg_t", "fmt", "b2AdcBits")
+    output: int = _at("rfConfig", "rlAdcOutCfg_t", "fmt", "b2AdcOutFmt")
+    profiles: list[_Profile] = _at("rfConfig", "rlProfiles", min_length=1)
+    chirps: list[_Chirp] = _at("rfConfig", "rlChirps", min_length=1)
+    frame: _Frame = _at("rfConfig", "rlFrameCfg_t")
+    swapped: int = _at("rawDataCaptureConfig", "rlDevDataFmtCfg_t", "iqSwapSel", default=0)
+    interleaved: int = _at("rawDataCaptureConfig", "rlDevDataFmtCfg_t", "chInterleave")
+    lanes: str = _at("rawDataCaptureConfig", "rlDevLaneEnable_t", "laneEn")
 
 
 class _Studio(_Part):
@@ -240,22 +219,17 @@ class _Studio(_Part):
 
 
 def _of_json(path: Path) -> TiSetup:
-    try:
+    with faults_in(path, _JSON):
         devices = _Studio.model_validate(read_json(path, _JSON)).mmWaveDevices
-    except ValidationError as error:
-        raise Sd2Error(first_fault(error), _JSON) from error
     devices = devices if isinstance(devices, list) else [devices]
     if len(devices) != 1:
         raise Sd2Error(f"It configures {len(devices)} devices", "one")
-    rf, capture = devices[0].rfConfig, devices[0].rawDataCaptureConfig
-    lanes = _mask(capture.rlDevLaneEnable_t.laneEn, "laneEn").bit_count()
+    device, frame = devices[0], devices[0].frame
+    lanes = _mask(device.lanes, "laneEn").bit_count()
     if lanes not in (2, 4):
         raise Sd2Error(f"laneEn enables {lanes} lanes of LVDS", "2 or 4")
-    frame, form = rf.rlFrameCfg_t, rf.rlAdcOutCfg_t.fmt
-    profiles = {}
-    for entry in rf.rlProfiles:
-        one = entry.rlProfileCfg_t
-        profiles[one.profileId] = Profile(
+    profiles = {
+        one.profileId: Profile(
             one.startFreqConst_GHz * 1e9,
             one.idleTimeConst_usec * 1e-6,
             one.adcStartTimeConst_usec * 1e-6,
@@ -264,6 +238,8 @@ def _of_json(path: Path) -> TiSetup:
             one.numAdcSamples,
             one.digOutSampleRate * 1e3,
         )
+        for one in device.profiles
+    }
     chirps = [
         Chirp(
             one.chirpStartIdx,
@@ -272,7 +248,7 @@ def _of_json(path: Path) -> TiSetup:
             _mask(one.txEnable, "txEnable"),
             one.idleTimeVar_usec * 1e-6,
         )
-        for one in (entry.rlChirpCfg_t for entry in rf.rlChirps)
+        for one in device.chirps
     ]
     return _setup(
         profiles,
@@ -281,12 +257,12 @@ def _of_json(path: Path) -> TiSetup:
         loops=frame.numLoops,
         frames=frame.numFrames,
         frame_s=frame.framePeriodicity_msec * 1e-3,
-        receivers=_mask(rf.rlChanCfg_t.rxChannelEn, "rxChannelEn"),
-        output=form.b2AdcOutFmt,
-        bits=form.b2AdcBits,
+        receivers=_mask(device.receivers, "rxChannelEn"),
+        output=device.output,
+        bits=device.bits,
         lanes=lanes,
-        q_first=capture.rlDevDataFmtCfg_t.iqSwapSel == 1,
-        interleaved=capture.rlDevDataFmtCfg_t.chInterleave == 0,
+        q_first=device.swapped == 1,
+        interleaved=device.interleaved == 0,
         notes=[],
     )
 

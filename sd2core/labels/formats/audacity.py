@@ -6,14 +6,13 @@ holds the frequencies of a spectral selection and belongs to the label above it.
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.texts import read_text
 from sd2core.labels.formats.losses import LabelFormat, Loss, losses_by_format
-from sd2core.labels.formats.numbers import positional
+from sd2core.labels.formats.numbers import finite_number, positional
 from sd2core.labels.formats.rows import UNNAMED, Row, assemble
 from sd2core.labels.spans import Labels
 from sd2core.timebase import Timebase
@@ -61,11 +60,8 @@ def read(path: Path, timebase: Timebase | None = None, observation: str | None =
 
 
 def _seconds(path: Path, line: int, text: str) -> float:
-    try:
-        # Some locales of older versions export decimal commas; tabs separate, so they are plain.
-        value = float(text.strip().replace(",", "."))
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
+    # Some locales of older versions export decimal commas; tabs separate, so they are plain.
+    value = finite_number(text.replace(",", "."))
+    if value is None:
         raise Sd2Error(f"{path}, line {line}: a time is {text[:50]!r}", _EXPECTED)
     return value

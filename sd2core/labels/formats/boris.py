@@ -177,7 +177,9 @@ def _rows(path: Path, events: list[Any], points: set[str]) -> list[Row]:
             begun[key] = (time_s, comment)
         else:
             start_s, first = begun.pop(key)
-            rows.append(_span(place, start_s, time_s, code, track, modifiers, first, comment))
+            details = _details(comment)
+            note = _note(modifiers, first, comment if details is None else "")
+            rows.append(Row(place, start_s, time_s, code, track, note, **(details or {})))
     if begun:
         (subject, code, _), (time_s, _) = next(iter(begun.items()))
         raise Sd2Error(
@@ -201,43 +203,23 @@ def _event(path: Path, place: str, event: Any) -> tuple[float, str, str, str, st
     return float(time_s), subject, code, modifiers, comment
 
 
-def _span(
-    place: str,
-    start_s: float,
-    end_s: float,
-    code: str,
-    track: str,
-    modifiers: str,
-    first: str,
-    second: str,
-) -> Row:
-    kept = _parsed_details(second)
-    if kept is None:
-        return Row(place, start_s, end_s, code, track, _note(modifiers, first, second))
-    known = kept.get("confidence")
-    number = kept.get("id")
-    return Row(
-        place,
-        start_s,
-        end_s,
-        code,
-        track,
-        _note(modifiers, first, ""),
-        str(kept.get("author", "")),
-        float(known) if isinstance(known, int | float) else None,
-        str(kept.get("origin", "import")),
-        number if isinstance(number, int) and not isinstance(number, bool) else None,
-    )
-
-
-def _parsed_details(comment: str) -> dict[str, Any] | None:
+def _details(comment: str) -> dict[str, Any] | None:
+    """Fields of a row that the comment of a STOP holds; None where somebody wrote it."""
     if not comment.startswith(_DETAILS):
         return None
     try:
         kept = json.loads(comment[len(_DETAILS) :])
     except (ValueError, RecursionError):
         return None
-    return kept if isinstance(kept, dict) else None
+    if not isinstance(kept, dict):
+        return None
+    known, number = kept.get("confidence"), kept.get("id")
+    return {
+        "author": str(kept.get("author", "")),
+        "confidence": float(known) if isinstance(known, int | float) else None,
+        "origin": str(kept.get("origin", "import")),
+        "id": number if isinstance(number, int) and not isinstance(number, bool) else None,
+    }
 
 
 def _note(modifiers: str, first: str, second: str) -> str:

@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import csv
 import io
-import math
 import re
 from collections.abc import Sequence
 from dataclasses import astuple
@@ -28,7 +27,7 @@ from sd2core.files.atomic import atomic_write_text
 from sd2core.files.tables import as_cell, of_cell
 from sd2core.files.texts import read_text
 from sd2core.labels.formats.losses import ASPECTS, LabelFormat, Loss, hold_texts, losses_by_format
-from sd2core.labels.formats.numbers import whole_number
+from sd2core.labels.formats.numbers import finite_number, whole_number
 from sd2core.labels.formats.rows import UNNAMED, TableRows, assemble
 from sd2core.labels.spans import Labels
 from sd2core.timebase import Timebase
@@ -248,10 +247,9 @@ class _Numbers:
 
     def of(self, line: int, column: str, text: str) -> float:
         """The number in a cell."""
-        value = math.nan
-        if _NUMBER.fullmatch(text.strip()):
-            value = float(text.strip().replace(",", "."))
-        if not math.isfinite(value):
+        plain = _NUMBER.fullmatch(text.strip())
+        value = finite_number(plain[0].replace(",", ".")) if plain else None
+        if value is None:
             raise Sd2Error(
                 f"{self._path}, line {line}: {column} is {text[:50]!r}", "a finite number"
             )

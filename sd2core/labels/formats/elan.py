@@ -151,11 +151,7 @@ def _in_range(path: Path, labels: Labels) -> tuple[Labels, list[Loss]]:
 
 
 def _header(
-    document: Element,
-    path: Path,
-    media: Path | None,
-    label_set: LabelSet,
-    last_id: int,
+    document: Element, path: Path, media: Path | None, label_set: LabelSet, last_id: int
 ) -> None:
     header = SubElement(document, "HEADER", {"MEDIA_FILE": "", "TIME_UNITS": "milliseconds"})
     if media is not None:
@@ -163,24 +159,13 @@ def _header(
         relative = stored_path(plain_path(media), here)
         if not relative.startswith((".", "/")):
             relative = f"./{relative}"
-        SubElement(
-            header,
-            "MEDIA_DESCRIPTOR",
-            {
-                "MEDIA_URL": plain_path(media).as_uri(),
-                "MIME_TYPE": _MIME.get(media.suffix.lower(), "unknown"),
-                "RELATIVE_MEDIA_URL": quote(relative),
-            },
-        )
-    used = SubElement(header, "PROPERTY", {"NAME": "lastUsedAnnotationId"})
-    used.text = str(last_id)
-    shown = SubElement(header, "PROPERTY", {"NAME": PROPERTY})
-    shown.text = json.dumps(
-        {
-            "label_set": label_set.name,
-            "labels": [[one.name, one.colour, one.key] for one in label_set.labels],
-        }
-    )
+        kind = _MIME.get(media.suffix.lower(), "unknown")
+        place = {"MEDIA_URL": plain_path(media).as_uri(), "RELATIVE_MEDIA_URL": quote(relative)}
+        SubElement(header, "MEDIA_DESCRIPTOR", place, MIME_TYPE=kind)
+    SubElement(header, "PROPERTY", NAME="lastUsedAnnotationId").text = str(last_id)
+    labels = [[one.name, one.colour, one.key] for one in label_set.labels]
+    shown = json.dumps({"label_set": label_set.name, "labels": labels})
+    SubElement(header, "PROPERTY", NAME=PROPERTY).text = shown
 
 
 def _time_order(document: Element, lanes: list[Lane]) -> dict[int, tuple[str, str]]:
@@ -221,85 +206,55 @@ def _tiers(
             first, second = slots[span.id]
             # The entry of the vocabulary, so that renaming it in ELAN renames the annotation.
             entry = {"CVE_REF": entries[span.label]} if span.label in entries else {}
-            _annotation(
-                tier,
-                "ALIGNABLE_ANNOTATION",
-                span.label,
-                ANNOTATION_ID=f"a{span.id}",
-                TIME_SLOT_REF1=first,
-                TIME_SLOT_REF2=second,
-                **entry,
-            )
+            slot = {"TIME_SLOT_REF1": first, "TIME_SLOT_REF2": second}
+            _annotation(tier, "ALIGNABLE_ANNOTATION", span.label, f"a{span.id}", **slot, **entry)
         for kind, text_of in details:
             name = f"{lane.name} - {kind}"
             while name in taken:
                 name += "'"
             taken.add(name)
             below = SubElement(
-                document,
-                "TIER",
-                {"LINGUISTIC_TYPE_REF": DETAILS[kind], "PARENT_REF": lane.name, "TIER_ID": name},
-            )
+                document, "TIER", LINGUISTIC_TYPE_REF=DETAILS[kind], PARENT_REF=lane.name,
+                TIER_ID=name,
+            )  # fmt: skip
             for span in lane.spans:
                 if text_of(span):
+                    about = {"ANNOTATION_REF": f"a{span.id}"}
                     _annotation(
-                        below,
-                        "REF_ANNOTATION",
-                        text_of(span),
-                        ANNOTATION_ID=f"a{next(numbers)}",
-                        ANNOTATION_REF=f"a{span.id}",
+                        below, "REF_ANNOTATION", text_of(span), f"a{next(numbers)}", **about
                     )
 
 
-def _annotation(tier: Element, kind: str, value: str, **attributes: str) -> None:
+def _annotation(tier: Element, kind: str, value: str, name: str, **attributes: str) -> None:
     outer = SubElement(tier, "ANNOTATION")
-    inner = SubElement(outer, kind, attributes)
+    inner = SubElement(outer, kind, {"ANNOTATION_ID": name}, **attributes)
     SubElement(inner, "ANNOTATION_VALUE").text = value
 
 
 def _types(document: Element, label_set: LabelSet) -> None:
     """Types of tiers, and the labels as vocabulary, in the order of the schema."""
+    kind = {"GRAPHIC_REFERENCES": "false"}
+    labelled = {"CONTROLLED_VOCABULARY_REF": vocabulary_id(label_set.name), **kind}
     SubElement(
-        document,
-        "LINGUISTIC_TYPE",
-        {
-            "CONTROLLED_VOCABULARY_REF": vocabulary_id(label_set.name),
-            "GRAPHIC_REFERENCES": "false",
-            "LINGUISTIC_TYPE_ID": LABELS,
-            "TIME_ALIGNABLE": "true",
-        },
+        document, "LINGUISTIC_TYPE", labelled, LINGUISTIC_TYPE_ID=LABELS, TIME_ALIGNABLE="true"
     )
+    below = {"CONSTRAINTS": "Symbolic_Association", **kind}
     for name in DETAILS.values():
         SubElement(
-            document,
-            "LINGUISTIC_TYPE",
-            {
-                "CONSTRAINTS": "Symbolic_Association",
-                "GRAPHIC_REFERENCES": "false",
-                "LINGUISTIC_TYPE_ID": name,
-                "TIME_ALIGNABLE": "false",
-            },
+            document, "LINGUISTIC_TYPE", below, LINGUISTIC_TYPE_ID=name, TIME_ALIGNABLE="false"
         )
     language = VOCABULARY_LANGUAGE
-    SubElement(
-        document,
-        "LANGUAGE",
-        {
-            "LANG_DEF": "http://cdb.iso.org/lg/CDB-00130975-001",
-            "LANG_ID": language,
-            "LANG_LABEL": f"undetermined ({language})",
-        },
-    )
+    defined = {"LANG_DEF": "http://cdb.iso.org/lg/CDB-00130975-001", "LANG_ID": language}
+    SubElement(document, "LANGUAGE", defined, LANG_LABEL=f"undetermined ({language})")
     for stereotype, description in _CONSTRAINTS.items():
-        SubElement(document, "CONSTRAINT", {"DESCRIPTION": description, "STEREOTYPE": stereotype})
-    vocabulary = SubElement(
-        document, "CONTROLLED_VOCABULARY", {"CV_ID": vocabulary_id(label_set.name)}
-    )
-    SubElement(vocabulary, "DESCRIPTION", {"LANG_REF": language})
+        SubElement(document, "CONSTRAINT", DESCRIPTION=description, STEREOTYPE=stereotype)
+    name = vocabulary_id(label_set.name)
+    vocabulary = SubElement(document, "CONTROLLED_VOCABULARY", CV_ID=name)
+    SubElement(vocabulary, "DESCRIPTION", LANG_REF=language)
     for number, label in enumerate(label_set.labels):
-        entry = SubElement(vocabulary, "CV_ENTRY_ML", {"CVE_ID": f"cve{number}"})
+        entry = SubElement(vocabulary, "CV_ENTRY_ML", CVE_ID=f"cve{number}")
         meaning = _BANNED.sub("\N{REPLACEMENT CHARACTER}", label.gesture_class)
-        value = SubElement(entry, "CVE_VALUE", {"DESCRIPTION": meaning, "LANG_REF": language})
+        value = SubElement(entry, "CVE_VALUE", DESCRIPTION=meaning, LANG_REF=language)
         value.text = label.name
 
 

@@ -18,7 +18,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.texts import read_text
 from sd2core.labels.formats.losses import ASPECTS, LabelFormat, Loss, counted, losses_by_format
-from sd2core.labels.formats.numbers import positional
+from sd2core.labels.formats.numbers import finite_number, positional
 from sd2core.labels.formats.rows import TableRows, assemble
 from sd2core.labels.spans import Labels, Span
 from sd2core.timebase import Timebase
@@ -140,11 +140,8 @@ def _changed(labels: Labels) -> list[Loss]:
 
 
 def _number(path: Path, line: int, column: str, text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
+    value = finite_number(text)
+    if value is None:
         raise Sd2Error(
             f"{path}, line {line}: {column} is {text[:50]!r}",
             "a finite number; of times, seconds since the first sample",

@@ -7,7 +7,6 @@ numbers and flags that stand free count, all other words only explain.
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,7 +15,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.texts import read_text
 from sd2core.labels.formats.losses import LabelFormat, Loss, losses_by_format
-from sd2core.labels.formats.numbers import positional, whole_number
+from sd2core.labels.formats.numbers import finite_number, positional, whole_number
 from sd2core.labels.formats.rows import Lane, Row, assemble, edges_s, lanes_of, track_of
 from sd2core.labels.spans import Labels, Overlap
 from sd2core.timebase import Timebase
@@ -161,11 +160,8 @@ class _Tokens:
 
     def number(self, what: str) -> float:
         found = self._next("number", what)
-        try:
-            value = float(found)
-        except ValueError:
-            value = math.nan
-        if not math.isfinite(value):
+        value = finite_number(found)
+        if value is None:
             raise Sd2Error(f"{self._path} has {found[:50]!r} for the {what}", "a finite number")
         return value
 

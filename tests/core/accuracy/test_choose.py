@@ -12,12 +12,12 @@ from accuracy_scenes import ball, moving, plate, steady, swinging, together
 
 from sd2core.accuracy.choosing import Survey, choose, survey_scene
 from sd2core.accuracy.plans import FRAME_RATE_FACTORS
-from sd2core.accuracy.results import relative_l1
 from sd2core.accuracy.sample import take_sample
 from sd2core.accuracy.trial import synthesizer_for
 from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.numerics.map_accuracy import relative_l1
 from sd2core.progress import Cancelled
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase

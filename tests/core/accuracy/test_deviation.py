@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from sd2core.accuracy.results import Spread, compute_errors, relative_l1
+from sd2core.accuracy.results import Spread, compute_errors
+from sd2core.numerics.map_accuracy import relative_l1
 from sd2core.sensor import VelocityAxis
 
 AXIS = VelocityAxis(4, 2.0)  # bins of 1 m/s, centres -1.5, -0.5, 0.5, 1.5

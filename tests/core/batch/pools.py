@@ -67,8 +67,7 @@ class SerialPool:
                     stream.write("here 1\n")
                 self._waiting.append((worker, tasks))
                 return []
-        records = [task.record(self._folder) for task in tasks]
-        return [Ending(tasks, run_tasks(records), worker)]
+        return [Ending(tasks, run_tasks(tasks, self._folder), worker)]
 
 
 @contextmanager

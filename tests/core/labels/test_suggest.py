@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from sd2core.doppler import Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.files.resources import resource_path
+from sd2core.io.mesh import load_mesh
 from sd2core.io.radar.kkt import load_kkt
 from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.labels.suggest import (
@@ -121,13 +122,12 @@ def test_no_more_than_the_highest_sidelobe_is_taken_for_one(gain: float, over: f
 
 def test_spans_are_suggestions_with_a_reason() -> None:
     doppler = doppler_map(pulses(200, (40, 60), (120, 140), gain=20.0))
-    spans = suggest_spans(doppler, label="swipe", track="Found", first_id=7)
-    assert [span.id for span in spans] == [7, 8]
+    spans = suggest_spans(doppler, label="swipe")
+    assert [span.id for span in spans] == [1, 2]
     for span in spans:
-        assert (span.origin, span.label, span.track) == ("suggestion", "swipe", "Found")
+        assert (span.origin, span.label, span.track) == ("suggestion", "swipe", TRACK)
         assert span.note == "up to 12 dB over the quiet level"
-    assert {span.track for span in suggest_spans(doppler)} == {TRACK}
-    Labels((LabelTrack("Found"),), spans)
+    Labels((LabelTrack(TRACK),), spans)
 
 
 @given(st.floats(6.4, 1e4))
@@ -331,14 +331,14 @@ def test_options_that_make_no_sense_are_refused(fields: dict[str, float], words:
 
 
 def test_the_eight_swipes_of_the_sample_are_found() -> None:
-    """Simulated: what else moves (arms raised and lowered between) is suggested too."""
+    """Of the true body; what else moves (arms raised and lowered between) is suggested too."""
     recording = open_recording(resource_path("swipes.sd2"))
     swipes = [
         (span["start_s"], span["end_s"])
         for span in json.loads(resource_path("swipes.sd2/recording.json").read_text())["spans"]
     ]
-    doppler = Synthesizer(recording.load_mesh(), preset="paper").map(recording.sensor)
-    spans = suggest_spans(doppler)
+    true = load_mesh(recording.folder / "mesh.zarr")
+    spans = suggest_spans(Synthesizer(true, preset="paper").map(recording.sensor))
     assert len(swipes) == 8
     assert len(spans) == 12
     best = [max(spans, key=lambda span, swipe=swipe: overlap(span, swipe)) for swipe in swipes]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 from PySide6.QtCore import QEvent, QKeyCombination, QModelIndex, QObject, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QKeySequence
@@ -21,6 +22,7 @@ from PySide6.QtWidgets import (
 from sd2app.manual.help import help_button
 from sd2app.shell.keys.bindings import KeyBindings
 from sd2app.shell.keys.model import KEYS, KeyListModel
+from sd2app.widgets.dialogs import closing
 from sd2app.widgets.inputs import SearchLine
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import sentence
@@ -58,11 +60,11 @@ class KeysDialog(QDialog):
         self._said = sentence("", "warning")
         self._change = self._button("Change", "Wait for another key", self._begin)
         self._add = self._button("Add", "Wait for a key besides", lambda: self._begin(besides=True))
-        self._clear = self._button("Remove", "Leave it without a key", self._take_away)
-        self._reset = self._button("Reset", "Give it its usual keys back", self._give_back)
+        clear, reset = partial(self._attempt, model.clear), partial(self._attempt, model.reset)
+        self._clear = self._button("Remove", "Leave it without a key", clear)
+        self._reset = self._button("Reset", "Give it its usual keys back", reset)
         every = self._button("Reset all", "Give everything its usual keys", bindings.reset_all)
-        close = QDialogButtonBox(QDialogButtonBox.StandardButton.Close, self)
-        close.rejected.connect(self.reject)
+        close = closing(self)
         close.button(QDialogButtonBox.StandardButton.Close).setAutoDefault(False)
         changing = (self._change, self._add, self._clear, self._reset)
         buttons = row_of(*changing, STRETCH, every, close)
@@ -93,19 +95,15 @@ class KeysDialog(QDialog):
         self._table.edit(self._table.currentIndex().siblingAtColumn(KEYS))
 
     def _take(self, row: int, key: str) -> None:
-        self._attempt(lambda: self._model.change(row, key, besides=self._cells.besides))
+        change, besides = self._model.change, self._cells.besides
+        self._attempt(lambda _: change(row, key, besides=besides))
         self._cells.besides = False
 
-    def _take_away(self) -> None:
-        self._attempt(lambda: self._model.clear(self._row))
-
-    def _give_back(self) -> None:
-        self._attempt(lambda: self._model.reset(self._row))
-
-    def _attempt(self, change: Callable[[], None]) -> None:
+    def _attempt(self, change: Callable[[int], None]) -> None:
+        """Change the current row, or say why that is refused."""
         self._said.clear()
         try:
-            change()
+            change(self._row)
         except Sd2Error as error:
             self._said.setText(str(error))
 

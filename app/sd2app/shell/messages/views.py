@@ -6,6 +6,7 @@ from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QDialog, QDialogButtonBox, QPlainTextEdit, QWidget
 
 from sd2app.shell.messages.model import Message, MessagesModel
+from sd2app.widgets.dialogs import closing
 from sd2app.widgets.layouts import column_of
 from sd2app.widgets.notices import Notice
 from sd2app.widgets.text import clock_text
@@ -62,11 +63,10 @@ class MessagesDialog(QDialog):
         self.list.setReadOnly(True)
         self.list.setAccessibleName("Messages, the newest first")
         self.list.setPlaceholderText(_NOTHING)
-        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close, self)
+        buttons = closing(self)
         buttons.addButton("Clear", QDialogButtonBox.ButtonRole.ResetRole).clicked.connect(
             messages.forget
         )
-        buttons.rejected.connect(self.reject)
         self.setLayout(column_of(self.list, buttons))
         messages.changed.connect(self._refresh)
         self._refresh()
