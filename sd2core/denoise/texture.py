@@ -26,9 +26,8 @@ _BLOCK = 512
 _GROUPS = 24
 _ROUNDS = 30
 _LEAST_SHOWN = 50
-_SEGMENTS = 64
-_PERSISTENCES = (0.0, 0.25, 0.5, 0.75, 0.9, 0.97)
-_FARTHEST = 9.0
+_APART = 3
+"""Frames apart at which a cell's fluctuations are taken as independent, its mean as the same."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +44,7 @@ class Texture:
     floor: float  # Mean power of what shows of the weakest cells.
     gain: float
     looks: float
-    persistence: float  # Correlation of a cell's fluctuations from frame to frame, 0 to below 1.
+    persistence: float  # Correlation of the normal process from frame to frame, 0 to below 1.
 
     def __post_init__(self) -> None:
         positive = min(self.half, self.slope, self.looks, self.floor + self.gain)
@@ -64,43 +63,16 @@ class Texture:
         groups = np.array_split(np.argsort(mean), _GROUPS)
         level = np.array([mean[one].mean() for one in groups])
         found = np.array([power[one].mean() for one in groups])
-        scatter = np.array([power[one].var() for one in groups])
         # Relative errors count.
         rows = np.stack([np.ones_like(level), level], axis=1) / found[:, None]
         floor, gain = np.linalg.lstsq(rows, np.ones_like(found))[0].clip(min=0.0).tolist()
-        looks = float(np.median(found**2 / np.maximum(scatter, 1e-9 * found**2)))
-        if not (floor + gain > 0 and slope > 0):
+        near, far = _change(radar, 1), _change(radar, _APART)
+        if not (floor + gain > 0 and slope > 0 and 0 < far < 1):
             return None
-        law = cls(half, slope, floor, gain, looks, 0.0)
-        return replace(law, persistence=law._persistence_of(means, radar))
-
-    def _persistence_of(self, means: Energies, radar: Energies) -> float:
-        """Persistence whose realisations are as alike from frame to frame as a radar's maps."""
-        frames, bins = means.shape[-2:]
-        some, given = (values.reshape(-1, frames, bins)[:_SEGMENTS] for values in (means, radar))
-        wanted = self._likeness(some, given)
-        found = [
-            self._likeness(
-                some,
-                np.stack(
-                    [
-                        replace(self, persistence=one).drawn(segment, (number,))
-                        for number, segment in enumerate(some)
-                    ]
-                ),
-            )
-            for one in _PERSISTENCES
-        ]
-        return float(np.interp(wanted, np.maximum.accumulate(found), _PERSISTENCES))
-
-    def _likeness(self, means: Energies, maps: Energies) -> float:
-        """Correlation of how far neighbouring frames are from their means, where both show."""
-        off = maps / np.maximum(self.floor + self.gain * means, np.finfo(np.float32).tiny) - 1.0
-        off = np.clip(off, -1.0, _FARTHEST)
-        both = (maps[:, 1:] > 0) & (maps[:, :-1] > 0)
-        if both.sum() < _LEAST_SHOWN:
-            return 0.0
-        return float(np.corrcoef(off[:, 1:][both], off[:, :-1][both])[0, 1])
+        looks = 0.5 * (1.0 / far - 1.0)
+        # Powers are alike by about the square of what they are made of.
+        persistence = float(np.sqrt(np.clip(1.0 - near / far, 0.0, 0.98)))
+        return cls(half, slope, floor, gain, looks, persistence)
 
     def mean_that_shows(self, share: float) -> float:
         """Mean of a cell that shows in this share of the frames, 0 to 1 both excluded."""
@@ -133,6 +105,20 @@ class Texture:
     def from_json(cls, content: Mapping[str, Any] | None) -> Texture | None:
         """From the dictionary of its fields; models of before there were textures have none."""
         return None if content is None else cls(**{name: float(content[name]) for name in content})
+
+
+def _change(radar: Energies, apart: int) -> float:
+    """Mean of ((x − y) / (x + y))² of a cell's powers some frames apart, where both show.
+
+    Of independent powers with the same gamma distribution it is 1 / (2 looks + 1), whatever their
+    mean is.
+    """
+    one, other = radar[..., :-apart, :], radar[..., apart:, :]
+    both = (one > 0) & (other > 0)
+    if both.sum() < _LEAST_SHOWN:
+        return 0.0
+    x, y = one[both].astype(np.float64), other[both].astype(np.float64)
+    return float((((x - y) / (x + y)) ** 2).mean())
 
 
 def _fluctuations(

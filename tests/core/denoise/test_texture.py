@@ -18,8 +18,9 @@ LAW = Texture(half=0.3, slope=1.5, floor=0.1, gain=0.9, looks=2.0, persistence=0
 
 
 def means(segments: int = 40, seed: int = 0) -> np.ndarray:
-    values = np.random.default_rng(seed).gamma(0.3, 1.0, (segments, 72, 29)) + 1e-6
-    return values.astype(np.float32)
+    """Of cells that do not change within a segment."""
+    values = np.random.default_rng(seed).gamma(0.3, 1.0, (segments, 1, 29)) + 1e-6
+    return np.repeat(values, 72, axis=1).astype(np.float32)
 
 
 def drawn(law: Texture, of: np.ndarray) -> np.ndarray:
@@ -27,13 +28,22 @@ def drawn(law: Texture, of: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("looks", [1.0, 4.0])
-@pytest.mark.parametrize("persistence", [0.0, 0.7])
+@pytest.mark.parametrize("persistence", [0.0, 0.4])
 def test_a_law_is_found_again_in_what_it_drew(looks: float, persistence: float) -> None:
     law = replace(LAW, looks=looks, persistence=persistence)
     found = Texture.fitted(means(), drawn(law, means()))
     assert found is not None
     for name, value in asdict(law).items():
-        assert getattr(found, name) == pytest.approx(value, rel=0.12, abs=0.08), name
+        near = 0.2 if name == "persistence" else 0.08
+        assert getattr(found, name) == pytest.approx(value, rel=0.12, abs=near), name
+
+
+def test_how_far_takes_are_from_the_answers_is_no_speckle() -> None:
+    """Takes of other levels than the model's answers scatter no more than each does."""
+    levels = np.random.default_rng(2).lognormal(0.0, 1.0, (40, 1, 1)).astype(np.float32)
+    found = Texture.fitted(means() * levels, drawn(LAW, means()))
+    assert found is not None
+    assert found.looks == pytest.approx(LAW.looks, rel=0.15)
 
 
 def test_power_is_that_of_the_law() -> None:
