@@ -140,8 +140,9 @@ of it the radar's few points allow: [real pairs](real-pairs.md#what-the-radar-al
 ## Texture
 
 A radar's map scatters about the mean that a network predicts; `--texture` draws it
-([decision 73](decisions/0073-texture.md)). Share of cells that show something, power of those over
-their mean (standard deviation), and likeness of neighbouring frames (correlation):
+([decision 73](decisions/0073-texture.md)). Share of cells that show something; how far the
+strongest tenth of those is above the weakest, over the mean; how much they change from frame to
+frame, |x − y| / (x + y):
 
 {texture}
 

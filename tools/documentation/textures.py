@@ -9,8 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.denoise.files import load_model
+from sd2core.denoise.live import TrainedDenoiser
+from sd2core.denoise.texture import Texture
 from sd2core.files.tables import markdown_table
-from sd2core.pairs.store import read_pairs
+from sd2core.pairs.segments import LENGTH
+from sd2core.pairs.store import Take, read_pairs
 
 Maps = list[NDArray[np.float32]]
 _STRONG = 0.5
@@ -20,16 +23,22 @@ _STRONG = 0.5
 def texture_table(models: Mapping[str, tuple[Path, Path, str | None]]) -> str:
     """Statistics of a run's own radar and of maps drawn for it, of people it has not learnt from.
 
-    ``models`` are a run, its pairs, and the subject judged; None: the run's test subjects.
+    ``models`` are a run, its pairs, and the subject judged; None: the run's test subjects. The law
+    is fitted to the people that the run learnt from.
     """
-    rows = [["maps", "cells that show", "power over its mean", "neighbouring frames"]]
+    rows = [["maps", "cells that show", "dB from weak to strong", "change"]]
     for title, (run, data, judged) in models.items():
         model = load_model(run / "best.safetensors")
-        texture = model.card.needed_texture()
-        subjects = [judged] if judged else model.card.about["subjects"]["test"]
-        takes = read_pairs(data).of(subjects).placements(first_only=True).takes
+        known = model.card.about["subjects"]
+        pairs = read_pairs(data)
+        learnt = pairs.of(known["training"]).placements(first_only=True).takes
+        answers = np.concatenate([_cut(_answer(model, take)) for take in learnt])
+        texture = Texture.fitted(answers, np.concatenate([_cut(take.radar) for take in learnt]))
+        assert texture is not None
+        subjects = [judged] if judged else known["test"]
+        takes = pairs.of(subjects).placements(first_only=True).takes
         counted = [n for n in range(model.card.axis.bins) if n not in model.card.null_bins]
-        means = [model.denoise_values(take.inputs(model.card.parts)) for take in takes]
+        means = [_answer(model, take) for take in takes]
         drawn = [texture.drawn(mean, (0, number)) for number, mean in enumerate(means)]
         radar = [take.radar for take in takes]
         for name, maps in (("the radar's", radar), ("drawn", drawn), ("the mean", means)):
@@ -38,18 +47,28 @@ def texture_table(models: Mapping[str, tuple[Path, Path, str | None]]) -> str:
     return "\n".join(markdown_table(rows))
 
 
+def _answer(model: TrainedDenoiser, take: Take) -> NDArray[np.float32]:
+    return model.denoise_values(take.inputs(model.card.parts))
+
+
+def _cut(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Whole segments of 72 frames, (segments, 72, bins)."""
+    whole = len(values) // LENGTH * LENGTH
+    return values[:whole].reshape(-1, LENGTH, values.shape[1])
+
+
 def _statistics(means: Maps, maps: Maps) -> tuple[float, float, float]:
     least = np.quantile(np.concatenate(means), _STRONG)
-    off, pairs = [], []
+    ratios, changes = [], []
     shown = cells = 0
     for mean, values in zip(means, maps, strict=True):
         strong = mean > max(least, 0.0)
         shown, cells = shown + int((values > 0)[strong].sum()), cells + int(strong.sum())
-        ratio = np.divide(values, mean, out=np.zeros_like(mean), where=strong)
-        off.append(ratio[strong & (values > 0)])
-        both = strong[1:] & strong[:-1]
-        pairs.append(np.sqrt(np.stack([ratio[1:][both], ratio[:-1][both]])))
-    together = np.concatenate(pairs, axis=1)
-    relative = np.concatenate(off)
-    likeness = np.corrcoef(together)[0, 1] if together.std() > 1e-6 else 1.0
-    return shown / max(cells, 1), float(relative.std() / relative.mean()), float(likeness)
+        known = strong & (values > 0)
+        ratios.append(values[known] / mean[known])
+        both = known[1:] & known[:-1]
+        one, other = values[1:][both], values[:-1][both]
+        changes.append(np.abs(one - other) / (one + other))
+    low, high = np.quantile(np.concatenate(ratios), [0.1, 0.9])
+    change = float(np.concatenate(changes).mean())
+    return shown / max(cells, 1), float(10.0 * np.log10(high / low)), change

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.accuracy.library import AccuracyLibrary
-from sd2app.background.latest import BackgroundModel, Emit, LatestRunner
+from sd2app.background.latest import Emit, LatestRunner, ReportingModel
 from sd2app.session.tasks import Job, ListedRunner, TaskList
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.mesh.sequence import MeshSequence
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 FAMILIES: tuple[Family, ...] = ("histogram", "fmcw")
 
 
-class MeasuredModel(BackgroundModel):
+class MeasuredModel(ReportingModel):
     """Measures when asked, and remembers per scene and machine; one measurement per family.
 
     ``changed`` is emitted for anything that is shown, ``failed`` with a sentence

@@ -9,7 +9,7 @@ from PySide6.QtCore import QObject, Signal
 from sd2app.accuracy.library import AccuracyLibrary
 from sd2app.accuracy.measurements import MeasuredModel, serves_at_rest
 from sd2app.accuracy.text import InUse
-from sd2app.background.latest import BackgroundModel, Emit
+from sd2app.background.latest import Emit, ReportingModel
 from sd2app.session.tasks import ListedRunner, TaskList
 from sd2app.settings import Settings
 from sd2core.doppler.options import SynthesisOptions
@@ -40,7 +40,7 @@ class _Surveyed(NamedTuple):
     survey: Survey
 
 
-class AccuracyModel(BackgroundModel):
+class AccuracyModel(ReportingModel):
     """Chooses a plan for the open scene in the background; the newest request wins.
 
     At rest the tolerance rules, unless the user clicked a point: then that plan

@@ -8,7 +8,7 @@ from typing import Literal
 
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.background.latest import BackgroundModel, Emit, LatestRunner
+from sd2app.background.latest import Emit, LatestRunner, ReportingModel
 from sd2app.labels.model import LabelsModel
 from sd2app.session.session import Session
 from sd2core.labels.agreement import Agreement, Disagreement, agreement, disagreements
@@ -19,7 +19,7 @@ from sd2core.labels.spans import Labels
 Compared = tuple[Agreement, tuple[Disagreement, ...]]
 
 
-class AgreementModel(BackgroundModel):
+class AgreementModel(ReportingModel):
     """Agreement with the labels of a file, compared again when the recording's labels change.
 
     Suggestions that are not accepted yet are left out.

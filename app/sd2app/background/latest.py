@@ -7,7 +7,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtCore import QObject, Qt, QTimer, Signal
 
 from sd2core.progress import Cancelled
 
@@ -143,11 +143,6 @@ class LatestRunner(QObject):
 class BackgroundModel(QObject):
     """Model that works in the background, by runners and other such models: its children."""
 
-    failed = Signal(str)
-
-    def _fail(self, error: Exception) -> None:
-        self.failed.emit(str(error))
-
     @property
     def busy(self) -> bool:
         """True while one of them works."""
@@ -159,4 +154,15 @@ class BackgroundModel(QObject):
             worker.close()
 
     def _workers(self) -> list[LatestRunner | BackgroundModel]:
-        return [one for one in self.children() if isinstance(one, LatestRunner | BackgroundModel)]
+        direct = Qt.FindChildOption.FindDirectChildrenOnly
+        runners = self.findChildren(LatestRunner, options=direct)
+        return [*runners, *self.findChildren(BackgroundModel, options=direct)]
+
+
+class ReportingModel(BackgroundModel):
+    """One that tells why its work failed."""
+
+    failed = Signal(str)
+
+    def _fail(self, error: Exception) -> None:
+        self.failed.emit(str(error))

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.background.latest import BackgroundModel, Emit, LatestRunner
+from sd2app.background.latest import Emit, LatestRunner, ReportingModel
 from sd2app.session.session import Session
 from sd2app.session.tasks import ListedRunner
 from sd2core.errors import Sd2Error
@@ -34,7 +34,7 @@ class _Wish(NamedTuple):
     current: str | None
 
 
-class ImuModel(BackgroundModel):
+class ImuModel(ReportingModel):
     """Sensors of the recording, of which one is shown; its signals are computed in the background.
 
     A recording has any number of virtual sensors, and one file of a real one.

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QDialog, QMessageBox, QWidget
 
-from sd2app.background.latest import BackgroundModel, Emit
+from sd2app.background.latest import Emit, ReportingModel
 from sd2app.feature import Shell
 from sd2app.labels.model import LabelsModel
 from sd2app.manual.help import with_help
@@ -42,7 +42,7 @@ class _Done(NamedTuple):
     same: int
 
 
-class CutOutModel(BackgroundModel):
+class CutOutModel(ReportingModel):
     """Cuts spans out into folders; asks first where a folder holds something else."""
 
     asked = Signal(int, str)  # number of occupied folders, one of them; answer: go_on or give_up

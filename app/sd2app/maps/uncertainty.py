@@ -5,7 +5,7 @@ from __future__ import annotations
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.accuracy.model import AccuracyModel
-from sd2app.background.latest import BackgroundModel, Emit
+from sd2app.background.latest import Emit, ReportingModel
 from sd2app.maps.model import SynthesisModel
 from sd2app.session.session import Session
 from sd2app.session.tasks import ListedRunner
@@ -15,7 +15,7 @@ from sd2core.maps import CellUncertainty, DopplerMap
 _SHOWN = "uncertain_cells"
 
 
-class UncertaintyModel(BackgroundModel):
+class UncertaintyModel(ReportingModel):
     """Follows the synthetic map of a mesh that states its uncertainty.
 
     The body's share of the accuracy is found for every finished map, and stays as pending while

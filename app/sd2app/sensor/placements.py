@@ -9,7 +9,7 @@ from PySide6.QtCore import QObject, Signal
 
 from sd2app.accuracy.model import AccuracyModel
 from sd2app.accuracy.text import InUse
-from sd2app.background.latest import BackgroundModel, Emit, LatestRunner
+from sd2app.background.latest import Emit, LatestRunner, ReportingModel
 from sd2app.session.session import Session
 from sd2app.widgets.text import bytes_text, counted, duration_text, seconds
 from sd2core.mesh.sequence import MeshSequence
@@ -36,7 +36,7 @@ class _Wish(NamedTuple):
     plan: Placements
 
 
-class PlacementsModel(BackgroundModel):
+class PlacementsModel(ReportingModel):
     """Plan of the open recording; its placements are computed in the background."""
 
     changed = Signal()  # places, their coverage or their cost

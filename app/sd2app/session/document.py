@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QUndoStack
 
-from sd2app.background.latest import BackgroundModel, Emit
+from sd2app.background.latest import Emit
 from sd2app.session.content import (
     PARTS,
     UNTITLED,
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from sd2core.io.video import VideoReader
 
 
-class DocumentModel(BackgroundModel):
+class DocumentModel(QObject):
     """One recording, its parts, and the history of its edits."""
 
     opened = Signal()  # another recording, or none
@@ -44,6 +44,7 @@ class DocumentModel(BackgroundModel):
     grown = Signal()  # frames were added at its end
     saved = Signal()  # on disk with all edits, maybe in another place than before
     noted = Signal(str)
+    failed = Signal(str)
 
     def __init__(self, jobs: TaskList, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -54,8 +55,10 @@ class DocumentModel(BackgroundModel):
         self.goes_on = False  # the recording is the one that was open before, with other files
         self.growing = False  # a radar is listened to, and adds frames
         self._base: Recording | None = None
-        self._runner = ListedRunner("open", jobs, self, self._receive, self._fail)
-        self._maps = ListedRunner("radar", jobs, self, self._receive_map, self._fail)
+        self._runner = ListedRunner("open", jobs, self, self._receive)
+        self._maps = ListedRunner("radar", jobs, self, self._receive_map)
+        for runner in (self._runner, self._maps):
+            runner.failed.connect(lambda error: self.failed.emit(str(error)))
 
     # --- what is there --------------------------------------------------------------------
 
@@ -210,7 +213,8 @@ class DocumentModel(BackgroundModel):
 
     def close(self) -> None:
         """Stop all work and let go of the files."""
-        super().close()
+        self._runner.close()
+        self._maps.close()
         if self.content is not None:
             self.content.close()
             self.content = None

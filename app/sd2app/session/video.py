@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.background.latest import BackgroundModel, Emit, LatestRunner
+from sd2app.background.latest import Emit, LatestRunner, ReportingModel
 from sd2app.session.playback import PlaybackModel
 from sd2core.io.video import VideoReader
 
 
-class VideoModel(BackgroundModel):
+class VideoModel(ReportingModel):
     """Follows the clock: one picture at a time is decoded, then the newest wanted one."""
 
     frame_changed = Signal()
