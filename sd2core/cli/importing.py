@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import shutil
 from pathlib import Path
 
 from sd2core.cli.command_parser import add_command
@@ -56,12 +57,14 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 
 def copy_sample(out: Path) -> None:
-    """Write a copy of the bundled sample recording."""
+    """Write a copy of the bundled sample recording, with the true body of its person."""
     from sd2core.files.resources import resource_path
     from sd2core.recording.recording import open_recording
 
-    copy = open_recording(resource_path("swipes.sd2")).save_as(out, copy=True)
-    print(f"Wrote {copy.folder}")
+    sample = resource_path("swipes.sd2")
+    copy = open_recording(sample).save_as(out, copy=True)
+    shutil.copytree(sample / "mesh.zarr", copy.folder / "mesh.zarr")
+    print(f"Wrote {copy.folder}; its mesh is a fit of its video, mesh.zarr the true body")
 
 
 def _import(options: argparse.Namespace) -> None:
