@@ -109,7 +109,7 @@ def _facts(entry: dict[str, Any]) -> dict[str, str]:
     if entry["problem"]:
         return {"not aligned": entry["problem"]} | facts
     return {
-        "radar offset": f"{entry['offset_s']:g} s (was {entry['before_s']:g} s)",
+        "radar offset": f"{entry['offset_s'] + 0.0:g} s (was {entry['before_s']:g} s)",
         **facts,
         "saved": "yes" if entry["saved"] else "no (--save)",
     }

@@ -64,7 +64,7 @@ def copy_sample(out: Path) -> None:
     sample = resource_path("swipes.sd2")
     copy = open_recording(sample).save_as(out, copy=True)
     shutil.copytree(sample / "mesh.zarr", copy.folder / "mesh.zarr")
-    print(f"Wrote {copy.folder}; its mesh is a fit of its video, mesh.zarr the true body")
+    print(f"Wrote {copy.folder}")
 
 
 def _import(options: argparse.Namespace) -> None:
