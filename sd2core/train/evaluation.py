@@ -156,7 +156,7 @@ def evaluate(
     Raises Sd2Error if a model does not fit the pairs, or a subject has no take.
     """
     for model in models:
-        _check_fits(model.card, pairs)
+        check_fits(model.card, pairs, "Judge it by pairs like those that it learnt from")
     judged_subjects = _judged_subjects(models, pairs, subjects)
     judged = pairs.of(judged_subjects).placements(first_only=first_only)
     if not judged.takes:
@@ -345,7 +345,8 @@ def _notes(
     return tuple(dict.fromkeys(notes))
 
 
-def _check_fits(card: ModelCard, pairs: PairSet) -> None:
+def check_fits(card: ModelCard, pairs: PairSet, remedy: str) -> None:
+    """Raise Sd2Error, with a remedy, for a model that is not made for maps like those of pairs."""
     for what, mine, theirs in (
         ("velocity axis", card.axis, pairs.axis),
         ("null bins", card.null_bins, tuple(pairs.null_bins)),
@@ -355,5 +356,5 @@ def _check_fits(card: ModelCard, pairs: PairSet) -> None:
             raise Sd2Error(
                 f"The {what} of the model {_title(card)} is {mine}, that of the pairs {theirs}",
                 "the same",
-                "Judge it by pairs like those that it learnt from",
+                remedy,
             )

@@ -20,6 +20,7 @@ from sd2core.denoise.live import TrainedDenoiser
 from sd2core.denoise.model import Denoiser, fit_standards, parameter_count
 from sd2core.denoise.registry import build, options
 from sd2core.denoise.scaling import Scaling
+from sd2core.denoise.texture import Texture
 from sd2core.errors import Sd2Error
 from sd2core.processes import lower_priority
 from sd2core.runs.control import Control, signals_kept
@@ -29,6 +30,7 @@ from sd2core.train.checkpoint import Checkpoint, Position, read_checkpoint
 from sd2core.train.config import TrainConfig
 from sd2core.train.data import Order, TrainingData, prepare, read_mixed
 from sd2core.train.denoiser_module import DenoiserModule
+from sd2core.train.evaluation import check_fits
 from sd2core.train.folder import TrainingFolder
 from sd2core.train.machine import device_of, machine_words, precision_of, settled
 from sd2core.train.steps import Steps
@@ -132,18 +134,8 @@ def carry_out(
 def _start(path: Path, data: TrainingData) -> TrainedDenoiser:
     """The model to go on from."""
     start = load_model(path)
-    card, pairs = start.card, data.pairs
-    for what, its, ours in (
-        ("velocity axis", card.axis, pairs.axis),
-        ("null bins", card.null_bins, tuple(pairs.null_bins)),
-        ("frame rate", card.frame_rate_hz, pairs.frame_rate_hz),
-    ):
-        if its != ours:
-            raise Sd2Error(
-                f"The {what} of {path} is {its}, that of the pairs {ours}",
-                "the same",
-                "Make the pairs like those that the model learnt from, or train a new one",
-            )
+    remedy = "Make the pairs like those that the model learnt from, or train a new one"
+    check_fits(start.card, data.pairs, remedy)
     return start
 
 
@@ -250,8 +242,12 @@ class _About:
         config, pairs, split = self.config, self.data.pairs, self.data.split
         name = config.model.name
         scaling = self.scaling
-        if found.texture is not None:
-            floor = max(scaling.floor, found.texture.mean_that_shows(_SHOWS))
+        # Here, because only the best epochs need it.
+        counted = [one for one in range(pairs.axis.bins) if one not in pairs.null_bins]
+        radar = self.data.validation.targets
+        texture = Texture.fitted(found.answers[..., counted], radar[..., counted])
+        if texture is not None:
+            floor = max(scaling.floor, texture.mean_that_shows(_SHOWS))
             scaling = replace(scaling, floor=floor)
         return ModelCard(
             model=name,
@@ -263,7 +259,7 @@ class _About:
             trained_on=pairs.kind,
             parts=self.data.parts,
             known=self.known,
-            texture=found.texture,
+            texture=texture,
             about={
                 "data": self._data_words(),
                 "command": self.command,

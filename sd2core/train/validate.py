@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from sd2core.denoise.metrics import velocity_error
 from sd2core.denoise.model import Denoiser
 from sd2core.denoise.scaling import Scaling
-from sd2core.denoise.texture import Texture
 from sd2core.maps import peak_velocity_mps
 from sd2core.sensor import VelocityAxis
 from sd2core.train.data import Segments
@@ -29,7 +28,7 @@ class Validation:
     """Of the peak velocity per frame, as :mod:`sd2core.denoise.metrics` defines it, in frames in
     which something moves. A model begins each segment without a state; ``sd2 eval``, which
     gives it whole takes, finds less."""
-    texture: Texture | None  # of the radar's maps about the answers
+    answers: NDArray[np.float32]  # energies, (segments, length, bins), 0 in nulled bins
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +92,4 @@ def validate(
     answers = np.concatenate(found)
     peaks_mps = peak_velocity_mps(answers.reshape(-1, bins), exam.axis)
     error = velocity_error(peaks_mps, exam.peaks_mps)
-    radar = exam.scaling.target.expand(exam.targets.cpu().numpy())
-    counted = list(exam.counted)
-    texture = Texture.fitted(answers[..., counted], radar[..., counted])
-    return Validation((squares / cells) ** 0.5, error.mae_mps, texture)
+    return Validation((squares / cells) ** 0.5, error.mae_mps, answers)

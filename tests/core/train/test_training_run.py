@@ -36,7 +36,7 @@ from sd2core.train.config import (
 )
 from sd2core.train.folder import TrainingFolder
 from sd2core.train.start import Ending, begin, go_on
-from sd2core.train.validate import Validation
+from sd2core.train.validate import Exam, Validation
 
 REPOSITORY = Path(__file__).resolve().parents[3]
 SMALL: dict[str, dict[str, Any]] = {
@@ -248,9 +248,11 @@ class TestLearning:
         self, pairs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         errors = iter([0.5, 0.4, 0.6, 0.4, 0.5, 0.1])
-        monkeypatch.setattr(
-            "sd2core.train.callbacks.validate", lambda *_: Validation(next(errors), 1.0, None)
-        )
+
+        def told(model: object, exam: Exam, *_: object) -> Validation:
+            return Validation(next(errors), 1.0, np.zeros(tuple(exam.targets.shape), np.float32))
+
+        monkeypatch.setattr("sd2core.train.callbacks.validate", told)
         ending = begin(settings(pairs, early_stopping_epochs=3, epochs=6), tmp_path / "run")
         assert (ending.outcome, ending.best_epoch) == ("finished", 2)
         assert [one[3] for one in curve(tmp_path / "run")] == [True, True, False, False, False]
