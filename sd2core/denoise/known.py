@@ -18,7 +18,7 @@ _RARE = 0.001
 _MARGIN_MPS = 0.15
 """Distance from what is known at which a frame is wholly strange."""
 _TRUSTS = (0.0, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0)
-_HARM = 3.0
+_HARM = 2.0
 """How much more it counts that a segment is made worse than that it is made better."""
 
 
@@ -112,22 +112,22 @@ class KnownMovements:
         """The same, with the trust that does best on maps that the network did not learn from.
 
         Answers, energies of the synthetic map and the radar's are (segments, frames, bins),
-        ``moving`` (segments, frames). Judged are peak, mean and cells (L1) of every segment,
-        relative to the synthetic map; what a segment is made worse by counts ``_HARM`` times.
+        ``moving`` (segments, frames). Peak, mean and cells (L1) count alike; what a segment is made
+        worse by than the synthetic map counts twice.
         """
-        judged = moving.any(axis=1)
-        if not judged.any():
+        if not moving.any():
             return self
 
         def errors(trust: float) -> NDArray[np.float64]:
             mixed = replace(self, trust=trust).mixed(answers, energies, axis)
-            return _errors(mixed, radar, moving, axis)[:, judged]
+            return _errors(mixed, radar, moving, axis)
 
         none = errors(0.0)
 
         def loss(trust: float) -> float:
-            change = np.log(errors(trust) / none)
-            return float(np.where(change > 0.0, _HARM * change, change).mean())
+            change = errors(trust) - none
+            counted = np.where(change > 0.0, _HARM * change, change).sum(axis=1)
+            return float((counted / np.maximum(none.sum(axis=1), 1e-12)).sum())
 
         return replace(self, trust=min(_TRUSTS, key=loss))
 
@@ -177,16 +177,10 @@ def _errors(
     moving: NDArray[np.bool_],
     axis: VelocityAxis,
 ) -> NDArray[np.float64]:
-    """Errors of each segment: peak and mean velocity in frames that move, and cells; (3, segments).
-
-    A tenth of a bin, and of the energy, is added: errors far below that are all alike.
-    """
+    """Errors of segments: peak and mean velocity in frames that move, and cells; (3, segments)."""
     one, other = (values.reshape(-1, axis.bins) for values in (estimate, radar))
-    frames = np.maximum(moving.sum(axis=1), 1)
-    found = []
+    found = [np.abs(estimate - radar).sum(axis=(1, 2), dtype=np.float64)]
     for velocity in (peak_velocity_mps, mean_velocity_mps):
         off = np.abs(np.nan_to_num(velocity(one, axis)) - np.nan_to_num(velocity(other, axis)))
-        found.append((off.reshape(moving.shape) * moving).sum(axis=1) / frames)
-    cells = np.abs(estimate - radar).sum(axis=(1, 2)) / np.maximum(radar.sum(axis=(1, 2)), 1e-12)
-    least = 0.1 * (axis.centres_mps[1] - axis.centres_mps[0])
-    return np.stack([found[0] + least, found[1] + least, cells + 0.1])
+        found.append((off.reshape(moving.shape) * moving).sum(axis=1))
+    return np.stack(found)
