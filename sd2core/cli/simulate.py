@@ -276,7 +276,7 @@ def _add_campaign(kinds: argparse._SubParsersAction) -> None:
     parser.add_value("--rate", positive_float, "FPS", text)
     parser.add_value("--bins", positive_int, "N", "velocity bins, 16 to 128 (default: 32)")
     parser.add_value("--take-seconds", positive_float, "S", "length of a take, in seconds", 15.0)
-    parser.add_value("--workers", positive_int, "N", "worker processes", 2)
+    parser.add_value("--workers", positive_int, "N", "worker processes (default: one per core)")
     parser.add_limbs()
     parser.add_value(
         "--fit-errors",
@@ -348,6 +348,7 @@ def _campaign(options: argparse.Namespace) -> None:
     """
     from sd2core.doppler.options import chosen_options
     from sd2core.io.radar import named_radar
+    from sd2core.numerics.compiled import worker_count
     from sd2core.pairs.store import read_pairs
     from sd2core.simulate.campaign.making import make_campaign
     from sd2core.simulate.campaign.radar import radar_at
@@ -380,7 +381,7 @@ def _campaign(options: argparse.Namespace) -> None:
             campaign,
             subjects=options.people,
             minutes=options.minutes,
-            processes=options.workers,
+            processes=options.workers or worker_count(),
             errors=options.fit_errors,
             progress=progress,
         )
