@@ -27,7 +27,6 @@ OLD = {
     "scale.md": "needs an idle machine; batches changed in what they check",
     "fitting.md": "ten idle minutes; only how its commands are declared has changed",
     "real-gestures.md": "five minutes; suggestions were rearranged, none of them changed",
-    "denoiser.md": "trust came in afterwards; four minutes from kept runs",
     "range-synthesis.md": _HOURS,
     "real-pairs.md": "a quarter of an hour; nothing that it measures was meant to change",
     "classifier.md": _HOURS,
