@@ -7,9 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.command_parser import add_command
-from sd2core.cli.options import (
-    positive_float,
-)
+from sd2core.cli.options import positive_float
 from sd2core.cli.output import print_facts, print_json
 from sd2core.errors import Sd2Error
 

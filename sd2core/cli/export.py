@@ -10,14 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.command_parser import Options, add_command
-from sd2core.cli.options import (
-    bin_list,
-    given,
-    name_list,
-    positive_float,
-    positive_int,
-    share,
-)
+from sd2core.cli.options import bin_list, given, name_list, positive_float, positive_int, share
 from sd2core.cli.output import (
     counted,
     duration,

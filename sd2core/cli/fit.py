@@ -10,10 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.command_parser import add_command
-from sd2core.cli.options import (
-    not_negative_float,
-    positive_float,
-)
+from sd2core.cli.options import not_negative_float, positive_float
 from sd2core.cli.output import (
     picked,
     print_event,

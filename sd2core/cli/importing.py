@@ -7,11 +7,7 @@ import shutil
 from pathlib import Path
 
 from sd2core.cli.command_parser import add_command
-from sd2core.cli.options import (
-    finite_float,
-    flag,
-    given,
-)
+from sd2core.cli.options import finite_float, flag, given
 from sd2core.cli.output import picked, print_json, progress_bar
 from sd2core.errors import Sd2Error
 

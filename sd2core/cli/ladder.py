@@ -7,12 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from sd2core.cli.command_parser import Options, add_command
-from sd2core.cli.options import (
-    given,
-    positive_float,
-    positive_int,
-    share,
-)
+from sd2core.cli.options import given, positive_float, positive_int, share
 from sd2core.cli.output import print_json, progress_bar
 from sd2core.errors import Sd2Error
 

@@ -8,12 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sd2core.cli.command_parser import Options, add_command
-from sd2core.cli.options import (
-    bin_list,
-    finite_float,
-    given,
-    position,
-)
+from sd2core.cli.options import bin_list, finite_float, given, position
 from sd2core.cli.output import print_facts, print_json, progress_bar
 
 if TYPE_CHECKING:

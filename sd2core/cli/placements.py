@@ -8,11 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.command_parser import add_command
 from sd2core.cli.ladder import add_wish
-from sd2core.cli.options import (
-    flag,
-    given,
-    positive_int,
-)
+from sd2core.cli.options import flag, given, positive_int
 from sd2core.cli.output import (
     counted,
     duration,

@@ -8,11 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
 from sd2core.cli.command_parser import add_command
-from sd2core.cli.options import (
-    flag,
-    given,
-    span_m,
-)
+from sd2core.cli.options import flag, given, span_m
 from sd2core.cli.output import progress_bar
 from sd2core.cli.radar_description import add_description, describe, refuse_description
 from sd2core.errors import Sd2Error

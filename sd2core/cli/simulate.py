@@ -9,12 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from sd2core.cli.command_parser import Options, add_command
-from sd2core.cli.options import (
-    finite_float,
-    position,
-    positive_float,
-    positive_int,
-)
+from sd2core.cli.options import finite_float, position, positive_float, positive_int
 from sd2core.cli.output import picked, print_json, progress_bar
 from sd2core.errors import Sd2Error
 

@@ -11,12 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.command_parser import Options, add_command
-from sd2core.cli.options import (
-    flag,
-    given,
-    positive_float,
-    positive_int,
-)
+from sd2core.cli.options import flag, given, positive_float, positive_int
 from sd2core.cli.output import picked, print_facts, print_json
 from sd2core.errors import Sd2Error
 from sd2core.processes import INTERRUPTED

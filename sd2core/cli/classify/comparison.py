@@ -13,10 +13,7 @@ from typing import TYPE_CHECKING, Any
 from sd2core.cli.classify.data import DATA_HELP, add_sources, clips_of
 from sd2core.cli.classify.train import add_network, network_of
 from sd2core.cli.command_parser import add_command
-from sd2core.cli.options import (
-    positive_int,
-    share,
-)
+from sd2core.cli.options import positive_int, share
 from sd2core.cli.output import finite, print_event, print_json, progress_bar
 
 if TYPE_CHECKING:

@@ -17,9 +17,7 @@ from sd2core.cli.labels.suggest import (
     spans_data,
     write_found,
 )
-from sd2core.cli.options import (
-    not_negative_float,
-)
+from sd2core.cli.options import not_negative_float
 from sd2core.cli.output import counted, print_json, print_rows, progress_bar
 from sd2core.cli.recording_maps import MAP_NAMES
 from sd2core.errors import Sd2Error
