@@ -79,8 +79,7 @@ class Options(argparse._ActionsContainer):
         group = self.add_mutually_exclusive_group()
         group.add_json()
         group.add_flag(
-            "--progress-json",
-            "print progress as JSON lines, for other programs (docs/formats.md)",
+            "--progress-json", "print progress as JSON lines, for other programs (docs/formats.md)"
         )
 
     def add_axis(self) -> None:

@@ -41,10 +41,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 def _add_errors(parser: Options) -> None:
     group = parser.add_argument_group("sensor errors", "none by default")
-    for short, long, unit in (
-        ("acc", "accelerometer", "m/s²"),
-        ("gyr", "gyroscope", "rad/s"),
-    ):
+    for short, long, unit in (("acc", "accelerometer", "m/s²"), ("gyr", "gyroscope", "rad/s")):
         text = f"constant error of the {long}, in {unit}"
         group.add_value(f"--{short}-bias", vector, "X,Y,Z", text, (0.0, 0.0, 0.0))
         group.add_argument(

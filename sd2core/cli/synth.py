@@ -198,8 +198,7 @@ def _check_wish(options: argparse.Namespace) -> None:
         raise Sd2Error(f"{wish} is given with --method fmcw", f"{wish} with the histogram only")
     for name in given(options, CHOSEN):
         raise Sd2Error(
-            f"{wish} is given with {flag(name)}",
-            f"one of them: with {wish} the plan chooses how",
+            f"{wish} is given with {flag(name)}", f"one of them: with {wish} the plan chooses how"
         )
 
 

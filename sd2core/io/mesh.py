@@ -111,14 +111,7 @@ def load_mesh(
         known = known.times(_velocity_factor(raw.times_s, times_s, scale))
     notes = (*raw.notes, *fitted_doubts(path))
     return MeshSequence(
-        raw.vertices,
-        raw.faces,
-        timebase,
-        source,
-        notes,
-        raw.vertex_counts,
-        raw.present,
-        known,
+        raw.vertices, raw.faces, timebase, source, notes, raw.vertex_counts, raw.present, known
     )
 
 
