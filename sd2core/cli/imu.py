@@ -24,13 +24,9 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     parser.add_value("--at", str, "PLACE|VERTEX", text, required=True)
     parser.add_output("FILE", "the samples to write (.csv, .sto or .npz)")
     parser.add_value("--rate", positive_float, "HZ", "samples per second", 100.0)
-    parser.add_value(
-        "--cutoff",
-        positive_float,
-        "HZ",
-        "where the zero-phase low pass leaves half of the amplitude, in Hz (default: 6, or a"
-        " fifth of the mesh's frame rate if that is lower)",
-    )
+    text = "where the zero-phase low pass leaves half of the amplitude, in Hz (default: 6, or a"
+    text += " fifth of the mesh's frame rate if that is lower)"
+    parser.add_value("--cutoff", positive_float, "HZ", text)
     text = "upwards in the mesh's frame (default: 0,-1,0, as for a camera held level)"
     parser.add_value("--up", vector, "X,Y,Z", text, (0.0, -1.0, 0.0))
     _add_errors(parser)
