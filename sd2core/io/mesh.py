@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import is_pattern
+from sd2core.files.texts import errors_in
 from sd2core.io.fitted import fitted_doubts
 from sd2core.io.mesh_arrays import RawMesh, read_npz, read_zarr, write_npz, write_zarr
 from sd2core.io.mesh_checks import check_mesh, mark_empty_frames, uncertainty_of
@@ -102,10 +103,8 @@ def load_mesh(
     mark_empty_frames(raw, source)
     _place(raw, 1.0 if scale is None else scale, distance_m or 0.0)
     check_mesh(raw, times_s, source, check_size=scale is None)
-    try:
+    with errors_in(source, remedy=""):
         timebase = Timebase(times_s)
-    except Sd2Error as error:
-        raise error.within(source) from error
     known = uncertainty_of(raw, source)
     if known is not None:
         known = known.times(_velocity_factor(raw.times_s, times_s, scale))
