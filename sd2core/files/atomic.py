@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import json
 import os
 import re
 import secrets
@@ -73,6 +74,11 @@ def atomic_write_text(path: Path, text: str) -> None:
     """Replace ``path`` by ``text`` (UTF-8) in one step."""
     with atomic_write(path) as stream:
         stream.write(text.encode("utf-8"))
+
+
+def atomic_write_json(path: Path, content: object) -> None:
+    """Replace ``path`` by JSON that people can read, in one step."""
+    atomic_write_text(path, json.dumps(content, indent=2, ensure_ascii=False) + "\n")
 
 
 def keep_text(path: Path, text: str) -> None:

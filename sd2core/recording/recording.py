@@ -7,7 +7,6 @@ to the folder, so that a whole data set can move. See ``docs/formats.md``.
 
 from __future__ import annotations
 
-import json
 import math
 import shutil
 import tempfile
@@ -17,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.errors import Sd2Error
-from sd2core.files.atomic import atomic_write_text, full_disk_named
+from sd2core.files.atomic import atomic_write_json, full_disk_named
 from sd2core.files.paths import (
     free_path,
     is_absolute,
@@ -337,8 +336,7 @@ class Recording:
             )
             self.spans = ()
             self._note_written(LABELS_NAME)
-        text = json.dumps(document.model_dump(mode="json"), indent=2, ensure_ascii=False)
-        atomic_write_text(self.folder / FILE_NAME, text + "\n")
+        atomic_write_json(self.folder / FILE_NAME, document.model_dump(mode="json"))
         self._note_written(FILE_NAME)
         self._read, self._base = document, self.state()
 
