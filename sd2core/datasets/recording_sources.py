@@ -254,9 +254,7 @@ class _Opened:
         times_s = next(iter(maps.values())).times_s
         channel = self.recording.channel_in_words
         return Source(
-            key.subject,
-            key.recording,
-            key.placement,
+            *key,
             sensor,
             maps,
             self._label(times_s),

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
-from sd2core.files.paths import is_pattern
+from sd2core.files.paths import PICKLE_SUFFIXES, is_pattern
 from sd2core.files.texts import errors_in
 from sd2core.io.fitted import fitted_doubts
 from sd2core.io.mesh_arrays import RawMesh, read_npz, read_zarr, write_npz, write_zarr
@@ -21,7 +21,6 @@ from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Progress, silent
 from sd2core.timebase import Timebase
 
-_PICKLES = {".pkl", ".pickle", ".joblib"}
 _KNOWN = (
     ".npz, .zarr, .zarr.zip, .obj/.ply/.glb (one, a folder or a pattern such as 'frames/*.obj'), "
     "or the .pkl of VIBE, WHAM or another tool that holds 'verts'"
@@ -174,7 +173,7 @@ def _read(
         return read_zarr(path)
     if suffix == ".npz":
         return read_npz(path)
-    if suffix in _PICKLES:
+    if suffix in PICKLE_SUFFIXES:
         return read_model_output(path, person, image_size, focal_px, distance_m)
     if suffix in SURFACE_SUFFIXES:
         return read_mesh_files(path, progress)

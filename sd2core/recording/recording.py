@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_json, full_disk_named
 from sd2core.files.paths import (
+    PICKLE_SUFFIXES,
     free_path,
     is_absolute,
     located_path,
@@ -59,9 +60,6 @@ if TYPE_CHECKING:
     from sd2core.timebase import Timebase
 
 SUFFIX = ".sd2"
-
-_PLACED_BY_VIDEO = {".pkl", ".pickle", ".joblib"}
-"""Outputs of body models, which know their place only in the picture's pixels."""
 
 _SENSOR = ("position_m", "azimuth_deg", "elevation_deg", "field_of_view_deg")
 
@@ -458,7 +456,7 @@ class Recording:
         options = self.mesh_reading.options()
         if self.faces is not None:
             options["faces"] = self._present("faces")
-        by_video = path.suffix.lower() in _PLACED_BY_VIDEO and self.video and self.video.exists()
+        by_video = path.suffix.lower() in PICKLE_SUFFIXES and self.video and self.video.exists()
         if by_video and "image_size" not in options:
             with self.open_video() as video:
                 options["image_size"] = (video.width, video.height)

@@ -198,16 +198,13 @@ def write_capture(
 
 def check_replaceable(folder: Path) -> None:
     """Raise Sd2Error for a folder that holds something else than a radar recording."""
-    if folder.exists() and not (folder.is_dir() and _replaceable(folder)):
+    ours = folder.is_dir() and ((folder / _DATA).is_file() or not any(folder.iterdir()))
+    if folder.exists() and not ours:
         raise Sd2Error(
             f"{folder} exists and is not a radar recording",
             "a new folder, or a radar recording to replace",
             "Choose another name",
         )
-
-
-def _replaceable(folder: Path) -> bool:
-    return (folder / _DATA).is_file() or not any(folder.iterdir())
 
 
 def _check_there(path: Path) -> None:
