@@ -15,7 +15,7 @@ from sd2core.accuracy.plans import Family
 from sd2core.accuracy.results import Machine, Measurement
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.errors import Sd2Error
-from sd2core.files.atomic import atomic_write_text
+from sd2core.files.atomic import keep_text
 from sd2core.files.paths import user_cache
 from sd2core.files.texts import read_text
 from sd2core.mesh.sequence import MeshSequence
@@ -102,19 +102,13 @@ def store_measurement(mesh: MeshSequence, measurement: Measurement) -> None:
 
     A folder that cannot be written to is no error.
     """
-    place = _place(mesh, measurement.family)
     content = {"format": _FORMAT, **asdict(measurement)}
     del content["stale"]
-    try:
-        place.parent.mkdir(parents=True, exist_ok=True)
-        atomic_write_text(place, json.dumps(content))
-    except OSError:
-        return
+    keep_text(_place(mesh, measurement.family), json.dumps(content))
 
 
 def _place(mesh: MeshSequence, family: Family) -> Path:
-    folder = user_cache("ladder")
-    return folder / f"{family}-{clip_fingerprint(mesh)}.json"
+    return user_cache("ladder") / f"{family}-{clip_fingerprint(mesh)}.json"
 
 
 def _from_json(text: str) -> Measurement:

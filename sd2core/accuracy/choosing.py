@@ -388,10 +388,7 @@ def _dearness(survey: Survey, plan: AccuracyPlan) -> tuple[int, int]:
 
 
 def _why_not(
-    survey: Survey,
-    plan: AccuracyPlan,
-    lower: AccuracyPlan,
-    tried: Mapping[AccuracyPlan, Errors],
+    survey: Survey, plan: AccuracyPlan, lower: AccuracyPlan, tried: Mapping[AccuracyPlan, Errors]
 ) -> float | None:
     """Error that a plan with one setting lowered has, or is forecast; None if it saves nothing."""
     if _dearness(survey, lower) >= _dearness(survey, plan):

@@ -25,7 +25,7 @@ from sd2core.accuracy.results import (
     compute_errors,
     shares,
 )
-from sd2core.accuracy.sample import all_frames, take_sample
+from sd2core.accuracy.sample import take_sample
 from sd2core.accuracy.trial import Trial
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.doppler.smoothing import velocity_kernel
@@ -43,22 +43,26 @@ from sd2core.scattering.facets import visible_facets
 from sd2core.sensor import VirtualSensor
 
 
-def time_in_turns(
-    plans: Sequence[AccuracyPlan],
+def timed_in_turns(
+    watched: Sequence[tuple[AccuracyPlan, Errors, int | None, float]],
     repeats: int,
     milliseconds: Callable[[AccuracyPlan], tuple[float, float]],
     progress: Progress,
-) -> list[tuple[Spread, Spread]]:
-    """Time all plans in turns, so that a busy machine slows all of them alike.
+) -> list[PlanResult]:
+    """Time plans in turns, so that a busy machine slows all of them alike.
 
+    Each comes with its errors, the most bytes that it took and the seconds of its setup.
     ``milliseconds`` gives the time per frame on one thread and on all cores.
     """
-    spent = np.empty((repeats, 2, len(plans)))
+    spent = np.empty((2, len(watched), repeats))
     for turn in range(repeats):
-        for number, plan in enumerate(plans):
-            progress(turn * len(plans) + number, repeats * len(plans))
-            spent[turn, :, number] = milliseconds(plan)
-    return [(Spread.of(spent[:, 0, k]), Spread.of(spent[:, 1, k])) for k in range(len(plans))]
+        for number, (plan, *_) in enumerate(watched):
+            progress(turn * len(watched) + number, repeats * len(watched))
+            spent[:, number, turn] = milliseconds(plan)
+    return [
+        PlanResult(plan, error, Cost(Spread.of(one), Spread.of(every), most, setup_s))
+        for (plan, error, most, setup_s), one, every in zip(watched, *spent, strict=True)
+    ]
 
 
 def peak_bytes(work: Callable[[], object], memory: bool) -> int | None:
@@ -128,25 +132,19 @@ def measure(
     runs = trial.sample.runs
     trial.reference(runs)
     trial.load_kernels()
-    errors, watched = [], []
+    watched = []
     for number, plan in enumerate(plans):
         progress(2 * number, total)
-        errors.append(trial.errors(plan, runs))
-        watched.append(_watched(trial, plan, memory))
-    costs = time_in_turns(
-        plans,
+        watched.append((plan, trial.errors(plan, runs), *_watched(trial, plan, memory)))
+    results = timed_in_turns(
+        watched,
         repeats,
         lambda plan: (trial.milliseconds(plan, 1), trial.milliseconds(plan)),
         lambda done, of: progress(total - of + done, total),
     )
-    results = [
-        PlanResult(plan, error, Cost(one, every, most, setup_s))
-        for plan, error, (one, every), (most, setup_s) in zip(
-            plans, errors, costs, watched, strict=True
-        )
-    ]
     reference = reference_plan(family, options.weight, surface=surface)
-    return _measurement(reference, results, all_frames(runs), mesh, sensor, options)
+    frames = tuple(sorted(frame for run in runs for frame in run.frames))
+    return _measurement(reference, results, frames, mesh, sensor, options)
 
 
 def _measurement(
@@ -310,21 +308,18 @@ def measure_waves(
     total = len(plans) * (repeats + 1) + 1
     progress(0, total)
     reference, converged = trial.reference(lambda: progress(0, total))
-    errors, watched = [], []
+    watched = []
     for number, plan in enumerate(plans):
         progress(1 + number, total)
-        errors.append(trial.errors(plan, reference))
-        watched.append(peak_bytes(partial(trial.columns, plan), memory))
-    costs = time_in_turns(
-        plans,
+        errors = trial.errors(plan, reference)
+        most = peak_bytes(partial(trial.columns, plan), memory)
+        watched.append((plan, errors, most, trial.setup_s(plan)))
+    results = timed_in_turns(
+        watched,
         repeats,
         lambda plan: _milliseconds(trial, plan),
         lambda done, of: progress(total - of + done, total),
     )
-    results = [
-        PlanResult(plan, error, Cost(one, every, most, trial.setup_s(plan)))
-        for plan, error, (one, every), most in zip(plans, errors, costs, watched, strict=True)
-    ]
     made = _measurement(reference_plan("fmcw"), results, trial.frames, mesh, sensor, options)
     return replace(made, convergence=_convergence(converged))
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -153,8 +152,3 @@ def _speed(mesh: MeshSequence, frame: int) -> float:
     step = probed[1] - probed[0]
     duration_s = mesh.times_s[frame + 1] - mesh.times_s[frame]
     return float((step**2).sum(axis=1).mean() / duration_s**2)
-
-
-def all_frames(runs: Sequence[Run]) -> tuple[int, ...]:
-    """Numbers of the runs' frames in the clip, ascending."""
-    return tuple(sorted(frame for run in runs for frame in run.frames))

@@ -80,11 +80,7 @@ class Trial:
     """
 
     def __init__(
-        self,
-        mesh: MeshSequence,
-        sensor: VirtualSensor,
-        options: SynthesisOptions,
-        sample: Sample,
+        self, mesh: MeshSequence, sensor: VirtualSensor, options: SynthesisOptions, sample: Sample
     ) -> None:
         self.mesh = mesh
         self.sensor = sensor

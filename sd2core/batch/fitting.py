@@ -7,7 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from sd2core.batch.inputs import MeshInput, mesh_input, mesh_input_of
+from sd2core.batch.inputs import MeshInput, mesh_input_of
 from sd2core.batch.plan import Fit
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
@@ -57,6 +57,7 @@ def fitted(mesh: Path) -> MeshInput | None:
     """Return a fitted mesh; None while it is missing or incomplete."""
     try:
         content = read_json(facts_path(mesh))
-        return mesh_input(content) if mesh.exists() else None
+        facts = MeshInput(**{**content, "target_m": tuple(content["target_m"])})
+        return facts if mesh.exists() else None
     except (Sd2Error, ValueError, KeyError, TypeError):
         return None

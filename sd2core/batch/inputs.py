@@ -77,11 +77,6 @@ class Inspection:
 _INSPECTION = TypeAdapter(Inspection)
 
 
-def mesh_input(content: Mapping[str, Any]) -> MeshInput:
-    """Rebuild from ``dataclasses.asdict``, also after JSON."""
-    return MeshInput(**{**content, "target_m": tuple(content["target_m"])})
-
-
 def find_origins(recordings: Recordings, apart_from: Path) -> list[Origin]:
     """Return all files that match the (absolute) patterns, sorted.
 
@@ -100,17 +95,13 @@ def find_origins(recordings: Recordings, apart_from: Path) -> list[Origin]:
             )
         found.update(matches)
     paths = [Path(path) for path in sorted(found)]
-    paths = [path for path in paths if not any(_holds(parent) for parent in path.parents)]
+    paths = [path for path in paths if not {".sd2", ".zarr"} & {at.suffix for at in path.parents}]
     root = Path(os.path.commonpath([path.parent for path in paths]))
     return [
         Origin(str(path), name, subject_of(recordings, path, name))
         for path in paths
         if (name := path.relative_to(root).as_posix())
     ]
-
-
-def _holds(folder: Path) -> bool:
-    return folder.suffix in (".sd2", ".zarr")
 
 
 def subject_of(recordings: Recordings, path: Path, name: str) -> str:

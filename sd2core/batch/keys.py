@@ -13,13 +13,7 @@ from sd2core.batch.plan import Step
 from sd2core.files.resources import resource_path
 
 _CODE: dict[Step, tuple[str, ...]] = {
-    "inspect": (
-        "batch/inputs.py",
-        "files/digests.py",
-        "io",
-        "recording",
-        "mesh",
-    ),
+    "inspect": ("batch/inputs.py", "files/digests.py", "io", "recording", "mesh"),
     "fit": ("batch/fitting.py", "body", "io", "mesh", "timebase.py"),
     "synthesise": (
         "batch/synthesis.py",

@@ -69,9 +69,7 @@ _PLAUSIBLE_MM = (8.0, 800.0)
 
 
 def camera_of(
-    video: VideoReader,
-    focal_px: float | None = None,
-    field_of_view_deg: float | None = None,
+    video: VideoReader, focal_px: float | None = None, field_of_view_deg: float | None = None
 ) -> tuple[PinholeCamera, Source]:
     """Camera of a video, and the source of its focal length.
 

@@ -334,11 +334,7 @@ def _run(
 ) -> int:
     """Run a command and report how much of a folder is there; its exit code."""
     process = subprocess.Popen(
-        command,
-        stdin=subprocess.DEVNULL,
-        stdout=errors,
-        stderr=subprocess.STDOUT,
-        env=environment,
+        command, stdin=subprocess.DEVNULL, stdout=errors, stderr=subprocess.STDOUT, env=environment
     )
     try:
         while process.poll() is None:

@@ -9,11 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.blazepose import Pose, PoseDetector, PoseLandmarker
-from sd2core.body.landmark_files import (
-    RefinedStretches,
-    SearchStore,
-    TrackInParts,
-)
+from sd2core.body.landmark_files import RefinedStretches, SearchStore, TrackInParts
 from sd2core.body.landmark_models import LandmarkModels
 from sd2core.body.landmark_repair import who_else
 from sd2core.body.person_selection import Rectangle, Start, find_person_in, find_prominent_person

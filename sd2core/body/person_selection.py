@@ -124,8 +124,7 @@ def find_person_in(
     """
     if not 0 <= rectangle.frame < len(video):
         raise Sd2Error(
-            f"The rectangle is in frame {rectangle.frame}",
-            f"a frame from 0 to {len(video) - 1}",
+            f"The rectangle is in frame {rectangle.frame}", f"a frame from 0 to {len(video) - 1}"
         )
     x, y, w, h = rectangle.x_px, rectangle.y_px, rectangle.width_px, rectangle.height_px
     inside = w > 0 and h > 0 and x < video.width and y < video.height and x + w > 0 and y + h > 0

@@ -92,11 +92,7 @@ class Normal:
         banded = columns.reshape(frames * unknowns, -1).T
         banded[-1] *= 1.0 + damping
         solved = solveh_banded(
-            banded,
-            -self.gradient.ravel(),
-            overwrite_ab=True,
-            overwrite_b=True,
-            check_finite=False,
+            banded, -self.gradient.ravel(), overwrite_ab=True, overwrite_b=True, check_finite=False
         )
         return np.asarray(solved.reshape(frames, unknowns))
 
@@ -247,8 +243,7 @@ class Objective:
         apart = along - trunk
         normal.add(residuals.depth, [(0, apart * (trust.depth / seen.depth_sd_m)[..., None])])
         normal.add(
-            residuals.trunk,
-            [(0, trunk * (trust.trunk / seen.trunk_sd_m[:, None])[..., None])],
+            residuals.trunk, [(0, trunk * (trust.trunk / seen.trunk_sd_m[:, None])[..., None])]
         )
         if frames > 1:
             per_m = trust.velocity / (self._velocity_sd_mps * self._step_s[:, None])
@@ -391,10 +386,7 @@ _CONVERGED = 1e-2
 
 
 def solve(
-    rig: Rig,
-    evidence: Evidence,
-    start: Pose,
-    tick: Callable[[int], None] = lambda done: None,
+    rig: Rig, evidence: Evidence, start: Pose, tick: Callable[[int], None] = lambda done: None
 ) -> Pose:
     """Pose through time that agrees best with the evidence of consecutive frames.
 

@@ -65,15 +65,7 @@ TORSO_CORNERS = tuple(
 )
 """Landmarks whose mean is the body's centre."""
 
-PER_FRAME = (
-    "image_px",
-    "depth_px",
-    "world_m",
-    "visibility",
-    "confidence",
-    "present",
-    "bridged",
-)
+PER_FRAME = ("image_px", "depth_px", "world_m", "visibility", "confidence", "present", "bridged")
 """Arrays of a track that have a row for every frame, besides its times."""
 
 PART_FRAMES = 3600

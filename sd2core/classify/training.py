@@ -175,11 +175,7 @@ class _Learning:
     """Loop over batches with the optimiser."""
 
     def __init__(
-        self,
-        network: Classifier,
-        material: Material,
-        weights: torch.Tensor,
-        chosen: TrainOptions,
+        self, network: Classifier, material: Material, weights: torch.Tensor, chosen: TrainOptions
     ) -> None:
         self._network, self._material, self._weights = network, material, weights
         self._chosen = chosen

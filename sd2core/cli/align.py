@@ -7,9 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.command_parser import add_command
-from sd2core.cli.options import (
-    positive_float,
-)
+from sd2core.cli.options import positive_float
 from sd2core.cli.output import print_facts, print_json
 from sd2core.errors import Sd2Error
 
@@ -22,12 +20,8 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``align``."""
     parser = add_command(commands, "align", handler=_align)
     parser.add_value("recordings", Path, "RECORDING", "with a mesh and a radar", nargs="+")
-    parser.add_value(
-        "--within",
-        positive_float,
-        "S",
-        "search so far before and after the recording's offset, 2 s at least (default: 5)",
-    )
+    text = "search so far before and after the recording's offset, 2 s at least (default: 5)"
+    parser.add_value("--within", positive_float, "S", text)
     parser.add_flag("--save", "write what was found into the recordings")
     parser.add_json()
 

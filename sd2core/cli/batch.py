@@ -11,9 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.command_parser import add_command
-from sd2core.cli.options import (
-    positive_int,
-)
+from sd2core.cli.options import positive_int
 from sd2core.cli.output import (
     counted,
     duration,

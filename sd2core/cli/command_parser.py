@@ -79,8 +79,7 @@ class Options(argparse._ActionsContainer):
         group = self.add_mutually_exclusive_group()
         group.add_json()
         group.add_flag(
-            "--progress-json",
-            "print progress as JSON lines, for other programs (docs/formats.md)",
+            "--progress-json", "print progress as JSON lines, for other programs (docs/formats.md)"
         )
 
     def add_axis(self) -> None:
@@ -134,12 +133,9 @@ class Options(argparse._ActionsContainer):
 
     def add_count(self) -> None:
         """Add ``--count``."""
-        self.add_choice(
-            "--count",
-            ("expected", "plain"),
-            "count a vertex as badly known as its mesh says its velocity to be, or in one bin"
-            " (default: expected)",
-        )
+        text = "count a vertex as badly known as its mesh says its velocity to be, or in one bin"
+        text += " (default: expected)"
+        self.add_choice("--count", ("expected", "plain"), text)
 
     def add_texture(self) -> None:
         """Add ``--texture``."""
@@ -149,11 +145,9 @@ class Options(argparse._ActionsContainer):
 
     def add_limbs(self) -> None:
         """Add ``--limbs``."""
-        self.add_flag(
-            "--limbs",
-            "also keep the synthetic map of each part of the body (trunk, upper arms, forearms,"
-            " thighs, lower legs)",
-        )
+        text = "also keep the synthetic map of each part of the body (trunk, upper arms, forearms,"
+        text += " thighs, lower legs)"
+        self.add_flag("--limbs", text)
 
     def add_people_kept_out(self, validation: str, test: str) -> None:
         """Add ``--validation-subjects`` and ``--test-subjects``; the texts say who else it is."""

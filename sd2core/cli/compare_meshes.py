@@ -8,17 +8,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.command_parser import add_command
-from sd2core.cli.options import (
-    position,
-)
+from sd2core.cli.options import position
 from sd2core.cli.output import print_json, print_rows, progress_bar
 from sd2core.errors import Sd2Error
+from sd2core.files.paths import PICKLE_SUFFIXES
 
 if TYPE_CHECKING:
     from sd2core.compare.meshes import Comparison
     from sd2core.mesh.sequence import MeshSequence
 
-_PICKLES = {".pkl", ".pickle", ".joblib"}
 _OWN_NAMES = {"mesh.zarr", "mesh.npz"}
 
 
@@ -145,7 +143,7 @@ def _load(path: Path, options: argparse.Namespace) -> MeshSequence:
     if is_recording(path):
         return open_recording(path).load_mesh()
     told: dict[str, Any] = mesh_reading(options).options() | {"faces": options.faces}
-    if path.suffix.lower() in _PICKLES:
+    if path.suffix.lower() in PICKLE_SUFFIXES:
         return load_mesh(path, **told)
     mesh = load_mesh(path)
     general = {name: told[name] for name in ("frames_per_s", "scale", "faces") if told.get(name)}

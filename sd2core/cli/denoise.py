@@ -15,12 +15,9 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     parser = add_command(commands, "denoise", handler=_denoise)
     parser.add_value("map", Path, "MAP", "a map from `sd2 synth`")
     parser.add_map_output()
-    parser.add_argument(
-        "--model",
-        metavar="FILE|NAME",
-        help="a model file from `sd2 train`, or the name of one that is installed (default: of"
-        " those that come with SD² Studio the one for limb maps, where there are such)",
-    )
+    text = "a model file from `sd2 train`, or the name of one that is installed (default: of"
+    text += " those that come with SD² Studio the one for limb maps, where there are such)"
+    parser.add_argument("--model", metavar="FILE|NAME", help=text)
     parser.add_texture()
     parser.add_json()
 

@@ -10,14 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.command_parser import Options, add_command
-from sd2core.cli.options import (
-    bin_list,
-    given,
-    name_list,
-    positive_float,
-    positive_int,
-    share,
-)
+from sd2core.cli.options import bin_list, given, name_list, positive_float, positive_int, share
 from sd2core.cli.output import (
     counted,
     duration,
@@ -62,30 +55,18 @@ def _add_content(parser: Options) -> None:
     group.add_value("--imu", name_list, "LIST", text, ())
     group.add_value("--segment-frames", positive_int, "N", "length of a segment", 72)
     group.add_value("--overlap-frames", int, "N", "frames that neighbours share", 10)
-    group.add_value(
-        "--rate",
-        positive_float,
-        "FPS",
-        "frames per second; other sources are brought to it (default: the first one's)",
-    )
-    group.add_choice(
-        "--label-rule",
-        ("foreground", "majority"),
-        "label of a segment: the gesture with most frames, if they are enough, or the label"
-        " with most frames, background included",
-        "foreground",
-    )
+    text = "frames per second; other sources are brought to it (default: the first one's)"
+    group.add_value("--rate", positive_float, "FPS", text)
+    text = "label of a segment: the gesture with most frames, if they are enough, or the label"
+    text += " with most frames, background included"
+    group.add_choice("--label-rule", ("foreground", "majority"), text, "foreground")
     text = "least share of a segment for foreground (default: 20%%)"
     group.add_value("--min-share", share, "SHARE", text, 0.2)
     group.add_value("--title", str, "TEXT", "title of the card and the sheet", "")
     people = parser.add_argument_group("people")
-    people.add_value(
-        "--subjects",
-        name_list,
-        "LIST",
-        "subject of each recording and map, separated by commas, in their order (default:"
-        " each recording shows another person)",
-    )
+    text = "subject of each recording and map, separated by commas, in their order (default:"
+    text += " each recording shows another person)"
+    people.add_value("--subjects", name_list, "LIST", text)
     people.add_people_kept_out(
         "kept out to validate with, separated by commas, or none (default: about a sixth of all,"
         " chosen by their names, so that adding people does not move others)",
@@ -100,12 +81,8 @@ def _add_making(parser: Options) -> None:
     text = "sensors around the body besides the recording's own, as `sd2 placements` writes"
     text += " them, or those that each recording plans"
     group.add_value("--placements", str, "FILE|planned", text)
-    group.add_value(
-        "--tolerance",
-        share,
-        "SHARE",
-        "make synthetic maps as fast as possible within this error, e.g. 2%% (default: exact)",
-    )
+    text = "make synthetic maps as fast as possible within this error, e.g. 2%% (default: exact)"
+    group.add_value("--tolerance", share, "SHARE", text)
     text = "simulate this radar (see sd2 simulate radar --help) at every place, which takes far"
     text += " longer than everything else (default: only the maps in radar files)"
     group.add_value("--simulate", str, "NAME|CONFIG.json", text)
@@ -114,12 +91,8 @@ def _add_making(parser: Options) -> None:
     group.add_texture()
     group.add_count()
     group.add_axis()
-    group.add_value(
-        "--null-bins",
-        bin_list,
-        "LIST",
-        "bins to set to zero in all kinds (default: those of the synthetic maps)",
-    )
+    text = "bins to set to zero in all kinds (default: those of the synthetic maps)"
+    group.add_value("--null-bins", bin_list, "LIST", text)
 
 
 def _export(options: argparse.Namespace) -> int:

@@ -10,10 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.command_parser import add_command
-from sd2core.cli.options import (
-    not_negative_float,
-    positive_float,
-)
+from sd2core.cli.options import not_negative_float, positive_float
 from sd2core.cli.output import (
     picked,
     print_event,
@@ -53,36 +50,20 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     parser = add_command(commands, "fit", handler=_fit)
     parser.add_value("video", Path, "VIDEO", "any video that FFmpeg reads")
     parser.add_output("FILE", "the mesh to write (.zarr or .npz)")
-    parser.add_value(
-        "--person-box",
-        _rectangle,
-        "X,Y,W,H",
-        "a rectangle around the person, in pixels (default: who is seen best)",
-    )
+    text = "a rectangle around the person, in pixels (default: who is seen best)"
+    parser.add_value("--person-box", _rectangle, "X,Y,W,H", text)
     parser.add_value(
         "--person-frame", _frame, "N", "the frame of that rectangle, counted from 0 (default: 0)"
     )
     parser.add_value(
         "--stature-m", positive_float, "M", "how tall the person is, in metres (default: 1.72)"
     )
-    parser.add_value(
-        "--focal-px",
-        positive_float,
-        "PX",
-        "focal length in pixels (default: as the file says, or 56° across the longer side)",
-    )
-    parser.add_value(
-        "--field-of-view",
-        positive_float,
-        "DEG",
-        "instead of it, the angle across the longer side of the picture",
-    )
-    parser.add_value(
-        "--max-gap-s",
-        not_negative_float,
-        "S",
-        "bridge gaps without the person up to this long; longer ones stay empty (default: 0.5)",
-    )
+    text = "focal length in pixels (default: as the file says, or 56° across the longer side)"
+    parser.add_value("--focal-px", positive_float, "PX", text)
+    text = "instead of it, the angle across the longer side of the picture"
+    parser.add_value("--field-of-view", positive_float, "DEG", text)
+    text = "bridge gaps without the person up to this long; longer ones stay empty (default: 0.5)"
+    parser.add_value("--max-gap-s", not_negative_float, "S", text)
     parser.add_choice(
         "--resolution", ("low", "medium", "high"), "1,229, 5,000 or 13,348 vertices", "medium"
     )

@@ -7,11 +7,7 @@ import shutil
 from pathlib import Path
 
 from sd2core.cli.command_parser import add_command
-from sd2core.cli.options import (
-    finite_float,
-    flag,
-    given,
-)
+from sd2core.cli.options import finite_float, flag, given
 from sd2core.cli.output import picked, print_json, progress_bar
 from sd2core.errors import Sd2Error
 
@@ -21,31 +17,17 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     parser = add_command(commands, "import", handler=_import)
     parser.add_output("NAME.sd2", "the recording to make")
     parser.add_value("--video", Path, "FILE", "video of the person")
-    parser.add_value(
-        "--mesh",
-        Path,
-        "FILE",
-        "body mesh fitted to the video (.npz, .zarr, a folder of .obj/.ply/.glb, or the"
-        " output of VIBE, WHAM or 4D-Humans)",
-    )
+    text = "body mesh fitted to the video (.npz, .zarr, a folder of .obj/.ply/.glb, or the"
+    text += " output of VIBE, WHAM or 4D-Humans)"
+    parser.add_value("--mesh", Path, "FILE", text)
     parser.add_mesh_reading()
     parser.add_value("--radar", Path, "CAPTURE", "radar capture of the same scene")
-    parser.add_value(
-        "--radar-offset-s",
-        finite_float,
-        "S",
-        "time in the video, in seconds, of the first radar frame",
-        0.0,
-    )
+    text = "time in the video, in seconds, of the first radar frame"
+    parser.add_value("--radar-offset-s", finite_float, "S", text, 0.0)
     parser.add_channel()
     parser.add_value("--imu", Path, "FILE", "samples of an inertial sensor (.csv, .sto, .npz)")
-    parser.add_value(
-        "--imu-offset-s",
-        finite_float,
-        "S",
-        "time in the video, in seconds, of their first sample",
-        0.0,
-    )
+    text = "time in the video, in seconds, of their first sample"
+    parser.add_value("--imu-offset-s", finite_float, "S", text, 0.0)
     parser.add_value("--title", str, "TEXT", "what to call it (default: its name)", "")
     parser.add_flag("--copy", "copy the files into the recording")
     parser.add_json()

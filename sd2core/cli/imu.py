@@ -8,11 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sd2core.cli.command_parser import Options, add_command
-from sd2core.cli.options import (
-    not_negative_float,
-    positive_float,
-    vector,
-)
+from sd2core.cli.options import not_negative_float, positive_float, vector
 from sd2core.cli.output import print_facts, print_json, progress_bar
 from sd2core.errors import Sd2Error
 
@@ -28,13 +24,9 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     parser.add_value("--at", str, "PLACE|VERTEX", text, required=True)
     parser.add_output("FILE", "the samples to write (.csv, .sto or .npz)")
     parser.add_value("--rate", positive_float, "HZ", "samples per second", 100.0)
-    parser.add_value(
-        "--cutoff",
-        positive_float,
-        "HZ",
-        "where the zero-phase low pass leaves half of the amplitude, in Hz (default: 6, or a"
-        " fifth of the mesh's frame rate if that is lower)",
-    )
+    text = "where the zero-phase low pass leaves half of the amplitude, in Hz (default: 6, or a"
+    text += " fifth of the mesh's frame rate if that is lower)"
+    parser.add_value("--cutoff", positive_float, "HZ", text)
     text = "upwards in the mesh's frame (default: 0,-1,0, as for a camera held level)"
     parser.add_value("--up", vector, "X,Y,Z", text, (0.0, -1.0, 0.0))
     _add_errors(parser)
@@ -45,10 +37,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
 
 def _add_errors(parser: Options) -> None:
     group = parser.add_argument_group("sensor errors", "none by default")
-    for short, long, unit in (
-        ("acc", "accelerometer", "m/s²"),
-        ("gyr", "gyroscope", "rad/s"),
-    ):
+    for short, long, unit in (("acc", "accelerometer", "m/s²"), ("gyr", "gyroscope", "rad/s")):
         text = f"constant error of the {long}, in {unit}"
         group.add_value(f"--{short}-bias", vector, "X,Y,Z", text, (0.0, 0.0, 0.0))
         group.add_argument(

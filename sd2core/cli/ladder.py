@@ -7,12 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from sd2core.cli.command_parser import Options, add_command
-from sd2core.cli.options import (
-    given,
-    positive_float,
-    positive_int,
-    share,
-)
+from sd2core.cli.options import given, positive_float, positive_int, share
 from sd2core.cli.output import print_json, progress_bar
 from sd2core.errors import Sd2Error
 
@@ -98,13 +93,9 @@ def _ladder(options: argparse.Namespace) -> int:
 def add_wish(parser: Options, default: str) -> None:
     """Add ``--tolerance`` and ``--budget-ms``, of which one may be given."""
     wanted = parser.add_mutually_exclusive_group()
-    wanted.add_value(
-        "--tolerance",
-        share,
-        "SHARE",
-        f"the error that is allowed, as 2%% or 0.02: relative L1 of the smoothed map"
-        f" (default: {default})",
-    )
+    text = "the error that is allowed, as 2%% or 0.02: relative L1 of the smoothed map"
+    text += f" (default: {default})"
+    wanted.add_value("--tolerance", share, "SHARE", text)
     wanted.add_value(
         "--budget-ms", positive_float, "MS", "instead, the milliseconds per frame that are allowed"
     )

@@ -13,9 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.command_parser import add_command
-from sd2core.cli.options import (
-    positive_float,
-)
+from sd2core.cli.options import positive_float
 from sd2core.cli.output import counted, print_event, print_facts
 from sd2core.errors import Sd2Error
 from sd2core.runs.control import stop_signals
@@ -37,14 +35,9 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``listen``."""
     parser = add_command(commands, "listen", handler=_listen)
     source = parser.add_mutually_exclusive_group(required=True)
-    source.add_argument(
-        "--dca1000",
-        nargs="?",
-        const="",
-        metavar="ADDRESS[:PORT]",
-        help="listen to a DCA1000 on this address of this computer (default: 127.0.0.1, which"
-        " only programs on this computer reach; port 4098)",
-    )
+    text = "listen to a DCA1000 on this address of this computer (default: 127.0.0.1, which"
+    text += " only programs on this computer reach; port 4098)"
+    source.add_argument("--dca1000", nargs="?", const="", metavar="ADDRESS[:PORT]", help=text)
     source.add_value(
         "--replay", Path, "CAPTURE", "a capture, or the one of a recording, at its own rate"
     )

@@ -8,6 +8,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
+from sd2core.files.tables import counted as counted
 from sd2core.files.tables import text_table
 from sd2core.progress import Progress
 from sd2core.runs.pace import Pace
@@ -66,11 +67,6 @@ def print_facts(title: str, facts: Mapping[str, str]) -> None:
     width = max(map(len, shown), default=0)
     for name, value in shown.items():
         print(f"  {name:<{width}}  {value}")
-
-
-def counted(number: int, what: str) -> str:
-    """``1 span``, ``2 spans``."""
-    return f"{number:,} {what}" + ("" if number == 1 else "s")
 
 
 def listed(counts: Mapping[Any, int]) -> str:

@@ -8,12 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sd2core.cli.command_parser import Options, add_command
-from sd2core.cli.options import (
-    bin_list,
-    finite_float,
-    given,
-    position,
-)
+from sd2core.cli.options import bin_list, finite_float, given, position
 from sd2core.cli.output import print_facts, print_json, progress_bar
 
 if TYPE_CHECKING:
@@ -34,65 +29,38 @@ def _add_recordings(kinds: argparse._SubParsersAction) -> None:
     parser.add_value("recordings", Path, "RECORDING", "with a mesh and a radar", nargs="+")
     _add_pairs(parser, "14,15,16 of 32, else none")
     parser.add_count()
-    parser.add_value(
-        "--subjects",
-        lambda text: tuple(text.split(",")),
-        "LIST",
-        "subject of each recording, separated by commas (default: each shows another person)",
-    )
+    text = "subject of each recording, separated by commas (default: each shows another person)"
+    parser.add_value("--subjects", lambda text: tuple(text.split(",")), "LIST", text)
 
 
 def _add_pairs(parser: Options, usual_null_bins: str) -> None:
     """Add the store of pairs, and the axis and nulled bins of its maps."""
     parser.add_output("FILE.zarr", "the pairs to write")
     parser.add_axis()
-    parser.add_value(
-        "--null-bins",
-        bin_list,
-        "LIST",
-        f"bins to set to zero in input and target, e.g. 14,15,16 (default: {usual_null_bins})",
-    )
+    text = f"bins to set to zero in input and target, e.g. 14,15,16 (default: {usual_null_bins})"
+    parser.add_value("--null-bins", bin_list, "LIST", text)
     parser.add_limbs()
     parser.add_json()
 
 
 def _add_mars(kinds: argparse._SubParsersAction) -> None:
     parser = add_command(kinds, "mars", handler=_mars)
-    parser.add_value(
-        "folders",
-        Path,
-        "FOLDER",
-        "a person's kinect_data_PART.csv and radar_data_PART.csv",
-        nargs="+",
-    )
+    text = "a person's kinect_data_PART.csv and radar_data_PART.csv"
+    parser.add_value("folders", Path, "FOLDER", text, nargs="+")
     _add_pairs(parser, "none")
-    parser.add_choice(
-        "--visibility",
-        ("none", "facing", "depth", "exact"),
-        "which vertices count (default: facing)",
-    )
+    text = "which vertices count (default: facing)"
+    parser.add_choice("--visibility", ("none", "facing", "depth", "exact"), text)
     parser.add_choice(
         "--weight", ("count", "area", "projected"), "weight of a vertex (default: count)"
     )
-    parser.add_value(
-        "--sensor",
-        position,
-        "X,Y,Z",
-        "where the radar is beside the Kinect, in metres, right, down and forward (default:"
-        " estimated; 0,0,0 where only --radar-offset-s is given)",
-    )
-    parser.add_value(
-        "--radar-offset-s",
-        finite_float,
-        "S",
-        "what the radar shows at a time is the motion so many seconds later (default:"
-        " estimated; 0 where only --sensor is given)",
-    )
-    parser.add_choice(
-        "--target",
-        ("share", "intensity"),
-        "target of each frame: shares that add up to 1, or intensities (default: share)",
-    )
+    text = "where the radar is beside the Kinect, in metres, right, down and forward (default:"
+    text += " estimated; 0,0,0 where only --radar-offset-s is given)"
+    parser.add_value("--sensor", position, "X,Y,Z", text)
+    text = "what the radar shows at a time is the motion so many seconds later (default:"
+    text += " estimated; 0 where only --sensor is given)"
+    parser.add_value("--radar-offset-s", finite_float, "S", text)
+    text = "target of each frame: shares that add up to 1, or intensities (default: share)"
+    parser.add_choice("--target", ("share", "intensity"), text)
 
 
 def _choices(options: argparse.Namespace) -> MarsChoices:

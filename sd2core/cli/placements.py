@@ -8,11 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.command_parser import add_command
 from sd2core.cli.ladder import add_wish
-from sd2core.cli.options import (
-    flag,
-    given,
-    positive_int,
-)
+from sd2core.cli.options import flag, given, positive_int
 from sd2core.cli.output import (
     counted,
     duration,
@@ -226,20 +222,16 @@ def _print(
         },
     )
     heading = ("range m", "azimuth °", "elevation °", "x", "y", "z", "up to m", "up to m/s", "")
-    rows = [heading]
+    rows: list[tuple[str, ...]] = [heading]
     for one in listed:
-        x, y, z = one["position_m"]
+        lengths = (*one["position_m"], one["farthest_m"], one["fastest_mps"])
         why = ", ".join(words for name, words in _LIMITS if one[name])
         rows.append(
             (
                 f"{one['range_m']:.2f}",
                 f"{one['azimuth_deg']:.1f}",
                 f"{one['elevation_deg']:.1f}",
-                f"{x:.2f}",
-                f"{y:.2f}",
-                f"{z:.2f}",
-                f"{one['farthest_m']:.2f}",
-                f"{one['fastest_mps']:.2f}",
+                *(f"{length:.2f}" for length in lengths),
                 why,
             )
         )

@@ -8,11 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
 from sd2core.cli.command_parser import add_command
-from sd2core.cli.options import (
-    flag,
-    given,
-    span_m,
-)
+from sd2core.cli.options import flag, given, span_m
 from sd2core.cli.output import progress_bar
 from sd2core.cli.radar_description import add_description, describe, refuse_description
 from sd2core.errors import Sd2Error
@@ -25,23 +21,15 @@ if TYPE_CHECKING:
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``radar``."""
     parser = add_command(commands, "radar", handler=_radar)
-    parser.add_value(
-        "capture",
-        Path,
-        "CAPTURE",
-        "a capture's file or folder, the .h5 of a K60168A, a recording, or the word describe",
-    )
+    text = "a capture's file or folder, the .h5 of a K60168A, a recording, or the word describe"
+    parser.add_value("capture", Path, "CAPTURE", text)
     parser.add_value("file", Path, "FILE", "after describe: the samples", nargs="?")
     parser.add_map_output(required=False)
     parser.add_axis()
-    parser.add_choice(
-        "--clutter",
-        get_args(Clutter),
-        "what to subtract as static: nothing; each frame's mean over its chirps; the"
-        " parabola that fits its chirps best, which swaying leaves no trace in; or the mean"
-        " averaged over frames, which keeps slow movers",
-        "none",
-    )
+    text = "what to subtract as static: nothing; each frame's mean over its chirps; the"
+    text += " parabola that fits its chirps best, which swaying leaves no trace in; or the mean"
+    text += " averaged over frames, which keeps slow movers"
+    parser.add_choice("--clutter", get_args(Clutter), text, "none")
     parser.add_value(
         "--range", span_m, "LO,HI", "count only echoes from this range in metres (default: all)"
     )

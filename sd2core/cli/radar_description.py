@@ -134,8 +134,7 @@ def _ask_for(name: str, told: dict[str, Any]) -> None:
     entry = _ENTRIES[name]
     if not sys.stdin.isatty():
         raise Sd2Error(
-            f"{flag(name)} is missing: {entry.meaning}",
-            "it as an option, or a terminal to ask on",
+            f"{flag(name)} is missing: {entry.meaning}", "it as an option, or a terminal to ask on"
         )
     while name not in told:
         print(f"{name} ({entry.meaning}): ", end="", file=sys.stderr, flush=True)

@@ -11,6 +11,7 @@ from sd2core.cli.options import flag, given
 from sd2core.cli.output import picked, progress_bar
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import check_writable
+from sd2core.files.paths import PICKLE_SUFFIXES
 
 if TYPE_CHECKING:
     from sd2core.mesh.sequence import MeshSequence
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 
 _OF_THE_MESH = ("faces", "fps", "scale", "person", "distance_m", "image_size", "focal_px")
 _OF_BODY_MODELS = ("person", "image_size", "focal_px")
-_BODY_MODEL_SUFFIXES = {".pkl", ".pickle", ".joblib"}
 
 
 def mesh_reading(options: argparse.Namespace) -> MeshReading:
@@ -83,11 +83,11 @@ def refuse_unused_mesh_options(
     if mesh is None:
         for name in map(flag, given(options, (n for n in _OF_THE_MESH if n not in but))):
             raise Sd2Error(f"{name} is given, and {path} holds no mesh", f"{name} for a mesh only")
-    elif mesh.suffix.lower() not in _BODY_MODEL_SUFFIXES:
+    elif mesh.suffix.lower() not in PICKLE_SUFFIXES:
         for name in map(flag, given(options, (n for n in _OF_BODY_MODELS if n not in but))):
             raise Sd2Error(
                 f"{name} is given, and {mesh} is not the output of a body model",
-                f"{name} for {', '.join(sorted(_BODY_MODEL_SUFFIXES))} files only",
+                f"{name} for {', '.join(sorted(PICKLE_SUFFIXES))} files only",
             )
 
 

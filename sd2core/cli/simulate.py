@@ -9,12 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from sd2core.cli.command_parser import Options, add_command
-from sd2core.cli.options import (
-    finite_float,
-    position,
-    positive_float,
-    positive_int,
-)
+from sd2core.cli.options import finite_float, position, positive_float, positive_int
 from sd2core.cli.output import picked, print_json, progress_bar
 from sd2core.errors import Sd2Error
 
@@ -44,31 +39,19 @@ def _add_radar(kinds: argparse._SubParsersAction) -> None:
     parser.add_mesh_and_sensor()
     parser.add_output("FOLDER", "the capture to write")
     add_radar_choice(parser)
-    parser.add_choice(
-        "--method",
-        ("nufft", "direct"),
-        "sum by a non-uniform FFT, or triangle by triangle, some hundred times slower",
-        "nufft",
-    )
+    text = "sum by a non-uniform FFT, or triangle by triangle, some hundred times slower"
+    parser.add_choice("--method", ("nufft", "direct"), text, "nufft")
     parser.add_value(
         "--blocks", positive_int, "N", "parts of a frame that follow the range as it changes", 1
     )
-    parser.add_choice(
-        "--motion",
-        ("constant", "interpolated"),
-        "within a frame: constant velocity, or the mesh interpolated at every chirp, which"
-        " takes as many sums as there are chirps",
-        "constant",
-    )
+    text = "within a frame: constant velocity, or the mesh interpolated at every chirp, which"
+    text += " takes as many sums as there are chirps"
+    parser.add_choice("--motion", ("constant", "interpolated"), text, "constant")
     parser.add_flag(
         "--incoherent", "a rough surface: every triangle has a random phase (default: a smooth one)"
     )
-    parser.add_choice(
-        "--visibility",
-        ("facing", "exact"),
-        "which triangles echo: those that face the radar, or those that nothing hides",
-        "exact",
-    )
+    text = "which triangles echo: those that face the radar, or those that nothing hides"
+    parser.add_choice("--visibility", ("facing", "exact"), text, "exact")
     parser.add_value(
         "--receivers",
         receivers,
@@ -76,36 +59,22 @@ def _add_radar(kinds: argparse._SubParsersAction) -> None:
         "how many, half a wavelength apart; or their places relative to the transmitter,"
         " as X,Y,Z;X,Y,Z in metres to the right, down and ahead (default: the radar's own number)",
     )
-    parser.add_value(
-        "--beam-width-deg",
-        positive_float,
-        "DEG",
-        "full width of the beam at half power, along where the sensor looks (default: all"
-        " directions alike)",
-    )
+    text = "full width of the beam at half power, along where the sensor looks (default: all"
+    text += " directions alike)"
+    parser.add_value("--beam-width-deg", positive_float, "DEG", text)
     plane = parser.add_mutually_exclusive_group()
-    plane.add_value(
-        "--ground",
-        plane_at,
-        "Y[,C]",
-        "a floor Y metres below the camera reflects; C is its amplitude coefficient"
-        " (default: concrete, -0.39)",
-    )
+    text = "a floor Y metres below the camera reflects; C is its amplitude coefficient"
+    text += " (default: concrete, -0.39)"
+    plane.add_value("--ground", plane_at, "Y[,C]", text)
     plane.add_value(
         "--wall", plane_at, "Z[,C]", "a wall Z metres in front of the camera reflects, likewise"
     )
     noise = parser.add_mutually_exclusive_group()
-    noise.add_value(
-        "--snr-db",
-        finite_float,
-        "DB",
-        "add thermal noise this many decibels below the moving mesh's echo (default: none)",
-    )
-    noise.add_flag(
-        "--link-budget",
-        "gain and noise of a 60 GHz radar on one chip, so that what is farther away is weaker"
-        " (default: a gain that suits the strongest echo)",
-    )
+    text = "add thermal noise this many decibels below the moving mesh's echo (default: none)"
+    noise.add_value("--snr-db", finite_float, "DB", text)
+    text = "gain and noise of a 60 GHz radar on one chip, so that what is farther away is weaker"
+    text += " (default: a gain that suits the strongest echo)"
+    noise.add_flag("--link-budget", text)
     parser.add_value("--seed", int, "N", "seed of noise and random phases", 0)
     parser.add_mesh_reading()
     parser.add_json()
@@ -231,45 +200,21 @@ def _add_campaign(kinds: argparse._SubParsersAction) -> None:
     parser.add_value("--people", positive_int, "N", "number of people", 6)
     parser.add_value("--minutes", positive_float, "MIN", "minutes of all people together", 90.0)
     parser.add_choice("--protocol", ("paper", "varied"), "what varies from take to take", "varied")
-    parser.add_choice(
-        "--order",
-        ("to-and-fro", "random"),
-        "of the paper's swipes: one kind in a take, or all four (default: to-and-fro)",
-    )
-    parser.add_choice(
-        "--movements",
-        ("swipes", "captured", "both"),
-        "what people do: swipes, what real people were recorded doing, or both in turn",
-        "swipes",
-    )
-    parser.add_value(
-        "--motions",
-        Path,
-        "FOLDER",
-        "recorded motions, as `python -m tools.motion_capture drive` makes them",
-    )
-    parser.add_choice(
-        "--motion-role",
-        ("learn", "calibrate", "measure"),
-        "people of that folder: those to learn from, or those kept apart",
-        "learn",
-    )
+    text = "of the paper's swipes: one kind in a take, or all four (default: to-and-fro)"
+    parser.add_choice("--order", ("to-and-fro", "random"), text)
+    text = "what people do: swipes, what real people were recorded doing, or both in turn"
+    parser.add_choice("--movements", ("swipes", "captured", "both"), text, "swipes")
+    text = "recorded motions, as `python -m tools.motion_capture drive` makes them"
+    parser.add_value("--motions", Path, "FOLDER", text)
+    text = "people of that folder: those to learn from, or those kept apart"
+    parser.add_choice("--motion-role", ("learn", "calibrate", "measure"), text, "learn")
     add_radar_choice(parser)
-    parser.add_choice(
-        "--radars",
-        ("one", "drawn"),
-        "the same radar in all takes, or looks, surface, noise and threshold drawn for each",
-        "one",
-    )
+    text = "the same radar in all takes, or looks, surface, noise and threshold drawn for each"
+    parser.add_choice("--radars", ("one", "drawn"), text, "one")
     parser.add_value("--seed", _seed, "N", "seed of all random numbers", 0)
-    parser.add_value(
-        "--sensors",
-        positive_int,
-        "N",
-        "sensors that see each take: its own, beside the camera, and N - 1 at other ranges"
-        " and angles",
-        1,
-    )
+    text = "sensors that see each take: its own, beside the camera, and N - 1 at other ranges"
+    text += " and angles"
+    parser.add_value("--sensors", positive_int, "N", text, 1)
     text = (
         "frames per second of the radar, 10 to 120, of which 240 is a multiple (default: its own)"
     )
@@ -278,12 +223,8 @@ def _add_campaign(kinds: argparse._SubParsersAction) -> None:
     parser.add_value("--take-seconds", positive_float, "S", "length of a take, in seconds", 15.0)
     parser.add_value("--workers", positive_int, "N", "worker processes (default: one per core)")
     parser.add_limbs()
-    parser.add_value(
-        "--fit-errors",
-        Path,
-        "FILE.json",
-        "errors of fits to imitate (default: those measured of `sd2 fit`)",
-    )
+    text = "errors of fits to imitate (default: those measured of `sd2 fit`)"
+    parser.add_value("--fit-errors", Path, "FILE.json", text)
     text = "how many times as large as those errors are, drawn anew for every take; 0,0: meshes"
     text += " without errors (default: 1,1)"
     parser.add_value("--fit-error-sizes", _sizes, "LEAST,MOST", text, (1.0, 1.0))

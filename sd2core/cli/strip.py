@@ -8,10 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.command_parser import add_command
-from sd2core.cli.options import (
-    positive_float,
-    positive_int,
-)
+from sd2core.cli.options import positive_float, positive_int
 from sd2core.cli.output import progress_bar
 
 if TYPE_CHECKING:

@@ -33,104 +33,50 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     parser = add_command(commands, "synth", handler=_synth)
     parser.add_mesh_and_sensor()
     parser.add_map_output()
-    parser.add_choice(
-        "--preset",
-        ("paper", "vid2doppler"),
-        "the paper's chain, or Vid2Doppler's arithmetic to the last digit",
-        "paper",
-    )
+    text = "the paper's chain, or Vid2Doppler's arithmetic to the last digit"
+    parser.add_choice("--preset", ("paper", "vid2doppler"), text, "paper")
     parser.add_method("count vertices, or simulate the radar's signal")
     add_radar_choice(parser)
     add_wish(parser, "none: what the options say")
-    parser.add_choice(
-        "--visibility",
-        ("none", "facing", "depth", "exact"),
-        "which vertices count: all, those that face the sensor, or those that nothing hides:"
-        " by a depth buffer (fast, approximate) or exactly",
-    )
-    parser.add_argument(
-        "--depth-resolution",
-        type=int,
-        choices=(128, 256),
-        help="pixels along each side of the depth buffer (default: 256)",
-    )
-    parser.add_value(
-        "--mask-stride",
-        positive_int,
-        "N",
-        "compute depth or exact visibility for every N-th frame only, and use it for the"
-        " frames nearest to each (default: 1)",
-    )
-    parser.add_value(
-        "--vertices-kept",
-        share,
-        "SHARE",
-        "simplify the surface to this share of its vertices, e.g. 25%% (default: 1, all)",
-    )
-    parser.add_choice(
-        "--weight",
-        ("count", "area", "projected"),
-        "a vertex counts as one, by its area, or by the area it turns towards the sensor",
-    )
+    text = "which vertices count: all, those that face the sensor, or those that nothing hides:"
+    text += " by a depth buffer (fast, approximate) or exactly"
+    parser.add_choice("--visibility", ("none", "facing", "depth", "exact"), text)
+    text = "pixels along each side of the depth buffer (default: 256)"
+    parser.add_argument("--depth-resolution", type=int, choices=(128, 256), help=text)
+    text = "compute depth or exact visibility for every N-th frame only, and use it for the"
+    text += " frames nearest to each (default: 1)"
+    parser.add_value("--mask-stride", positive_int, "N", text)
+    text = "simplify the surface to this share of its vertices, e.g. 25%% (default: 1, all)"
+    parser.add_value("--vertices-kept", share, "SHARE", text)
+    text = "a vertex counts as one, by its area, or by the area it turns towards the sensor"
+    parser.add_choice("--weight", ("count", "area", "projected"), text)
     parser.add_count()
     parser.add_axis()
-    parser.add_value(
-        "--null-bins",
-        bin_list,
-        "LIST",
-        "bins to empty, as 14,15,16, or none (default: those from -0.25 to 0.125 m/s, which"
-        " the paper's radar cannot tell from a static room; on any axis those at 0 m/s)",
-    )
-    parser.add_choice(
-        "--beyond",
-        ("drop", "wrap", "clip"),
-        "velocities beyond the axis: left out, folded back as a radar does, or counted in"
-        " the last bin",
-    )
-    parser.add_value(
-        "--range-exponent",
-        not_negative_float,
-        "N",
-        "echoes weaken with range to the power of N; 4 is the radar equation, 0 is off",
-    )
-    parser.add_value(
-        "--reference-range-m",
-        positive_float,
-        "M",
-        "range at which a vertex counts as one (paper: 2.2)",
-    )
-    parser.add_choice(
-        "--range-law",
-        ("vertex", "frame"),
-        "echoes weaken with the range of each vertex or of the whole frame (default: vertex)",
-    )
-    parser.add_value(
-        "--trajectory-smoothing-s",
-        not_negative_float,
-        "S",
-        "smooth the mesh's motion over this many seconds (sigma), without delay",
-    )
-    parser.add_value(
-        "--oversampling",
-        positive_int,
-        "N",
-        "raise the frame rate N times before velocities are taken, and average each frame over"
-        " its N moments (default: 1)",
-    )
-    parser.add_value(
-        "--velocity-sigma-bins",
-        not_negative_float,
-        "BINS",
-        "smooth the map along velocity (sigma in bins)",
-    )
+    text = "bins to empty, as 14,15,16, or none (default: those from -0.25 to 0.125 m/s, which"
+    text += " the paper's radar cannot tell from a static room; on any axis those at 0 m/s)"
+    parser.add_value("--null-bins", bin_list, "LIST", text)
+    text = "velocities beyond the axis: left out, folded back as a radar does, or counted in"
+    text += " the last bin"
+    parser.add_choice("--beyond", ("drop", "wrap", "clip"), text)
+    text = "echoes weaken with range to the power of N; 4 is the radar equation, 0 is off"
+    parser.add_value("--range-exponent", not_negative_float, "N", text)
+    text = "range at which a vertex counts as one (paper: 2.2)"
+    parser.add_value("--reference-range-m", positive_float, "M", text)
+    text = "echoes weaken with the range of each vertex or of the whole frame (default: vertex)"
+    parser.add_choice("--range-law", ("vertex", "frame"), text)
+    text = "smooth the mesh's motion over this many seconds (sigma), without delay"
+    parser.add_value("--trajectory-smoothing-s", not_negative_float, "S", text)
+    text = "raise the frame rate N times before velocities are taken, and average each frame over"
+    text += " its N moments (default: 1)"
+    parser.add_value("--oversampling", positive_int, "N", text)
+    text = "smooth the map along velocity (sigma in bins)"
+    parser.add_value("--velocity-sigma-bins", not_negative_float, "BINS", text)
     parser.add_value(
         "--time-sigma-s", not_negative_float, "S", "smooth the map along time (sigma in seconds)"
     )
-    parser.add_flag(
-        "--uncertainty",
-        "add to the map how well its values are known (arrays sd and expected), which a mesh"
-        " from sd2 fit says",
-    )
+    text = "add to the map how well its values are known (arrays sd and expected), which a mesh"
+    text += " from sd2 fit says"
+    parser.add_flag("--uncertainty", text)
     parser.add_limbs()
     parser.add_mesh_reading()
     parser.add_json()
@@ -198,8 +144,7 @@ def _check_wish(options: argparse.Namespace) -> None:
         raise Sd2Error(f"{wish} is given with --method fmcw", f"{wish} with the histogram only")
     for name in given(options, CHOSEN):
         raise Sd2Error(
-            f"{wish} is given with {flag(name)}",
-            f"one of them: with {wish} the plan chooses how",
+            f"{wish} is given with {flag(name)}", f"one of them: with {wish} the plan chooses how"
         )
 
 

@@ -11,12 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.command_parser import Options, add_command
-from sd2core.cli.options import (
-    flag,
-    given,
-    positive_float,
-    positive_int,
-)
+from sd2core.cli.options import flag, given, positive_float, positive_int
 from sd2core.cli.output import picked, print_facts, print_json
 from sd2core.errors import Sd2Error
 from sd2core.processes import INTERRUPTED
@@ -79,40 +74,20 @@ def _add_learning(parser: Options) -> None:
     group.add_value("--set", _option, "NAME=VALUE", text, [], action="append")
     text = "go on from a model with pairs of one's own"
     group.add_value("--from", str, "FILE|NAME", text)
-    group.add_argument(
-        "--frozen",
-        action="store_true",
-        default=None,
-        help="with --from: let the last layers learn alone, for very few pairs",
-    )
+    text = "with --from: let the last layers learn alone, for very few pairs"
+    group.add_argument("--frozen", action="store_true", default=None, help=text)
     group.add_value("--epochs", positive_int, "N", "passes over all segments (default: 500)")
-    group.add_value(
-        "--minutes",
-        positive_float,
-        "MIN",
-        "train for so long instead; the learning rate follows the clock",
-    )
+    text = "train for so long instead; the learning rate follows the clock"
+    group.add_value("--minutes", positive_float, "MIN", text)
     group.add_value("--batch-size", positive_int, "N", "segments of a batch (default: 64)")
     group.add_value("--learning-rate", positive_float, "RATE", "at its highest (default: 0.003)")
-    group.add_value(
-        "--ssm-learning-rate",
-        positive_float,
-        "RATE",
-        "the same for the parameters of state spaces (default: 0.001)",
-    )
-    group.add_value(
-        "--early-stopping",
-        int,
-        "N",
-        "end after N epochs without a better one, 0: never (default: 100)",
-    )
-    group.add_value(
-        "--velocity-weight",
-        float,
-        "W",
-        "learn the mean and the peak velocity of a frame beside the map: weight of 1 m/s"
-        " beside the error of the map (default: 0, as in the paper)",
-    )
+    text = "the same for the parameters of state spaces (default: 0.001)"
+    group.add_value("--ssm-learning-rate", positive_float, "RATE", text)
+    text = "end after N epochs without a better one, 0: never (default: 100)"
+    group.add_value("--early-stopping", int, "N", text)
+    text = "learn the mean and the peak velocity of a frame beside the map: weight of 1 m/s"
+    text += " beside the error of the map (default: 0, as in the paper)"
+    group.add_value("--velocity-weight", float, "W", text)
     group.add_argument(
         "--balanced",
         action="store_true",
@@ -121,11 +96,8 @@ def _add_learning(parser: Options) -> None:
         " are not shown too slow, and far ones not too coarsely (default: all frames alike, as in"
         " the paper)",
     )
-    group.add_choice(
-        "--select-by",
-        ("rmse", "mae"),
-        "what makes an epoch the best: error of the map, or of the peak velocity (default: rmse)",
-    )
+    text = "what makes an epoch the best: error of the map, or of the peak velocity (default: rmse)"
+    group.add_choice("--select-by", ("rmse", "mae"), text)
     group.add_value("--seed", int, "N", "seed of all random numbers (default: 0)")
 
 
@@ -139,23 +111,13 @@ def _add_data(parser: Options) -> None:
     )
     group.add_value("--segment-frames", positive_int, "N", "length of a segment (default: 72)")
     group.add_value("--overlap-frames", int, "N", "frames that neighbours share (default: 10)")
-    group.add_choice(
-        "--segments",
-        ("shifted", "fixed"),
-        "cut at other places in every epoch, or always at the same (default: shifted)",
-    )
-    group.add_choice(
-        "--placements",
-        ("all", "first"),
-        "range synthesis: learn from all places of the sensor, or the first only (default: all)",
-    )
-    group.add_value(
-        "--range-factor",
-        positive_float,
-        "FACTOR",
-        "range synthesis: scale input and target together, as if the person were up to F"
-        " times nearer or farther (default: 1, off)",
-    )
+    text = "cut at other places in every epoch, or always at the same (default: shifted)"
+    group.add_choice("--segments", ("shifted", "fixed"), text)
+    text = "range synthesis: learn from all places of the sensor, or the first only (default: all)"
+    group.add_choice("--placements", ("all", "first"), text)
+    text = "range synthesis: scale input and target together, as if the person were up to F"
+    text += " times nearer or farther (default: 1, off)"
+    group.add_value("--range-factor", positive_float, "FACTOR", text)
 
 
 def _add_machine(parser: Options) -> None:
@@ -164,20 +126,13 @@ def _add_machine(parser: Options) -> None:
         "--device", ("auto", "cpu", "cuda"), "where to compute (default: a GPU where there is one)"
     )
     group.add_value("--devices", positive_int, "N", "number of GPUs (default: 1)")
-    group.add_choice(
-        "--precision",
-        ("auto", "32", "bf16"),
-        "of matrix products (default: bf16 on GPUs that have it, else 32)",
-    )
+    text = "of matrix products (default: bf16 on GPUs that have it, else 32)"
+    group.add_choice("--precision", ("auto", "32", "bf16"), text)
     group.add_value("--threads", positive_int, "N", "of the CPU")
     group.add_value("--nice", int, "N", "lower the priority, 0 to 19")
     group.add_flag("--background", f"one thread and nice {_BACKGROUND_NICE}, to work beside it")
-    group.add_argument(
-        "--deterministic",
-        action="store_true",
-        default=None,
-        help="refuse operations whose result may differ from run to run (on GPUs; a CPU has none)",
-    )
+    text = "refuse operations whose result may differ from run to run (on GPUs; a CPU has none)"
+    group.add_argument("--deterministic", action="store_true", default=None, help=text)
 
 
 def _option(text: str) -> tuple[str, Any]:

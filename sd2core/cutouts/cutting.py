@@ -15,7 +15,12 @@ import numpy as np
 
 from sd2core.cutouts.source import FORMAT, CutSource, folder_name
 from sd2core.errors import Sd2Error
-from sd2core.files.atomic import atomic_write_text, full_disk_named
+from sd2core.files.atomic import (
+    atomic_write_json,
+    atomic_write_text,
+    full_disk_named,
+    replace_folder,
+)
 from sd2core.files.lock import FileLock
 from sd2core.files.tables import as_cell
 from sd2core.files.texts import read_json
@@ -117,9 +122,7 @@ def write_index(folder: Path) -> None:
     atomic_write_text(folder / "index.csv", table.getvalue())
     kept = [{key: value for key, value in one.items() if key != "frame_times_s"} for one in entries]
     content = {"format": f"{FORMAT}-index", "version": 1, "spans": kept}
-    atomic_write_text(
-        folder / "index.json", json.dumps(content, indent=2, ensure_ascii=False) + "\n"
-    )
+    atomic_write_json(folder / "index.json", content)
 
 
 def _write_all(
@@ -172,7 +175,7 @@ def _write_one(
             replace(part, meta=part.meta | {"cut_out": label}).save(made / f"{name}.npz")
     described = source.described(span)
     described["files"] = [name for name in described["files"] if (made / name).exists()]
-    atomic_write_text(made / _DETAILS, _text(described))
+    atomic_write_json(made / _DETAILS, described)
 
 
 def _write_clip(
@@ -195,13 +198,9 @@ def _write_clip(
 
 def _put(made: Path, path: Path) -> None:
     """Give a complete folder its name; one that is in the way goes aside first."""
-    if path.exists():
-        aside = made.with_name(f"{made.name}-before")
-        path.rename(aside)
-        made.rename(path)
-        shutil.rmtree(aside, ignore_errors=True)
-    else:
-        made.rename(path)
+    aside = made.with_name(f"{made.name}-before")
+    replace_folder(made, path, aside)
+    shutil.rmtree(aside, ignore_errors=True)
 
 
 def _state(path: Path, described: dict[str, Any]) -> State:
@@ -210,7 +209,7 @@ def _state(path: Path, described: dict[str, Any]) -> State:
     found = _read(path / _DETAILS)
     if found is None or not all((path / name).exists() for name in found["files"]):
         return "other"
-    known = json.loads(_text(described)) | {"files": found["files"]}
+    known = json.loads(json.dumps(described)) | {"files": found["files"]}
     return "same" if found == known else "other"
 
 
@@ -226,7 +225,3 @@ def _read(path: Path) -> dict[str, Any] | None:
         first, stop = found["frames"]
         found["frames"] = asdict(ShownFrames(first, stop - 1, stop - first))
     return found
-
-
-def _text(described: dict[str, Any]) -> str:
-    return json.dumps(described, indent=2, ensure_ascii=False) + "\n"

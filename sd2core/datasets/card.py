@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -14,7 +13,8 @@ from sd2core.datasets.layout import SPLITS
 from sd2core.datasets.reading import Dataset, open_dataset
 from sd2core.datasets.source import KINDS
 from sd2core.datasets.splitting import RULE, borrowed, named_splits, split_people
-from sd2core.files.atomic import atomic_write_text
+from sd2core.files.atomic import atomic_write_json, atomic_write_text
+from sd2core.files.tables import counted
 from sd2core.mesh.vertex_parts import QUANTITIES
 from sd2core.numerics.map_accuracy import MapAccuracy
 
@@ -34,7 +34,7 @@ def write_card(path: Path) -> dict[str, Any]:
     with open_dataset(path) as dataset:
         card = describe_dataset(dataset)
     markdown, as_json, _ = card_paths(path)
-    atomic_write_text(as_json, json.dumps(card, indent=2, ensure_ascii=False) + "\n")
+    atomic_write_json(as_json, card)
     atomic_write_text(markdown, card_text(card))
     return card
 
@@ -311,8 +311,8 @@ def _summary(card: dict[str, Any]) -> str:
     return (
         f"{card['segments']:,} segments of {card['length']} frames ({card['segment_s']:.2f} s at"
         f" {card['frame_rate_hz']:g} frames/s) × {card['bins']} velocity bins, from"
-        f" {_counted(card['recordings'], 'recording')} of"
-        f" {_counted(len(card['subjects']), 'subject')}, {duration_text(card)}"
+        f" {counted(card['recordings'], 'recording')} of"
+        f" {counted(len(card['subjects']), 'subject')}, {duration_text(card)}"
         + (f", each seen from up to {card['placements']} places" if card["placements"] > 1 else "")
         + f". Written by {card['made_by']}; format {card['dataset'].rsplit('.', 1)[-1]},"
         " described in docs/formats.md of SD² Studio."
@@ -451,7 +451,3 @@ def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     return "\n".join(
         "| " + " | ".join(str(cell).replace("|", "\\|") for cell in line) + " |" for line in lines
     )
-
-
-def _counted(number: int, what: str) -> str:
-    return f"{number:,} {what}" + ("" if number == 1 else "s")

@@ -157,10 +157,7 @@ def label_of_segments(
 
 
 def _values(
-    values: NDArray[np.float32],
-    times_s: NDArray[np.float64],
-    clip: Clip,
-    null_bins: Sequence[int],
+    values: NDArray[np.float32], times_s: NDArray[np.float64], clip: Clip, null_bins: Sequence[int]
 ) -> NDArray[np.float32]:
     """Return energies of a clip at its own times: (…, bins, frames) → (frames, …, bins)."""
     own = np.moveaxis(values, -1, 0)[clip.start : clip.stop].copy()

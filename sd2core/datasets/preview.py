@@ -236,12 +236,7 @@ def _words(figure: Figure, example: Example, x: float, y: float) -> None:
 
 
 def _frame(
-    figure: Figure,
-    title: str,
-    header: Header,
-    segments: int,
-    shown: Any,
-    size: tuple[float, float],
+    figure: Figure, title: str, header: Header, segments: int, shown: Any, size: tuple[float, float]
 ) -> None:
     """Draw the title and the colour scale."""
     width, height = size

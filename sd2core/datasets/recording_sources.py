@@ -249,15 +249,12 @@ class _Opened:
         maps = {kind: one for kind, one in maps.items() if kind in wanted}
         if not maps:
             raise Sd2Error(
-                f"{self.recording.folder} has no map that is wanted",
-                f"one of {', '.join(wanted)}",
+                f"{self.recording.folder} has no map that is wanted", f"one of {', '.join(wanted)}"
             )
         times_s = next(iter(maps.values())).times_s
         channel = self.recording.channel_in_words
         return Source(
-            key.subject,
-            key.recording,
-            key.placement,
+            *key,
             sensor,
             maps,
             self._label(times_s),

@@ -70,11 +70,7 @@ class Scatterers:
         return np.ones(points.shape[1], bool)
 
     def weights(
-        self,
-        row: int,
-        points: NDArray[Any],
-        sensor: NDArray[np.float64],
-        counting: Counting,
+        self, row: int, points: NDArray[Any], sensor: NDArray[np.float64], counting: Counting
     ) -> NDArray[np.float64]:
         """Weight of each vertex of a frame, float64 (V,); parameters as for :meth:`seen`."""
         if self.area_vectors is not None:

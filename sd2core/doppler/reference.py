@@ -101,11 +101,7 @@ def _sigma_bins(
 
 
 def at_frames(
-    mesh: MeshSequence,
-    place: NDArray[np.float64],
-    options: SynthesisOptions,
-    start: int,
-    stop: int,
+    mesh: MeshSequence, place: NDArray[np.float64], options: SynthesisOptions, start: int, stop: int
 ) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
     """Yield velocities (moments, V) and positions (3, V), frame by frame."""
     every = options.oversampling

@@ -64,11 +64,7 @@ class StripSource:
 
     @classmethod
     def of(
-        cls,
-        recording: Recording,
-        video: VideoReader | None,
-        mesh: MeshSequence | None,
-        name: str,
+        cls, recording: Recording, video: VideoReader | None, mesh: MeshSequence | None, name: str
     ) -> StripSource:
         """Source from a recording, its parts opened by the caller."""
         width, height = (video.width, video.height) if video is not None else (640, 480)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import errno
+import json
 import os
 import re
 import secrets
 import shutil
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
@@ -73,6 +74,18 @@ def atomic_write_text(path: Path, text: str) -> None:
     """Replace ``path`` by ``text`` (UTF-8) in one step."""
     with atomic_write(path) as stream:
         stream.write(text.encode("utf-8"))
+
+
+def atomic_write_json(path: Path, content: object) -> None:
+    """Replace ``path`` by JSON that people can read, in one step."""
+    atomic_write_text(path, json.dumps(content, indent=2, ensure_ascii=False) + "\n")
+
+
+def keep_text(path: Path, text: str) -> None:
+    """Write a file of a cache, in a folder made for it; what cannot be written is not kept."""
+    with suppress(OSError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        atomic_write_text(path, text)
 
 
 @contextmanager

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from sd2core.errors import Sd2Error
-from sd2core.files.atomic import atomic_write_text
+from sd2core.files.atomic import keep_text
 from sd2core.files.paths import user_cache
 from sd2core.files.texts import read_json
 
@@ -88,11 +88,7 @@ def cached_digest(path: Path) -> str:
     digests = Digests(*_kept(place))
     found = digests.of(path)
     content = {"files": digests.files, "digests": digests.digests}
-    try:
-        place.parent.mkdir(parents=True, exist_ok=True)
-        atomic_write_text(place, json.dumps(content) + "\n")
-    except OSError:
-        pass
+    keep_text(place, json.dumps(content) + "\n")
     return found
 
 

@@ -11,6 +11,9 @@ from pathlib import Path, PurePath, PurePosixPath, PureWindowsPath
 from sd2core.errors import Sd2Error
 from sd2core.progress import Progress
 
+PICKLE_SUFFIXES = frozenset({".pkl", ".pickle", ".joblib"})
+"""Of outputs of body models, which know their place only in the picture's pixels."""
+
 
 def user_data(name: str) -> Path:
     """Folder of the user's data of one kind; it may not exist yet."""

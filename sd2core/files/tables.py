@@ -29,6 +29,11 @@ def markdown_table(rows: Sequence[Sequence[str]]) -> list[str]:
     return [f"| {' | '.join(row)} |" for row in (rows[0], rule, *rows[1:])]
 
 
+def counted(number: int, what: str) -> str:
+    """``1 span``, ``2 spans``."""
+    return f"{number:,} {what}" + ("" if number == 1 else "s")
+
+
 # With wide signs, which some spreadsheets compute as well. Apostrophes count, so that a text with
 # one of its own comes back.
 _FORMULA = re.compile(r"'*\s*[=+\-@＝＋－＠]")

@@ -129,13 +129,13 @@ def parse_toml(text: str, place: str | Path, expected: str, remedy: str = "") ->
 
 
 @contextmanager
-def errors_in(path: Path) -> Iterator[None]:
+def errors_in(place: str | Path, remedy: str = _REMEDY) -> Iterator[None]:
     """Name the file in errors about what stands in it, and say what to do where they do not."""
     try:
         yield
     except Sd2Error as error:
-        told = error.within(path)
-        raise Sd2Error(told.found, told.expected, told.remedy or _REMEDY) from error
+        told = error.within(place)
+        raise Sd2Error(told.found, told.expected, told.remedy or remedy) from error
 
 
 @contextmanager

@@ -259,8 +259,6 @@ def recurrent_sum(
     sample_turns: Floats,
     migration_turns: Floats,
     amplitude: NDArray[np.complex128],
-    start: int,
-    stop: int,
     first_chirp: float,
     first_sample: float,
     half_chirps: float,
@@ -276,7 +274,7 @@ def recurrent_sum(
     terms = amplitude.shape[0]
     real, imaginary = np.empty(chirps), np.empty(chirps)
     cosine, sine = np.empty(chirps), np.empty(chirps)
-    for k in range(start, stop):
+    for k in range(start_turns.shape[0]):
         for m in range(chirps):
             place = first_chirp + m
             strength = amplitude[terms - 1, k]
@@ -322,4 +320,4 @@ def compile_kernels() -> None:
     )
     direct_sum(one, one, one, one, echo, 0, 1, 0.0, 0.0, 1.0, np.zeros((1, 1), np.complex128))
     square = np.zeros((1, 1))
-    recurrent_sum(one, one, one, one, echo, 0, 1, 0.0, 0.0, 1.0, square, square.copy())
+    recurrent_sum(one, one, one, one, echo, 0.0, 0.0, 1.0, square, square.copy())

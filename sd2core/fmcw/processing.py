@@ -254,11 +254,7 @@ def _without_person(capture: RadarCapture) -> list[str]:
 
 
 def _notes(
-    config: RadarConfig,
-    axis: VelocityAxis,
-    unseen: tuple[int, ...],
-    beyond: float,
-    clipped: float,
+    config: RadarConfig, axis: VelocityAxis, unseen: tuple[int, ...], beyond: float, clipped: float
 ) -> list[str]:
     notes = []
     if axis.v_max_mps > config.v_max_mps * (1 + 1e-9):

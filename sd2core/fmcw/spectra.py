@@ -9,10 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sd2core.errors import Sd2Error
-from sd2core.fmcw.chain import (
-    FrameChain,
-    ProcessingOptions,
-)
+from sd2core.fmcw.chain import FrameChain, ProcessingOptions
 from sd2core.fmcw.options import WaveOptions
 from sd2core.fmcw.processing import rebinning
 from sd2core.fmcw.wave import BeatSignal, WaveScene

@@ -13,7 +13,7 @@ import itertools
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +31,7 @@ class _Plans(threading.local):
     """Prepared finufft plans of this thread: preparing takes a third as long as using."""
 
     def __init__(self) -> None:
-        self.made: dict[tuple[tuple[int, int], int, float], Any] = {}
+        self.made: dict[tuple[tuple[int, int], int], Any] = {}
 
 
 _plans = _Plans()
@@ -61,8 +61,7 @@ class Echoes:
         return np.atleast_2d(self.amplitude)
 
 
-@dataclass(frozen=True, eq=False)
-class Turns:
+class Turns(NamedTuple):
     """Phase in turns: start + m chirp + n sample + m n migration, (k,) each."""
 
     start: NDArray[np.float64]
@@ -91,10 +90,7 @@ def direct(
         if go_on is not None:
             go_on()
         direct_sum(
-            turns.start,
-            turns.chirp,
-            turns.sample,
-            turns.migration,
+            *turns,
             amplitude,
             start,
             min(start + step, count),
@@ -113,17 +109,11 @@ def recurrent(
 
     Nothing is left out; rounding adds some 1e-14 times the samples of a chirp.
     """
-    turns = turns_of(echoes, config)
     shape = (config.samples_per_chirp, chirps or config.chirps_per_frame)
     real, imaginary = np.zeros(shape), np.zeros(shape)
     recurrent_sum(
-        turns.start,
-        turns.chirp,
-        turns.sample,
-        turns.migration,
+        *turns_of(echoes, config),
         np.ascontiguousarray(echoes.terms),
-        0,
-        echoes.count,
         -0.5 * (shape[1] - 1),
         -0.5 * shape[0],
         0.5 * config.chirps_per_frame,
@@ -134,17 +124,13 @@ def recurrent(
 
 
 def nufft(
-    echoes: Echoes,
-    config: RadarConfig,
-    blocks: int = 1,
-    chirps: int | None = None,
-    tolerance: float = NUFFT_TOLERANCE,
+    echoes: Echoes, config: RadarConfig, blocks: int = 1, chirps: int | None = None
 ) -> NDArray[np.complex128]:
     """Compute the same sum by type-1 non-uniform FFTs on one thread, (chirps, samples).
 
     Each of the ``blocks``, no more than there are chirps, has beat frequencies of its own. One
     block leaves 2 pi (2 / c) S r t_m t_n out of the phase at its ends. ``chirps`` is the number
-    around the middle; None: the radar's own. ``tolerance`` is the relative error of the sums.
+    around the middle; None: the radar's own.
     """
     turns = turns_of(echoes, config)
     chirps = chirps or config.chirps_per_frame
@@ -168,9 +154,7 @@ def nufft(
         start += (samples // 2 - 0.5 * samples) * sample
         along_samples, phasor = _angle(sample), np.exp(1j * _angle(start))
         shape = (length, samples)
-        total[first:last] = _transform(
-            along_chirps, along_samples, terms[:1] * phasor, shape, tolerance
-        )[0]
+        total[first:last] = _transform(along_chirps, along_samples, terms[:1] * phasor, shape)[0]
         if not len(changing):
             continue
         parts = _transform(
@@ -178,7 +162,6 @@ def nufft(
             along_samples[changing],
             terms[1:, changing] * phasor[changing],
             shape,
-            tolerance,
         )
         for power, part in enumerate(parts, start=1):
             total[first:last] += times[first:last, None] ** power * part
@@ -190,18 +173,17 @@ def _transform(
     along_samples: NDArray[np.float64],
     strengths: NDArray[np.complex128],
     shape: tuple[int, int],
-    tolerance: float,
 ) -> NDArray[np.complex128]:
     """Type-1 transforms of several strengths at the same points, (terms, chirps, samples)."""
     import finufft
 
     plans = _plans.made
-    key = (shape, len(strengths), tolerance)
+    key = (shape, len(strengths))
     if key not in plans:
         if len(plans) >= _MOST_PLANS:
             plans.clear()
         plans[key] = finufft.Plan(
-            1, shape, n_trans=len(strengths), eps=tolerance, isign=1, nthreads=1
+            1, shape, n_trans=len(strengths), eps=NUFFT_TOLERANCE, isign=1, nthreads=1
         )
     plan = plans[key]
     plan.setpts(along_chirps, along_samples)

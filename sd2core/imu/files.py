@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterator
+from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
 from sd2core.files.limits import open_regular
 from sd2core.files.numpy_files import open_npz_file
-from sd2core.files.texts import lines_of
+from sd2core.files.texts import errors_in, lines_of
 from sd2core.imu.signals import InertialSignals
 from sd2core.imu.tables import AccelerationUnit, TurnRateUnit, read_table
 
@@ -80,15 +81,12 @@ def read_signals(
     path = Path(path)
     if not path.exists():
         raise Sd2Error(f"{path} does not exist", "samples of an inertial sensor", "Check the path")
-
-    def read_csv(path: Path) -> InertialSignals:
-        return read_table(
-            path,
-            rate_hz=rate_hz,
-            acceleration_unit=acceleration_unit,
-            turn_rate_unit=turn_rate_unit,
-        )
-
+    read_csv = partial(
+        read_table,
+        rate_hz=rate_hz,
+        acceleration_unit=acceleration_unit,
+        turn_rate_unit=turn_rate_unit,
+    )
     read = _of_suffix(path, {".csv": read_csv, ".sto": _read_sto, ".npz": _read_npz})
     try:
         return read(path)
@@ -171,11 +169,9 @@ def _read_sto(path: Path) -> InertialSignals:
                 raise Sd2Error(f"{path} has {table.shape[1]} numbers in a row", "seven")
         except ValueError as error:
             raise Sd2Error(f"{path} cannot be read ({str(error)[:200]})", _EXPECTED_STO) from error
-    try:
-        meta = {"at": names[1].removesuffix(_STO_ENDS[0]), "source": path.name} | facts
+    meta = {"at": names[1].removesuffix(_STO_ENDS[0]), "source": path.name} | facts
+    with errors_in(path, remedy=""):
         return InertialSignals(table[:, 0], table[:, 1:4], table[:, 4:], meta)
-    except Sd2Error as error:
-        raise error.within(path) from error
 
 
 def _sto_header(path: Path, lines: Iterator[str]) -> dict[str, str]:
@@ -212,7 +208,5 @@ def _read_npz(path: Path) -> InertialSignals:
         if meta.pop("format") != FORMAT or not 1 <= meta.pop("version") <= VERSION:
             raise Sd2Error(f"{path} is of another format or a later version", _EXPECTED_NPZ)
         times_s, acceleration, turn_rate = (np.asarray(data[name], np.float64) for name in _ARRAYS)
-        try:
+        with errors_in(path, remedy=""):
             return InertialSignals(times_s, acceleration, turn_rate, meta)
-        except Sd2Error as error:
-            raise error.within(path) from error

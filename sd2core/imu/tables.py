@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.files.limits import open_regular
-from sd2core.files.texts import lines_of
+from sd2core.files.texts import errors_in, lines_of
 from sd2core.imu.signals import InertialSignals
 from sd2core.io.imu_columns import AXES, UNITS, Column, cell_text, column_of, titles_of
 
@@ -76,10 +76,8 @@ def read_table(
         rate_hz = _rate(path, rate_text) if rate_hz is None else rate_hz
         times_s = np.arange(len(values)) / _plausible(path, rate_hz)
     meta = {"source": path.name, "columns": [one.title for one in columns]}
-    try:
+    with errors_in(path, remedy=""):
         signals = InertialSignals(times_s, values[:, :3], values[:, 3:6], meta)
-    except Sd2Error as error:
-        raise error.within(path) from error
     if len(times_s) > 1:
         _plausible(path, signals.rate_hz)
     return signals

@@ -8,7 +8,7 @@ from typing import Literal
 
 from sd2core.errors import Sd2Error
 from sd2core.files.limits import check_regular
-from sd2core.files.paths import is_pattern
+from sd2core.files.paths import PICKLE_SUFFIXES, is_pattern
 from sd2core.files.stores import read_attributes
 from sd2core.io.imu_columns import holds_inertial_signals
 from sd2core.pairs.store import is_pair_store
@@ -20,7 +20,7 @@ DATASET_FORMAT = "sd2-dataset"
 VIDEO_SUFFIXES = frozenset({".mp4", ".mkv", ".mov", ".avi", ".webm", ".m4v", ".mpg", ".ts", ".wmv"})
 RADAR_MAP_SUFFIXES = frozenset({".h5", ".hdf5"})
 RADAR_SUFFIXES = frozenset({".npy", ".bin", ".sigmf-meta", ".sigmf-data"}) | RADAR_MAP_SUFFIXES
-MESH_SUFFIXES = frozenset({".obj", ".ply", ".glb", ".pkl", ".pickle", ".joblib"})
+MESH_SUFFIXES = frozenset({".obj", ".ply", ".glb"}) | PICKLE_SUFFIXES
 
 
 def kind_of(path: Path) -> Kind:

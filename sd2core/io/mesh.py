@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
-from sd2core.files.paths import is_pattern
+from sd2core.files.paths import PICKLE_SUFFIXES, is_pattern
+from sd2core.files.texts import errors_in
 from sd2core.io.fitted import fitted_doubts
 from sd2core.io.mesh_arrays import RawMesh, read_npz, read_zarr, write_npz, write_zarr
 from sd2core.io.mesh_checks import check_mesh, mark_empty_frames, uncertainty_of
@@ -20,7 +21,6 @@ from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Progress, silent
 from sd2core.timebase import Timebase
 
-_PICKLES = {".pkl", ".pickle", ".joblib"}
 _KNOWN = (
     ".npz, .zarr, .zarr.zip, .obj/.ply/.glb (one, a folder or a pattern such as 'frames/*.obj'), "
     "or the .pkl of VIBE, WHAM or another tool that holds 'verts'"
@@ -102,23 +102,14 @@ def load_mesh(
     mark_empty_frames(raw, source)
     _place(raw, 1.0 if scale is None else scale, distance_m or 0.0)
     check_mesh(raw, times_s, source, check_size=scale is None)
-    try:
+    with errors_in(source, remedy=""):
         timebase = Timebase(times_s)
-    except Sd2Error as error:
-        raise error.within(source) from error
     known = uncertainty_of(raw, source)
     if known is not None:
         known = known.times(_velocity_factor(raw.times_s, times_s, scale))
     notes = (*raw.notes, *fitted_doubts(path))
     return MeshSequence(
-        raw.vertices,
-        raw.faces,
-        timebase,
-        source,
-        notes,
-        raw.vertex_counts,
-        raw.present,
-        known,
+        raw.vertices, raw.faces, timebase, source, notes, raw.vertex_counts, raw.present, known
     )
 
 
@@ -182,7 +173,7 @@ def _read(
         return read_zarr(path)
     if suffix == ".npz":
         return read_npz(path)
-    if suffix in _PICKLES:
+    if suffix in PICKLE_SUFFIXES:
         return read_model_output(path, person, image_size, focal_px, distance_m)
     if suffix in SURFACE_SUFFIXES:
         return read_mesh_files(path, progress)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
+from sd2core.files.texts import errors_in
 from sd2core.io.mesh_arrays import RawMesh
 from sd2core.io.stored_vertices import StoredVertices
 from sd2core.mesh.presence import checked
@@ -34,10 +35,8 @@ def mark_empty_frames(raw: RawMesh, source: str) -> None:
     """
     frames = int(raw.vertices.shape[0])
     if raw.present is not None:
-        try:
+        with errors_in(source, remedy=""):
             raw.present = checked(raw.present, frames)
-        except Sd2Error as error:
-            raise Sd2Error(f"{source}: {error.found}", error.expected) from error
     if isinstance(raw.vertices, StoredVertices):
         return
     vertices: NDArray[Any] = np.asarray(raw.vertices)
@@ -82,10 +81,8 @@ def uncertainty_of(raw: RawMesh, source: str) -> VelocityUncertainty | None:
         return None
     vertex_limb, along, across = raw.uncertainty
     limbs = raw.limbs or tuple(f"limb {number}" for number in range(np.shape(along)[-1]))
-    try:
+    with errors_in(source, remedy=""):
         return VelocityUncertainty(limbs, vertex_limb, along, across)
-    except Sd2Error as error:
-        raise Sd2Error(f"{source}: {error.found}", error.expected) from error
 
 
 def check_mesh(raw: RawMesh, times_s: NDArray[np.float64], source: str, check_size: bool) -> None:

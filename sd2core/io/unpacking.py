@@ -32,10 +32,7 @@ def npz_bytes(path: Path) -> int:
 def npz_vertices(path: Path) -> tuple[int, int]:
     """Frames and vertices of the mesh in an ``.npz``, read from a header; Sd2Error without any."""
     try:
-        with (
-            open_zip(path) as archive,
-            archive.open(_vertex_member(archive, path)) as stream,
-        ):
+        with open_zip(path) as archive, archive.open(_vertex_member(archive, path)) as stream:
             frames, vertices, _ = _header(stream, path)[0]
             return frames, vertices
     except (OSError, ValueError, zipfile.BadZipFile) as error:

@@ -228,12 +228,7 @@ def _read_packets(container: Any, stream: Any, progress: Progress) -> _Packets:
             entry_pts.append(packet.pts)
     if (np.diff(entry_pts) <= 0).any() or not pts:
         usable = False
-    return _Packets(
-        np.array(pts, np.int64),
-        np.array(entry_pts, np.int64),
-        count,
-        usable,
-    )
+    return _Packets(np.array(pts, np.int64), np.array(entry_pts, np.int64), count, usable)
 
 
 def _keys_from_ends(path: Path, packets: _Packets, progress: Progress) -> NDArray[np.int64] | None:

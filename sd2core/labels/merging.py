@@ -66,9 +66,7 @@ def chosen(base: Value | None, mine: Value, theirs: Value) -> Value:
 
 
 def _by_name(
-    base: Mapping[str, Value],
-    mine: Mapping[str, Value],
-    theirs: Mapping[str, Value],
+    base: Mapping[str, Value], mine: Mapping[str, Value], theirs: Mapping[str, Value]
 ) -> dict[str, Value]:
     """Entries of both sides, without those that a side removed and the other left as they were."""
     order = theirs if list(mine) == list(base) else mine

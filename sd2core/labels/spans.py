@@ -171,8 +171,7 @@ class Labels:
                 last[span.track] = span
             elif span.track not in names:
                 raise Sd2Error(
-                    f"{span.words()} is on the track {span.track!r}",
-                    f"one of {', '.join(names)}",
+                    f"{span.words()} is on the track {span.track!r}", f"one of {', '.join(names)}"
                 )
 
     @property

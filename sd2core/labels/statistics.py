@@ -12,17 +12,7 @@ import numpy as np
 from sd2core.files.tables import as_cell
 from sd2core.labels.spans import Labels, Span
 
-HEADINGS = (
-    "label",
-    "spans",
-    "total s",
-    "mean s",
-    "sd s",
-    "median s",
-    "min s",
-    "max s",
-    "share %",
-)
+HEADINGS = ("label", "spans", "total s", "mean s", "sd s", "median s", "min s", "max s", "share %")
 NO_NUMBER = "–"
 
 

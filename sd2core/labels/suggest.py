@@ -134,10 +134,7 @@ def _leaked(seen: NDArray[np.float64], still: NDArray[np.bool_]) -> NDArray[np.f
 
 
 def suggest_spans(
-    doppler: DopplerMap,
-    options: SuggestOptions | None = None,
-    *,
-    label: str = LABEL,
+    doppler: DopplerMap, options: SuggestOptions | None = None, *, label: str = LABEL
 ) -> tuple[Span, ...]:
     """Find spans in which something moves, in order; edges are those of frames.
 

@@ -289,8 +289,7 @@ def _bounded(
         for value in values:
             if not least <= value <= most:
                 raise Sd2Error(
-                    f"A placement has the {name} {value:g}{unit}",
-                    f"{least:g} to {most:g}{unit}",
+                    f"A placement has the {name} {value:g}{unit}", f"{least:g} to {most:g}{unit}"
                 )
     return (("ranges", ranges_m), ("azimuths", azimuths_deg), ("elevations", elevations_deg))
 

@@ -7,7 +7,6 @@ to the folder, so that a whole data set can move. See ``docs/formats.md``.
 
 from __future__ import annotations
 
-import json
 import math
 import shutil
 import tempfile
@@ -17,8 +16,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.errors import Sd2Error
-from sd2core.files.atomic import atomic_write_text, full_disk_named
+from sd2core.files.atomic import atomic_write_json, full_disk_named
 from sd2core.files.paths import (
+    PICKLE_SUFFIXES,
     free_path,
     is_absolute,
     located_path,
@@ -60,9 +60,6 @@ if TYPE_CHECKING:
     from sd2core.timebase import Timebase
 
 SUFFIX = ".sd2"
-
-_PLACED_BY_VIDEO = {".pkl", ".pickle", ".joblib"}
-"""Outputs of body models, which know their place only in the picture's pixels."""
 
 _SENSOR = ("position_m", "azimuth_deg", "elevation_deg", "field_of_view_deg")
 
@@ -337,8 +334,7 @@ class Recording:
             )
             self.spans = ()
             self._note_written(LABELS_NAME)
-        text = json.dumps(document.model_dump(mode="json"), indent=2, ensure_ascii=False)
-        atomic_write_text(self.folder / FILE_NAME, text + "\n")
+        atomic_write_json(self.folder / FILE_NAME, document.model_dump(mode="json"))
         self._note_written(FILE_NAME)
         self._read, self._base = document, self.state()
 
@@ -460,7 +456,7 @@ class Recording:
         options = self.mesh_reading.options()
         if self.faces is not None:
             options["faces"] = self._present("faces")
-        by_video = path.suffix.lower() in _PLACED_BY_VIDEO and self.video and self.video.exists()
+        by_video = path.suffix.lower() in PICKLE_SUFFIXES and self.video and self.video.exists()
         if by_video and "image_size" not in options:
             with self.open_video() as video:
                 options["image_size"] = (video.width, video.height)

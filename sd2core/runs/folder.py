@@ -7,7 +7,6 @@ Needs neither Qt, Dask nor torch.
 
 from __future__ import annotations
 
-import json
 import os
 import time
 from collections.abc import Iterator
@@ -18,7 +17,7 @@ from typing import Any, ClassVar, Literal
 from pydantic import ValidationError
 
 from sd2core.errors import Sd2Error
-from sd2core.files.atomic import atomic_write_text
+from sd2core.files.atomic import atomic_write_json
 from sd2core.files.lock import FileLock, is_locked
 from sd2core.files.texts import first_fault, read_json
 from sd2core.processes import ProcessId
@@ -189,5 +188,4 @@ class RunFolder:
     def _describe(self, state: State, **about: Any) -> None:
         before = self.about() if self.exists else {}
         content = {"format": self.format, "version": self.version, **before, **about}
-        text = json.dumps(content | {"state": state}, indent=2, ensure_ascii=False)
-        atomic_write_text(self.description, text + "\n")
+        atomic_write_json(self.description, content | {"state": state})

@@ -11,7 +11,7 @@ import platform
 from pathlib import Path
 
 from sd2core.errors import Sd2Error
-from sd2core.files.atomic import atomic_write_text
+from sd2core.files.atomic import keep_text
 from sd2core.files.paths import user_cache
 from sd2core.files.texts import read_json
 
@@ -71,12 +71,8 @@ def keep_pace(kind: Kind, seconds: float, items: float) -> None:
     before = known.pop(name, (0.0, 0.0))
     now = float(f"{seconds / items:.4g}"), round(seconds, 3)
     known[name] = before if seconds < min(before[1], _SHORT_S) else now
-    path, newest = _path(), list(known.items())[-_MOST_KINDS:]
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        atomic_write_text(path, json.dumps(dict(newest), indent=1) + "\n")
-    except OSError:
-        return
+    newest = dict(list(known.items())[-_MOST_KINDS:])
+    keep_text(_path(), json.dumps(newest, indent=1) + "\n")
 
 
 def _name(kind: Kind) -> str:

@@ -109,11 +109,7 @@ def standing(events: Iterable[Event]) -> list[Event]:
 
 def last_of(events: Iterable[Event], kind: str) -> Event | None:
     """The last line of a kind."""
-    found = None
-    for event in events:
-        if event["event"] == kind:
-            found = event
-    return found
+    return next((event for event in reversed([*events]) if event["event"] == kind), None)
 
 
 def _undone(event: Event, done: int) -> bool:

@@ -13,10 +13,7 @@ from typing import TYPE_CHECKING, Any
 from sd2core.cli.classify.data import DATA_HELP, add_sources, clips_of
 from sd2core.cli.classify.train import add_network, network_of
 from sd2core.cli.command_parser import add_command
-from sd2core.cli.options import (
-    positive_int,
-    share,
-)
+from sd2core.cli.options import positive_int, share
 from sd2core.cli.output import finite, print_event, print_json, progress_bar
 
 if TYPE_CHECKING:
@@ -32,13 +29,9 @@ def add_table(kinds: argparse._SubParsersAction) -> None:
     add_sources(parser)
     parser.add_output("FOLDER", "the tables, figures and models to write")
     parser.add_value("--seeds", positive_int, "N", "number of repetitions (default: 5; quick: 2)")
-    parser.add_value(
-        "--shares",
-        _shares,
-        "LIST",
-        "shares of the real data for the learning curve (default:"
-        " 1%%,2%%,5%%,10%%,25%%,50%%,100%%; quick: 10%%,100%%)",
-    )
+    text = "shares of the real data for the learning curve (default:"
+    text += " 1%%,2%%,5%%,10%%,25%%,50%%,100%%; quick: 10%%,100%%)"
+    parser.add_value("--shares", _shares, "LIST", text)
     parser.add_flag("--quick", "few trainings, for a first look")
     parser.add_flag(
         "--radar-only", "add no synthetic maps: compare networks and amounts of radar data only"

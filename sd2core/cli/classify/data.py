@@ -57,9 +57,7 @@ def add_sources(parser: Options) -> None:
 
 
 def clips_of(
-    sources: Sequence[LabelledSource],
-    maps: Sequence[MapName] | None,
-    denoiser: str | None = None,
+    sources: Sequence[LabelledSource], maps: Sequence[MapName] | None, denoiser: str | None = None
 ) -> ClipSet:
     """Return all clips of the sources as one set.
 

@@ -13,12 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from sd2core.classify.defaults import DELAY_S, MODELS, WIDTH
 from sd2core.cli.classify.data import DATA_HELP, add_data, asked_maps, clips_of, split_of
 from sd2core.cli.command_parser import Options, add_command
-from sd2core.cli.options import (
-    given,
-    not_negative_float,
-    positive_float,
-    positive_int,
-)
+from sd2core.cli.options import given, not_negative_float, positive_float, positive_int
 from sd2core.cli.output import finite, print_event, print_facts, print_json
 from sd2core.processes import INTERRUPTED
 

@@ -17,9 +17,7 @@ from sd2core.cli.labels.suggest import (
     spans_data,
     write_found,
 )
-from sd2core.cli.options import (
-    not_negative_float,
-)
+from sd2core.cli.options import not_negative_float
 from sd2core.cli.output import counted, print_json, print_rows, progress_bar
 from sd2core.cli.recording_maps import MAP_NAMES
 from sd2core.errors import Sd2Error
@@ -135,20 +133,11 @@ def add_apply(kinds: argparse._SubParsersAction) -> None:
     parser = add_command(kinds, "apply", handler=_apply)
     add_searched_map(parser, MAP_NAMES)
     _add_model(parser)
-    parser.add_value(
-        "--probabilities",
-        Path,
-        "FILE.npz",
-        "write `probabilities` (frames, classes), `times_s` and `classes`",
-    )
+    text = "write `probabilities` (frames, classes), `times_s` and `classes`"
+    parser.add_value("--probabilities", Path, "FILE.npz", text)
     parser.add_value("--min-duration-s", not_negative_float, "S", "shorter spans are left out", 0.2)
-    parser.add_value(
-        "--merge-gap-s",
-        not_negative_float,
-        "S",
-        "merge spans of a class with a shorter gap between them",
-        0.1,
-    )
+    text = "merge spans of a class with a shorter gap between them"
+    parser.add_value("--merge-gap-s", not_negative_float, "S", text, 0.1)
     parser.add_json()
 
 

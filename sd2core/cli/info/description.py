@@ -120,10 +120,7 @@ def describe_video(path: Path, video: VideoReader) -> Description:
         **_clock_data(video.timebase),
         "notes": list(video.notes),
     }
-    facts = {
-        "picture": f"{video.width} x {video.height} pixels",
-        "time": _clock(video.timebase),
-    }
+    facts = {"picture": f"{video.width} x {video.height} pixels", "time": _clock(video.timebase)}
     return Description(f"Video {path}", data, facts, video.notes)
 
 
@@ -416,7 +413,4 @@ def _clock(timebase: Timebase) -> str:
 
 
 def _clock_data(timebase: Timebase) -> dict[str, float]:
-    return {
-        "frames": len(timebase),
-        **picked(timebase, "start_s", "duration_s", "frames_per_s"),
-    }
+    return {"frames": len(timebase), **picked(timebase, "start_s", "duration_s", "frames_per_s")}

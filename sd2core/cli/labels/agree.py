@@ -10,9 +10,7 @@ from typing import TYPE_CHECKING, Any
 from sd2core.cli.command_parser import add_command
 from sd2core.cli.labels.reading import add_clock, clock_of, labels_at, needed, with_rate
 from sd2core.cli.labels.suggest import spans_data
-from sd2core.cli.options import (
-    share,
-)
+from sd2core.cli.options import share
 from sd2core.cli.output import counted, picked, print_json, print_rows
 
 if TYPE_CHECKING:

@@ -9,9 +9,7 @@ from typing import TYPE_CHECKING
 
 from sd2core.cli.command_parser import add_command
 from sd2core.cli.labels.reading import labels_at, recording_clock
-from sd2core.cli.options import (
-    not_negative_float,
-)
+from sd2core.cli.options import not_negative_float
 from sd2core.cli.output import counted, print_json, progress_bar
 from sd2core.cli.recording_maps import add_labelled_recording, chosen_maps, maps_of
 from sd2core.errors import Sd2Error

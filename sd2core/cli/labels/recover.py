@@ -20,13 +20,8 @@ if TYPE_CHECKING:
 def add_recover(kinds: argparse._SubParsersAction) -> None:
     """Add ``recover``."""
     parser = add_command(kinds, "recover", handler=_recover)
-    parser.add_value(
-        "recording",
-        Path,
-        "RECORDING",
-        "the labelled recording, or a video that was not saved as one yet",
-        nargs="?",
-    )
+    text = "the labelled recording, or a video that was not saved as one yet"
+    parser.add_value("recording", Path, "RECORDING", text, nargs="?")
     parser.add_output("FILE.json", "write the newest of RECORDING, for `convert`", required=False)
     add_replace(parser)
     parser.add_json()

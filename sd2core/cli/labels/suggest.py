@@ -15,11 +15,7 @@ from sd2core.cli.labels.reading import (
     recording_clock,
     write,
 )
-from sd2core.cli.options import (
-    flag,
-    given,
-    not_negative_float,
-)
+from sd2core.cli.options import flag, given, not_negative_float
 from sd2core.cli.output import counted, picked, print_json, print_rows
 from sd2core.cli.recording_maps import MapName, maps_of
 from sd2core.errors import Sd2Error

@@ -209,9 +209,7 @@ def _frame_count(
         raise Sd2Error(f"{parts[0]} has {total:,} bytes in {len(parts)} parts", told, remedy)
     if setup.frames and frames > setup.frames:
         raise Sd2Error(
-            f"{parts[0]} has {total:,} bytes, {frames} frames",
-            f"{setup.frames} {told}",
-            remedy,
+            f"{parts[0]} has {total:,} bytes, {frames} frames", f"{setup.frames} {told}", remedy
         )
     if left:
         notes.append(f"The last {left:,} bytes are no whole frame, and are left out.")

@@ -7,7 +7,6 @@ recording (``.sigmf-data``). The description has the same name with the suffix `
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 from typing import Any, Literal
@@ -17,7 +16,12 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from sd2core.errors import Sd2Error
-from sd2core.files.atomic import atomic_folder, atomic_write, atomic_write_text
+from sd2core.files.atomic import (
+    atomic_folder,
+    atomic_write,
+    atomic_write_json,
+    atomic_write_text,
+)
 from sd2core.files.texts import errors_in, faults_in, read_json, read_toml
 from sd2core.files.toml import toml_lines
 from sd2core.io.radar.capture import LazySamples, RadarCapture
@@ -165,7 +169,7 @@ def write_described(
     with atomic_folder(folder) as new:
         write_description(description, new / DATA_NAME)
         if meta:
-            atomic_write_text(new / _META, json.dumps(meta, indent=2, ensure_ascii=False) + "\n")
+            atomic_write_json(new / _META, meta)
         with atomic_write(new / DATA_NAME) as stream:
             header = {"descr": "<i2", "fortran_order": False, "shape": shape}
             np.lib.format.write_array_header_1_0(stream, header)

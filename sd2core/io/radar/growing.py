@@ -8,6 +8,7 @@ its entry is there, so that the capture is whole at any moment, however writing 
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any, Literal
 
@@ -77,10 +78,7 @@ class GrowingHead(BaseModel):
     @property
     def frame_bytes(self) -> int:
         """Size of the samples of one frame."""
-        size = self.word_type.itemsize
-        for length in self.frame_shape:  # in whole numbers of any size
-            size *= length
-        return size
+        return self.word_type.itemsize * math.prod(self.frame_shape)
 
     @property
     def word_type(self) -> np.dtype[Any]:

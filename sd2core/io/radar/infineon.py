@@ -11,7 +11,6 @@ A recording is a folder, usually called ``RadarIfxAvian_00``::
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,7 +20,12 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import AliasPath, BaseModel, ConfigDict, Field, ValidationError
 
 from sd2core.errors import Sd2Error
-from sd2core.files.atomic import atomic_folder, atomic_write, atomic_write_text
+from sd2core.files.atomic import (
+    atomic_folder,
+    atomic_write,
+    atomic_write_json,
+    atomic_write_text,
+)
 from sd2core.files.limits import open_regular
 from sd2core.files.numpy_files import open_npy_file
 from sd2core.files.texts import errors_in, lines_of, read_json
@@ -184,8 +188,8 @@ def write_capture(
     times = timebase.times_s + start_unix_s
     folder.parent.mkdir(parents=True, exist_ok=True)
     with atomic_folder(folder) as new:
-        atomic_write_text(new / _CONFIG, _json({"device_config": {"fmcw_single_shape": shape}}))
-        atomic_write_text(new / _META, _json(described))
+        atomic_write_json(new / _CONFIG, {"device_config": {"fmcw_single_shape": shape}})
+        atomic_write_json(new / _META, described)
         atomic_write_text(new / _TIMES, "".join(f"{time!r}\n" for time in times.tolist()))
         with atomic_write(new / _DATA) as stream:
             np.save(stream, cube, allow_pickle=False)
@@ -194,20 +198,13 @@ def write_capture(
 
 def check_replaceable(folder: Path) -> None:
     """Raise Sd2Error for a folder that holds something else than a radar recording."""
-    if folder.exists() and not (folder.is_dir() and _replaceable(folder)):
+    ours = folder.is_dir() and ((folder / _DATA).is_file() or not any(folder.iterdir()))
+    if folder.exists() and not ours:
         raise Sd2Error(
             f"{folder} exists and is not a radar recording",
             "a new folder, or a radar recording to replace",
             "Choose another name",
         )
-
-
-def _replaceable(folder: Path) -> bool:
-    return (folder / _DATA).is_file() or not any(folder.iterdir())
-
-
-def _json(content: dict[str, Any]) -> str:
-    return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
 
 
 def _check_there(path: Path) -> None:

@@ -216,7 +216,6 @@ def _columns(path: Path, names: tuple[str, ...] | list[str]) -> NDArray[np.float
     if not np.isfinite(table).all():
         row, column = np.argwhere(~np.isfinite(table))[0]
         raise Sd2Error(
-            f"{path}: {names[column]} of row {row + 1} is {table[row, column]}",
-            "a finite number",
+            f"{path}: {names[column]} of row {row + 1} is {table[row, column]}", "a finite number"
         )
     return np.asarray(table, np.float64)

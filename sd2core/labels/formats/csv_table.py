@@ -130,11 +130,7 @@ def _table(path: Path, text: str) -> tuple[list[str], list[tuple[int, list[str]]
     first = next(line for line in text.splitlines() if line.strip())
     fitting = [mark for mark in ",;\t|" if _spoken_for(next(csv.reader([first], delimiter=mark)))]
     if not fitting:
-        raise Sd2Error(
-            f"The first line of {path} is {first[:100]!r}",
-            _EXPECTED,
-            _remedy(first),
-        )
+        raise Sd2Error(f"The first line of {path} is {first[:100]!r}", _EXPECTED, _remedy(first))
     if len(fitting) > 1:
         raise Sd2Error(
             f"The first line of {path} is {first[:100]!r}, a heading with {fitting[0]!r} and with "

@@ -141,7 +141,7 @@ def test_a_failed_save_is_tried_again_without_a_question(
     mine, _ = both
     labelled(mine)
     with monkeypatch.context() as patch:
-        patch.setattr("sd2core.recording.recording.atomic_write_text", lambda *_: 1 / 0)
+        patch.setattr("sd2core.recording.recording.atomic_write_json", lambda *_: 1 / 0)
         with pytest.raises(ZeroDivisionError):
             mine.save()
     assert (mine.folder / "labels.json").exists()
