@@ -95,7 +95,7 @@ class MapStack(QScrollArea):
         """First open map of which the upper half is in view: *This frame* shares its axis."""
         top = self.verticalScrollBar().value()
         views = [self._named[name] for name in self.shown]
-        opened = [view for view in views if not view.folded and view.has_map]
+        opened = [view for view in views if not view.folded and view.track.map is not None]
         seen = [view for view in opened if view.y() + view.height() // 2 > top]
         return next(iter(seen or opened), None)
 
