@@ -51,16 +51,11 @@ class Columns:
         """Columns of the time range in view."""
         assert track.map is not None
         timebase = track.map.timebase
-        frames = column_frames(
-            timebase.times_s,
-            timebase.end_s,
-            start_s - track.offset_s,
-            stop_s - track.offset_s,
-            columns,
-        )
+        from_s, to_s = start_s - track.offset_s, stop_s - track.offset_s
+        frames = column_frames(timebase.times_s, timebase.end_s, from_s, to_s, columns)
         first = frames[:-1]
         filled = (first >= 0) & (first < len(timebase))
-        left_s = start_s - track.offset_s + (stop_s - start_s) * np.arange(columns) / columns
+        left_s = from_s + (stop_s - start_s) * np.arange(columns) / columns
         # Of a column that a gap ends in, the frames after it are shown.
         later = frames[1:] > first + 1
         filled[filled] = later[filled] | (

@@ -62,9 +62,8 @@ class MessagesDialog(QDialog):
         self.list.setAccessibleName("Messages, the newest first")
         self.list.setPlaceholderText(_NOTHING)
         buttons = closing(self)
-        buttons.addButton("Clear", QDialogButtonBox.ButtonRole.ResetRole).clicked.connect(
-            messages.forget
-        )
+        clear = buttons.addButton("Clear", QDialogButtonBox.ButtonRole.ResetRole)
+        clear.clicked.connect(messages.forget)
         self.setLayout(column_of(self.list, buttons))
         messages.changed.connect(self._refresh)
         self._refresh()
