@@ -254,6 +254,7 @@ def _add_campaign(kinds: argparse._SubParsersAction) -> None:
         "people of that folder: those to learn from, or those kept apart",
         "learn",
     )
+    add_radar_choice(parser)
     parser.add_choice(
         "--radars",
         ("one", "drawn"),
@@ -269,11 +270,13 @@ def _add_campaign(kinds: argparse._SubParsersAction) -> None:
         " and angles",
         1,
     )
-    text = "frames per second of the radar, 10 to 120 (default: 30)"
+    text = (
+        "frames per second of the radar, 10 to 120, of which 240 is a multiple (default: its own)"
+    )
     parser.add_value("--rate", positive_float, "FPS", text)
     parser.add_value("--bins", positive_int, "N", "velocity bins, 16 to 128 (default: 32)")
     parser.add_value("--take-seconds", positive_float, "S", "length of a take, in seconds", 15.0)
-    parser.add_value("--workers", positive_int, "N", "worker processes", 2)
+    parser.add_value("--workers", positive_int, "N", "worker processes (default: one per core)")
     parser.add_limbs()
     parser.add_value(
         "--fit-errors",
@@ -305,10 +308,11 @@ def _protocol(options: argparse.Namespace) -> Protocol:
     from sd2core.simulate.campaign.protocol import PAPER, VARIED
 
     if options.protocol == "paper":
-        if options.movements != "swipes" or options.radars != "one":
+        if options.movements != "swipes" or options.radars != "one" or options.radar != "paper":
             raise Sd2Error(
-                f"--protocol paper with movements {options.movements} and radars {options.radars}",
-                "swipes before one radar, as in the paper",
+                f"--protocol paper with movements {options.movements}, radars {options.radars} and"
+                f" radar {options.radar}",
+                "swipes before one radar, the paper's",
                 "Leave the protocol out",
             )
         return replace(PAPER, order=options.order or PAPER.order)
@@ -338,23 +342,32 @@ def _campaign(options: argparse.Namespace) -> None:
       sd2 simulate campaign --out campaign.zarr
       sd2 simulate campaign --people 3 --minutes 5 --seed 1 --out small.zarr
       sd2 simulate campaign --sensors 3 --out ranges.zarr
+      sd2 simulate campaign --radar iwr6843 --out as-that-radar.zarr
       sd2 simulate campaign --protocol paper --out as-in-the-paper.zarr
       sd2 simulate campaign --movements both --motions motions --radars drawn --out all
     """
     from sd2core.doppler.options import chosen_options
+    from sd2core.io.radar import named_radar
+    from sd2core.numerics.compiled import worker_count
     from sd2core.pairs.store import read_pairs
     from sd2core.simulate.campaign.making import make_campaign
     from sd2core.simulate.campaign.radar import radar_at
     from sd2core.simulate.campaign.takes import Campaign
 
-    rate, bins = options.rate or 30.0, options.bins or 32
-    if not (10 <= rate <= 120 and 16 <= bins <= 128):
-        raise Sd2Error(f"{rate:g} frames/s and {bins} bins", "10 to 120 frames/s, 16 to 128 bins")
+    radar = named_radar(options.radar)
+    rate, bins = options.rate or 1.0 / radar.frame_repetition_s, options.bins or 32
+    # Swipes are computed at 240 Hz.
+    if not (10 <= rate <= 120 and 16 <= bins <= 128 and abs(240 / rate - round(240 / rate)) < 1e-6):
+        raise Sd2Error(
+            f"{rate:g} frames/s and {bins} bins",
+            "10 to 120 frames/s that 240 is a multiple of, 16 to 128 bins",
+            "Choose a rate, e.g. --rate 24",
+        )
     campaign = Campaign(
         options.seed,
         options.take_seconds,
         options.sensors,
-        radar_at(rate, bins),
+        radar_at(rate, bins, radar),
         limbs=options.limbs,
         protocol=_protocol(options),
         motions=options.motions,
@@ -368,7 +381,7 @@ def _campaign(options: argparse.Namespace) -> None:
             campaign,
             subjects=options.people,
             minutes=options.minutes,
-            processes=options.workers,
+            processes=options.workers or worker_count(),
             errors=options.fit_errors,
             progress=progress,
         )

@@ -10,12 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
+from sd2core.maps import mean_velocity_mps, peak_velocity_mps
 from sd2core.sensor import VelocityAxis
 
 _RARE = 0.001
 """Share of the frames learnt from that are rarer than what counts as known."""
 _MARGIN_MPS = 0.15
 """Distance from what is known at which a frame is wholly strange."""
+_TRUSTS = (0.0, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0)
+_HARM = 2.0
+"""How much more it counts that a segment is made worse than that it is made better."""
 
 
 @dataclass(frozen=True)
@@ -29,10 +33,16 @@ class KnownMovements:
     fastest_mps: float
     spread_mps: float  # Greatest standard deviation of the velocities of a frame.
     gain: float  # Energy of the radar's maps over that of the input.
+    # Share of the network in the amplitudes of an answer; the rest is the synthetic map's.
+    trust: float = 1.0
 
     def __post_init__(self) -> None:
-        if not (self.slowest_mps <= self.fastest_mps and self.spread_mps >= 0 and self.gain > 0):
-            raise Sd2Error(f"A model knows movements {asdict(self)}", "ranges, and a gain above 0")
+        ordered = self.slowest_mps <= self.fastest_mps and self.spread_mps >= 0 and self.gain > 0
+        if not (ordered and 0 <= self.trust <= 1):
+            raise Sd2Error(
+                f"A model knows movements {asdict(self)}",
+                "ranges, a gain above 0, a trust of 0 to 1",
+            )
 
     @classmethod
     def of(
@@ -73,16 +83,61 @@ class KnownMovements:
         """Frames (…, bins) that are rather the synthetic map's than the model's, (…,)."""
         return np.asarray(self.strangeness(energies, axis) > 0.5)
 
-    def passed_through(
-        self, answer: NDArray[np.float32], energies: NDArray[np.float32], axis: VelocityAxis
+    def mixed(
+        self,
+        answer: NDArray[np.float32],
+        energies: NDArray[np.float32],
+        axis: VelocityAxis,
+        floor: float = 0.0,
     ) -> NDArray[np.float32]:
-        """Answers (…, bins), but what they were made of (…, bins) where that is strange."""
-        share = self.strangeness(energies, axis)[..., None]
-        return np.asarray((1.0 - share) * answer + share * np.float32(self.gain) * energies)
+        """Answers (…, bins) of a network with what they were made of (…, bins), as trust says.
+
+        What is strange is the synthetic map's alone; of the rest, cells below ``floor`` are empty.
+        """
+        share = (self.trust * (1.0 - self.strangeness(energies, axis)))[..., None]
+        amplitude = share * np.sqrt(answer)
+        amplitude += (1.0 - share) * np.sqrt(np.float32(self.gain) * energies)
+        mixed = np.square(amplitude)
+        mixed[(mixed < floor) & (share > 0)] = 0.0
+        return np.asarray(mixed, dtype=np.float32)
+
+    def trusting(
+        self,
+        answers: NDArray[np.float32],
+        energies: NDArray[np.float32],
+        radar: NDArray[np.float32],
+        moving: NDArray[np.bool_],
+        axis: VelocityAxis,
+    ) -> KnownMovements:
+        """The same, with the trust that does best on maps that the network did not learn from.
+
+        Answers, energies of the synthetic map and the radar's are (segments, frames, bins),
+        ``moving`` (segments, frames). Peak, mean and cells (L1) count alike; what a segment is made
+        worse by than the synthetic map counts twice.
+        """
+        if not moving.any():
+            return self
+
+        def errors(trust: float) -> NDArray[np.float64]:
+            mixed = replace(self, trust=trust).mixed(answers, energies, axis)
+            return _errors(mixed, radar, moving, axis)
+
+        none = errors(0.0)
+
+        def loss(trust: float) -> float:
+            change = errors(trust) - none
+            counted = np.where(change > 0.0, _HARM * change, change).sum(axis=1)
+            return float((counted / np.maximum(none.sum(axis=1), 1e-12)).sum())
+
+        return replace(self, trust=min(_TRUSTS, key=loss))
 
     @property
     def words(self) -> str:
-        """Ranges in words."""
+        """Ranges and trust in words."""
+        return f"{self._ranges}; its amplitudes are {self.trust:.0%} the network's"
+
+    @property
+    def _ranges(self) -> str:
         return (
             f"mean velocities of {self.slowest_mps:.2f} to {self.fastest_mps:.2f} m/s,"
             f" spread up to {self.spread_mps:.2f} m/s"
@@ -95,7 +150,7 @@ class KnownMovements:
             return None
         return (
             f"{strange:,} of {len(energies):,} frames move otherwise than what the model learnt"
-            f" from ({self.words}): they are the synthetic map's"
+            f" from ({self._ranges}): they are the synthetic map's"
         )
 
     @classmethod
@@ -114,3 +169,18 @@ def _moments(
     mean = values @ axis.centres_mps / total
     square = values @ axis.centres_mps**2 / total
     return mean, np.sqrt(np.maximum(square - mean**2, 0.0))
+
+
+def _errors(
+    estimate: NDArray[np.float32],
+    radar: NDArray[np.float32],
+    moving: NDArray[np.bool_],
+    axis: VelocityAxis,
+) -> NDArray[np.float64]:
+    """Errors of segments: peak and mean velocity in frames that move, and cells; (3, segments)."""
+    one, other = (values.reshape(-1, axis.bins) for values in (estimate, radar))
+    found = [np.abs(estimate - radar).sum(axis=(1, 2), dtype=np.float64)]
+    for velocity in (peak_velocity_mps, mean_velocity_mps):
+        off = np.abs(np.nan_to_num(velocity(one, axis)) - np.nan_to_num(velocity(other, axis)))
+        found.append((off.reshape(moving.shape) * moving).sum(axis=1))
+    return np.stack(found)

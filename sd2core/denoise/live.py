@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from sd2core.denoise import resample_to_model as matching
 from sd2core.denoise.card import ModelCard
 from sd2core.denoise.model import Denoiser
+from sd2core.denoise.scaling import whole_map
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import Presence, runs
@@ -142,20 +143,17 @@ class TrainedDenoiser:
         the model does not know stays the synthetic map's
         (:class:`~sd2core.denoise.known.KnownMovements`).
         """
-        energies = self.card.scaling.target.expand(answer)
-        energies[~given[..., : self.card.features - self.card.more].any(axis=-1)] = 0.0
-        energies[energies < self.card.scaling.floor] = 0.0
-        if self.card.known is not None:
-            energies = self.card.known.passed_through(energies, self._whole(given), self.card.axis)
+        scaling, known = self.card.scaling, self.card.known
+        maps = given[..., : self.card.features - self.card.more]
+        energies = scaling.target.expand(answer)
+        energies[~maps.any(axis=-1)] = 0.0
+        if known is None:
+            energies[energies < scaling.floor] = 0.0
+        else:
+            whole = whole_map(scaling.input.expand(maps), self.card.axis.bins)
+            energies = known.mixed(energies, whole, self.card.axis, scaling.floor)
         energies[..., list(self.card.null_bins)] = 0.0
         return energies
-
-    def _whole(self, given: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Energies of the whole map (…, bins) in the network's input (…, features)."""
-        card = self.card
-        maps = card.scaling.input.expand(given[..., : card.maps * card.axis.bins])
-        whole: NDArray[np.float32] = maps.reshape(*given.shape[:-1], card.maps, -1).sum(axis=-2)
-        return whole
 
     def live(self) -> LiveDenoiser:
         """Denoiser of single frames, at the model's frame rate."""

@@ -29,6 +29,12 @@ def null_columns(null_bins: Iterable[int], bins: int, parts: int) -> list[int]:
     return [part * bins + number for part in range(parts) for number in emptied]
 
 
+def whole_map(energies: NDArray[np.float32], bins: int) -> NDArray[np.float32]:
+    """Sum (…, bins) of maps that follow one another, (…, maps · bins)."""
+    maps = energies.reshape(*energies.shape[:-1], -1, bins)
+    return np.asarray(maps.sum(axis=-2))
+
+
 @dataclass(frozen=True)
 class Compression:
     """Compression of energies, y = (x / reference)^exponent, and its inverse."""

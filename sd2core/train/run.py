@@ -19,7 +19,7 @@ from sd2core.denoise.known import KnownMovements
 from sd2core.denoise.live import TrainedDenoiser
 from sd2core.denoise.model import Denoiser, fit_standards, parameter_count
 from sd2core.denoise.registry import build, options
-from sd2core.denoise.scaling import Scaling
+from sd2core.denoise.scaling import Scaling, whole_map
 from sd2core.denoise.texture import Texture
 from sd2core.errors import Sd2Error
 from sd2core.processes import lower_priority
@@ -243,9 +243,15 @@ class _About:
         name = config.model.name
         scaling = self.scaling
         # Here, because only the best epochs need it.
-        counted = [one for one in range(pairs.axis.bins) if one not in pairs.null_bins]
-        radar = self.data.validation.targets
-        texture = Texture.fitted(found.answers[..., counted], radar[..., counted])
+        held_out, axis, known = self.data.validation, pairs.axis, self.known
+        answers, radar = found.answers, held_out.targets
+        if known is not None:
+            maps = held_out.inputs[..., : held_out.inputs.shape[-1] - scaling.more]
+            whole = whole_map(maps, axis.bins)
+            known = known.trusting(answers, whole, radar, held_out.moving, axis)
+            answers = known.mixed(answers, whole, axis)
+        counted = [one for one in range(axis.bins) if one not in pairs.null_bins]
+        texture = Texture.fitted(answers[..., counted], radar[..., counted])
         if texture is not None:
             floor = max(scaling.floor, texture.mean_that_shows(_SHOWS))
             scaling = replace(scaling, floor=floor)
@@ -253,12 +259,12 @@ class _About:
             model=name,
             options={**options(name), **config.model.options},
             scaling=scaling,
-            axis=pairs.axis,
+            axis=axis,
             null_bins=pairs.null_bins,
             frame_rate_hz=pairs.frame_rate_hz,
             trained_on=pairs.kind,
             parts=self.data.parts,
-            known=self.known,
+            known=known,
             texture=texture,
             about={
                 "data": self._data_words(),

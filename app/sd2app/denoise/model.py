@@ -25,7 +25,6 @@ from sd2core.errors import Sd2Error
 if TYPE_CHECKING:
     from sd2core.denoise.card import ModelCard
 
-_DRAWN = " · drawn as the radar would show it"
 _TEXTURED = "textured"
 _PATIENCE_MS = 2000
 """Longest delay of the first model, which waits for the synthetic map."""
@@ -261,7 +260,7 @@ class DenoiseModel(ReportingModel):
             self.map.use(None)
         else:
             texture = loaded.card.texture if self.textured else None
-            words = origin_words(loaded.card) + (_DRAWN if texture is not None else "")
+            words = ("drawn · " if texture is not None else "") + origin_words(loaded.card)
             self.map.use(loaded.denoiser, words, texture=texture, known=loaded.card.known)
         self._show_before()
         self.changed.emit()

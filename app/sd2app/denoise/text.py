@@ -29,10 +29,10 @@ def kind_words(card: ModelCard) -> str:
 
 
 def origin_words(card: ModelCard) -> str:
-    """Origin of the training data; simulation is named as such."""
+    """What a model learned from; simulation is named as such."""
     if card.trained_on == "simulated":
-        return "learned from simulated data only"
-    return "learned from real captures"
+        return "simulated data only"
+    return "real captures"
 
 
 def track_words(card: ModelCard | None) -> str:

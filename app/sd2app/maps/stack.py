@@ -92,12 +92,13 @@ class MapStack(QScrollArea):
 
     @property
     def leading(self) -> HeatmapView | None:
-        """First open map of which the upper half is in view: *This frame* shares its axis."""
+        """First open map that begins in view, or shows a half: *This frame* shares its axis."""
         top = self.verticalScrollBar().value()
         views = [self._named[name] for name in self.shown]
         opened = [view for view in views if not view.folded and view.track.map is not None]
+        whole = [view for view in opened if view.y() >= top]
         seen = [view for view in opened if view.y() + view.height() // 2 > top]
-        return next(iter(seen or opened), None)
+        return next(iter(whole or seen or opened), None)
 
     def view(self, name: str) -> HeatmapView:
         """View of a map by its name."""

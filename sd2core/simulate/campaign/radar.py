@@ -39,6 +39,8 @@ the range at which the paper's preset counts vertices fully."""
 
 PROCESSING = ProcessingOptions(clutter=CLUTTER)
 
+Samples = NDArray[np.float32] | NDArray[np.complex64]
+
 _NO_PLANE = np.array([0.0, 0.0, 0.0, 1.0])
 _BLOCK_FRAMES = 16
 _SMOOTH, _LOOKS = 0.25, (1, 2, 4, 8, 12)
@@ -72,19 +74,17 @@ class TargetOptions:
         return said if self.smooth else {name: said[name] for name in said if name != "smooth"}
 
 
-def radar_at(frames_per_s: float, bins: int) -> RadarConfig:
-    """The paper's radar at another frame rate, for maps of so many bins.
+def radar_at(frames_per_s: float, bins: int, radar: RadarConfig = PAPER_RADAR) -> RadarConfig:
+    """A radar at another frame rate, with as many of its chirps as fit into a frame.
 
-    A frame has two chirps per bin, as the paper's, or as many as fit into it.
+    The paper's has two chirps per bin of the map.
     """
-    radar = PAPER_RADAR
     fitting = int((1.0 + 1e-9) / (frames_per_s * radar.chirp_repetition_s))
-    return replace(
-        radar,
-        frame_repetition_s=1.0 / frames_per_s,
-        chirps_per_frame=min(2 * bins, fitting),
-        name=f"60 GHz, {min(2 * bins, fitting)} chirps, 32 samples, {frames_per_s:g} frames/s",
-    )
+    chirps = min(2 * bins if radar == PAPER_RADAR else radar.chirps_per_frame, fitting)
+    name = radar.name
+    if radar == PAPER_RADAR:
+        name = f"60 GHz, {chirps} chirps, 32 samples, {frames_per_s:g} frames/s"
+    return replace(radar, frame_repetition_s=1.0 / frames_per_s, chirps_per_frame=chirps, name=name)
 
 
 def radar_target(
@@ -135,7 +135,7 @@ def radar_target(
 
 
 def _power(
-    samples: NDArray[np.float32], chain: FrameChain, weights: NDArray[np.float32]
+    samples: Samples, chain: FrameChain, weights: NDArray[np.float32]
 ) -> NDArray[np.float32]:
     """Power of samples (n, looks, chirps, samples), summed over looks, (n, bins)."""
     power = chain.power_over_doppler(chain.without_own_clutter(samples))
@@ -153,7 +153,7 @@ def _noise(
     return power.mean(axis=0), power.std(axis=0)
 
 
-def _looks(scene: MeshScene, frame: int, phases: NDArray[np.complex64]) -> NDArray[np.float32]:
+def _looks(scene: MeshScene, frame: int, phases: NDArray[np.complex64]) -> Samples:
     """Beat signals of one frame, (looks, chirps, samples).
 
     The sum over facets is separable in chirps and samples when migration through range
@@ -170,13 +170,17 @@ def _looks(scene: MeshScene, frame: int, phases: NDArray[np.complex64]) -> NDArr
     fast = _phasors(turns.sample, samples, np.zeros_like(first))
     # Phases go to the shorter of the two.
     right = phases[:, None, rows] * fast.astype(np.complex64)  # (looks, samples, facets)
-    # Re(a b) is the product of conj(a) and b as pairs of real numbers.
-    pairs = [
-        np.ascontiguousarray(x).view(np.float32)
-        for x in (slow.conj().astype(np.complex64), right.reshape(-1, len(rows)))
-    ]
-    signal = (pairs[0] @ pairs[1].T).reshape(chirps, len(phases), samples)
-    return np.ascontiguousarray(signal.transpose(1, 0, 2))
+    right = right.reshape(-1, len(rows))
+    if config.sampling == "complex":
+        signal = slow.astype(np.complex64) @ right.T
+    else:
+        # Re(a b) is the product of conj(a) and b as pairs of real numbers.
+        pairs = [
+            np.ascontiguousarray(x).view(np.float32)
+            for x in (slow.conj().astype(np.complex64), right)
+        ]
+        signal = pairs[0] @ pairs[1].T
+    return np.ascontiguousarray(signal.reshape(chirps, len(phases), samples).transpose(1, 0, 2))
 
 
 def _echoes(scene: MeshScene, frame: int) -> tuple[Echoes, NDArray[np.int32]]:
@@ -220,16 +224,19 @@ def _phasors(turns: Floats, count: int, first: Floats) -> NDArray[np.complex128]
 
 
 def _received(
-    signals: NDArray[np.floating],
+    signals: Samples,
     config: RadarConfig,
     link: LinkBudget | None,
     rng: np.random.Generator,
-) -> tuple[NDArray[np.float32], float]:
+) -> tuple[Samples, float]:
     """Samples relative to the converter's half range, with noise and rounded; that range."""
+    kind: Any = np.complex64 if config.sampling == "complex" else np.float32
+    signals = signals.astype(kind)
     if link is None:
-        return signals.astype(np.float32), 1.0
-    noise = rng.standard_normal(signals.shape, np.float32) * np.float32(link.noise_rms(config))
+        return signals, 1.0
+    parts = signals.view(np.float32)  # I and Q, where there are both
+    noise = rng.standard_normal(parts.shape, np.float32) * np.float32(link.noise_rms(config))
     counts = 2.0 ** (config.adc_bits - 1)
-    samples = (signals + noise) * np.float32(counts / link.full_scale)
+    samples = (parts + noise) * np.float32(counts / link.full_scale)
     np.clip(np.rint(samples, out=samples), -counts, counts - 1.0, out=samples)
-    return (samples / counts).astype(np.float32), link.full_scale
+    return (samples / counts).astype(np.float32).view(kind), link.full_scale

@@ -9,6 +9,7 @@ import pytest
 from cli_outcome import Sd2
 
 from sd2core.pairs.store import read_pairs
+from sd2core.radar_profiles import RADARS
 
 
 def test_a_campaign_is_made_and_told(sd2: Sd2, tmp_path: Path) -> None:
@@ -61,3 +62,24 @@ def test_varied_takes_have_no_order(sd2: Sd2, tmp_path: Path) -> None:
     assert outcome.code == 1
     assert "Add --protocol paper" in outcome.err
     assert not (tmp_path / "x.zarr").exists()
+
+
+def test_a_radar_by_its_name_has_its_own_sweep_and_rate(sd2: Sd2, tmp_path: Path) -> None:
+    short = ["--people", 1, "--minutes", 0.03, "--take-seconds", 2, "--workers", 1]
+    for options, rate in (([], 20.0), (["--rate", 24], 24.0)):
+        out = tmp_path / f"{rate:g}.zarr"
+        command = ("simulate", "campaign", "--out", out, *short, "--radar", "iwr6843", *options)
+        assert sd2(*command).code == 0
+        pairs = read_pairs(out)
+        assert pairs.frame_rate_hz == pytest.approx(rate)
+        radar = pairs.provenance["radar"]
+        assert radar["start_frequency_hz"] == RADARS["iwr6843"].start_frequency_hz
+        assert radar["chirps_per_frame"] == 64
+    for wrong, words in (
+        (["--radar", "wifi-2.4ghz"], "10 to 120 frames/s"),
+        (["--radar", "a121"], "--rate 24"),
+        (["--radar", "bgt60", "--protocol", "paper"], "the paper's"),
+    ):
+        outcome = sd2("simulate", "campaign", "--out", tmp_path / "x.zarr", *short, *wrong)
+        assert outcome.code == 1
+        assert words in outcome.err

@@ -89,7 +89,7 @@ def test_the_synthetic_map_is_passed_through(name: str, parts: tuple[str, ...]) 
     moves = rng.normal(size=(len(JOINTS), len(QUANTITIES), 80)).astype(np.float32)
     doppler = synthetic_map(values, limbs=LimbMaps(PARTS, limbs, moves))
     denoised, as_before = model.denoise(doppler), plain.denoise(doppler)
-    np.testing.assert_array_equal(denoised.values[:, :40], as_before.values[:, :40])
+    np.testing.assert_allclose(denoised.values[:, :40], as_before.values[:, :40], rtol=1e-6)
     passed = 3.0 * values.T[:, 40:]
     np.testing.assert_allclose(denoised.values[:, 40:], passed, rtol=1e-4, atol=1e-6)
     (note,) = denoised.meta["notes"]
@@ -102,6 +102,37 @@ def test_the_synthetic_map_is_passed_through(name: str, parts: tuple[str, ...]) 
         given_values = doppler.limbs.inputs(parts) if parts else values
         stepped = np.array([live.step(frame) for frame in given_values]).T
         np.testing.assert_allclose(stepped, denoised.values, rtol=1e-3, atol=1e-6)
+
+
+@given(
+    trust=st.just(0.0) | st.floats(0.01, 1.0),
+    mine=st.floats(0.0, 10.0),
+    theirs=st.floats(0.0, 10.0),
+)
+def test_amplitudes_are_mixed_as_trust_says(trust: float, mine: float, theirs: float) -> None:
+    known = replace(KNOWN, trust=trust)
+    answer, energies = frames_at(17, values=mine), frames_at(17, values=theirs)
+    mixed = known.mixed(answer, energies, AXIS)[0, 17]
+    wanted = (trust * np.sqrt(mine) + (1.0 - trust) * np.sqrt(KNOWN.gain * theirs)) ** 2
+    assert mixed == pytest.approx(wanted, rel=1e-4, abs=1e-6)
+    floored = known.mixed(answer, energies, AXIS, floor=2.0 * float(mixed) + 1e-3)[0, 17]
+    assert floored == (0.0 if trust > 0.0 else pytest.approx(mixed))
+
+
+@settings(max_examples=20)
+@given(seed=st.integers(0, 10**6))
+def test_who_answers_as_the_radar_is_trusted_and_who_answers_noise_is_not(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    shape = (6, 40, 32)
+    radar = rng.gamma(1.0, size=shape).astype(np.float32)
+    near = (radar * rng.uniform(0.5, 1.5, shape) / KNOWN.gain).astype(np.float32)
+    noise = rng.gamma(1.0, size=shape).astype(np.float32)
+    wide = replace(KNOWN, spread_mps=2.0)
+    moving = np.ones(shape[:2], bool)
+    moving[0] = False
+    assert wide.trusting(radar, noise, radar, moving, AXIS).trust == 1.0
+    assert wide.trusting(noise, near, radar, moving, AXIS).trust == 0.0
+    assert wide.trusting(noise, near, radar, 0 * moving, AXIS) == wide
 
 
 def test_a_run_learns_what_it_knows(tmp_path) -> None:  # type: ignore[no-untyped-def]
@@ -117,7 +148,9 @@ def test_a_run_learns_what_it_knows(tmp_path) -> None:  # type: ignore[no-untype
     wanted = KnownMovements.of(
         [(take.synthetic, take.radar) for take in takes], read_pairs(pairs).axis
     )
-    assert describe_model(ending.model).known == wanted
+    known = describe_model(ending.model).known
+    assert known is not None
+    assert replace(known, trust=1.0) == wanted
 
 
 def test_cards_of_before_and_nonsense() -> None:
@@ -126,7 +159,10 @@ def test_cards_of_before_and_nonsense() -> None:
     old = card.to_json()
     del old["known"]
     assert ModelCard.from_json(old).known is None
-    for wrong in ({"gain": -1.0}, {"slowest_mps": 2.0}, {"other": 1.0}):
+    untrusting = card.to_json()
+    del untrusting["known"]["trust"]
+    assert ModelCard.from_json(untrusting).known == KNOWN
+    for wrong in ({"gain": -1.0}, {"slowest_mps": 2.0}, {"trust": 1.5}, {"other": 1.0}):
         content = card.to_json()
         content["known"] = {**content["known"], **wrong}
         with pytest.raises(Sd2Error):

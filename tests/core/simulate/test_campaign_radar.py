@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from sd2core.fmcw.options import Reflector
 from sd2core.fmcw.scene import MeshScene
 from sd2core.fmcw.sums import Echoes, nufft
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.radar_config import CLUTTER, PAPER_RADAR, Clutter
+from sd2core.radar_config import CLUTTER, PAPER_RADAR, Clutter, RadarConfig
 from sd2core.sensor import VelocityAxis, VirtualSensor
 from sd2core.simulate.campaign import radar
 from sd2core.simulate.campaign.radar import LinkBudget, TargetOptions, radar_target
@@ -44,9 +45,12 @@ def plate(
 
 
 def target(
-    mesh: MeshSequence, options: TargetOptions = QUIET, **more: object
+    mesh: MeshSequence,
+    options: TargetOptions = QUIET,
+    config: RadarConfig = PAPER_RADAR,
+    **more: object,
 ) -> NDArray[np.float32]:
-    return radar_target(mesh, PAPER_RADAR, SENSOR, AXIS, NULLED, options=options, **more)  # type: ignore[arg-type]
+    return radar_target(mesh, config, SENSOR, AXIS, NULLED, options=options, **more)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("approach_mps", [1.3, 0.6, -0.6, -1.3])
@@ -54,6 +58,18 @@ def target(
 def test_what_approaches_is_positive(approach_mps: float, options: TargetOptions) -> None:
     values = target(plate(approach_mps, 2.2), options)
     peak = AXIS.centres_mps[values[1:-1].argmax(axis=1)]
+    np.testing.assert_allclose(peak, approach_mps, atol=AXIS.bin_width_mps)
+
+
+@pytest.mark.parametrize("approach_mps", [0.9, -0.6])
+def test_i_and_q_show_what_real_samples_do(approach_mps: float) -> None:
+    both = replace(PAPER_RADAR, sampling="complex")
+    mesh = plate(approach_mps, 2.2)
+    real, quadrature = (target(mesh, QUIET, config)[2] for config in (PAPER_RADAR, both))
+    np.testing.assert_allclose(quadrature.sum(), real.sum(), rtol=0.1)
+    assert quadrature.argmax() == real.argmax()
+    noisy = target(mesh, TargetOptions(), both)[1:-1]
+    peak = AXIS.centres_mps[noisy.argmax(axis=1)]
     np.testing.assert_allclose(peak, approach_mps, atol=AXIS.bin_width_mps)
 
 

@@ -87,7 +87,7 @@ def test_a_click_chooses_a_model_and_the_track_appears(window, qtbot):
     tops = [tracks.synthetic.y(), tracks.denoised.y(), tracks.real.y()]
     assert tops == sorted(tops)
     assert shown_button(window).text() == "kitchen"
-    assert "learned from simulated data only" in tracks.denoised._status()
+    assert "simulated data only" in tracks.denoised._status()
     choose(window, qtbot, shown_button(window), "hall")
     assert is_of(c, 3.0)
     qtbot.keyClick(window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)

@@ -171,6 +171,19 @@ def test_this_frame_stands_beside_the_leading_map(window, stack, qtbot):
         stack.toggle_enlarged(name)
 
 
+def test_this_frame_stays_below_its_title_while_maps_are_scrolled(window, stack, qtbot):
+    spectrum = window.findChild(SpectrumView)
+    for name in ("synthetic", "real"):
+        stack.arrangement.set_height(name, round(0.7 * stack.viewport().height()))
+    bar = stack.verticalScrollBar()
+    assert bar.maximum() > 0
+    for value in np.linspace(0, bar.maximum(), 9):
+        bar.setValue(round(float(value)))
+        QApplication.processEvents()
+        assert spectrum.plot_rect().top() >= 24
+    bar.setValue(0)
+
+
 def test_the_context_menu_reads_sets_and_plays(window, stack, qtbot):
     c, view = models_of(window), stack.synthetic
     values = c.synthetic.map.values
