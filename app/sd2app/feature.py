@@ -103,6 +103,13 @@ class Shell(Protocol):
         """Open files in place of what is open."""
 
 
+def report(shell: Shell, *models: Any) -> None:
+    """Tell the user what models note, and what goes wrong in them."""
+    for model in models:
+        model.failed.connect(shell.warn)
+        model.noted.connect(shell.note)
+
+
 class Feature:
     """One subject of the window: builds, wires and closes its models, and hands over its views.
 

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QWidget
 from sd2app.accuracy.library import AccuracyLibrary
 from sd2app.accuracy.model import AccuracyModel
 from sd2app.accuracy.panel import AccuracyPanel
-from sd2app.feature import Action, Feature, Shell
+from sd2app.feature import Action, Feature, Shell, report
 from sd2app.session.session import Session
 
 
@@ -24,8 +24,7 @@ class AccuracyFeature(Feature):
         self.model = AccuracyModel(
             session.jobs, session.settings, library or AccuracyLibrary(), parent
         )
-        self.model.failed.connect(shell.warn)
-        self.model.noted.connect(shell.note)
+        report(shell, self.model)
         self.changing = (self.model.plan_changed, self.model.measured.changed)
         self.closing = (self.model,)
 

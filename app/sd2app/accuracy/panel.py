@@ -196,14 +196,8 @@ class ToleranceRow(QWidget):
     def __init__(self, accuracy: AccuracyModel, parent: QWidget) -> None:
         super().__init__(parent)
         self._accuracy = accuracy
-        self._box = NumberBox(
-            0.05,
-            50.0,
-            " %",
-            "Tolerance: how much of the map may differ from the reference, after smoothing",
-            decimals=2,
-            step=0.5,
-        )
+        tip = "Tolerance: how much of the map may differ from the reference, after smoothing"
+        self._box = NumberBox(0.05, 50.0, " %", tip, step=0.5)
         self._box.valueChanged.connect(lambda value: accuracy.set_tolerance(value / 100))
         self._presets: dict[float, QToolButton] = {}
         for tolerance in PRESETS:

@@ -63,11 +63,7 @@ class AgreementModel(ReportingModel):
     def open(self, path: Path) -> None:
         """Compare with the labels of a file, in the background."""
         base = self._playback.timebase
-
-        def read(emit: Emit) -> tuple[Path, Incoming]:
-            return path, Incoming.of(read_labels(path, base), base)
-
-        self._reader.submit(read)
+        self._reader.submit(lambda emit: (path, Incoming.of(read_labels(path, base), base)))
 
     def clear(self) -> None:
         """End the comparison."""

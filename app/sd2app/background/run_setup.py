@@ -61,6 +61,10 @@ class RunSetup(BackgroundModel, Generic[D]):
 
     # --- what is chosen ---------------------------------------------------------------------
 
+    def data_problem(self, nothing: str) -> str:
+        """Reason why the data cannot be worked on, ``nothing`` without any; empty if it can."""
+        return next((one.problem for one in self.data if one.problem), "" if self.data else nothing)
+
     def value(self, name: str) -> Any:
         """One of the settings."""
         return self._values[name]

@@ -10,7 +10,7 @@ from sd2app.batch.dialog import BatchWindow
 from sd2app.batch.model import BatchModel
 from sd2app.batch.questions import BatchQuestions
 from sd2app.denoise.model import DenoiseModel
-from sd2app.feature import Action, Feature, Shell
+from sd2app.feature import Action, Feature, Shell, report
 from sd2app.sensor.placements import PlacementsModel
 from sd2app.session.session import Session
 from sd2core.runs.command_folder import COMMAND
@@ -30,8 +30,7 @@ class BatchFeature(Feature):
     ) -> None:
         self.model = BatchModel(session.settings, parent, command or COMMAND)
         self.running = (self.model,)
-        self.model.failed.connect(shell.warn)
-        self.model.noted.connect(shell.note)
+        report(shell, self.model)
         self._shell = shell
         self._questions = BatchQuestions(self.model, session, shell, placements, denoiser)
         self._questions.said.connect(self._say)

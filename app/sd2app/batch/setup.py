@@ -109,11 +109,8 @@ class BatchSetupModel(RunSetup[Entry]):
     @property
     def problem(self) -> str:
         """Reason why there is no plan; empty when there is one."""
-        if not self.data:
-            return "Add recordings to work on."
-        bad = [entry.problem for entry in self.data if entry.problem]
-        if bad:
-            return bad[0]
+        if problem := self.data_problem("Add recordings to work on."):
+            return problem
         if any(entry.count is None for entry in self.data):
             return "Looking for recordings…"
         return ""

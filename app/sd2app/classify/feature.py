@@ -17,7 +17,7 @@ from sd2app.classify.strip import ClassStrip
 from sd2app.classify.text import learned_text, network_text
 from sd2app.classify.training import ClassTraining
 from sd2app.denoise.validity import MapValidity
-from sd2app.feature import Action, Drop, Feature, Shell
+from sd2app.feature import Action, Drop, Feature, Shell, report
 from sd2app.labels.actions import editing
 from sd2app.labels.edits import LabelEdits
 from sd2app.labels.model import LabelsModel
@@ -57,8 +57,7 @@ class ClassifyFeature(Feature):
         self.training = ClassTraining(session.settings, self.model.use, parent)
         self.dialogs = ClassifyDialogs(shell, self.model, self.training, session)
         self.model.failed.connect(shell.warn)
-        self.training.failed.connect(shell.warn)
-        self.training.noted.connect(shell.note)
+        report(shell, self.training)
         self.changing = (self.model.changed,)
         self.closing = (self.training, self.model)  # runs go on
         self.working, self.running = (self.model,), (self.training,)

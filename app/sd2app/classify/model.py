@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from PySide6.QtCore import QObject, Signal, SignalInstance
 
-from sd2app.background.latest import LatestRunner, delayed
+from sd2app.background.latest import LatestRunner, ReportingModel, delayed
 from sd2app.background.model_worker.client import RemoteClassifier
 from sd2app.background.model_worker.library import ClassifierLibrary
 from sd2app.classify.track import ClassReading, ClassTrack
@@ -32,7 +32,7 @@ class _Loaded(NamedTuple):
     classifier: RemoteClassifier
 
 
-class ClassifyModel(QObject):
+class ClassifyModel(ReportingModel):
     """The chosen classifier, remembered and used for all recordings, and the map that it reads.
 
     It is a finder of suggestions too: of spans that it recognises as gestures.
@@ -46,7 +46,6 @@ class ClassifyModel(QObject):
     changed = Signal()  # the classifier, the map that it reads, or its visibility
     moved = Signal()  # probabilities of frames, or the frame on screen
     counts_changed = Signal()  # probabilities are valid or outdated: sensor moved, or map followed
-    failed = Signal(str)
 
     def __init__(
         self,
@@ -89,7 +88,7 @@ class ClassifyModel(QObject):
     @property
     def busy(self) -> bool:
         """True while it is being loaded, is about to be, or is at work."""
-        return self._runner.busy or self._patience.isActive() or self.track.busy
+        return super().busy or self._patience.isActive()
 
     @property
     def problem(self) -> str:
@@ -217,8 +216,7 @@ class ClassifyModel(QObject):
     def close(self) -> None:
         """Stop classifying."""
         self._patience.stop()
-        self._runner.close()
-        self.track.close()
+        super().close()
 
     # --- following ------------------------------------------------------------------------
 
@@ -259,5 +257,5 @@ class ClassifyModel(QObject):
     def _fail(self, error: Exception) -> None:
         self._problem = str(error)
         self.card = None
-        self.failed.emit(str(error))
+        super()._fail(error)
         self.changed.emit()

@@ -68,14 +68,11 @@ class ClassSetupView(TrainingForm):
             "A classifier learns from labelled maps: of a simulated campaign, of an exported data"
             " set, or of recordings and radar files in which gestures are labelled.",
         )
-        folder = menu.addAction("Folder…")
+        folder = menu.addAction("Folder…", self._dialogs.add_folder)
         folder.setToolTip("A campaign or pairs, a data set (.zarr), a recording, or several")
-        folder.triggered.connect(self._dialogs.add_folder)
-        file = menu.addAction("File…")
+        file = menu.addAction("File…", self._dialogs.add_file)
         file.setToolTip("A data set (.h5, .npz), or a labelled radar file (.h5)")
-        file.triggered.connect(self._dialogs.add_file)
-        this = menu.addAction("This recording")
-        this.triggered.connect(self._dialogs.add_this)
+        this = menu.addAction("This recording", self._dialogs.add_this)
         menu.aboutToShow.connect(lambda: this.setEnabled(self._dialogs.has_this()))
 
     def _add_network(self) -> None:
@@ -86,13 +83,9 @@ class ClassSetupView(TrainingForm):
         grid = grid_of(gaps_px=(8, 4), wide=(1, 3))
         grid.addWidget(QLabel("Maps", self), 0, 0)
         grid.addLayout(side_by_side(*self._boxes.values()), 0, 1, 1, 3)
-        for row, (text, choice) in enumerate(
-            (
-                ("Network", self.choice("model", "Kind of network", MODEL_WORDS)),
-                ("Shown", self.choice("features", "What it is shown of each frame", FEATURE_WORDS)),
-            ),
-            start=1,
-        ):
+        network = self.choice("model", "Kind of network", MODEL_WORDS)
+        shown = self.choice("features", "What it is shown of each frame", FEATURE_WORDS)
+        for row, (text, choice) in enumerate((("Network", network), ("Shown", shown)), start=1):
             grid.addWidget(QLabel(text, self), row, 0)
             grid.addWidget(choice, row, 1, 1, 3)
         for number, field in enumerate(_FIELDS):

@@ -145,11 +145,8 @@ class ClassSetup(RunSetup[DataSource]):
     @property
     def problem(self) -> str:
         """Reason why nothing can be started; empty when something can."""
-        if not self.data:
-            return "Add labelled data to learn from."
-        problems = [one.problem for one in self.data if one.problem]
-        if problems:
-            return problems[0]
+        if problem := self.data_problem("Add labelled data to learn from."):
+            return problem
         if any(not one.facts for one in self.data):
             return "Reading the data…"
         return why_not_together(self.data)

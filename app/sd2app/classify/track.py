@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.background.latest import Emit, LatestRunner, delayed
+from sd2app.background.latest import BackgroundModel, Emit, LatestRunner, delayed
 from sd2app.background.model_worker.client import RemoteClasses, RemoteClassifier
 from sd2app.denoise.map import AT_ONCE, cut_out
 from sd2app.session.maps import MapModel
@@ -61,7 +61,7 @@ class _Piece(NamedTuple):
     going: _Going | None
 
 
-class ClassTrack(QObject):
+class ClassTrack(BackgroundModel):
     """Classifies what changed of a map, from the first frame that differs.
 
     Classifiers are causal: what stands before that frame stays right, and where the map
@@ -100,7 +100,7 @@ class ClassTrack(QObject):
     @property
     def busy(self) -> bool:
         """True while frames are being classified or about to be."""
-        return self._runner.busy or self._calm.isActive()
+        return super().busy or self._calm.isActive()
 
     @property
     def complete(self) -> bool:
@@ -166,7 +166,7 @@ class ClassTrack(QObject):
     def close(self) -> None:
         """Stop."""
         self._calm.stop()
-        self._runner.close()
+        super().close()
 
     # --- following the map ----------------------------------------------------------------
 

@@ -156,7 +156,6 @@ class ExportDialog(QDialog):
         self._length.show_value(choice.length)
         self._overlap.show_value(choice.overlap)
         self._format.show_value(choice.ending)
-        model = self._model
         there = {self._sensors: model.places > 0, self._inertial: bool(model.imu_places)}
         for field in (
             self._this, self._other, self._sensors, self._inertial, self._length, self._overlap,

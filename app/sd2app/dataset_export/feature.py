@@ -8,7 +8,7 @@ from PySide6.QtCore import QObject, Qt
 
 from sd2app.dataset_export.dialog import ExportDialog
 from sd2app.dataset_export.model import ExportModel
-from sd2app.feature import Action, Feature, Shell
+from sd2app.feature import Action, Feature, Shell, report
 from sd2app.session.session import Session
 from sd2app.widgets.dialogs import Answer, confirmed
 
@@ -19,8 +19,7 @@ class DatasetExportFeature(Feature):
     def __init__(self, session: Session, shell: Shell, parent: QObject) -> None:
         self._session, self._shell = session, shell
         self.model = ExportModel(session.jobs, parent)
-        self.model.failed.connect(shell.warn)
-        self.model.noted.connect(shell.note)
+        report(shell, self.model)
         self.closing = self.running = (self.model,)  # an export goes on
 
     def actions(self) -> Sequence[Action]:

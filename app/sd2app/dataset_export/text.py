@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from sd2app.widgets.text import counted
+
 if TYPE_CHECKING:
     from sd2core.datasets.forecast import Forecast
 
@@ -14,11 +16,9 @@ _MOST_NAMED = 4
 def size_words(forecast: Forecast, length: int) -> str:
     """Size in words: ``24 segments of 2.4 s from 3 views · 0.7 MB before compression``."""
     seconds = length / forecast.frame_rate_hz
-    views = f"{forecast.sources:,} view{'s' * (forecast.sources != 1)}"
-    return (
-        f"{forecast.segments:,} segment{'s' * (forecast.segments != 1)} of {seconds:.1f} s"
-        f" from {views} · {bytes_words(forecast.total_bytes)} before compression"
-    )
+    segments, views = counted(forecast.segments, "segment"), counted(forecast.sources, "view")
+    size = bytes_words(forecast.total_bytes)
+    return f"{segments} of {seconds:.1f} s from {views} · {size} before compression"
 
 
 def label_words(forecast: Forecast) -> str:

@@ -13,7 +13,7 @@ from sd2app.background.model_worker.library import DenoiserLibrary
 from sd2app.denoise.live import LiveDenoiseModel
 from sd2app.denoise.model import DenoiseModel
 from sd2app.denoise.text import denoiser_page, kind_words, origin_words
-from sd2app.feature import Action, Drop, Feature, Shell
+from sd2app.feature import Action, Drop, Feature, Shell, report
 from sd2app.maps.model import SynthesisModel
 from sd2app.maps.stack import MapStack
 from sd2app.session.session import Session
@@ -45,8 +45,7 @@ class DenoiseFeature(Feature):
     ) -> None:
         self._session, self._shell = session, shell
         self.model = DenoiseModel(session, synthesis, library, parent)
-        self.model.failed.connect(shell.warn)
-        self.model.noted.connect(shell.note)
+        report(shell, self.model)
         self.live = LiveDenoiseModel(session, self.model, parent)
         self.changing = (self.model.changed, self.live.changed)
         self.closing, self.working = (self.live, self.model), (self.model,)

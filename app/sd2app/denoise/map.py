@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.background.latest import LatestRunner, delayed
+from sd2app.background.latest import BackgroundModel, LatestRunner, delayed
 from sd2app.background.model_worker.client import RemoteDenoiser, RemoteLive
 from sd2app.maps.partial_map import View
 from sd2app.maps.quality import Companion
@@ -64,7 +64,7 @@ class _Answer(NamedTuple):
     session: RemoteLive | None = None  # at the end of the piece, where pieces follow in order
 
 
-class DenoisedMap(QObject):
+class DenoisedMap(BackgroundModel):
     """Denoises what changed of the synthetic map, what is in view first.
 
     While the sensor is dragged the model is asked in the same background task that
@@ -127,7 +127,7 @@ class DenoisedMap(QObject):
     @property
     def busy(self) -> bool:
         """True while something is being denoised or about to be."""
-        return self._runner.busy or self._again.isActive() or self._lacks_limbs
+        return super().busy or self._again.isActive() or self._lacks_limbs
 
     @property
     def _lacks_limbs(self) -> bool:
@@ -275,7 +275,7 @@ class DenoisedMap(QObject):
     def close(self) -> None:
         """Stop computing."""
         self._stop()
-        self._runner.close()
+        super().close()
 
     # --- denoising ------------------------------------------------------------------------
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.background.latest import LatestRunner, delayed
+from sd2app.background.latest import LatestRunner, ReportingModel, delayed
 from sd2app.background.model_worker.client import RemoteDenoiser
 from sd2app.background.model_worker.library import DenoiserLibrary
 from sd2app.denoise.map import TEXTURE_SEED, DenoisedMap
@@ -38,12 +38,11 @@ class Loaded:
     denoiser: RemoteDenoiser
 
 
-class DenoiseModel(QObject):
+class DenoiseModel(ReportingModel):
     """Follows the recording's choice, loads the model in the background, and uses it."""
 
     changed = Signal()  # choice, model or comparison
     noted = Signal(str)
-    failed = Signal(str)
 
     def __init__(
         self, session: Session, synthesis: SynthesisModel, library: DenoiserLibrary, parent: QObject
@@ -98,7 +97,7 @@ class DenoiseModel(QObject):
     def busy(self) -> bool:
         """True while a model is being loaded or a map denoised."""
         waiting = self.path is not None and self._patience.isActive()
-        return waiting or self._runner.busy or self.map.busy or self.before_map.busy
+        return waiting or super().busy
 
     @property
     def can_export(self) -> bool:
@@ -168,9 +167,7 @@ class DenoiseModel(QObject):
         self._patience.stop()
         self._runner.cancel()
         self._library.close()
-        self._runner.close()
-        self.map.close()
-        self.before_map.close()
+        super().close()
 
     # --- following the recording ----------------------------------------------------------
 

@@ -199,18 +199,16 @@ class NewFromVideoDialog(QDialog):
         self._message = sentence("")
 
     def _lay_out(self) -> None:
+        scale = _hint(
+            f"{DEFAULT_STATURE_M:g} m where it is not known. It fixes the scale: all distances and"
+            " velocities are proportional to it."
+        )
         form = form_of(
             ("Video", row_of((self._video, 1), self._other_video, spacing_px=8)),
             ("Person", row_of((self._person, 1), self._clear, spacing_px=8)),
             ("", _hint("Drag a rectangle around the person, where there are several.")),
             ("Body height", side_by_side(self._known, self._stature)),
-            (
-                "",
-                _hint(
-                    f"{DEFAULT_STATURE_M:g} m where it is not known. It fixes the scale: all"
-                    " distances and velocities are proportional to it."
-                ),
-            ),
+            ("", scale),
             ("Camera", side_by_side(self._camera, self._angle, self._focal)),
             ("Save as", row_of((self._folder, 1), self._other_folder, spacing_px=8)),
             gaps_px=(16, 12),

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.background.latest import Emit, LatestRunner
+from sd2app.background.latest import BackgroundModel, LatestRunner
 from sd2app.fit.request import FitRequest, Person, read_request
 from sd2core.body.camera import DEFAULT_FIELD_OF_VIEW_DEG
 from sd2core.body.shape import DEFAULT_STATURE_M as DEFAULT_STATURE_M
@@ -37,7 +37,7 @@ class FitChoices:
     person: Person | None = None  # rectangle around the person; None: one is chosen
 
 
-class FitSetupModel(QObject):
+class FitSetupModel(BackgroundModel):
     """Choices for a fit, and the frame of the video on which the person is picked."""
 
     changed = Signal()  # any choice, or the video's presence
@@ -82,11 +82,7 @@ class FitSetupModel(QObject):
         self.video, self.problem, self.frame = path, "", 0
         folder = folder_for(path, open_now)
         self.choices = replace(self.choices, folder=folder, person=None)
-
-        def read(emit: Emit) -> VideoReader:
-            return open_video(path, lambda *_: emit(None))
-
-        self._opener.submit(read)
+        self._opener.submit(lambda emit: open_video(path, lambda *_: emit(None)))
         self.changed.emit()
         self.picture_changed.emit()
 
@@ -175,8 +171,7 @@ class FitSetupModel(QObject):
 
     def close(self) -> None:
         """Stop reading, let go of the file."""
-        self._opener.close()
-        self._decoder.close()
+        super().close()
         self._let_go()
 
     # --- inside ---------------------------------------------------------------------------

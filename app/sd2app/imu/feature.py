@@ -8,7 +8,7 @@ from PySide6.QtCore import QObject, QPointF
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QMenu
 
-from sd2app.feature import Action, Feature, Shell
+from sd2app.feature import Action, Feature, Shell, report
 from sd2app.imu.model import ImuModel, place_words
 from sd2app.imu.text import reading_lines
 from sd2app.imu.track import InertialTrack
@@ -26,8 +26,7 @@ class ImuFeature(Feature):
     def __init__(self, session: Session, shell: Shell, parent: QObject) -> None:
         self._session, self._shell = session, shell
         self.model = ImuModel(session, parent)
-        self.model.failed.connect(shell.warn)
-        self.model.noted.connect(shell.note)
+        report(shell, self.model)
         self.changing = (self.model.changed, session.placing.changed)
         self.closing = self.working = (self.model,)
 

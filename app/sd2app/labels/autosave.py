@@ -53,7 +53,7 @@ class LabelAutosave(QObject):
         self.notes: tuple[str, ...] = ()  # on unreadable sessions, or edits that are not kept
         self.waiting = Found()  # at the start, until a recording is open
         beat = QTimer(self)
-        beat.timeout.connect(self._beat)
+        beat.timeout.connect(lambda: self._place is not None and self._place.beat())
         beat.start(round(BEAT_EVERY_S * 1000))
         document.saved.connect(self._follow_saving)
         document.undo_stack.indexChanged.connect(self._keep_others)
@@ -103,10 +103,6 @@ class LabelAutosave(QObject):
             self._place.release()
         self._place = None
         self._refusal, self._offers, self.notes, self._keeping = "", (), (), True
-
-    def _beat(self) -> None:
-        if self._place is not None:
-            self._place.beat()
 
     def _begin_at(self, path: Path, *, reread: bool) -> None:
         content = self._document.content

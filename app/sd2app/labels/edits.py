@@ -107,8 +107,9 @@ class LabelEdits(QObject):
 
     def split(self) -> None:
         """Split the selected span, or the one on the track, at the frame on screen."""
-        now_s = self._now_s
-        here = [span for span in self._candidates() if span.start_s < now_s < span.end_s]
+        now_s, track = self._now_s, self.labels.track
+        among = self.labels.selected or (self.labels.labels.of_track(track) if track else ())
+        here = [span for span in among if span.start_s < now_s < span.end_s]
         if here:
             self.apply(lambda labels, base: edits.split(labels, base, here[0].id, now_s))
 
@@ -217,10 +218,6 @@ class LabelEdits(QObject):
     @property
     def _now_s(self) -> float:
         return self.playback.timebase.time_of(self.playback.frame)
-
-    def _candidates(self) -> Iterable[Span]:
-        track = self.labels.track
-        return self.labels.selected or (self.labels.labels.of_track(track) if track else ())
 
     def _ids(self) -> tuple[int, ...]:
         return tuple(span.id for span in self.labels.selected)

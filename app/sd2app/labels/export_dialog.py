@@ -74,14 +74,8 @@ class LabelExportDialog(QDialog):
         self._format.currentIndexChanged.connect(self._look)
         self._about, self._said = sentence(""), sentence("")
         self._buttons = ExportButtons(self, self._ask)
-        parts = (
-            form_of(("For", self._format)),
-            self._about,
-            rule(),
-            self._said,
-            STRETCH,
-            with_help("Export labels", self._buttons),
-        )
+        form, foot = form_of(("For", self._format)), with_help("Export labels", self._buttons)
+        parts = form, self._about, rule(), self._said, STRETCH, foot
         self.setLayout(column_of(*parts, spacing_px=8, margins_px=16))
         self._look()
         self.resize(560, 300)

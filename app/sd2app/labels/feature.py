@@ -8,7 +8,7 @@ from pathlib import Path
 from PySide6.QtCore import QObject, QPointF
 from PySide6.QtWidgets import QMenu, QWidget
 
-from sd2app.feature import Action, Drop, Feature, Shell
+from sd2app.feature import Action, Drop, Feature, Shell, report
 from sd2app.labels.actions import LabelActions, ReactionMenu, editing, fill_place_menu
 from sd2app.labels.autosave import LabelAutosave
 from sd2app.labels.cut_out import CutOutModel, ask_about_others, ask_for_cut_outs
@@ -64,18 +64,10 @@ class LabelsFeature(Feature):
         self.edits.done_at.connect(s.span.reveal_any)
         self.edits.failed.connect(shell.warn)
         self.edits.restoring.connect(s.edits.restore)
-        for model in (self.autosave, self.cut_out):
-            model.failed.connect(shell.warn)
-            model.noted.connect(shell.note)
+        report(shell, self.autosave, self.cut_out)
         s.document.changed.connect(self._follow_capture)
-        self.changing = (
-            self.autosave.changed,
-            labels.changed,
-            labels.selection_changed,
-            labels.marks_changed,
-            self.dragging.changed,
-            self.loop.changed,
-        )
+        shown = labels.changed, labels.selection_changed, labels.marks_changed
+        self.changing = self.autosave.changed, *shown, self.dragging.changed, self.loop.changed
         self.closing = (self.cut_out, self.autosave)
 
     # --- menus ----------------------------------------------------------------------------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 from PySide6.QtCore import (
     QAbstractItemModel,
@@ -118,15 +119,12 @@ class LabelSetPage(QWidget):
         count = self._model.spans_of(row)
         whose = "The span keeps" if count == 1 else f"The {count:,} spans keep"
         menu = QMenu(self)
-        menu.addAction(f"{whose} the label, shown in grey").triggered.connect(
-            lambda _: self._gone(row)
-        )
+        menu.addAction(f"{whose} the label, shown in grey", partial(self._gone, row))
         others = menu.addMenu("Give the span another label" if count == 1 else "Give them another")
         for label in self._model.label_set.labels:
             if label != self._model.label_set.labels[row]:
-                others.addAction(swatch_icon(label.colour), label.name).triggered.connect(
-                    lambda _, name=label.name: self._gone(row, name)
-                )
+                instead = partial(self._gone, row, label.name)
+                others.addAction(swatch_icon(label.colour), label.name, instead)
         return menu
 
     def _gone(self, row: int, instead: str | None = None) -> None:

@@ -122,19 +122,17 @@ def paint_span(
     full = QColor(colour)
     tint = QColor(full)
     tint.setAlpha(_SELECTED_TINT if selected else _TINT)
+    painter.setBrush(Qt.BrushStyle.NoBrush)
     if suggestion:
         painter.fillRect(box, QBrush(tint, Qt.BrushStyle.BDiagPattern))
         painter.setPen(QPen(full, 1.0, Qt.PenStyle.DashLine))
-        painter.setBrush(Qt.BrushStyle.NoBrush)
         painter.drawRect(box.adjusted(0.5, 0.5, -0.5, -0.5))
     else:
         painter.fillRect(box, tint)
-    if not suggestion:
         painter.fillRect(QRectF(box.left(), box.top(), 2.0, box.height()), full)
         painter.fillRect(QRectF(box.right() - 2.0, box.top(), 2.0, box.height()), full)
     if selected:
         painter.setPen(QPen(QColor(palette.text), 1.0))
-        painter.setBrush(Qt.BrushStyle.NoBrush)
         painter.drawRect(box.adjusted(0.5, 0.5, -0.5, -0.5))
     if box.width() >= _TEXT_FROM_PX:
         room = box.adjusted(6.0, 0.0, -4.0, 0.0)

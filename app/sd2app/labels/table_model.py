@@ -12,6 +12,7 @@ from PySide6.QtGui import QIcon
 from sd2app.labels.edits import LabelEdits
 from sd2app.widgets.icons import swatch_icon
 from sd2app.widgets.record_table import NO_PARENT, Heading, Index, RecordTableModel
+from sd2app.widgets.text import counted
 from sd2core.errors import Sd2Error
 from sd2core.labels import field_edits
 from sd2core.labels.edits import Change, Edit, Side, resize
@@ -205,7 +206,7 @@ class SpanTableModel(RecordTableModel[Span]):
     @property
     def words(self) -> str:
         """Number of spans, and of those shown."""
-        whole = f"{self.total:,} span{'s' * (self.total != 1)}"
+        whole = counted(self.total, "span")
         return whole if len(self.rows) == self.total else f"{len(self.rows):,} of {whole}"
 
     def row_of(self, span_id: int) -> int | None:

@@ -69,7 +69,6 @@ class LabelTimeline(ZoomedPlot, SessionPlot):
         self._target: HitTarget | None = None
         self._pointer_px = 0.0
         self._within_s, self._cutting = 0.0, False
-        self.rows = LabelRows.of(labels.labels.tracks, labels.arrays, labels.marks)
         self._scroll = QTimer(self, interval=_SCROLL_MS)
         self._scroll.timeout.connect(self._scroll_on)
         self.setMouseTracking(True)

@@ -81,8 +81,9 @@ class LabelTracks:
 
     def move(self, towards: Literal[-1, 1]) -> None:
         """Move the track up or down."""
-        track, place = self._labels.track, self._place + towards
-        if 0 <= place < len(self._names):
+        track, names = self._labels.track, self._names
+        place = names.index(track) + towards if track else -1
+        if 0 <= place < len(names):
             self._edits.apply(lambda labels, _: field_edits.move_track(labels, track, place))
 
     def toggle_overlap(self) -> None:
@@ -103,10 +104,6 @@ class LabelTracks:
     @property
     def _names(self) -> list[str]:
         return [track.name for track in self._labels.labels.tracks]
-
-    @property
-    def _place(self) -> int:
-        return self._names.index(self._labels.track) if self._labels.track else -1
 
 
 class TrackDialog(QDialog):

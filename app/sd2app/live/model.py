@@ -11,8 +11,9 @@ from collections.abc import Sequence
 from typing import Any, Literal
 
 import numpy as np
-from PySide6.QtCore import QObject, QProcess, QProcessEnvironment, QTimer, Signal
+from PySide6.QtCore import QObject, QProcess, QProcessEnvironment, Signal
 
+from sd2app.background.latest import delayed
 from sd2app.live.growing_map import GrowingMap
 from sd2app.live.request import ListenRequest
 from sd2app.session.content import Content
@@ -60,10 +61,8 @@ class LiveModel(QObject):
         self._is_shown = True  # false where the recording cannot be read
         self._process: QProcess | None = None
         self._said = ""  # on standard error
-        self._teller = QTimer(self, singleShot=True, interval=_TELL_MS)
-        self._teller.timeout.connect(self.changed)
-        self._painted = QTimer(self, singleShot=True, interval=0)
-        self._painted.timeout.connect(self._note_latency)
+        self._teller = delayed(self.changed.emit, _TELL_MS, self)
+        self._painted = delayed(self._note_latency, 0, self)
         self._document.changed.connect(self._begin_when_open)
         self._document.failed.connect(self._fail_to_open)
 

@@ -21,7 +21,6 @@ from sd2app.maps.readout import reading_lines
 from sd2app.maps.spectrum import SpectrumView
 from sd2app.maps.stack import MapStack
 from sd2app.maps.uncertainty import UncertaintyModel
-from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
 from sd2app.widgets.canvas import Overlay
 from sd2app.widgets.dialogs import ask_map
@@ -121,10 +120,6 @@ class MapsFeature(Feature):
         play = self._session.playback.play_stretch
         menu.addAction("Play what is in view in a &loop", lambda: play(span.start_s, span.end_s))
         menu.addAction(export)
-
-    def view_of(self, track: MapModel, overlays: Sequence[Overlay]) -> HeatmapView:
-        """View of one more map on the shared time axis."""
-        return HeatmapView(track, self._session, overlays)
 
     def panels(self) -> Mapping[str, QWidget]:
         """The spectra of this frame over the levels of all maps."""

@@ -98,16 +98,6 @@ class HeatmapView(TrackMouse, MapWidget):
         track.status_changed.connect(self.redraw)
         self.follow(self._pointer.changed)
 
-    @property
-    def track(self) -> MapModel:
-        """Map that is shown."""
-        return self._track
-
-    @property
-    def has_map(self) -> bool:
-        """True while there is a map to show."""
-        return self._track.map is not None
-
     def set_state(self, *, folded: bool, enlarged: bool) -> None:
         """Show the title alone, or that this map stands for all."""
         if (folded, enlarged) != (self.folded, self.enlarged):
@@ -127,7 +117,7 @@ class HeatmapView(TrackMouse, MapWidget):
 
     def title(self) -> str:
         """Title of the map, with the part of the body that is shown alone."""
-        return title_of(self._track)
+        return title_of(self.track)
 
     def bin_marks(self) -> BinMarks:
         """Look of bins without information."""
@@ -143,8 +133,8 @@ class HeatmapView(TrackMouse, MapWidget):
     @property
     def _map(self) -> DopplerMap:
         """The map, where there is one."""
-        assert self._track.map is not None
-        return self._track.map
+        assert self.track.map is not None
+        return self.track.map
 
     def y_of(self, velocity_mps: float) -> float:
         """Pixel of a velocity."""
@@ -163,14 +153,14 @@ class HeatmapView(TrackMouse, MapWidget):
         if self._button_px != self._room_px:
             self._kept = None
         self.paint_kept(painter, self._paint_map)
-        if self._track.map is not None and not self.folded:
+        if self.track.map is not None and not self.folded:
             self._paint_cursors(painter, self.plot_rect())
 
     def _paint_map(self, painter: QPainter) -> None:
         colours = self._display.palette
         painter.fillRect(self.rect(), QColor(colours.panel))
         muted, centre = QColor(colours.muted), Qt.AlignmentFlag.AlignCenter
-        if self._track.map is None and not self._track.awaited:
+        if self.track.map is None and not self.track.awaited:
             painter.setPen(muted)
             painter.drawText(self.rect(), centre, self._hint)
             return
@@ -178,7 +168,7 @@ class HeatmapView(TrackMouse, MapWidget):
         if self.folded:
             return
         plot = self.plot_rect()
-        if self._track.map is None:
+        if self.track.map is None:
             painter.fillRect(plot, QColor(colours.well))
             painter.setPen(muted)
             painter.drawText(plot, centre, "This map is being made…")
@@ -234,15 +224,15 @@ class HeatmapView(TrackMouse, MapWidget):
 
     def _status(self) -> str:
         """Carrier and quality of the map, and the reason where nothing shows."""
-        strongest_db, lowest_db = self._track.strongest_db, self._display.levels.low_db
-        carrier_hz = None if self._track.map is None else self._track.map.carrier_hz
-        parts = ["" if carrier_hz is None else f"{1e-9 * carrier_hz:.4g} GHz", self._track.status]
-        if gaps_s := self._track.gaps_s:
+        strongest_db, lowest_db = self.track.strongest_db, self._display.levels.low_db
+        carrier_hz = None if self.track.map is None else self.track.map.carrier_hz
+        parts = ["" if carrier_hz is None else f"{1e-9 * carrier_hz:.4g} GHz", self.track.status]
+        if gaps_s := self.track.gaps_s:
             parts.append(f"no person in {sum(end - start for start, end in gaps_s):.2f} s")
-        if self._track.uncertainty is not None:
+        if self.track.uncertainty is not None:
             colour = "amber" if self._display.levels.colour_map == "gray" else "grey"
             parts.append(f"{colour}: ±{100 * UNCERTAIN_SHARE:.0f} % or worse")
-        if self._track.covered is None and -math.inf < strongest_db < lowest_db:
+        if self.track.covered is None and -math.inf < strongest_db < lowest_db:
             level = f"{strongest_db:.0f}".replace("-", "−")
             parts.append(f"strongest bin {level} dB, below the scale: R sets 0 dB here")
         return " · ".join(filter(None, parts))
@@ -251,7 +241,7 @@ class HeatmapView(TrackMouse, MapWidget):
         edges = self._map.axis.edges_mps
         stretches = [
             (self.scale.x_of(start_s), self.scale.x_of(end_s))
-            for start_s, end_s in self._track.covered_s
+            for start_s, end_s in self.track.covered_s
         ]
         nothing, hatch, marked = self.bin_marks()
         with clipped(painter, plot):
@@ -297,23 +287,27 @@ class HeatmapView(TrackMouse, MapWidget):
         """Use of the left button: the header of a measured map drags it in time."""
         return "offset" if self.alignable and place.y() < HEADER_PX else "seek"
 
+    def _cell_at(self, position: QPointF) -> tuple[float, float] | None:
+        """Time and velocity at a pixel, None beside the map."""
+        if self.track.map is None or self.folded or not self.plot_rect().contains(position):
+            return None
+        return self.scale.time_of(position.x()), self.velocity_of(position.y())
+
     def reading_at(self, position: QPointF) -> Reading | None:
         """Cell at a pixel, None where there is none."""
-        if self._track.map is None or self.folded or not self.plot_rect().contains(position):
-            return None
-        return self.read(self.scale.time_of(position.x()), self.velocity_of(position.y()))
+        cell = self._cell_at(position)
+        return None if cell is None else self.read(*cell)
 
     def point_at(self, position: QPointF) -> None:
         """Read the cell under the pointer."""
-        if self._track.map is None or self.folded or not self.plot_rect().contains(position):
+        if (cell := self._cell_at(position)) is None:
             self._pointer.leave()
-            return
-        time_s, velocity_mps = self.scale.time_of(position.x()), self.velocity_of(position.y())
-        self._pointer.point_at(time_s, velocity_mps, self.read(time_s, velocity_mps))
+        else:
+            self._pointer.point_at(*cell, self.read(*cell))
 
     def read(self, time_s: float, velocity_mps: float) -> Reading | None:
         """Cell at a time and velocity, with the range of the body that was synthesised from."""
-        found = self._track.read(time_s, velocity_mps)
-        if found is None or self._track is not self._session.maps.synthetic:
+        found = self.track.read(time_s, velocity_mps)
+        if found is None or self.track is not self._session.maps.synthetic:
             return found
         return replace(found, range_m=body_range_m(self._session, time_s))

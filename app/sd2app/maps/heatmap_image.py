@@ -51,16 +51,11 @@ class Columns:
         """Columns of the time range in view."""
         assert track.map is not None
         timebase = track.map.timebase
-        frames = column_frames(
-            timebase.times_s,
-            timebase.end_s,
-            start_s - track.offset_s,
-            stop_s - track.offset_s,
-            columns,
-        )
+        from_s, to_s = start_s - track.offset_s, stop_s - track.offset_s
+        frames = column_frames(timebase.times_s, timebase.end_s, from_s, to_s, columns)
         first = frames[:-1]
         filled = (first >= 0) & (first < len(timebase))
-        left_s = start_s - track.offset_s + (stop_s - start_s) * np.arange(columns) / columns
+        left_s = from_s + (stop_s - start_s) * np.arange(columns) / columns
         # Of a column that a gap ends in, the frames after it are shown.
         later = frames[1:] > first + 1
         filled[filled] = later[filled] | (
@@ -176,7 +171,7 @@ class MapWidget(SessionPlot):
 
     def __init__(self, track: MapModel, session: Session, overlays: Sequence[Overlay] = ()) -> None:
         super().__init__(session, overlays)
-        self._track = track
+        self.track = track  # the map that is shown
         self._image: QImage | None = None
         self.setMouseTracking(True)
         for signal in (track.changed, self._display.levels_changed, self._display.theme_changed):
@@ -201,13 +196,13 @@ class MapWidget(SessionPlot):
     def make_image(self, start_s: float, end_s: float, columns: int) -> QImage:
         """Image of the time window, one pixel per column and bin."""
         background = QColor(self._display.palette.well).rgb()
-        return heatmap_image(self._track, self._display.levels, start_s, end_s, columns, background)
+        return heatmap_image(self.track, self._display.levels, start_s, end_s, columns, background)
 
     def paint_gaps(self, painter: QPainter, plot: QRectF, scale: TimeScale) -> None:
         """Hatch the frames without a person."""
         colours = self._display.palette
         with clipped(painter, plot):
-            for start_s, end_s in self._track.gaps_s:
+            for start_s, end_s in self.track.gaps_s:
                 left, right = scale.x_of(start_s), scale.x_of(end_s)
                 # The narrowest is still seen.
                 box = QRectF(left, plot.top(), max(right - left, 1.0), plot.height())

@@ -31,23 +31,18 @@ class LimbsModel(QObject):
 
     def __init__(self, session: Session, synthesis: SynthesisModel, parent: QObject) -> None:
         super().__init__(parent)
-        self._track, self._synthesis = session.maps.synthetic, synthesis
+        self.track, self._synthesis = session.maps.synthetic, synthesis
         synthesis.completed.connect(self._check)
         session.document.opened.connect(lambda: self.show(""))
 
     @property
     def part(self) -> str:
         """Part that is shown alone; empty for the whole body."""
-        return self._track.part
-
-    @property
-    def available(self) -> bool:
-        """True if there is a synthetic map to split."""
-        return self._track.map is not None
+        return self.track.part
 
     def show(self, part: str) -> None:
         """Show one part alone, or (empty) the whole body."""
-        self._track.set_part(part)
+        self.track.set_part(part)
         self._synthesis.want_limbs("one part shown", bool(part))
 
     def _check(self) -> None:
@@ -79,4 +74,4 @@ class LimbMenu(QMenu):
     def _update(self) -> None:
         for action in self.actions():
             action.setChecked(action.data() == self._model.part)
-            action.setEnabled(self._model.available)
+            action.setEnabled(self._model.track.map is not None)

@@ -29,8 +29,8 @@ class Overview(MapWidget):
 
     def set_track(self, track: MapModel) -> None:
         """Show another track."""
-        self._track.changed.disconnect(self.invalidate)
-        self._track = track
+        self.track.changed.disconnect(self.invalidate)
+        self.track = track
         track.changed.connect(self.invalidate)
         self.invalidate()
 
@@ -45,7 +45,7 @@ class Overview(MapWidget):
         painter.fillRect(self.rect(), QColor(colours.panel))
         painter.setPen(QColor(colours.muted))
         painter.drawText(QRectF(0, plot.top(), GUTTER_PX - 8, plot.height()), AT_RIGHT, "All")
-        if self._track.map is not None:
+        if self.track.map is not None:
             self.paint_map(painter, plot, *self._span.extent_s)
             self.paint_gaps(painter, plot, scale)
         strip = QRectF(plot.left(), plot.top(), plot.width(), _LABELS_PX)

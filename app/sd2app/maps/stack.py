@@ -95,7 +95,7 @@ class MapStack(QScrollArea):
         """First open map that begins in view, or shows a half: *This frame* shares its axis."""
         top = self.verticalScrollBar().value()
         views = [self._named[name] for name in self.shown]
-        opened = [view for view in views if not view.folded and view.has_map]
+        opened = [view for view in views if not view.folded and view.track.map is not None]
         whole = [view for view in opened if view.y() >= top]
         seen = [view for view in opened if view.y() + view.height() // 2 > top]
         return next(iter(whole or seen or opened), None)

@@ -41,10 +41,8 @@ _VIEWS: tuple[tuple[str, Preset, str, str], ...] = (
 )
 
 _SHORT = {
-    "velocity": "radial velocity",
-    "range": "range",
-    "visibility": "visibility",
-    "plain": "plain",
+    colour: text.removeprefix("Colour by ").removesuffix(" mesh").lower()
+    for colour, text, _ in _COLOURS
 }
 
 

@@ -55,7 +55,6 @@ class InertialHand:
 
     def words_at(self, x_px: float, y_px: float) -> str:
         """Sensor under the pointer, or the one that a click would place, in words."""
-        place = None
         if self.placing:
             vertex = self.vertex_at(x_px, y_px)
             place = None if vertex is None else self._model.place_at(vertex)

@@ -87,21 +87,11 @@ class Overlay(Canvas):
         """Paint all texts; repainted only after a change."""
         scene, navigator, colouring = self._scene, self._navigator, self._scene.colouring
         state = (
-            self.message,
-            self.hint,
-            self.font(),
-            scene.pose,
-            scene.sensor,
-            scene.colours,
-            scene.has_mesh,
-            colouring.mode,
-            colouring.v_max_mps,
-            colouring.range_limits_m,
-            scene.knows_hidden,
-            scene.metre_labels,
-            navigator.hovers_sensor,
-            navigator.holds_sensor,
-            navigator.marker,
+            (self.message, self.hint, self.font()),
+            (scene.pose, scene.sensor, scene.colours, scene.has_mesh),
+            (colouring.mode, colouring.v_max_mps, colouring.range_limits_m),
+            (scene.knows_hidden, scene.metre_labels),
+            (navigator.hovers_sensor, navigator.holds_sensor, navigator.marker),
         )
         if state != self._state:
             self._state = state

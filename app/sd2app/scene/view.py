@@ -124,8 +124,13 @@ class SceneView(QWidget):
 
     def closeEvent(self, event: QCloseEvent) -> None:
         """Release everything of VTK."""
-        self._shut_down()
         event.accept()
+        backend, self._backend = self._backend, None
+        if backend is not None:
+            for signal, slot in self._followed:
+                signal.disconnect(slot)
+            backend.widget.removeEventFilter(self)
+            backend.shut_down()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Fill the view."""
@@ -226,8 +231,7 @@ class SceneView(QWidget):
 
     def _follow_clock(self) -> None:
         if self._session.document.mesh is not None:
-            self._stale_scattering = True
-            self.request_render()
+            self._follow_scattering()
 
     def _follow_sensor(self) -> None:
         self.scene.set_sensor(self._session.sensor.sensor)
@@ -325,16 +329,13 @@ class SceneView(QWidget):
     def _choose_cursor(self) -> None:
         if self._backend is None:
             return
-        if self.navigator.holds_sensor:
-            shape = Qt.CursorShape.ClosedHandCursor
-        elif self.navigator.hovers_sensor:
-            shape = Qt.CursorShape.OpenHandCursor
-        elif self.navigator.marker is not None:
-            shape = Qt.CursorShape.PointingHandCursor
-        elif self.inertial_hand.placing:
-            shape = Qt.CursorShape.CrossCursor
-        else:
-            shape = Qt.CursorShape.ArrowCursor
+        shapes = {
+            Qt.CursorShape.ClosedHandCursor: self.navigator.holds_sensor,
+            Qt.CursorShape.OpenHandCursor: self.navigator.hovers_sensor,
+            Qt.CursorShape.PointingHandCursor: self.navigator.marker is not None,
+            Qt.CursorShape.CrossCursor: self.inertial_hand.placing,
+        }
+        shape = next((one for one, fits in shapes.items() if fits), Qt.CursorShape.ArrowCursor)
         if self._backend.widget.cursor().shape() != shape:
             self._backend.widget.setCursor(shape)
 
@@ -344,15 +345,6 @@ class SceneView(QWidget):
         label.setWordWrap(True)
         label.setAlignment(Qt.AlignmentFlag.AlignCenter)
         label.setMargin(24)
-
-    def _shut_down(self) -> None:
-        if self._backend is None:
-            return
-        backend, self._backend = self._backend, None
-        for signal, slot in self._followed:
-            signal.disconnect(slot)
-        backend.widget.removeEventFilter(self)
-        backend.shut_down()
 
 
 def make_backend(parent: QWidget) -> Backend:

@@ -48,9 +48,8 @@ class AlignmentModel(BackgroundModel):
         """Search up to so many seconds from the recording's offset, by default as before."""
         self.within_s = reach_s = within_s or self.within_s
         self.found, self.problem = None, ""
-        synthetic, radar, now_s = (
-            self._session.maps.synthetic.map, self._session.maps.real.map, self.now_s
-        )  # fmt: skip
+        maps, now_s = self._session.maps, self.now_s
+        synthetic, radar = maps.synthetic.map, maps.real.map
         if synthetic is None or radar is None:
             return
         self._runner.submit(lambda emit: align(synthetic, radar, around_s=now_s, within_s=reach_s))

@@ -15,6 +15,10 @@ from sd2app.widgets.panel import sentence, show_words, side_by_side
 from sd2app.widgets.plot import Themed
 from sd2core.doppler.alignment import LEAST_WITHIN_S
 
+_ABOUT = (
+    "Mean velocity and motion of the synthetic map, compared with the radar's at each time offset."
+)
+
 
 class AlignmentDialog(QDialog):
     """A view of :class:`AlignmentModel`; the search begins with it."""
@@ -32,21 +36,10 @@ class AlignmentDialog(QDialog):
         self._within.show_value(model.within_s)
         self._within.valueChanged.connect(model.search)
         buttons, self._apply = accepting(self, "Apply")
-        self.setLayout(
-            column_of(
-                sentence(
-                    "Mean velocity and motion of the synthetic map, compared with the radar's at"
-                    " each time offset."
-                ),
-                (self._chart, 1),
-                self._result,
-                self._problem,
-                form_of(("Search within ±", side_by_side(self._within))),
-                with_help("Align automatically", buttons),
-                spacing_px=12,
-                margins_px=16,
-            )
-        )
+        within = form_of(("Search within ±", side_by_side(self._within)))
+        foot = with_help("Align automatically", buttons)
+        parts = sentence(_ABOUT), (self._chart, 1), self._result, self._problem, within, foot
+        self.setLayout(column_of(*parts, spacing_px=12, margins_px=16))
         self.accepted.connect(model.apply)
         self.finished.connect(lambda _: model.cancel())
         model.changed.connect(self._refresh)

@@ -58,20 +58,11 @@ class SensorPanel(QWidget):
         self._too_far = sentence("", "warning")
         self._capture = self._capture_part(self._button(align, "Find…"))
         buttons = (self._button(aim, "Aim at body"), self._button(to_camera, "To camera"))
-        self.setLayout(
-            column_of(
-                row_of(title("Placement"), STRETCH, *buttons),
-                self._placement_form(),
-                self._too_far,
-                rule(),
-                title("What it sees"),
-                self._readout_form(),
-                self._capture,
-                STRETCH,
-                spacing_px=5,
-                margins_px=(8, 4, 8, 4),
-            )
-        )
+        head = row_of(title("Placement"), STRETCH, *buttons)
+        placement = head, self._placement_form(), self._too_far
+        seen = title("What it sees"), self._readout_form()
+        parts = *placement, rule(), *seen, self._capture, STRETCH
+        self.setLayout(column_of(*parts, spacing_px=5, margins_px=(8, 4, 8, 4)))
         session.sensor.changed.connect(self._refresh_placement)
         synthesis.frame_changed.connect(self._refresh_placement)
         synthesis.readout_changed.connect(self._refresh_readout)

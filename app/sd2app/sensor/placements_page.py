@@ -75,17 +75,10 @@ class PlacementsPage(QWidget):
             "Export…", "Write the plan, as for sd2 placements", self._export_plan, self
         )
         make = outlined("Batch…", "Make the maps, of many recordings", batch, self)
-        self.setLayout(
-            column_of(
-                row_of(title("Plan"), STRETCH, self._kind),
-                self._nothing,
-                self._planned,
-                row_of(self._take, self._export, make, STRETCH, spacing_px=6),
-                STRETCH,
-                spacing_px=6,
-                margins_px=(8, 4, 8, 4),
-            )
-        )
+        head = row_of(title("Plan"), STRETCH, self._kind)
+        buttons = row_of(self._take, self._export, make, STRETCH, spacing_px=6)
+        parts = head, self._nothing, self._planned, buttons, STRETCH
+        self.setLayout(column_of(*parts, spacing_px=6, margins_px=(8, 4, 8, 4)))
         placements.current_changed.connect(self._show_current)
         for signal in (placements.changed, accuracy.changed, self._fields.changed):
             signal.connect(self._refresh)
@@ -107,21 +100,11 @@ class PlacementsPage(QWidget):
             outlined(text, "Put the sensor there", partial(model.step, by), self)
             for text, by in (("Previous", -1), ("Next", 1))
         )
-        return pane(
-            self._form(),
-            self._how,
-            self._problem,
-            rule(),
-            row_of((self._count, 1), self._shown, spacing_px=6),
-            self._scale,
-            self._limits,
-            self._radar,
-            row_of((self._current, 1), back, on, spacing_px=6),
-            rule(),
-            self._cost,
-            self._source,
-            spacing_px=6,
-        )
+        head = row_of((self._count, 1), self._shown, spacing_px=6)
+        steps = row_of((self._current, 1), back, on, spacing_px=6)
+        typed = self._form(), self._how, self._problem
+        places = head, self._scale, self._limits, self._radar, steps
+        return pane(*typed, rule(), *places, rule(), self._cost, self._source, spacing_px=6)
 
     def _form(self) -> QGridLayout:
         self._rows: dict[Name, tuple[QLabel, TypedLine]] = {}

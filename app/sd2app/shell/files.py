@@ -9,7 +9,7 @@ from typing import Literal
 
 from PySide6.QtWidgets import QMenu, QMessageBox, QPushButton, QWidget
 
-from sd2app.feature import Action, Drop, Feature, Shell
+from sd2app.feature import Action, Drop, Feature, Shell, report
 from sd2app.fit.model import FitModel
 from sd2app.fit.request import read_request
 from sd2app.labels.edits import LabelEdits
@@ -53,8 +53,7 @@ class FilesFeature(Feature):
         self._document = session.document
         self._document.opened.connect(self._remember)
         self._document.saved.connect(self._remember)
-        self._document.failed.connect(shell.warn)
-        self._document.noted.connect(shell.note)
+        report(shell, self._document)
         self.changing = (self._document.changed,)
         self.closing = (self._document,)
 

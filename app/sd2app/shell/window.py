@@ -89,16 +89,9 @@ class MainWindow(QMainWindow):
     # --- building -------------------------------------------------------------------------
 
     def _build_skeleton(self) -> None:
-        self._top = splitter(
-            Qt.Orientation.Horizontal,
-            [self._panels[name] for name in ("video", "scene")],
-            (340, 588),
-        )
-        self._bottom = splitter(
-            Qt.Orientation.Horizontal,
-            [self._panels["tracks"], self._panels["spectrum"]],
-            (728, 200),
-        )
+        across, panels = Qt.Orientation.Horizontal, self._panels
+        self._top = splitter(across, [panels["video"], panels["scene"]], (340, 588))
+        self._bottom = splitter(across, [panels["tracks"], panels["spectrum"]], (728, 200))
         # A wide window gives the video a part of its width, which its height lets it fill.
         self._top.setStretchFactor(0, 1)
         self._top.setStretchFactor(1, 3)
@@ -110,11 +103,7 @@ class MainWindow(QMainWindow):
         beside = QWidget(self)
         beside.setLayout(self._column)
         # The side panel has the window's full height, from the menus to the last line.
-        self._across = splitter(
-            Qt.Orientation.Horizontal,
-            [beside, self._panels["side"]],
-            (936, _SIDE_PX),
-        )
+        self._across = splitter(across, [beside, panels["side"]], (936, _SIDE_PX))
         self._lines = column_of((self._across, 1), spacing_px=4, margins_px=(8, 0, 8, 0))
         self._centre = QWidget(self)
         self._centre.setLayout(self._lines)

@@ -25,6 +25,7 @@ from sd2app.labels.feature import LabelsFeature
 from sd2app.live.feature import LiveFeature
 from sd2app.manual.window import ManualOpener
 from sd2app.maps.feature import MapsFeature
+from sd2app.maps.heatmap import HeatmapView
 from sd2app.maps.stack import MapStack
 from sd2app.mesh_comparison.feature import MeshComparisonFeature
 from sd2app.playback.feature import PlaybackFeature
@@ -100,7 +101,7 @@ class Features:
             session,
             shell,
             self.video.overlay,
-            lambda track: maps.view_of(track, (labels.over_maps,)),
+            lambda track: HeatmapView(track, session, (labels.over_maps,)),
         )
         self.dataset_export = DatasetExportFeature(session, shell, parent)
         self.batch = BatchFeature(

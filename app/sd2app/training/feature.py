@@ -8,7 +8,7 @@ from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QWidget
 
 from sd2app.denoise.model import DenoiseModel
-from sd2app.feature import Action, Feature, Shell
+from sd2app.feature import Action, Feature, Shell, report
 from sd2app.session.session import Session
 from sd2app.training.dialogs import TrainingDialogs
 from sd2app.training.model import COMMAND, TrainingModel
@@ -32,9 +32,7 @@ class TrainingFeature(Feature):
         self.model = TrainingModel(session.settings, parent, command or COMMAND)
         self.adoption = ModelAdoption(self.model, denoise, session.maps, user_models_folder, parent)
         self._dialogs = TrainingDialogs(shell, self.model, session.document)
-        for model in (self.model, self.adoption):
-            model.failed.connect(shell.warn)
-            model.noted.connect(shell.note)
+        report(shell, self.model, self.adoption)
         self.closing, self.running = (self.adoption, self.model), (self.model,)  # runs go on
 
     def actions(self) -> Sequence[Action]:

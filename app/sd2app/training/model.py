@@ -17,7 +17,7 @@ from sd2app.settings import Settings
 from sd2app.training.pair_maker import PairMaker
 from sd2app.training.run import TrainingMonitor
 from sd2app.training.setup import TrainingSetupModel
-from sd2app.training.text import model_name, state_text
+from sd2app.training.text import model_name
 from sd2app.widgets.text import clock_text
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import user_data
@@ -210,4 +210,5 @@ def _new_run(folder: Path, config: TrainConfig) -> Path:
 
 def _title(status: RunStatus) -> str:
     when = clock_text(status.started_unix_s)
-    return f"{when} · {model_name(status.model)} · {state_text(status.state)}"
+    state = {"died": "ended unexpectedly", "running": "training"}.get(status.state, status.state)
+    return f"{when} · {model_name(status.model)} · {state}"

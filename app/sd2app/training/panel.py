@@ -151,7 +151,7 @@ class TrainingGainView(QWidget):
         self._summary.setText(gain_summary(use.gain, use.has_radar))
         self._table.show_facts(gain_rows(use.gain) if use.gain is not None else [])
         self._both.show_checked(use.denoise.comparing)
-        self._both.setVisible(use.can_compare)
+        self._both.setVisible(use.previous is not None)
 
 
 def training_chart(history: TrainingHistory) -> Chart:

@@ -60,7 +60,7 @@ class ModelAdoption(QObject):
         self._models = models
         self._kept: Path | None = None
         self._run: Path | None = None
-        self._previous: Path | None = None
+        self.previous: Path | None = None  # model that was in use before
         self._gain: Improvement | None = None
         self._before_mps: float | None = None
         # Maps change many times while one is denoised piece by piece.
@@ -85,11 +85,6 @@ class ModelAdoption(QObject):
         """True if there is a radar's map to compare with."""
         return self._maps.real.map is not None
 
-    @property
-    def can_compare(self) -> bool:
-        """True if there was an earlier model."""
-        return self._previous is not None
-
     # --- what one can do ------------------------------------------------------------------
 
     def use(self) -> None:
@@ -106,20 +101,20 @@ class ModelAdoption(QObject):
             return
         self._kept, self._run = kept, run.folder.path
         if previous != kept:
-            self._previous = previous
+            self.previous = previous
         self._gain = self._before_mps = None
         if self.denoise.path != kept:
             self.noted.emit(
                 f"The model is kept as {kept.stem}. Open a recording to denoise it with that."
             )
         else:
-            self.denoise.set_comparing(self._previous is not None)
+            self.denoise.set_comparing(self.previous is not None)
         self._compare()
 
     def go_back(self) -> None:
         """Denoise with the model that was in use before."""
         try:
-            self.denoise.use(self._previous)
+            self.denoise.use(self.previous)
             self.denoise.set_comparing(False)
         except Sd2Error as error:
             self.failed.emit(str(error))
@@ -159,7 +154,7 @@ class ModelAdoption(QObject):
                 plain_mps,
                 self._before_mps,
                 now_mps,
-                self._previous.stem if self._previous is not None else "",
+                self.previous.stem if self.previous is not None else "",
                 frames,
                 radar.kind == "simulated",
             )

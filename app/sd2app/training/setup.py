@@ -118,11 +118,8 @@ class TrainingSetupModel(RunSetup[Store]):
     @property
     def problem(self) -> str:
         """Reason why it cannot be started; empty when it can."""
-        if not self.data:
-            return "Add pairs to learn from."
-        problems = [store.problem for store in self.data if store.problem]
-        if problems:
-            return problems[0]
+        if problem := self.data_problem("Add pairs to learn from."):
+            return problem
         facts = [store.facts for store in self.data if store.facts is not None]
         if len(facts) < len(self.data):
             return "Reading the pairs…"

@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QGridLayout, QWidget
 from sd2app.training.dialogs import TrainingDialogs
 from sd2app.training.model import TrainingModel
 from sd2app.training.text import INPUT_WORDS, MODEL_WORDS, division_text
-from sd2app.widgets.layouts import STRETCH, pane, row_of
+from sd2app.widgets.layouts import STRETCH, grid_of, pane, row_of
 from sd2app.widgets.model_page import model_title
 from sd2app.widgets.panel import ElidedLabel, Fold, outlined, sentence, title
 from sd2app.widgets.progress_bar import ProgressBar
@@ -53,9 +53,8 @@ class TrainingSetupView(TrainingForm):
         self._menu.aboutToShow.connect(self._fill_menu)
         self.column.addWidget(self._making_part())
         names = {name: words[0] for name, words in MODEL_WORDS.items()}
-        kind = self.choice("model", "Kind of model", names)
+        self._kind = self.choice("model", "Kind of model", names)
         self._about = sentence("")
-        self._kind = kind
         self._inputs = self.choice(
             "inputs", "What it learns from; all but the map need pairs with --limbs", INPUT_WORDS
         )
@@ -65,7 +64,7 @@ class TrainingSetupView(TrainingForm):
             "Go on from a model with pairs of your own: fewer are enough",
             {"": "New", **starts},
         )
-        for name, one in (("Model", kind), ("Input", self._inputs), ("Start", start)):
+        for name, one in (("Model", self._kind), ("Input", self._inputs), ("Start", start)):
             self.column.addLayout(row_of(title(name), (one, 1), spacing_px=8))
         self.column.addWidget(self._about)
         self._add_settings()
@@ -84,11 +83,9 @@ class TrainingSetupView(TrainingForm):
 
     def _add_settings(self) -> None:
         # Labels to the left; several boxes share what room there is.
-        grid = QGridLayout()
-        grid.setHorizontalSpacing(8)
+        grid = grid_of(gaps_px=(8, 0), wide=(1, 3))
         for column, field in enumerate(_FIELDS):
             labelled(grid, (0, 2 * column), field, self.number(field))
-            grid.setColumnStretch(2 * column + 1, 1)
         tip = "Put all settings back to the paper's"
         self._reset = outlined("Reset", tip, self._pairs.reset, self)
         hidden = QWidget(self)
@@ -142,12 +139,10 @@ class TrainingSetupView(TrainingForm):
             action.triggered.connect(lambda _=False, path=path: self._pairs.add(path))
         if not menu.isEmpty():
             menu.addSeparator()
-        menu.addAction("Folder of pairs…").triggered.connect(self._dialogs.ask_store)
-        one = menu.addAction("Make of this recording")
+        menu.addAction("Folder of pairs…", self._dialogs.ask_store)
+        one = menu.addAction("Make of this recording", self._dialogs.make_of_this)
         one.setToolTip(self._dialogs.why_not_this or "Its mesh and its radar, as it was saved")
         one.setEnabled(not self._dialogs.why_not_this)
-        one.triggered.connect(self._dialogs.make_of_this)
-        make = menu.addAction("Make of recordings…")
+        make = menu.addAction("Make of recordings…", self._dialogs.ask_recordings)
         make.setToolTip("Of one recording, or of all in a folder, that have a mesh and a radar")
         make.setEnabled(self._training.pair_maker.out is None)
-        make.triggered.connect(self._dialogs.ask_recordings)

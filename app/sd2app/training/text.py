@@ -10,7 +10,6 @@ from sd2app.training.run import EpochPoint, TrainingHistory, TrainingMonitor
 from sd2app.widgets.text import about, counted, error_text, exact_text
 
 if TYPE_CHECKING:
-    from sd2core.runs.folder import State
     from sd2core.train.data import Split
 
 MODEL_WORDS = {
@@ -48,11 +47,6 @@ _AT_WORK: tuple[Phase, ...] = ("running", "pausing", "paused", "resuming")
 def model_name(model: str) -> str:
     """Name of a kind of model."""
     return MODEL_WORDS.get(model, (model, ""))[0]
-
-
-def state_text(state: State) -> str:
-    """State of a run, for a list."""
-    return {"died": "ended unexpectedly", "running": "training"}.get(state, state)
 
 
 def point_text(point: EpochPoint) -> str:

@@ -265,21 +265,12 @@ class ChartView(Canvas):
         """Axes, legend, curves, the best mark, and what is pointed at."""
         chart, plot = self._chart, self.plot_rect()
         across, upwards = chart.across, chart.upwards
+        widest = max(int(plot.width() / (44 if across.log else 52)), 2)
         most = max(int(plot.height() / (1.8 * painter.fontMetrics().height())), 2)
-        paint_axes(
-            painter,
-            plot,
-            self._display.palette,
-            [
-                (self.place_of(value, upwards.low).x(), across.text(value))
-                for value in across.ticks(max(int(plot.width() / (44 if across.log else 52)), 2))
-            ],
-            [
-                (self.place_of(across.low, value).y(), upwards.text(value))
-                for value in upwards.ticks(most)
-            ],
-            chart.below,
-        )
+        at = self.place_of
+        columns = [(at(one, upwards.low).x(), across.text(one)) for one in across.ticks(widest)]
+        lines = [(at(across.low, one).y(), upwards.text(one)) for one in upwards.ticks(most)]
+        paint_axes(painter, plot, self._display.palette, columns, lines, chart.below)
         self._paint_legend(painter)
         with clipped(painter, plot.adjusted(-8, -8, 8, 8)):
             for curve in chart.curves:

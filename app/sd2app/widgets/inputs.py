@@ -20,14 +20,13 @@ from PySide6.QtWidgets import (
 from sd2core.errors import Sd2Error
 from sd2core.files.quantities import parse_quantity
 
+_ENDING_KEYS = (Qt.Key.Key_Escape, Qt.Key.Key_Return, Qt.Key.Key_Enter)
 _STEP_KEYS = (
     Qt.Key.Key_Up,
     Qt.Key.Key_Down,
     Qt.Key.Key_PageUp,
     Qt.Key.Key_PageDown,
-    Qt.Key.Key_Return,
-    Qt.Key.Key_Enter,
-    Qt.Key.Key_Escape,
+    *_ENDING_KEYS,
 )
 
 _PLAIN = (
@@ -35,7 +34,6 @@ _PLAIN = (
     Qt.KeyboardModifier.ShiftModifier,
     Qt.KeyboardModifier.KeypadModifier,
 )
-_ENDING_KEYS = (Qt.Key.Key_Escape, Qt.Key.Key_Return, Qt.Key.Key_Enter)
 
 
 class NumberBox(QDoubleSpinBox):
@@ -124,21 +122,19 @@ class NumberBox(QDoubleSpinBox):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """End the editing with Return or Escape."""
+        ends = event.key() in _ENDING_KEYS
         if event.key() == Qt.Key.Key_Escape:
             self._end_typing()
             self.lineEdit().setText(
                 self.prefix() + self.textFromValue(self.value()) + self.suffix()
             )
-            self.clearFocus()
+        elif ends and (refusal := self._refusal(self.lineEdit().text())):
+            self._refuse(refusal)
             return
-        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
-            if refusal := self._refusal(self.lineEdit().text()):
-                self._refuse(refusal)
-                return
+        else:
             super().keyPressEvent(event)
+        if ends:
             self.clearFocus()
-            return
-        super().keyPressEvent(event)
 
     def focusOutEvent(self, event: QFocusEvent) -> None:
         """Take what was typed, or go back to the number before it and say why."""

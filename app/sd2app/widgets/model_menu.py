@@ -86,9 +86,8 @@ class ModelMenu(QMenu):
         self.addActions(self._below)
 
     def _add(self, text: str, tip: str, path: Path | None) -> None:
-        action = self.addAction(text)
+        action = self.addAction(text, lambda: self._use(path))
         action.setToolTip(tip)
-        action.triggered.connect(lambda: self._use(path))
         action.setCheckable(True)
         action.setActionGroup(self._group)
         action.setChecked(self.chosen.path == path)

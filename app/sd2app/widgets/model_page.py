@@ -29,10 +29,8 @@ def map_and_file_rows(
     axis: VelocityAxis, frame_rate_hz: float, path: Path | None
 ) -> Iterator[tuple[str, str]]:
     """The maps that a model knows, and its file."""
-    yield (
-        "Works on",
-        (f"{axis.bins} bins over ±{axis.v_max_mps:g} m/s, {frame_rate_hz:g} frames/s"),
-    )
+    shown = f"{axis.bins} bins over ±{axis.v_max_mps:g} m/s, {frame_rate_hz:g} frames/s"
+    yield "Works on", shown
     if path is not None:
         try:
             size_kb = path.stat().st_size / 1000
@@ -45,12 +43,9 @@ def about_sections(
     content: Mapping[str, Any],
 ) -> Iterator[tuple[str, list[tuple[str, str]]]]:
     """Notes of a model's makers by heading, limits and measurements first."""
-    about = dict(content)
-    for name in ("limits", "metrics", "data", "command"):
-        if name in about:
-            yield _heading(name), list(_lines(about.pop(name)))
-    for name, value in about.items():
-        yield _heading(name), list(_lines(value))
+    first = [name for name in ("limits", "metrics", "data", "command") if name in content]
+    for name in dict.fromkeys([*first, *content]):
+        yield _heading(name), list(_lines(content[name]))
 
 
 def _heading(name: str) -> str:

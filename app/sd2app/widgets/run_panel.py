@@ -121,17 +121,11 @@ class RunView(QWidget, Generic[Run]):
         *harmless, delete = self._buttons.values()
         # At the top, where no text above moves them; the one that deletes stands below, so that it
         # never comes to where another one was.
-        self.column = column_of(
-            row_of(*harmless, STRETCH, spacing_px=6),
-            self._headline,
-            self._bar,
-            self._time,
-            row_of(delete, STRETCH, spacing_px=6),
-            self._reason,
-            self._note,
-            spacing_px=6,
-            margins_px=0,
-        )
+        top = row_of(*harmless, STRETCH, spacing_px=6)
+        below = row_of(delete, STRETCH, spacing_px=6)
+        words = self._headline, self._bar, self._time
+        parts = top, *words, below, self._reason, self._note
+        self.column = column_of(*parts, spacing_px=6, margins_px=0)
         self.setLayout(self.column)
         runs.changed.connect(self.refresh)
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QDialog, QDialogButtonBox, QPlainTextEdit, QWidget
 
+from sd2app.background.latest import delayed
 from sd2app.shell.messages.model import Message, MessagesModel
 from sd2app.widgets.dialogs import closing
 from sd2app.widgets.layouts import column_of
@@ -22,9 +22,7 @@ class MessageNotice(Notice):
     def __init__(self, messages: MessagesModel) -> None:
         super().__init__("Message", close=messages.dismiss)
         self._messages = messages
-        self._timer = QTimer(self)
-        self._timer.setSingleShot(True)
-        self._timer.timeout.connect(self._time_out)
+        self._timer = delayed(self._time_out, _REMARK_MS, self)
         messages.changed.connect(self._refresh)
 
     def _refresh(self) -> None:
@@ -42,11 +40,11 @@ class MessageNotice(Notice):
         self.show_words(head, "\n".join(shown), "warning" if messages.failed else "plain")
         self._timer.stop()
         if lines and not messages.failed:
-            self._timer.start(_REMARK_MS)
+            self._timer.start()
 
     def _time_out(self) -> None:
         if self.underMouse():
-            self._timer.start(_REMARK_MS)  # it is being read
+            self._timer.start()  # it is being read
         else:
             self._messages.dismiss()
 
@@ -64,9 +62,8 @@ class MessagesDialog(QDialog):
         self.list.setAccessibleName("Messages, the newest first")
         self.list.setPlaceholderText(_NOTHING)
         buttons = closing(self)
-        buttons.addButton("Clear", QDialogButtonBox.ButtonRole.ResetRole).clicked.connect(
-            messages.forget
-        )
+        clear = buttons.addButton("Clear", QDialogButtonBox.ButtonRole.ResetRole)
+        clear.clicked.connect(messages.forget)
         self.setLayout(column_of(self.list, buttons))
         messages.changed.connect(self._refresh)
         self._refresh()
