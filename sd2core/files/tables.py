@@ -29,9 +29,9 @@ def markdown_table(rows: Sequence[Sequence[str]]) -> list[str]:
     return [f"| {' | '.join(row)} |" for row in (rows[0], rule, *rows[1:])]
 
 
-def counted(number: int, what: str) -> str:
-    """``1 span``, ``2 spans``."""
-    return f"{number:,} {what}" + ("" if number == 1 else "s")
+def counted(number: int, what: str, several: str = "") -> str:
+    """``1 map``, ``2,000 maps``; ``several`` is a plural without a plain ``s``."""
+    return f"{number:,} {what if number == 1 else several or what + 's'}"
 
 
 # With wide signs, which some spreadsheets compute as well. Apostrophes count, so that a text with

@@ -41,8 +41,10 @@ _VIEWS: tuple[tuple[str, Preset, str, str], ...] = (
 )
 
 _SHORT = {
-    colour: text.removeprefix("Colour by ").removesuffix(" mesh").lower()
-    for colour, text, _ in _COLOURS
+    "velocity": "radial velocity",
+    "range": "range",
+    "visibility": "visibility",
+    "plain": "plain",
 }
 
 

@@ -329,13 +329,16 @@ class SceneView(QWidget):
     def _choose_cursor(self) -> None:
         if self._backend is None:
             return
-        shapes = {
-            Qt.CursorShape.ClosedHandCursor: self.navigator.holds_sensor,
-            Qt.CursorShape.OpenHandCursor: self.navigator.hovers_sensor,
-            Qt.CursorShape.PointingHandCursor: self.navigator.marker is not None,
-            Qt.CursorShape.CrossCursor: self.inertial_hand.placing,
-        }
-        shape = next((one for one, fits in shapes.items() if fits), Qt.CursorShape.ArrowCursor)
+        if self.navigator.holds_sensor:
+            shape = Qt.CursorShape.ClosedHandCursor
+        elif self.navigator.hovers_sensor:
+            shape = Qt.CursorShape.OpenHandCursor
+        elif self.navigator.marker is not None:
+            shape = Qt.CursorShape.PointingHandCursor
+        elif self.inertial_hand.placing:
+            shape = Qt.CursorShape.CrossCursor
+        else:
+            shape = Qt.CursorShape.ArrowCursor
         if self._backend.widget.cursor().shape() != shape:
             self._backend.widget.setCursor(shape)
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import time
 
+from sd2core.files.tables import counted as counted
+
 
 def duration_text(seconds: float) -> str:
     """Duration, rounded as an estimate."""
@@ -60,11 +62,6 @@ def milliseconds(value_ms: float) -> str:
 def seconds(value_s: float) -> str:
     """Duration in seconds or milliseconds."""
     return milliseconds(1e3 * value_s) if value_s < 1 else f"{number(value_s)} s"
-
-
-def counted(number: int, what: str, several: str = "") -> str:
-    """``1 map``, ``2,000 maps``; ``several`` is a plural without a plain ``s``."""
-    return f"{number:,} {what if number == 1 else several or what + 's'}"
 
 
 def bytes_text(count: int) -> str:
