@@ -118,14 +118,20 @@ class KnownMovements:
         if not moving.any():
             return self
 
-        def errors(trust: float) -> NDArray[np.float64]:
-            mixed = replace(self, trust=trust).mixed(answers, energies, axis)
-            return _errors(mixed, radar, moving, axis)
+        seen = _velocities(radar, axis)
 
-        none = errors(0.0)
+        def errors(trust: float) -> NDArray[np.float64]:
+            """Of every segment: cells, and velocities in frames that move, (3, segments)."""
+            mixed = replace(self, trust=trust).mixed(answers, energies, axis)
+            cells = np.abs(mixed - radar).sum(axis=(1, 2), dtype=np.float64)
+            off = np.abs(_velocities(mixed, axis) - seen) * moving
+            return np.stack([cells, *off.sum(axis=2)])
+
+        found = {trust: errors(trust) for trust in _TRUSTS}
+        none = found[0.0]
 
         def loss(trust: float) -> float:
-            change = errors(trust) - none
+            change = found[trust] - none
             counted = np.where(change > 0.0, _HARM * change, change).sum(axis=1)
             return float((counted / np.maximum(none.sum(axis=1), 1e-12)).sum())
 
@@ -171,16 +177,11 @@ def _moments(
     return mean, np.sqrt(np.maximum(square - mean**2, 0.0))
 
 
-def _errors(
-    estimate: NDArray[np.float32],
-    radar: NDArray[np.float32],
-    moving: NDArray[np.bool_],
-    axis: VelocityAxis,
-) -> NDArray[np.float64]:
-    """Errors of segments: peak and mean velocity in frames that move, and cells; (3, segments)."""
-    one, other = (values.reshape(-1, axis.bins) for values in (estimate, radar))
-    found = [np.abs(estimate - radar).sum(axis=(1, 2), dtype=np.float64)]
-    for velocity in (peak_velocity_mps, mean_velocity_mps):
-        off = np.abs(np.nan_to_num(velocity(one, axis)) - np.nan_to_num(velocity(other, axis)))
-        found.append((off.reshape(moving.shape) * moving).sum(axis=1))
-    return np.stack(found)
+def _velocities(energies: NDArray[np.float32], axis: VelocityAxis) -> NDArray[np.float64]:
+    """Peak and mean velocity of every frame (segments, frames, bins), (2, segments, frames).
+
+    They are 0 where the frame is empty.
+    """
+    frames = energies.reshape(-1, axis.bins)
+    found = [np.nan_to_num(of(frames, axis)) for of in (peak_velocity_mps, mean_velocity_mps)]
+    return np.stack(found).reshape(2, *energies.shape[:-1])

@@ -38,7 +38,8 @@ _STRETCH = 0.992
 _TOE_OFF_DEG = 32.0
 _STRIKE_DEG = 14.0
 _ARM_SWING_DEG = 20.0
-_GRID_HZ = 240.0
+GRID_HZ = 240.0
+"""Frame rates divide it."""
 _DOWN = np.array([0.0, 1.0, 0.0])
 _ACROSS = np.array([1.0, 0.0, 0.0])
 
@@ -88,7 +89,7 @@ def gait(skeleton: Skeleton, times_s: Floats, path: Path, arm_scale: float = 1.0
     :func:`sd2core.simulate.limbs.reach`.
     """
     duration_s = float(times_s[-1]) + 1.0
-    fine = np.arange(0.0, duration_s, 1.0 / _GRID_HZ)
+    fine = np.arange(0.0, duration_s, 1.0 / GRID_HZ)
     rotations = np.tile(np.eye(3), (len(fine), len(skeleton), 1, 1))
     leg_m = _leg_length_m(skeleton)
     steps = plan_steps(path, float(times_s[-1]), _HALF_BASE * leg_m)
@@ -103,10 +104,10 @@ def gait(skeleton: Skeleton, times_s: Floats, path: Path, arm_scale: float = 1.0
         _stand(skeleton, rotations, translation, "LR"[side], foot, yaw_deg)
     # Arms are posed on a body that faces the camera, and turn with the trunk.
     _swing_arms(skeleton, rotations, lead, pace, arm_scale)
-    rows = np.clip(np.rint(np.asarray(times_s) * _GRID_HZ).astype(int), 0, len(fine) - 1)
-    if np.allclose(rows / _GRID_HZ, times_s, atol=1e-9):
+    rows = np.clip(np.rint(np.asarray(times_s) * GRID_HZ).astype(int), 0, len(fine) - 1)
+    if np.allclose(rows / GRID_HZ, times_s, atol=1e-9):
         return Motion(rotations[rows], translation[rows])
-    raise ValueError(f"times must be multiples of 1/{_GRID_HZ:g} s")
+    raise ValueError(f"times must be multiples of 1/{GRID_HZ:g} s")
 
 
 class _Foot(NamedTuple):
@@ -218,7 +219,7 @@ def _pelvis_way(
     # The smooth curve stays above the needed drop: widest in a window, then rounded.
     from scipy.ndimage import maximum_filter1d
 
-    translation[:, 1] = _smoothed(maximum_filter1d(drop, int(0.24 * _GRID_HZ)), 0.06)
+    translation[:, 1] = _smoothed(maximum_filter1d(drop, int(0.24 * GRID_HZ)), 0.06)
     return translation
 
 
@@ -283,5 +284,5 @@ def _leg_length_m(skeleton: Skeleton) -> float:
 def _smoothed(values: Floats, sigma_s: float) -> Floats:
     from scipy.ndimage import gaussian_filter1d
 
-    smooth: NDArray[np.float64] = gaussian_filter1d(values, sigma_s * _GRID_HZ, mode="nearest")
+    smooth: NDArray[np.float64] = gaussian_filter1d(values, sigma_s * GRID_HZ, mode="nearest")
     return smooth

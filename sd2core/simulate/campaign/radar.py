@@ -80,9 +80,9 @@ def radar_at(frames_per_s: float, bins: int, radar: RadarConfig = PAPER_RADAR) -
     The paper's has two chirps per bin of the map.
     """
     fitting = int((1.0 + 1e-9) / (frames_per_s * radar.chirp_repetition_s))
-    chirps = min(2 * bins if radar == PAPER_RADAR else radar.chirps_per_frame, fitting)
-    name = radar.name
+    chirps, name = min(radar.chirps_per_frame, fitting), radar.name
     if radar == PAPER_RADAR:
+        chirps = min(2 * bins, fitting)
         name = f"60 GHz, {chirps} chirps, 32 samples, {frames_per_s:g} frames/s"
     return replace(radar, frame_repetition_s=1.0 / frames_per_s, chirps_per_frame=chirps, name=name)
 

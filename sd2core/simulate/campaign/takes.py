@@ -30,6 +30,7 @@ from sd2core.simulate.campaign.motion import perform
 from sd2core.simulate.campaign.protocol import VARIED, Protocol
 from sd2core.simulate.campaign.radar import PROCESSING, TargetOptions, radar_target
 from sd2core.simulate.campaign.scene import kept_away, random_setting, random_subject
+from sd2core.simulate.gait import GRID_HZ
 from sd2core.timebase import Timebase
 
 FITTED: Resolution = "medium"
@@ -77,6 +78,14 @@ class Campaign:
                 f"Movements {self.protocol.movements} and recorded motions from {self.motions}",
                 "recorded motions for movements captured or both, and for those only",
                 "Say with --motions where they are",
+            )
+        steps = GRID_HZ * self.radar.frame_repetition_s
+        pacing = self.protocol.others and self.protocol.movements != "captured"
+        if pacing and abs(steps - round(steps)) > 1e-6:
+            raise Sd2Error(
+                f"People pace, and {1.0 / self.radar.frame_repetition_s:g} frames/s",
+                f"a rate that {GRID_HZ:g} is a multiple of",
+                "Choose another one, e.g. --rate 24",
             )
         least, most = self.error_sizes
         if not 0.0 <= least <= most <= 10.0:

@@ -16,7 +16,7 @@ from sd2core.mocap.body_motion import RATE_HZ, BodyMotion, load_motions
 from sd2core.pairs.store import Take
 from sd2core.simulate.campaign.captured import CapturedMotions
 from sd2core.simulate.campaign.protocol import PAPER, VARIED
-from sd2core.simulate.campaign.radar import TargetOptions
+from sd2core.simulate.campaign.radar import TargetOptions, radar_at
 from sd2core.simulate.campaign.scene import RANGES_M, random_subject
 from sd2core.simulate.campaign.takes import Campaign, TakeMaker
 
@@ -140,6 +140,15 @@ def test_both_in_turn_and_radars_drawn(motions: Path) -> None:
     noise_db = [radar.link.noise_figure_db for radar in radars if radar.link is not None]
     assert min(noise_db) < 6.0
     assert max(noise_db) > 18.0
+
+
+def test_only_who_paces_needs_frames_that_fit_the_gait(motions: Path) -> None:
+    asked = {"radar": radar_at(25.0, 32)}
+    for others in (campaign(motions, **asked), campaign(None, protocol=PAPER, **asked)):
+        assert len(TakeMaker(others).make(0, 1)[0].times_s) == 100
+    for protocol in (VARIED, replace(VARIED, movements="both")):
+        with pytest.raises(Sd2Error, match=r"25 frames/s.*240 is a multiple of.*--rate 24"):
+            campaign(motions if protocol != VARIED else None, protocol=protocol, **asked)
 
 
 def test_a_campaign_of_before_says_what_it_said() -> None:
