@@ -48,6 +48,7 @@ class MapError:
 
     # Σ|x̂ − x| / Σx of the energies; 0 when both are empty, infinite when only the estimate is not.
     relative_l1: float
+    shape_l1: float  # The same with the estimate brought to the target's energy: its gain is free.
     # Root mean square error of compressed values, over the bins that are not nulled; 1 for an empty
     # estimate of maps like those of the training.
     rmse_compressed: float
@@ -134,12 +135,18 @@ def map_error(
         np.delete(values, list(null_bins), axis=1).astype(np.float64)
         for values in (estimate, target)
     )
-    difference, total = float(np.abs(found - wanted).sum()), float(wanted.sum())
-    without_target = float("inf") if difference > 0 else 0.0
-    relative = difference / total if total > 0 else without_target
+    total, energy = float(wanted.sum()), float(found.sum())
+
+    def relative_l1(estimated: NDArray[np.float64]) -> float:
+        difference = float(np.abs(estimated - wanted).sum())
+        without_target = float("inf") if difference > 0 else 0.0
+        return difference / total if total > 0 else without_target
+
+    relative = relative_l1(found)
+    shape = relative_l1(found * (total / energy)) if energy > 0 and total > 0 else relative
     found, wanted = compression.compress(found), compression.compress(wanted)
     rmse = float(np.sqrt(((found - wanted) ** 2).mean())) if found.size else float("nan")
-    return MapError(relative, rmse, _correlation(found.ravel(), wanted.ravel()))
+    return MapError(relative, shape, rmse, _correlation(found.ravel(), wanted.ravel()))
 
 
 def stands_out(

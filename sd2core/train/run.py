@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import time
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -38,6 +39,8 @@ from sd2core.train.validate import Exam, Validation
 
 _SHOWS = 0.4
 """Share of the frames in which a cell must show, or it is empty in a denoised map."""
+_NAMED = 12
+"""No more people are named in a card's words."""
 
 
 def carry_out(
@@ -291,19 +294,46 @@ class _About:
         pairs, split = self.data.pairs, self.data.split
         names = ", ".join(path.name for path in self.config.data.pairs)
         frames = sum(len(take.times_s) for take in self.data.learnt_takes)
+        few = len(split.training) <= _NAMED
+        people = f" ({', '.join(split.training)})" if few else ""
         return (
-            f"{names}: {len(split.training)} people"
-            f" ({', '.join(split.training)}), {frames / pairs.frame_rate_hz / 60:.1f} min"
+            f"{names}: {len(split.training)} people{people}, {frames / pairs.frame_rate_hz / 60:.1f} min"
             f" of {pairs.kind} radar at {pairs.frame_rate_hz:g} frames/s"
         )
 
     def _limits(self) -> str:
-        said = [f"Knows movements like those of {len(self.data.split.training)} people."]
+        stores = self.data.pairs.provenance.get("mixed", [self.data.pairs.provenance])
+        said = [
+            f"Knows movements like those of {len(self.data.split.training)} people"
+            f"{_named('movements', map(_movements, stores))}"
+            f"{_named('before', map(_radar, stores))}."
+        ]
         if self.data.pairs.kind == "simulated":
             said.append("Learnt from a simulated radar; nothing is said about a real one.")
         if self.data.split.by_take:
             said.append("Validated on other minutes of the same people, not on other people.")
         return " ".join(said)
+
+
+def _named(what: str, words: Iterable[str]) -> str:
+    """Part of a sentence with all different words; nothing where none is known."""
+    known = list(dict.fromkeys(word for word in words if word))
+    return f"; {what}: {', '.join(known)}" if known else ""
+
+
+def _movements(store: Mapping[str, Any]) -> str:
+    """Movements in a store of pairs, as far as its provenance says."""
+    campaign = store.get("made_by") == "sd2 simulate campaign"
+    moves = store.get("protocol", {}).get("movements", "swipes") if campaign else ""
+    return {"both": "swipes and recorded motion", "captured": "recorded motion"}.get(moves, moves)
+
+
+def _radar(store: Mapping[str, Any]) -> str:
+    """Radar of a store of pairs, as far as its provenance says."""
+    radar = store.get("radar", "")
+    name = str(radar.get("name", "")) if isinstance(radar, Mapping) else str(radar)
+    drawn = store.get("protocol", {}).get("drawn_radars")
+    return f"{name} with surfaces and noise drawn" if name and drawn else name
 
 
 def _errors(name: str, found: Validation) -> dict[str, float | None]:

@@ -135,6 +135,7 @@ class TestMaps:
         target = np.random.default_rng(seed).exponential(size=(20, 6))
         found = map_error(factor * target, target, self.COMPRESSION)
         assert found.relative_l1 == pytest.approx(abs(factor - 1))
+        assert found.shape_l1 == pytest.approx(0.0, abs=1e-9)
         assert found.correlation == pytest.approx(1.0)
 
     def test_an_empty_estimate_has_an_error_of_one(self) -> None:
