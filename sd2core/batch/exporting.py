@@ -68,7 +68,8 @@ def export_dataset(folder: BatchFolder, export: Export) -> None:
         overlap=export.overlap_frames,
         validation=export.validation_subjects,
         test=export.test_subjects,
-        **export.model_dump(include={"kinds", "frame_rate_hz", "limbs", "title"}),
+        spans=export.spans,
+        **export.model_dump(include={"kinds", "frame_rate_hz", "min_purity", "limbs", "title"}),
     )
     settings = key_of("export", {"settings": export.model_dump(mode="json")})
     if _noted(folder).get("settings") != settings or _is_stale(out, folder, export):
@@ -170,7 +171,7 @@ def _loader(
 ) -> Any:
     def load(_: Progress) -> Source:
         from sd2core.datasets.recording_sources import labels_and_classes
-        from sd2core.datasets.source import Source, label_per_frame
+        from sd2core.datasets.source import Source, label_per_frame, labelled_spans
         from sd2core.labels.spans import Labels
         from sd2core.mocap.recording_pairs import on_clock
 
@@ -198,6 +199,7 @@ def _loader(
                 "recording": key.recording if recording is None else recording.title,
                 "simulated": recording is not None and recording.simulated,
             },
+            spans=labelled_spans(labels.spans, names),
         )
 
     return load

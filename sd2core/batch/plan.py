@@ -18,6 +18,7 @@ from pydantic import (
 
 from sd2core.accuracy.plans import CHOSEN
 from sd2core.body.model import Resolution
+from sd2core.datasets.options import SpanOptions
 from sd2core.datasets.source import KINDS
 from sd2core.doppler.options import (
     PRESETS,
@@ -158,6 +159,10 @@ class Export(_Section):
     segment_frames: Annotated[int, Field(ge=2, le=10_000)] = LENGTH
     overlap_frames: Annotated[int, Field(ge=0)] = OVERLAP
     frame_rate_hz: Positive | None = None  # of all segments; otherwise that of the first source
+    min_purity: Annotated[FiniteFloat, Field(ge=0, le=1)] = 0.0
+    """Windows with less of their label than this share are left out."""
+    spans: SpanOptions | None = None
+    """One segment of each labelled span: ``margin_s``, ``shortest_s``, ``length``."""
     validation_subjects: tuple[Text, ...] | None = None
     """Chosen automatically if not given, like the test subjects."""
     test_subjects: tuple[Text, ...] | None = None

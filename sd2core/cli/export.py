@@ -10,7 +10,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.command_parser import Options, add_command
-from sd2core.cli.options import bin_list, given, name_list, positive_float, positive_int, share
+from sd2core.cli.options import (
+    bin_list,
+    given,
+    name_list,
+    not_negative_float,
+    positive_float,
+    positive_int,
+    share,
+)
 from sd2core.cli.output import (
     counted,
     duration,
@@ -62,6 +70,17 @@ def _add_content(parser: Options) -> None:
     group.add_choice("--label-rule", ("foreground", "majority"), text, "foreground")
     text = "least share of a segment for foreground (default: 20%%)"
     group.add_value("--min-share", share, "SHARE", text, 0.2)
+    text = "leave out windows with less of their label than this share (default: none)"
+    group.add_value("--min-purity", share, "SHARE", text, 0.0)
+    text = "windows, wherever labels begin, or one segment per labelled span"
+    group.add_choice("--segments", ("windows", "spans"), text, "windows")
+    text = "of spans: time kept before and after each"
+    group.add_value("--margin-s", not_negative_float, "S", text, 0.0)
+    group.add_value(
+        "--shortest-s", not_negative_float, "S", "of spans: leave out shorter ones", 0.0
+    )
+    text = "of spans: fill up with empty frames, which the array mask tells apart, or stretch"
+    group.add_choice("--span-length", ("padded", "resampled"), text, "padded")
     group.add_value("--title", str, "TEXT", "title of the card and the sheet", "")
     people = parser.add_argument_group("people")
     text = "subject of each recording and map, separated by commas, in their order (default:"
@@ -98,13 +117,14 @@ def _add_making(parser: Options) -> None:
 def _export(options: argparse.Namespace) -> int:
     """Write a data set to learn from: segments with labels, sensors and provenance.
 
-    Cuts maps into segments of 72 frames and writes them with a label per frame and per
-    segment, subject, sensor, provenance, and a split by subject. Beside the data set
-    come a card (.card.md, .card.json) and a preview sheet (.png). Inputs are recordings
-    or folders of them, pairs, and Doppler maps. Sources that are in the
+    Cuts maps into segments, windows of 72 frames or one of each labelled span, and writes
+    them with a label per frame and per segment, subject, sensor, provenance, and a split by
+    subject. Beside it come a card (.card.md, .card.json) and a preview sheet (.png).
+    Inputs are recordings or folders of them, pairs, and Doppler maps. Sources that are in the
     data set already are kept: the same command resumes a stopped export, or adds inputs.
 
       sd2 export walk.sd2 --out walk.zarr
+      sd2 export walk.sd2 --segments spans --margin-s 0.2 --out gestures.zarr
       sd2 export anna.sd2 ben.sd2 --placements grid.json --out gestures.h5
       sd2 export campaign.zarr --kinds denoised,simulated --out campaign-set.zarr
       sd2 export recordings/ --out set.zarr --dry-run
@@ -154,8 +174,9 @@ def _exported(options: argparse.Namespace) -> int:
 
 
 def _dataset_options(options: argparse.Namespace) -> DatasetOptions:
-    from sd2core.datasets.options import DatasetOptions
+    from sd2core.datasets.options import DatasetOptions, SpanOptions
 
+    spans = SpanOptions(options.margin_s, options.shortest_s, options.span_length)
     return DatasetOptions(
         kinds=tuple(options.kinds.replace(" ", "").split(",")),
         length=options.segment_frames,
@@ -164,7 +185,8 @@ def _dataset_options(options: argparse.Namespace) -> DatasetOptions:
         null_bins=options.null_bins,
         validation=options.validation_subjects,
         test=options.test_subjects,
-        **picked(options, "label_rule", "min_share", "limbs", "imu", "title"),
+        spans=spans if options.segments == "spans" else None,
+        **picked(options, "label_rule", "min_share", "min_purity", "limbs", "imu", "title"),
         provenance={"command": shlex.join(["sd2", *sys.argv[1:]])},
     )
 

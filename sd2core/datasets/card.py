@@ -48,13 +48,17 @@ def describe_dataset(dataset: Dataset) -> dict[str, Any]:
     frames = np.zeros(labels, np.int64)
     for start in range(0, len(dataset), _ROWS):
         part = np.asarray(dataset["label"][start : start + _ROWS])
+        if header.spans is not None:
+            part = part[np.asarray(dataset["mask"][start : start + _ROWS])]
         frames += np.bincount(part.ravel(), minlength=labels)
     of_subject = np.bincount(column["subject"], minlength=len(header.subjects))
     available = column["available"].sum(axis=0)
     sources = _Sources()
     for entry in dataset.sources():
         sources.add(entry)
-    imu = {"imu_cutoff_hz": sources.imu_cutoff_hz} if header.imu else {}
+    more: dict[str, Any] = {"imu_cutoff_hz": sources.imu_cutoff_hz} if header.imu else {}
+    if header.spans is not None:
+        more["spans_counted"] = dict(sources.spans)
     by_label = _named(header.labels, segments.sum(axis=1))
     return {
         "format": CARD_FORMAT,
@@ -87,7 +91,7 @@ def describe_dataset(dataset: Dataset) -> dict[str, Any]:
         "simulated_recordings": sources.simulated,
         "accuracy": sources.accuracy,
         "how": sources.how(),
-        **imu,
+        **more,
     }  # fmt: skip
 
 
@@ -111,6 +115,7 @@ class _Sources:
         self.simulated = 0
         self.minutes = 0.0
         self.frames_without_person = 0
+        self.spans: Counter[str] = Counter()
         self._views: Counter[int] = Counter()
         self._cutoffs_hz: list[float] = []
         self._accuracies: list[MapAccuracy] = []
@@ -127,6 +132,7 @@ class _Sources:
             self.minutes += entry["frames"] / entry["frame_rate_hz"] / 60
             self.frames_without_person += entry["frames"] - entry["frames_with_person"]
             self.simulated += bool(provenance.get("simulated"))
+            self.spans.update(entry.get("spans", {}))
         for made in provenance.get("imu", {}).values():
             self._cutoffs_hz.append(made["cutoff_hz"])
         for kind, made in provenance["maps"].items():
@@ -273,7 +279,19 @@ def limits(card: dict[str, Any]) -> list[str]:
     several = [kind for kind, units in card["units"].items() if len(units) > 1]
     if several:
         found.append(f"Values of {' and '.join(several)} come in several units: scale each source.")
-    if card["resampled_segments"]:
+    spans = card.get("spans")
+    left_out = card["spans_counted"].items() if spans else ()
+    found += [
+        f"{count:,} labelled spans are {why}: they give no segment."
+        for why, count in left_out
+        if why != "segments"
+    ]
+    if spans and spans["length"] == "resampled":
+        found.append(
+            "Spans were stretched to one length: velocities are as they were, durations are"
+            " `end_s` - `start_s`."
+        )
+    elif card["resampled_segments"]:
         found.append(
             f"{card['resampled_segments']:,} segments had uneven frames or another frame rate and"
             f" were brought to {card['frame_rate_hz']:g} frames/s by linear interpolation."
@@ -284,16 +302,19 @@ def limits(card: dict[str, Any]) -> list[str]:
         )
     if card["sources_without_segments"]:
         found.append(
-            f"{card['sources_without_segments']} sources are shorter than a segment and give none."
+            f"{card['sources_without_segments']} sources give no segment:"
+            f" {'nothing is labelled there' if spans else 'they are too short, or not pure'}."
         )
     if len([count for count in card["segments_of_label"].values() if count]) < 2:
         found.append("All segments have the same label.")
     never = [name for name, count in card["segments_of_label"].items() if not count]
     if never:
         found.append(f"No segment is labelled {', '.join(never)}; single frames may be.")
-    found.append(
-        f"Neighbouring segments share {card['overlap']} frames or more: they are not independent."
-    )
+    if not spans:
+        found.append(
+            f"Neighbouring segments share {card['overlap']} frames or more: they are not"
+            " independent."
+        )
     if card["placements"] > 1:
         found.append(
             "Placements show the same movements from other places: they add views, not movements."
@@ -308,9 +329,10 @@ def duration_text(card: dict[str, Any]) -> str:
 
 
 def _summary(card: dict[str, Any]) -> str:
+    one_each = ", one of each labelled span," if card.get("spans") else ""
     return (
-        f"{card['segments']:,} segments of {card['length']} frames ({card['segment_s']:.2f} s at"
-        f" {card['frame_rate_hz']:g} frames/s) × {card['bins']} velocity bins, from"
+        f"{card['segments']:,} segments{one_each} of {card['length']} frames"
+        f" ({card['segment_s']:.2f} s at {card['frame_rate_hz']:g} frames/s) × {card['bins']} velocity bins, from"
         f" {counted(card['recordings'], 'recording')} of"
         f" {counted(len(card['subjects']), 'subject')}, {duration_text(card)}"
         + (f", each seen from up to {card['placements']} places" if card["placements"] > 1 else "")
@@ -374,6 +396,13 @@ def _labels(card: dict[str, Any]) -> str:
         for label, count in card["segments_of_label"].items()
     ]
     rule = _RULES[card["label_rule"]].format(share=card["min_share"])
+    if card.get("min_purity"):
+        rule += f"; segments less than {card['min_purity']:.0%} of which have it are left out"
+    spans = card.get("spans")
+    if spans:
+        rule = f"that of its span; {spans['margin_s']:g} s before and after it are kept"
+        if spans["length"] == "padded":
+            rule += ", and empty frames fill it (`mask` is false there)"
     classes = ", ".join(
         f"{name} {count:,}" for name, count in card["segments_of_class"].items()
     )  # fmt: skip
@@ -420,8 +449,9 @@ def _axes(card: dict[str, Any]) -> str:
         f"velocity: {card['bins']} bins of {width:g} m/s over ±{card['v_max_mps']:g} m/s,"
         " approaching is positive",
         f"bins set to zero in all kinds: {nulled}",
-        f"segments share {card['overlap']} frames with the next one",
     ]
+    if not card.get("spans"):
+        lines.append(f"segments share {card['overlap']} frames with the next one")
     for name, words, unit in (
         ("range_m", "range of the sensor from the body", " m"),
         ("azimuth_deg", "azimuth, as seen from the body", "°"),

@@ -24,6 +24,12 @@ def clips_of_dataset(dataset: Dataset, kind: MapKind) -> ClipSet:
     counts once and a classifier that remembers sees whole movements.
     """
     header = dataset.header
+    if header.spans is not None and header.spans.length == "resampled":
+        raise Sd2Error(
+            f"{dataset.path} holds spans that were stretched to one length",
+            "frames at the pace at which they came",
+            "Export windows, or spans that are padded",
+        )
     if kind not in header.kinds:
         raise Sd2Error(f"{dataset.path} holds no {kind} maps", f"one of {', '.join(header.kinds)}")
     names = [header.classes.get(label, label) for label in header.labels]
@@ -39,9 +45,14 @@ def clips_of_dataset(dataset: Dataset, kind: MapKind) -> ClipSet:
     # which are no whole numbers of frames; only what was resampled has just its times.
     frames, times_s = dataset["start_frame"][:][rows], dataset["start_s"][:][rows]
     first_frame = np.where(resampled, times_s * header.frame_rate_hz, frames.astype(np.float64))
-    for run, starts in _runs(2 * source + resampled, first_frame, header.length):
+    # Spans are clips of their own, even where they lie side by side.
+    belongs = 2 * source + resampled if header.spans is None else np.arange(len(rows))
+    for run, starts in _runs(belongs, first_frame, header.length):
         energies = _joined(dataset[kind][rows[run]], starts)
         label = _joined(dataset["label"][rows[run]], starts)
+        if header.spans is not None:
+            filled = dataset["mask"][rows[run]][0]
+            energies, label = energies[filled], label[filled]
         first = run.start
         clips.append(
             Clip(

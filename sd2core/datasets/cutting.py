@@ -1,9 +1,10 @@
 """Cutting of a source into segments: pure functions from maps to rows of a data set.
 
-Segments lie within clips: runs of frames with a person, between which no time is missing.
-Where frames come evenly and at the rate of the data set, a segment holds them as they are.
-Otherwise the clip is brought to that rate first: energies are interpolated linearly, a label
-is that of the nearest frame, and a map is known where both its neighbours are.
+A segment is a window of fixed length, or what a labelled span holds. Both lie within clips: runs
+of frames with a person, between which no time is missing. Where frames come evenly and at the rate
+of the data set, a segment holds them as they are. Otherwise the clip is brought to that rate first:
+energies are interpolated linearly, a label is that of the nearest frame, and a map is known where
+both its neighbours are.
 """
 
 from __future__ import annotations
@@ -15,13 +16,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.datasets.options import DatasetOptions
-from sd2core.datasets.source import KINDS, Outline, Source
+from sd2core.datasets.options import DatasetOptions, SpanOptions
+from sd2core.datasets.source import KINDS, LabelledSpan, Outline, Source
 from sd2core.denoise.resample_to_model import clips, interpolated, is_regular
+from sd2core.errors import Sd2Error
 from sd2core.pairs.segments import cut, segment_starts
 
 _BLOCK = 256
 """Segments that are in memory at a time, besides the maps of the source."""
+_ROUNDING = 1e-6
 
 Arrays = dict[str, NDArray]
 
@@ -35,6 +38,7 @@ class Clip:
     times_s: NDArray[np.float64]  # Times of its frames as segments hold them.
     resampled: bool  # True if these are other times than those of the source.
     starts: NDArray[np.int64]  # First frames of the segments, within the clip.
+    span: LabelledSpan | None = None  # That it is; None: windows are cut from it.
 
 
 def clips_of(
@@ -61,15 +65,73 @@ def clips_of(
     return found
 
 
+def clips_of_spans(
+    outline: Outline, frame_rate_hz: float, length: int, options: SpanOptions
+) -> tuple[list[Clip], Counter[str]]:
+    """Find the clip of one segment that each labelled span is, and why others are none.
+
+    Of a span that the person leaves, its longest part counts. Raises Sd2Error for a span of more
+    than ``length`` frames, unless spans are resampled.
+    """
+    times_s = outline.times_s
+    whole = clips_of(times_s, outline.present, frame_rate_hz, 1, 0)
+    ends_s = np.array([clip.times_s[-1] for clip in whole])
+    found: list[Clip] = []
+    left_out: Counter[str] = Counter()
+    for span in sorted(outline.spans):
+        parts = []
+        for number in range(int(np.searchsorted(ends_s, span.start_s)), len(whole)):
+            if whole[number].times_s[0] >= span.end_s:
+                break
+            first, last = np.searchsorted(whole[number].times_s, span[:2])
+            parts.append((int(last - first), number))
+        frames, number = max(parts, default=(0, 0))
+        if not frames or frames / frame_rate_hz < options.shortest_s - 1e-9:
+            why = "shorter than asked for" if frames else "without a frame that shows the person"
+            left_out[why] += 1
+            continue
+        clip = whole[number]
+        wide_s = span.start_s - options.margin_s, span.end_s + options.margin_s
+        own_s = clip.times_s[slice(*np.searchsorted(clip.times_s, wide_s))]
+        if options.length == "resampled":
+            own_s = np.linspace(own_s[0], own_s[-1], length)
+        elif len(own_s) > length:
+            raise Sd2Error(
+                f"The span {outline.labels[span.label]} at {span.start_s:.3f} s has"
+                f" {len(own_s)} frames with its margins, the segments {length}",
+                "spans that fit into a segment",
+                f"Choose segments of {len(own_s)} frames, or spans that are resampled",
+            )
+        resampled = clip.resampled or options.length == "resampled"
+        # Interpolation needs the frames around.
+        around = int(resampled)
+        start = max(int(np.searchsorted(times_s, own_s[0])) - around, clip.start)
+        stop = min(int(np.searchsorted(times_s, own_s[-1], "right")) + around, clip.stop)
+        found.append(Clip(start, stop, own_s, resampled, np.zeros(1, np.int64), span))
+    return found, left_out
+
+
+def count_spans(
+    outline: Outline, frame_rate_hz: float, length: int, options: SpanOptions
+) -> dict[str, int]:
+    """Count the spans that are segments (``segments``), and the others by their reasons."""
+    found, left_out = clips_of_spans(outline, frame_rate_hz, length, options)
+    return {"segments": len(found), **left_out}
+
+
 def count_segments(outline: Outline, frame_rate_hz: float, options: DatasetOptions) -> Counter[str]:
     """Count the segments of a source by their labels."""
     counts: Counter[str] = Counter()
+    if options.spans is not None:
+        found, _ = clips_of_spans(outline, frame_rate_hz, options.length, options.spans)
+        return Counter(outline.labels[clip.span.label] for clip in found if clip.span)
     for clip in clips_of(
         outline.times_s, outline.present, frame_rate_hz, options.length, options.overlap
     ):
         label = _label(outline.times_s, outline.label, clip)
         windows = label[clip.starts[:, None] + np.arange(options.length)]
-        named, _ = label_of_segments(windows, len(outline.labels), options)
+        named, purity = label_of_segments(windows, len(outline.labels), options)
+        named = named[purity >= options.min_purity - _ROUNDING]
         counts.update(outline.labels[number] for number in np.sort(named).tolist())
     return counts
 
@@ -87,26 +149,31 @@ def cut_source(
     the source. A block has, per segment (first axis), the kinds that the source has, ``limbs``
     and ``kinematics`` if they are wanted and its synthetic map has them, ``imu`` if it is wanted,
     and ``available``, ``label``, ``segment_label``, ``purity``, ``start_s``, ``start_frame``,
-    ``resampled``.
+    ``resampled``; of spans also ``mask`` and ``end_s``.
     """
     known = source.known
     kinds = [kind for kind in options.kinds if kind in source.maps]
     length = options.length
-    for clip in clips_of(source.times_s, source.present, frame_rate_hz, length, options.overlap):
-        label = label_numbers[_label(source.times_s, source.label, clip)]
+    if options.spans is None:
+        found = clips_of(source.times_s, source.present, frame_rate_hz, length, options.overlap)
+    else:
+        found, _ = clips_of_spans(source.outline(), frame_rate_hz, length, options.spans)
+    for clip in found:
+        label = _filled(label_numbers[_label(source.times_s, source.label, clip)], length)
         there = {kind: _known(source.times_s, known[kind], clip) for kind in kinds}
+        there = {kind: _filled(one, length, True) for kind, one in there.items()}
         values = {
-            kind: _values(source.maps[kind].values, source.times_s, clip, null_bins)
+            kind: _values(source.maps[kind].values, source.times_s, clip, null_bins, length)
             for kind in kinds
         }
         limbs = source.maps["synthetic"].limbs if options.limbs and "synthetic" in kinds else None
         if limbs is not None:
-            split = _values(limbs.values, source.times_s, clip, null_bins)
+            split = _values(limbs.values, source.times_s, clip, null_bins, length)
             assert limbs.kinematics is not None
-            moving = _values(limbs.kinematics, source.times_s, clip, ())
+            moving = _values(limbs.kinematics, source.times_s, clip, (), length)
         if options.imu:
             felt = np.stack([source.imu[name].channels for name in options.imu], axis=2)
-            channels = _values(felt.transpose(2, 1, 0), source.times_s, clip, ())
+            channels = _values(felt.transpose(2, 1, 0), source.times_s, clip, (), length)
         for begun in range(0, len(clip.starts), _BLOCK):
             starts = clip.starts[begun : begun + _BLOCK]
             places = starts[:, None] + np.arange(length)  # (segments, length)
@@ -123,9 +190,17 @@ def cut_source(
             if options.imu:
                 arrays["imu"] = cut(channels, starts, length)
             arrays["label"] = label[places]
-            arrays["segment_label"], arrays["purity"] = label_of_segments(
-                arrays["label"], int(label_numbers.max()) + 1, options
-            )
+            if clip.span is None:
+                arrays["segment_label"], arrays["purity"] = label_of_segments(
+                    arrays["label"], int(label_numbers.max()) + 1, options
+                )
+            else:
+                named = label_numbers[[clip.span.label]]
+                filled = len(clip.times_s)
+                arrays["segment_label"] = named
+                arrays["purity"] = np.array([(label[:filled] == named).mean()], np.float32)
+                arrays["mask"] = np.arange(length)[None] < filled
+                arrays["end_s"] = clip.times_s[-1:] + 1 / frame_rate_hz
             arrays["start_s"] = clip.times_s[starts]
             arrays["resampled"] = np.full(len(starts), clip.resampled)
             arrays["start_frame"] = (
@@ -133,7 +208,8 @@ def cut_source(
                 if clip.resampled
                 else clip.start + starts
             )
-            yield arrays
+            pure = arrays["purity"] >= options.min_purity - _ROUNDING
+            yield {name: values[pure] for name, values in arrays.items()}
 
 
 def label_of_segments(
@@ -157,26 +233,43 @@ def label_of_segments(
 
 
 def _values(
-    values: NDArray[np.float32], times_s: NDArray[np.float64], clip: Clip, null_bins: Sequence[int]
+    values: NDArray[np.float32],
+    times_s: NDArray[np.float64],
+    clip: Clip,
+    null_bins: Sequence[int],
+    least: int,
 ) -> NDArray[np.float32]:
-    """Return energies of a clip at its own times: (…, bins, frames) → (frames, …, bins)."""
+    """Return energies of a clip at its own times: (…, bins, frames) → (frames, …, bins).
+
+    Empty frames make them ``least`` frames.
+    """
     own = np.moveaxis(values, -1, 0)[clip.start : clip.stop].copy()
     if clip.resampled:
         rows = own.reshape(len(own), -1)
         rows = interpolated(rows, times_s[clip.start : clip.stop], clip.times_s)
         own = rows.reshape(-1, *own.shape[1:])
     own[..., list(null_bins)] = 0.0
-    return own
+    return _filled(own, least)
+
+
+def _filled(values: NDArray, least: int, with_: float = 0) -> NDArray:
+    """Append frames, so that there are ``least``."""
+    missing = [(0, max(0, least - len(values)))] + [(0, 0)] * (values.ndim - 1)
+    return np.pad(values, missing, constant_values=with_)
 
 
 def _label(
     times_s: NDArray[np.float64], label: NDArray[np.integer], clip: Clip
 ) -> NDArray[np.integer]:
     own = label[clip.start : clip.stop]
-    if not clip.resampled:
+    if clip.resampled:
+        middles_s = (times_s[clip.start : clip.stop - 1] + times_s[clip.start + 1 : clip.stop]) / 2
+        own = own[np.searchsorted(middles_s, clip.times_s)]
+    if clip.span is None:
         return own
-    middles_s = (times_s[clip.start : clip.stop - 1] + times_s[clip.start + 1 : clip.stop]) / 2
-    return own[np.searchsorted(middles_s, clip.times_s)]
+    # Another span may lie over it.
+    inside = (clip.times_s >= clip.span.start_s) & (clip.times_s < clip.span.end_s)
+    return np.where(inside, clip.span.label, own)
 
 
 def _known(times_s: NDArray[np.float64], known: NDArray[np.bool_], clip: Clip) -> NDArray[np.bool_]:

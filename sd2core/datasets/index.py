@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from sd2core.datasets.cutting import count_spans
 from sd2core.datasets.layout import Header
 from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.source import BACKGROUND, Source
@@ -69,6 +70,8 @@ def empty_header(
         frame_rate_hz=options.frame_rate_hz or round(timebase.frames_per_s, 3),
         label_rule=options.label_rule,
         min_share=options.min_share,
+        min_purity=options.min_purity,
+        spans=options.spans,
         kinds_wanted=options.kinds,
         parts=options.parts,
         joints=options.joints,
@@ -147,7 +150,13 @@ def entry_of(source: Source, header: Header, fingerprint: str) -> dict[str, Any]
         if source.target_m is None
         else {"range_m": range_m, "azimuth_deg": azimuth_deg, "elevation_deg": elevation_deg},
         "provenance": source.made_of(),
+        **({} if header.spans is None else {"spans": _spans(source, header)}),
     }
+
+
+def _spans(source: Source, header: Header) -> dict[str, int]:
+    assert header.spans is not None
+    return count_spans(source.outline(), header.frame_rate_hz, header.length, header.spans)
 
 
 def refuse_other_settings(out: Path, there: Header, options: DatasetOptions) -> None:
@@ -163,6 +172,8 @@ def refuse_other_settings(out: Path, there: Header, options: DatasetOptions) -> 
         ("null bins", there.null_bins, options.null_bins),
         ("the label rule", there.label_rule, options.label_rule),
         ("the least share", there.min_share, options.min_share),
+        ("the least purity", there.min_purity, options.min_purity),
+        ("spans as", there.spans or "windows", options.spans or "windows"),
     ):
         if now is not None and before != now:
             raise Sd2Error(

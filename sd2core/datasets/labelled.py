@@ -130,8 +130,11 @@ def _of_dataset(path: Path) -> LabelledFacts:
     with open_dataset(path) as dataset:
         header = dataset.header
         kinds = {"radar" if kind in ("simulated", "real") else kind for kind in header.kinds}
-        seen_from = np.unique(dataset["placement"][:], return_counts=True)[1]
-    step_s = (header.length - header.overlap) / header.frame_rate_hz
+        placement = dataset["placement"][:]
+        seen_from = np.unique(placement, return_counts=True)[1]
+        step_s = (header.length - header.overlap) / header.frame_rate_hz
+        if header.spans is not None and len(dataset):
+            step_s = float(np.mean(dataset["end_s"][:] - dataset["start_s"][:]))
     return LabelledFacts(
         path,
         "data set",

@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 from pydantic import TypeAdapter
 
-from sd2core.datasets.options import LabelRule
+from sd2core.datasets.options import LabelRule, SpanOptions
 from sd2core.datasets.source import KINDS
 from sd2core.errors import Sd2Error
 from sd2core.io.kinds import DATASET_FORMAT
@@ -58,7 +58,8 @@ CHUNK_ROWS = 8192
 class Header:
     """Header of a data set: properties of all its segments.
 
-    ``label_rule`` and ``min_share`` are those of :class:`~sd2core.datasets.options.DatasetOptions`.
+    ``label_rule``, ``min_share``, ``min_purity`` and ``spans`` are those of
+    :class:`~sd2core.datasets.options.DatasetOptions`.
     """
 
     length: int  # Frames of a segment.
@@ -68,6 +69,8 @@ class Header:
     frame_rate_hz: float
     label_rule: LabelRule
     min_share: float
+    min_purity: float = 0.0
+    spans: SpanOptions | None = None
     kinds_wanted: tuple[MapKind, ...] = KINDS  # Those that were asked for.
     kinds: tuple[MapKind, ...] = ()  # Those that some segment has.
     # Numbers in ``label`` and ``segment_label`` are places in it; the first is background.
@@ -94,8 +97,9 @@ class Header:
         """Return the header as JSON can hold it."""
         content = _HEADER.dump_python(self, mode="json")
         axis = content.pop("axis")
-        if not self.imu:  # Descriptions without it are as they were before there was any.
-            del content["imu"]
+        for name in _ADDED:  # Descriptions without it are as they were before there was any.
+            if not content[name]:
+                del content[name]
         return {"format": FORMAT, "version": VERSION, **axis, "all_kinds": list(KINDS), **content}
 
     @classmethod
@@ -106,9 +110,7 @@ class Header:
             axis = VelocityAxis(int(entry["bins"]), float(entry["v_max_mps"]))
             names = (one.name for one in fields(cls) if one.name != "axis")
             # Before there were limb maps, headers did not have parts.
-            content = {
-                name: ({"parts": (), "joints": (), "imu": ()} | entry)[name] for name in names
-            }
+            content = {name: ({"parts": (), "joints": ()} | _ADDED | entry)[name] for name in names}
             return _HEADER.validate_python({**content, "axis": axis})
         except Sd2Error as error:
             raise Sd2Error(f"{path}: {error.found}", error.expected) from error
@@ -118,6 +120,7 @@ class Header:
             ) from error
 
 
+_ADDED: dict[str, Any] = {"imu": (), "spans": None, "min_purity": 0.0}
 _HEADER = TypeAdapter(Header)
 
 
@@ -154,6 +157,8 @@ def row_shapes(header: Header) -> dict[str, tuple[str, tuple[int, ...]]]:
         maps["kinematics"] = ("float32", (header.length, len(header.joints), len(QUANTITIES)))
     if header.imu:
         maps["imu"] = ("float32", (header.length, len(header.imu), len(IMU_CHANNELS)))
+    if header.spans is not None:
+        maps |= {"mask": ("bool", (header.length,)), "end_s": ("float64", ())}
     return maps | {"label": ("int16", (header.length,))} | COLUMNS
 
 

@@ -20,6 +20,36 @@ LabelRule = Literal["foreground", "majority"]
 LABEL_RULES: tuple[LabelRule, ...] = get_args(LabelRule)
 MIN_SHARE = 0.2
 
+SpanLength = Literal["padded", "resampled"]
+SPAN_LENGTHS: tuple[SpanLength, ...] = get_args(SpanLength)
+
+
+@dataclass(frozen=True)
+class SpanOptions:
+    """How labelled spans become segments, one of each.
+
+    Parameters
+    ----------
+    margin_s : float
+        Time that is kept before and after each, as far as there are frames.
+    shortest_s : float
+        Spans that are shorter, as far as the person is seen, give no segment.
+    length : {"padded", "resampled"}
+        ``padded``: frames as they are, then empty ones that the array ``mask`` tells apart; a
+        longer span is refused. ``resampled``: each is stretched to the segment's frames.
+    """
+
+    margin_s: float = 0.0
+    shortest_s: float = 0.0
+    length: SpanLength = "padded"
+
+    def __post_init__(self) -> None:
+        for what, value in (("margin of", self.margin_s), ("shortest", self.shortest_s)):
+            if not 0 <= value < math.inf:
+                raise Sd2Error(f"The {what} spans is {value} s", "0 s or more")
+        if self.length not in SPAN_LENGTHS:
+            raise Sd2Error(f"Spans are {self.length!r}", f"one of {', '.join(SPAN_LENGTHS)}")
+
 
 @dataclass(frozen=True)
 class DatasetOptions:
@@ -45,6 +75,10 @@ class DatasetOptions:
         frames have, background included. Of equal counts the lower label wins.
     min_share : float
         0 to 1.
+    min_purity : float
+        Least share of a window's frames that have its label, 0 to 1; others are left out.
+    spans : SpanOptions, optional
+        One segment per labelled span, named by it; None: windows, wherever spans begin.
     validation, test : tuple of str, optional
         Subjects that validate and test; None: chosen by their names, see
         :mod:`sd2core.datasets.splitting`.
@@ -67,6 +101,8 @@ class DatasetOptions:
     null_bins: tuple[int, ...] | None = None
     label_rule: LabelRule = "foreground"
     min_share: float = MIN_SHARE
+    min_purity: float = 0.0
+    spans: SpanOptions | None = None
     validation: tuple[str, ...] | None = None
     test: tuple[str, ...] | None = None
     limbs: bool = False
@@ -96,8 +132,9 @@ class DatasetOptions:
             raise Sd2Error(
                 f"The label rule is {self.label_rule!r}", f"one of {', '.join(LABEL_RULES)}"
             )
-        if not 0 <= self.min_share <= 1:
-            raise Sd2Error(f"The least share of a label is {self.min_share}", "0 to 1")
+        for what, value in (("share of a label", self.min_share), ("purity", self.min_purity)):
+            if not 0 <= value <= 1:
+                raise Sd2Error(f"The least {what} is {value}", "0 to 1")
 
     @property
     def parts(self) -> tuple[str, ...]:

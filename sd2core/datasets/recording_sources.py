@@ -25,6 +25,7 @@ from sd2core.datasets.source import (
     Source,
     SourceKey,
     label_per_frame,
+    labelled_spans,
     plain_name,
 )
 from sd2core.denoise.files import LIMBS_MODEL, MAP_MODEL, default_name, describe_model, find_model
@@ -221,6 +222,7 @@ class _Opened:
             present,
             self._label(timebase.times_s),
             self._names,
+            labelled_spans(self._spans, self._names),
         )
 
     def source(self, key: SourceKey, progress: Progress) -> Source:
@@ -269,6 +271,7 @@ class _Opened:
                 **self._plan,
             },
             self._imu,
+            labelled_spans(self._spans, self._names),
         )
 
     @property

@@ -17,6 +17,7 @@ from sd2core.maps import DopplerMap, MapKind
 from sd2core.mesh.presence import Presence
 from sd2core.progress import Progress
 from sd2core.sensor import Vector, VirtualSensor, spherical_from_position
+from sd2core.timebase import Timebase
 
 BACKGROUND = "background"
 """Label of frames in which nothing is labelled; always label 0."""
@@ -45,6 +46,14 @@ class SourceKey(NamedTuple):
         return f"{self.recording} of {self.subject}{at}"
 
 
+class LabelledSpan(NamedTuple):
+    """Stretch of a source that has a label, on its clock."""
+
+    start_s: float
+    end_s: float  # Exclusive.
+    label: int  # Index into the source's labels.
+
+
 @dataclass(frozen=True, eq=False)
 class Outline:
     """Outline of a source before its maps are made, enough to count segments."""
@@ -54,6 +63,7 @@ class Outline:
     present: NDArray[np.bool_] | None  # Frames with a person; None: all.
     label: NDArray[np.integer]  # Index into ``labels``, per frame.
     labels: tuple[str, ...]  # The first is :data:`BACKGROUND`.
+    spans: tuple[LabelledSpan, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +88,8 @@ class Source:
         Mean place of the body, from which range and angles of the sensor follow.
     imu : mapping of str to InertialSignals
         Inertial sensors by their places, sampled at the frames of the maps.
+    spans : tuple of LabelledSpan, optional
+        Labelled stretches, which may overlap; None: the runs of frames with a label.
     provenance : dict
         Origin of the maps, as JSON can hold it, besides what the maps say of themselves.
 
@@ -98,6 +110,7 @@ class Source:
     target_m: Vector | None = None
     provenance: dict[str, Any] = field(default_factory=dict)
     imu: Mapping[str, InertialSignals] = field(default_factory=dict)
+    spans: tuple[LabelledSpan, ...] | None = None
 
     def __post_init__(self) -> None:
         title = self.key.title
@@ -124,6 +137,8 @@ class Source:
             if not np.array_equal(signals.times_s, first.times_s):
                 raise Sd2Error(f"{title}: the sensor {name} has a clock of its own", "one clock")
         _check_labels(title, self.label, self.labels, len(first.timebase))
+        if self.spans is None:
+            object.__setattr__(self, "spans", runs_of(self.label, first.times_s))
 
     @property
     def key(self) -> SourceKey:
@@ -162,7 +177,10 @@ class Source:
 
     def outline(self) -> Outline:
         """Return the outline, without the values."""
-        return Outline(tuple(self.maps), self.times_s, self.present, self.label, self.labels)
+        assert self.spans is not None
+        return Outline(
+            tuple(self.maps), self.times_s, self.present, self.label, self.labels, self.spans
+        )
 
     def made_of(self) -> dict[str, Any]:
         """Return the provenance of the source and its maps, without per-frame values."""
@@ -181,6 +199,8 @@ class Source:
         told = [asdict(self.sensor), self.labels, dict(self.classes)]
         sums.update(json.dumps(told).encode())
         sums.update(np.ascontiguousarray(self.label, np.int16).data)
+        if self.spans != runs_of(self.label, self.times_s):
+            sums.update(json.dumps(self.spans).encode())
         sums.update(np.ascontiguousarray(self.times_s).data)
         for kind in KINDS:
             if kind in self.maps:
@@ -234,6 +254,26 @@ def label_per_frame(
             plain_name(span.label)
         )
     return label
+
+
+def labelled_spans(spans: Any, labels: tuple[str, ...]) -> tuple[LabelledSpan, ...]:
+    """Return all spans but suggestions, with their labels as indices."""
+    return tuple(
+        LabelledSpan(span.start_s, span.end_s, labels.index(plain_name(span.label)))
+        for span in spans
+        if span.origin != "suggestion"
+    )
+
+
+def runs_of(label: NDArray[np.integer], times_s: NDArray[np.float64]) -> tuple[LabelledSpan, ...]:
+    """Return the runs of frames with a label other than background."""
+    edges = np.flatnonzero(np.diff(label, prepend=0, append=0))
+    ends_s = np.append(times_s, Timebase(times_s).end_s)
+    return tuple(
+        LabelledSpan(float(times_s[start]), float(ends_s[stop]), int(label[start]))
+        for start, stop in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True)
+        if label[start]
+    )
 
 
 def _check_labels(

@@ -18,7 +18,15 @@ from sd2core.datasets.recording_sources import (
     labels_and_classes,
     recording_sources,
 )
-from sd2core.datasets.source import LazySource, Outline, Source, SourceKey, label_per_frame
+from sd2core.datasets.source import (
+    LazySource,
+    Outline,
+    Source,
+    SourceKey,
+    label_per_frame,
+    labelled_spans,
+    runs_of,
+)
 from sd2core.denoise.files import default_name, find_model
 from sd2core.errors import Sd2Error
 from sd2core.files.digests import cached_digest
@@ -141,6 +149,7 @@ def map_source(path: Path, subject: str, label_file: Path | None = None) -> Lazy
             classes,
             None,
             {"file": path.name, "labels": None if label_file is None else label_file.name},
+            spans=labelled_spans(labels.spans, names),
         )
 
     return LazySource(key, load, fingerprint, lambda: load(lambda *_: None).outline())
@@ -238,7 +247,9 @@ class _PairStore:
 
     def _outline(self, take: dict[str, Any]) -> Outline:
         label = self._part("label", take)
-        return Outline(self._kinds, self._part("times_s", take), None, label, self._labels)
+        times_s = self._part("times_s", take)
+        runs = runs_of(label, times_s)
+        return Outline(self._kinds, times_s, None, label, self._labels, runs)
 
     def _source(self, key: SourceKey, take: dict[str, Any]) -> Source:
         clock = Timebase(self._part("times_s", take))

@@ -60,8 +60,8 @@ class SegmentDataset(TorchDataset[Item]):
     target : str
         Its second: another of these; ``"class"`` or ``"label"`` of the segment, an int64
         number; or ``"frame class"`` or ``"frame label"``, int64 of shape (length,). Segments
-        whose label has no class are left out of ``"class"``; such frames are
-        :data:`NOT_LEARNT`.
+        whose label has no class are left out of ``"class"``; such frames, and those that fill a
+        span's segment, are :data:`NOT_LEARNT`.
     split : str, optional
         ``"train"``, ``"validation"`` or ``"test"``; None: all.
     gain_db : float
@@ -128,6 +128,8 @@ class SegmentDataset(TorchDataset[Item]):
         else:
             array = "label" if self.target.startswith("frame") else "segment_label"
             targets = self._numbers[self._rows(array, rows)]
+            if array == "label" and self.header.spans is not None:
+                targets = np.where(self._rows("mask", rows), targets, NOT_LEARNT)
         items = []
         for row, one, other in zip(rows.tolist(), energies, targets, strict=True):
             gain = self._gain(row)

@@ -297,8 +297,9 @@ class _About:
         few = len(split.training) <= _NAMED
         people = f" ({', '.join(split.training)})" if few else ""
         return (
-            f"{names}: {len(split.training)} people{people}, {frames / pairs.frame_rate_hz / 60:.1f} min"
-            f" of {pairs.kind} radar at {pairs.frame_rate_hz:g} frames/s"
+            f"{names}: {len(split.training)} people{people},"
+            f" {frames / pairs.frame_rate_hz / 60:.1f} min of {pairs.kind} radar"
+            f" at {pairs.frame_rate_hz:g} frames/s"
         )
 
     def _limits(self) -> str:

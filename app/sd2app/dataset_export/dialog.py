@@ -80,6 +80,15 @@ class ExportDialog(QDialog):
             "", self, lambda wanted: model.choose(imu=model.imu_places if wanted else ())
         )
         self._inertial.setAccessibleName("Inertial sensors")
+        self._cut = Choice(
+            "What a segment is",
+            self,
+            {False: "windows of", True: "each labelled span, filled up to"},
+            lambda spans: model.choose(spans=spans),
+        )
+        tip = "Time kept before and after each span"
+        self._margin = NumberBox(0.0, 10.0, " s around", tip, decimals=1, step=0.1)
+        self._margin.valueChanged.connect(lambda value: model.choose(margin_s=round(value, 3)))
         self._length = self._frames("Frames of a segment", 2)
         self._overlap = self._frames("Frames that neighbouring segments share", 0)
         self._length.valueChanged.connect(lambda _: self._choose_frames())
@@ -88,7 +97,9 @@ class ExportDialog(QDialog):
             "Format of the data set", self, _FORMATS, lambda ending: model.choose(ending=ending)
         )
         where = row_of((self._place, 1), self._this, self._other, spacing_px=8)
-        segments = side_by_side(self._length, QLabel("overlap", self), self._overlap)
+        self._overlap_word = QLabel("overlap", self)
+        around = (self._overlap_word, self._overlap, self._margin)
+        segments = side_by_side(self._cut, self._length, *around)
         self._form = form_of(
             ("From", where),
             ("People", self._people),
@@ -153,13 +164,18 @@ class ExportDialog(QDialog):
             if model.imu_places
             else "No recording has one at a named place of the body: Edit → Place inertial sensor…"
         )
+        self._cut.show_value(choice.spans)
+        self._margin.show_value(choice.margin_s)
+        self._margin.setVisible(choice.spans)
+        for one in (self._overlap_word, self._overlap):
+            one.setVisible(not choice.spans)
         self._length.show_value(choice.length)
         self._overlap.show_value(choice.overlap)
         self._format.show_value(choice.ending)
         there = {self._sensors: model.places > 0, self._inertial: bool(model.imu_places)}
         for field in (
-            self._this, self._other, self._sensors, self._inertial, self._length, self._overlap,
-            self._format, self._people, *self._boxes.values(),
+            self._this, self._other, self._sensors, self._inertial, self._cut, self._length,
+            self._overlap, self._margin, self._format, self._people, *self._boxes.values(),
         ):  # fmt: skip
             field.setEnabled(not model.under_way and there.get(field, True))
         self._show_counts()

@@ -59,6 +59,8 @@ class ExportChoice:
     subjects: tuple[str, ...] = ()  # person of each recording; empty: each of a different person
     length: int = LENGTH  # frames
     overlap: int = OVERLAP  # frames
+    spans: bool = False  # one segment of each labelled span, instead of windows
+    margin_s: float = 0.0  # kept before and after each span
     ending: str = ".zarr"  # one of ENDINGS
     imu: tuple[str, ...] = ()  # named places of inertial sensors; empty: none are exported
 
@@ -95,6 +97,8 @@ class ExportChoice:
             tuple(map(str, content["subjects"])),
             int(content["length"]),
             int(content["overlap"]),
+            bool(content["spans"]),
+            float(content["margin_s"]),
             ENDINGS[ENDINGS.index(ending)],
             tuple(map(str, content["imu"])),
         )
@@ -193,6 +197,7 @@ class ExportModel(Runs[ExportRun]):
             "--segment-frames", str(choice.length), "--overlap-frames", str(choice.overlap),
             "--progress-json",
         ]  # fmt: skip
+        words += ["--segments", "spans", "--margin-s", str(choice.margin_s)] if choice.spans else []
         words += ["--placements", "planned"] if choice.planned else []
         words += ["--imu", ",".join(choice.imu)] if choice.imu else []
         words += ["--subjects", ",".join(choice.subjects)] if choice.subjects else []
@@ -307,11 +312,15 @@ class ExportModel(Runs[ExportRun]):
 
         def count(emit: Emit) -> _Counted:
             from sd2core.datasets.forecast import Counting
-            from sd2core.datasets.options import DatasetOptions
+            from sd2core.datasets.options import DatasetOptions, SpanOptions
             from sd2core.datasets.sources import gather
 
             options = DatasetOptions(
-                kinds=choice.kinds, length=choice.length, overlap=choice.overlap, imu=choice.imu
+                kinds=choice.kinds,
+                length=choice.length,
+                overlap=choice.overlap,
+                imu=choice.imu,
+                spans=SpanOptions(choice.margin_s) if choice.spans else None,
             )
             if known is not None and known.sources == choice.sources:
                 counting = known.counting
@@ -327,7 +336,11 @@ class ExportModel(Runs[ExportRun]):
     def _receive(self, counted: _Counted) -> None:
         self._counted = counted
         if not counted.forecast.segments:
-            self.problem = f"No recording has {self.choice.length} frames on end with a person."
+            self.problem = (
+                "Nothing is labelled where a person is seen."
+                if self.choice.spans
+                else f"No recording has {self.choice.length} frames on end with a person."
+            )
         self.changed.emit()
 
     def _refuse(self, error: Exception) -> None:
