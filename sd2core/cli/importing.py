@@ -1,41 +1,78 @@
-"""``sd2 import`` and ``sd2 relink``: recordings from files."""
+"""``sd2 import``, ``sd2 set`` and ``sd2 relink``: recordings from files."""
 
 from __future__ import annotations
 
 import argparse
 import shutil
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from sd2core.cli.command_parser import add_command
-from sd2core.cli.options import finite_float, flag, given
-from sd2core.cli.output import picked, print_json, progress_bar
+from sd2core.cli.command_parser import Options, add_command
+from sd2core.cli.options import finite_float, flag, given, name_list, position, positive_float
+from sd2core.cli.output import print_json, progress_bar
 from sd2core.errors import Sd2Error
+
+if TYPE_CHECKING:
+    from sd2core.recording.recording import Recording
+    from sd2core.sensor import VirtualSensor
+
+_CHANNEL = ("receiver", "transmitter")
+_LEFT_OUT = {
+    **{name: name for name in ("video", "mesh", "radar", "imu", "denoiser")},
+    **{name: f"radar_{name}" for name in _CHANNEL},
+}
+"""What `sd2 set --without` names, and the fields that it empties."""
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
-    """Add ``import`` and ``relink``."""
+    """Add ``import``, ``set`` and ``relink``."""
     parser = add_command(commands, "import", handler=_import)
     parser.add_output("NAME.sd2", "the recording to make")
-    parser.add_value("--video", Path, "FILE", "video of the person")
-    text = "body mesh fitted to the video (.npz, .zarr, a folder of .obj/.ply/.glb, or the"
-    text += " output of VIBE, WHAM or 4D-Humans)"
-    parser.add_value("--mesh", Path, "FILE", text)
-    parser.add_mesh_reading()
-    parser.add_value("--radar", Path, "CAPTURE", "radar capture of the same scene")
-    text = "time in the video, in seconds, of the first radar frame"
-    parser.add_value("--radar-offset-s", finite_float, "S", text, 0.0)
-    parser.add_channel()
-    parser.add_value("--imu", Path, "FILE", "samples of an inertial sensor (.csv, .sto, .npz)")
-    text = "time in the video, in seconds, of their first sample"
-    parser.add_value("--imu-offset-s", finite_float, "S", text, 0.0)
-    parser.add_value("--title", str, "TEXT", "what to call it (default: its name)", "")
+    _add_content(parser)
+    text = "where the radar is, in metres, as seen from the camera (default: the camera)"
+    parser.add_value("--sensor", position, "X,Y,Z", text)
     parser.add_flag("--copy", "copy the files into the recording")
+    parser.add_json()
+
+    parser = add_command(commands, "set", handler=_set)
+    parser.add_value("recording", Path, "RECORDING", "a recording (.sd2)")
+    _add_content(parser)
+    group = parser.add_argument_group("sensor", "where the radar is")
+    group.add_value("--sensor", position, "X,Y,Z", "in metres, as seen from the camera")
+    text = "or its distance from the body, which keeps the angles that are not given"
+    group.add_value("--range-m", positive_float, "M", text)
+    text = "angle about the body, 0 towards the camera, positive to its right"
+    group.add_value("--azimuth-deg", finite_float, "DEG", text)
+    group.add_value("--elevation-deg", finite_float, "DEG", "above the body's middle")
+    text = (
+        "take out what is named, some of video, mesh, radar, imu, denoiser, receiver, transmitter"
+    )
+    parser.add_value("--without", name_list, "LIST", text, ())
     parser.add_json()
 
     parser = add_command(commands, "relink", handler=_relink)
     parser.add_value("recording", Path, "RECORDING", "a recording (.sd2)")
     parser.add_value("folder", Path, "FOLDER", "where to look, and in all folders below")
     parser.add_json()
+
+
+def _add_content(parser: Options) -> None:
+    """Add files of a recording and what they do not say."""
+    parser.add_value("--video", Path, "FILE", "video of the person")
+    text = "body mesh fitted to the video (.npz, .zarr, a folder of .obj/.ply/.glb, or the"
+    text += " output of VIBE, WHAM or 4D-Humans)"
+    parser.add_value("--mesh", Path, "FILE", text)
+    parser.add_mesh_reading()
+    parser.add_value("--radar", Path, "CAPTURE", "radar capture of the same scene")
+    text = "time in the video, in seconds, of the first radar frame (default: 0)"
+    parser.add_value("--radar-offset-s", finite_float, "S", text)
+    parser.add_channel()
+    parser.add_value("--imu", Path, "FILE", "samples of an inertial sensor (.csv, .sto, .npz)")
+    text = "time in the video, in seconds, of their first sample (default: 0)"
+    parser.add_value("--imu-offset-s", finite_float, "S", text)
+    parser.add_value("--title", str, "TEXT", "what to call it (default: its name)")
 
 
 def copy_sample(out: Path) -> None:
@@ -65,21 +102,14 @@ def _import(options: argparse.Namespace) -> None:
     from sd2core.cli.info.description import describe_parts, describe_recording, show
     from sd2core.cli.reading import mesh_reading, refuse_unused_mesh_options
     from sd2core.recording.recording import Recording
+    from sd2core.sensor import VirtualSensor
 
     # The window lays any mesh over the video by its focal length.
     refuse_unused_mesh_options(options, options.out, options.mesh, but=("focal_px",))
-    recording = Recording(
-        options.out,
-        mesh_reading=mesh_reading(options),
-        radar_receiver=options.receiver,
-        radar_transmitter=options.transmitter,
-        **picked(options, "video", "mesh", "faces", "radar", "imu", "title"),
-        **picked(options, "radar_offset_s", "imu_offset_s"),
-    )
-    chosen = given(options, ("receiver", "transmitter"))
-    if chosen and (recording.radar is None or recording.holds_radar_map):
-        name = flag(next(iter(chosen)))
-        raise Sd2Error(f"{name} is given without raw samples", f"{name} with --radar CAPTURE")
+    recording = Recording(options.out, mesh_reading=mesh_reading(options), **_content(options))
+    _refuse_unused_channel(recording, options)
+    if options.sensor is not None:
+        recording.sensor = VirtualSensor(options.sensor)
     recording.learn_camera()
     # Opens every file, so that nothing is made of what cannot be read.
     parts = describe_parts(recording)
@@ -88,6 +118,94 @@ def _import(options: argparse.Namespace) -> None:
     if options.copy:
         parts = describe_parts(recording)
     show(describe_recording(recording, parts), as_json=options.json)
+
+
+def _content(options: argparse.Namespace) -> dict[str, Any]:
+    """Fields of a recording that were given."""
+    names = ("video", "mesh", "faces", "radar", "imu", "title", "radar_offset_s", "imu_offset_s")
+    channel = {f"radar_{name}": value for name, value in given(options, _CHANNEL).items()}
+    return given(options, names) | channel
+
+
+def _refuse_unused_channel(recording: Recording, options: argparse.Namespace) -> None:
+    chosen = given(options, _CHANNEL)
+    if chosen and (recording.radar is None or recording.holds_radar_map):
+        name = flag(next(iter(chosen)))
+        raise Sd2Error(f"{name} is given without raw samples", f"{name} with --radar CAPTURE")
+
+
+def _set(options: argparse.Namespace) -> None:
+    """Change what a recording is made of: its files, its clocks, where its radar is.
+
+    What is not named stays. Pairs, alignment, exports and the window use what is set.
+    Every file is opened before anything is written, and the labels stay as they are.
+
+      sd2 set walk.sd2 --sensor 0.1,0,0
+      sd2 set walk.sd2 --range-m 3 --azimuth-deg 30
+      sd2 set walk.sd2 --mesh better.zarr --radar-offset-s 0.35
+      sd2 set walk.sd2 --without receiver,denoiser
+    """
+    from sd2core.cli.info.description import describe_parts, describe_recording, show
+    from sd2core.cli.reading import mesh_reading, refuse_unused_mesh_options
+    from sd2core.files.paths import plain_path
+    from sd2core.files.resources import is_bundled
+    from sd2core.recording.recording import open_recording
+
+    recording = open_recording(options.recording)
+    if is_bundled(recording.folder):
+        raise Sd2Error(f"{recording.folder} comes with the program", "a recording of your own")
+    content = _content(options)
+    reading = mesh_reading(options).options()
+    place = given(options, ("sensor", "range_m", "azimuth_deg", "elevation_deg"))
+    if not (content or reading or place or options.without):
+        raise Sd2Error("Nothing is to be set", "one option at least")
+    for name in options.without:
+        if name not in _LEFT_OUT:
+            raise Sd2Error(f"--without names {name!r}", f"some of {', '.join(_LEFT_OUT)}")
+        setattr(recording, _LEFT_OUT[name], None)
+    for name, value in content.items():
+        if isinstance(value, Path) and not value.exists():
+            raise Sd2Error(f"The {name} {value} does not exist", "a file or folder")
+        setattr(recording, name, plain_path(value) if isinstance(value, Path) else value)
+    if not (recording.video or recording.mesh or recording.radar):
+        raise Sd2Error(f"{recording.folder} would hold nothing", "a video, a mesh or a radar")
+    if options.mesh is not None and not options.faces:
+        recording.faces = None
+    refuse_unused_mesh_options(options, recording.folder, recording.mesh, but=("focal_px",))
+    before = recording.mesh_reading if options.mesh is None else type(recording.mesh_reading)()
+    recording.mesh_reading = before.model_copy(update=reading)
+    _refuse_unused_channel(recording, options)
+    if options.video is not None or options.mesh is not None:
+        recording.camera = None
+        recording.learn_camera()
+    parts = describe_parts(recording)
+    if place:
+        recording.sensor = _placed(recording, place)
+    recording.save()
+    show(describe_recording(recording, parts), as_json=options.json)
+
+
+def _placed(recording: Recording, place: Mapping[str, Any]) -> VirtualSensor:
+    """Sensor of a recording at a place in the room, or about its body."""
+    from sd2core.placements.body_extent import BodyExtent
+    from sd2core.sensor import position_from_spherical, spherical_from_position
+
+    position_m = place.get("sensor")
+    about = {name: value for name, value in place.items() if name != "sensor"}
+    if about:
+        if position_m is not None or recording.mesh is None:
+            raise Sd2Error(
+                f"{flag(next(iter(about)))} is given "
+                + ("beside --sensor" if position_m is not None else "without a mesh"),
+                "either --sensor, or a distance and angles about the body of a mesh",
+            )
+        target_m = BodyExtent.of(recording.load_mesh()).target_m
+        now = spherical_from_position(target_m, recording.sensor.position_m)
+        names = ("range_m", "azimuth_deg", "elevation_deg")
+        wanted = [about.get(name, value) for name, value in zip(names, now, strict=True)]
+        position_m = position_from_spherical(target_m, *wanted)
+    assert position_m is not None
+    return replace(recording.sensor, position_m=position_m)
 
 
 def _relink(options: argparse.Namespace) -> int:

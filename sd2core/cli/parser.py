@@ -43,6 +43,7 @@ examples:
   sd2 info walk.npz                           what is in a file
   sd2 fit walk.mp4 --out walk.zarr            a moving mesh from a video of a person
   sd2 import --video walk.mkv --mesh walk.npz --out walk.sd2
+  sd2 set walk.sd2 --sensor 0.1,0,0           where its radar is, and what it is made of
   sd2 align walk.sd2 --save                   the radar's clock, from what both saw
   sd2 synth walk.npz --out map.npz --sensor 0,0,1
   sd2 radar capture/ --out real.npz

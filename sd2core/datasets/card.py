@@ -332,8 +332,8 @@ def _summary(card: dict[str, Any]) -> str:
     one_each = ", one of each labelled span," if card.get("spans") else ""
     return (
         f"{card['segments']:,} segments{one_each} of {card['length']} frames"
-        f" ({card['segment_s']:.2f} s at {card['frame_rate_hz']:g} frames/s) × {card['bins']} velocity bins, from"
-        f" {counted(card['recordings'], 'recording')} of"
+        f" ({card['segment_s']:.2f} s at {card['frame_rate_hz']:g} frames/s)"
+        f" × {card['bins']} velocity bins, from {counted(card['recordings'], 'recording')} of"
         f" {counted(len(card['subjects']), 'subject')}, {duration_text(card)}"
         + (f", each seen from up to {card['placements']} places" if card["placements"] > 1 else "")
         + f". Written by {card['made_by']}; format {card['dataset'].rsplit('.', 1)[-1]},"

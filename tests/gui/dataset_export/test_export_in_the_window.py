@@ -128,3 +128,18 @@ def test_it_goes_on_when_the_dialog_is_closed_and_can_be_stopped(
     assert button(again, "Export…").isEnabled()
     assert not models_of(window).jobs.jobs
     again.close()
+
+
+def test_one_segment_of_each_labelled_span(window, dialog, qtbot) -> None:
+    model = models_of(window).export
+    cut = next(one for one in dialog.findChildren(QComboBox) if "segment is" in one.toolTip())
+    qtbot.keyClick(cut, Qt.Key.Key_Down)
+    assert model.choice.spans
+    type_frames(dialog, "Time kept before and after each span", "0.1", qtbot)
+    assert model.choice.margin_s == pytest.approx(0.1)
+    shown = {one.toolTip() for one in dialog.findChildren(NumberBox) if one.isVisible()}
+    assert shown == {"Frames of a segment", "Time kept before and after each span"}
+    qtbot.waitUntil(lambda: not model.counting, timeout=20_000)
+    assert model.forecast is not None
+    assert model.forecast.of_label == {"there": 1, "back": 1}
+    assert "Labels: there 1 · back 1" in words(dialog)

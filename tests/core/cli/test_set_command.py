@@ -1,0 +1,98 @@
+"""``sd2 set``: a recording is wholly editable by command, and nothing else changes."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cli_outcome import Sd2
+from swinging_recordings import recording
+
+from sd2core.files.resources import resource_path
+from sd2core.pairs.store import read_pairs
+from sd2core.placements.body_extent import BodyExtent
+from sd2core.recording.recording import Recording, open_recording
+from sd2core.sensor import spherical_from_position
+
+
+@pytest.fixture
+def one(tmp_path: Path) -> Recording:
+    return recording(tmp_path / "anna.sd2")
+
+
+def content(one: Recording) -> dict:
+    return json.loads((one.folder / "recording.json").read_text(encoding="utf-8"))
+
+
+def test_what_is_not_named_stays(sd2: Sd2, one: Recording) -> None:
+    before = content(one)
+    outcome = sd2("set", one.folder, "--radar-offset-s", "-0.25", "--title", "Anna, again")
+    assert outcome.code == 0, outcome.err
+    assert "radar offset  -0.25 s" in outcome.out
+    assert content(one) == before | {"radar_offset_s": -0.25, "title": "Anna, again"}
+
+
+def test_pairs_are_made_with_the_radar_where_it_is_said_to_be(
+    sd2: Sd2, one: Recording, tmp_path: Path
+) -> None:
+    assert sd2("set", one.folder, "--sensor", "0.5,-0.1,0").code == 0
+    assert sd2("pairs", "recordings", one.folder, "--out", tmp_path / "p.zarr").code == 0
+    (take,) = read_pairs(tmp_path / "p.zarr").takes
+    np.testing.assert_allclose(take.sensor_position_m, (0.5, -0.1, 0.0))
+
+
+def test_a_place_about_the_body_keeps_what_is_not_given(sd2: Sd2, one: Recording) -> None:
+    target_m = BodyExtent.of(one.load_mesh()).target_m
+    before = spherical_from_position(target_m, one.sensor.position_m)
+    assert sd2("set", one.folder, "--range-m", "3.5", "--azimuth-deg", "25").code == 0
+    moved = open_recording(one.folder).sensor.position_m
+    found = spherical_from_position(target_m, moved)
+    assert found == pytest.approx((3.5, 25.0, before[2]))
+
+
+def test_another_mesh_comes_with_its_own_reading(sd2: Sd2, one: Recording, tmp_path: Path) -> None:
+    assert sd2("set", one.folder, "--fps", "20").code == 0
+    assert open_recording(one.folder).mesh_reading.frames_per_s == 20
+    other = tmp_path / f"other{one.mesh.suffix}"
+    copy = shutil.copytree if one.mesh.is_dir() else shutil.copy
+    copy(one.mesh, other)
+    assert sd2("set", one.folder, "--mesh", other).code == 0
+    found = open_recording(one.folder)
+    assert found.mesh == other
+    assert found.mesh_reading.frames_per_s is None
+
+
+def test_a_part_can_be_taken_out(sd2: Sd2, one: Recording) -> None:
+    assert sd2("set", one.folder, "--without", "radar").code == 0
+    assert open_recording(one.folder).radar is None
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ((), "Nothing is to be set"),
+        (("--mesh", "nowhere.zarr"), "The mesh nowhere.zarr does not exist"),
+        (("--without", "mesh,radar"), "would hold nothing"),
+        (("--without", "sensor"), "some of video, mesh"),
+        (("--sensor", "0,0,0", "--range-m", "2"), "beside --sensor"),
+        (("--without", "mesh", "--range-m", "2"), "without a mesh"),
+        (("--receiver", "99"), "Receiver 99"),
+        (("--without", "radar", "--receiver", "1"), "without raw samples"),
+    ],
+)
+def test_what_cannot_be_changes_nothing(
+    sd2: Sd2, one: Recording, words: tuple[str, ...], said: str
+) -> None:
+    before = content(one)
+    outcome = sd2("set", one.folder, *words)
+    assert outcome.code == 1
+    assert said in outcome.err
+    assert content(one) == before
+
+
+def test_what_comes_with_the_program_is_not_changed(sd2: Sd2) -> None:
+    outcome = sd2("set", resource_path("swipes.sd2"), "--title", "mine")
+    assert "comes with the program" in outcome.err
