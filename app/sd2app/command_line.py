@@ -86,6 +86,8 @@ def _add_window_commands(commands: argparse._SubParsersAction) -> None:
             metavar="FILE.png",
             help="draw the window into a picture instead of on the screen",
         )
+    for parser in (opening, demo):
+        parser.add_overwrite()
 
     examining = add_command(
         commands,

@@ -20,7 +20,7 @@ def main() -> int:
     """Run one of the library's commands and return its exit code."""
     parser, commands = build_parser(_EXAMPLES)
     demo = add_command(commands, "demo", handler=_demo)
-    demo.add_output("NAME.sd2", "the copy to write", required=False)
+    demo.add_output("NAME.sd2", "the copy to write; new", required=False, goes_on=True)
     demo.add_argument("--screenshot", type=Path, help=argparse.SUPPRESS)
     for name in _WINDOW_COMMANDS:  # not listed
         absent = commands.add_parser(name)

@@ -93,13 +93,25 @@ class Options(argparse._ActionsContainer):
         self.add_value("mesh", Path, "MESH", "a mesh, or a recording")
         self.add_sensor()
 
-    def add_output(self, metavar: str, text: str, *, required: bool = True) -> None:
-        """Add ``--out``."""
+    def add_output(
+        self, metavar: str, text: str, *, required: bool = True, goes_on: bool = False
+    ) -> None:
+        """Add ``--out``, and ``--overwrite`` unless the command goes on with what is there."""
         self.add_argument("--out", type=Path, required=required, metavar=metavar, help=text)
+        if not goes_on:
+            self.add_overwrite()
 
     def add_figure_output(self, drawn: str) -> None:
         """Add ``--figure``."""
         self.add_value("--figure", Path, "FILE", f"draw {drawn}, as .png, .svg or .pdf")
+        self.add_overwrite()
+
+    def add_overwrite(self) -> None:
+        """Add ``--overwrite``, without which outputs that exist are refused."""
+        if "--overwrite" not in self._option_string_actions:
+            text = "replace outputs that exist"
+            # It was called --replace where labels are written.
+            self.add_argument("--overwrite", "--replace", action="store_true", help=text)
 
     def add_map_output(self, *, required: bool = True) -> None:
         """Add ``--out`` for a Doppler map."""

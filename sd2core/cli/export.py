@@ -47,7 +47,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``export``."""
     parser = add_command(commands, "export", handler=_export)
     parser.add_value("inputs", Path, "INPUT", "recordings, pairs, maps, folders", nargs="+")
-    parser.add_output("FILE", "the data set to write (.zarr, .h5 or .npz)")
+    parser.add_output("FILE", "the data set to write (.zarr, .h5 or .npz)", goes_on=True)
     _add_content(parser)
     _add_making(parser)
     parser.add_flag("--dry-run", "print counts, size and time, and write nothing")

@@ -29,7 +29,7 @@ _LEFT_OUT = {
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``import``, ``set`` and ``relink``."""
     parser = add_command(commands, "import", handler=_import)
-    parser.add_output("NAME.sd2", "the recording to make")
+    parser.add_output("NAME.sd2", "the recording to make; new", goes_on=True)
     _add_content(parser)
     text = "where the radar is, in metres, as seen from the camera (default: the camera)"
     parser.add_value("--sensor", position, "X,Y,Z", text)

@@ -44,7 +44,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     parser.add_value(
         "--setup", Path, "FILE", "the .cfg or .json that the radar runs with (with --dca1000)"
     )
-    parser.add_output("NAME.sd2", "the recording to write")
+    parser.add_output("NAME.sd2", "the recording to write", goes_on=True)
     parser.add_value("--classifier", Path, "FILE", "a classifier of `sd2 classify train`")
     parser.add_value("--seconds", positive_float, "S", "stop after so long (default: never)")
     parser.add_json()

@@ -35,7 +35,7 @@ def _add_recordings(kinds: argparse._SubParsersAction) -> None:
 
 def _add_pairs(parser: Options, usual_null_bins: str) -> None:
     """Add the store of pairs, and the axis and nulled bins of its maps."""
-    parser.add_output("FILE.zarr", "the pairs to write")
+    parser.add_output("FILE.zarr", "the pairs to write", goes_on=True)
     parser.add_axis()
     text = f"bins to set to zero in input and target, e.g. 14,15,16 (default: {usual_null_bins})"
     parser.add_value("--null-bins", bin_list, "LIST", text)

@@ -196,7 +196,7 @@ def _radar(options: argparse.Namespace) -> None:
 
 def _add_campaign(kinds: argparse._SubParsersAction) -> None:
     parser = add_command(kinds, "campaign", handler=_campaign)
-    parser.add_output("FILE.zarr", "the pairs to write")
+    parser.add_output("FILE.zarr", "the pairs to write", goes_on=True)
     parser.add_value("--people", positive_int, "N", "number of people", 6)
     parser.add_value("--minutes", positive_float, "MIN", "minutes of all people together", 90.0)
     parser.add_choice("--protocol", ("paper", "varied"), "what varies from take to take", "varied")

@@ -49,7 +49,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     parser = add_command(commands, "train", handler=_train)
     text = "a file with settings, or one or several stores of pairs, which are mixed"
     parser.add_value("inputs", Path, "CONFIG.toml|DATA", text, nargs="*")
-    parser.add_output("RUN", "the folder of the run; new", required=False)
+    parser.add_output("RUN", "the folder of the run; new", required=False, goes_on=True)
     parser.add_value("--resume", Path, "RUN", "go on with a run that was stopped or killed")
     parser.add_flag("--show-settings", "print all settings as TOML and train nothing")
     _add_learning(parser)

@@ -589,7 +589,7 @@ def _new_folder(folder: Path) -> Path:
         raise Sd2Error(
             f"{folder} is a recording already",
             "a new folder",
-            "Choose another name, or delete that folder first",
+            "Choose another name, change it with `sd2 set`, or delete that folder first",
         )
     if not folder.parent.is_dir():
         raise Sd2Error(f"The folder {folder.parent} does not exist", "an existing folder")

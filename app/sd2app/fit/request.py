@@ -61,7 +61,8 @@ class FitRequest:
 
     def arguments(self) -> list[str]:
         """The same as a command line."""
-        words = ["fit", str(self.video), "--out", str(self.mesh), "--progress-json"]
+        # A mesh of this name in the folder is of a fit before.
+        words = ["fit", str(self.video), "--out", str(self.mesh), "--overwrite", "--progress-json"]
         if self.stature_m is not None:
             words += ["--stature-m", f"{self.stature_m:.3f}"]
         if self.focal_px is not None:

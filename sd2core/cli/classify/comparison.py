@@ -27,7 +27,7 @@ def add_table(kinds: argparse._SubParsersAction) -> None:
     """Add ``table``."""
     parser = add_command(kinds, "table", handler=_table, description=DATA_HELP)
     add_sources(parser)
-    parser.add_output("FOLDER", "the tables, figures and models to write")
+    parser.add_output("FOLDER", "the tables, figures and models to write", goes_on=True)
     parser.add_value("--seeds", positive_int, "N", "number of repetitions (default: 5; quick: 2)")
     text = "shares of the real data for the learning curve (default:"
     text += " 1%%,2%%,5%%,10%%,25%%,50%%,100%%; quick: 10%%,100%%)"

@@ -159,7 +159,7 @@ def _apply(options: argparse.Namespace) -> None:
     from sd2core.denoise.resample_to_model import check_bins
 
     if options.out is not None:
-        check_label_output(options.out, replace=options.replace)
+        check_label_output(options.out)
     if options.probabilities is not None:
         check_output(options.probabilities, ".npz")
     chosen = SpanOptions(options.min_duration_s, options.merge_gap_s)

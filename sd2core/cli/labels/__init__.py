@@ -11,7 +11,6 @@ from sd2core.cli.labels.agree import add_agree
 from sd2core.cli.labels.label_set import add_set
 from sd2core.cli.labels.reading import (
     add_labels,
-    add_replace,
     check_label_output,
     print_lost,
     read_named,
@@ -49,7 +48,6 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     add_labels(convert)
     convert.add_output("FILE", "the file to write")
     convert.add_value("--to", str, "NAME", "the format of --out, likewise")
-    add_replace(convert)
     convert.add_json()
 
     _add_statistics(kinds)
@@ -107,7 +105,7 @@ def _convert(options: argparse.Namespace) -> None:
       sd2 labels convert labels.json --out labels.txt --to audacity --fps 30
       sd2 labels convert walk.eaf --out labels.json
     """
-    there = check_label_output(options.out, replace=options.replace)
+    there = check_label_output(options.out)
     labels, clock = read_named(options)
     lost = write(options.out, labels, clock, options.to, over=there)
     if options.json:

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 from sd2core.cli.command_parser import add_command
 from sd2core.cli.labels.reading import (
     add_labels,
-    add_replace,
     check_label_output,
     print_lost,
     read_named,
@@ -33,7 +32,6 @@ def add_set(kinds: argparse._SubParsersAction) -> None:
     parser.add_value("--export", Path, "FILE.json", "write the set by itself")
     parser.add_value("--use", str, "FILE.json", f"another set; {_USUAL!r} is the program's own")
     parser.add_output("FILE", "where to write the labels with that other set", required=False)
-    add_replace(parser)
     parser.add_json()
 
 
@@ -54,7 +52,7 @@ def _set(options: argparse.Namespace) -> None:
     if (options.use is None) != (options.out is None):
         raise Sd2Error("One of --use and --out is given", "both of them, or none")
     there = {
-        path: check_label_output(path, replace=options.replace)
+        path: check_label_output(path)
         for path in (options.export, options.out)
         if path is not None
     }

@@ -46,11 +46,6 @@ def read_named(options: argparse.Namespace) -> tuple[Labels, Timebase | None]:
     return labels, with_rate(options, clock, labels)
 
 
-def add_replace(parser: Options) -> None:
-    """Add ``--replace``."""
-    parser.add_flag("--replace", "replace the file where it exists")
-
-
 def labels_at(
     path: Path,
     timebase: Timebase | None = None,
@@ -189,15 +184,13 @@ def print_lost(lost: list[str]) -> None:
         print(f"  not kept: {sentence}")
 
 
-def check_label_output(path: Path, *, replace: bool) -> str:
-    """Refuse a file that cannot be written, or that is there and not to be replaced.
+def check_label_output(path: Path) -> str:
+    """Refuse a file that cannot be written.
 
     Return the digest of what is there, for :func:`write`; empty without a file.
     """
     from sd2core.cli.reading import check_output
 
-    if path.exists() and not replace:
-        raise Sd2Error(f"{path} exists", "a new file", "Choose another name, or say --replace")
     check_output(path, path.suffix.lower())
     return cached_digest(path)
 

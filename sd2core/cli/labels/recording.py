@@ -92,11 +92,14 @@ def add_cut(kinds: argparse._SubParsersAction) -> None:
     """Add ``cut``."""
     parser = add_command(kinds, "cut", handler=_cut)
     add_labelled_recording(parser)
-    parser.add_output("FOLDER", "where to write a folder for each span")
+    parser.add_output("FOLDER", "where to write a folder for each span", goes_on=True)
     text = "only spans with this label; may be given several times"
     parser.add_value("--label", str, "LABEL", text, action="append")
     parser.add_value("--parts", str, "LIST", f"some of {_PARTS} (default: all)", _PARTS)
-    parser.add_flag("--replace", "replace folders that hold something else")
+    parser.add_argument(
+        "--overwrite", "--replace", dest="replace_others", action="store_true",
+        help="replace folders that hold something else",
+    )  # fmt: skip
     parser.add_json()
 
 
@@ -145,16 +148,16 @@ def _cut(options: argparse.Namespace) -> None:
     source = _source(options, recording, clock)
     cuts = plan_cuts(source, spans, options.out)
     others = [cut for cut in cuts if cut.state == "other"]
-    if others and not options.replace:
+    if others and not options.replace_others:
         raise Sd2Error(
             f"{counted(len(others), 'folder')} in {options.out} hold something else, such as"
             f" {others[0].path.name}",
             "folders of these very spans, or none",
-            "Choose another folder, or say --replace",
+            "Choose another folder, or say --overwrite",
         )
     with progress_bar("Cutting") as progress:
         written = cut_out(
-            source, cuts, options.out, replace_others=options.replace, progress=progress
+            source, cuts, options.out, replace_others=options.replace_others, progress=progress
         )
     if options.json:
         print_json(

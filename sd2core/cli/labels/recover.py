@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.command_parser import add_command
-from sd2core.cli.labels.reading import add_replace, check_label_output
+from sd2core.cli.labels.reading import check_label_output
 from sd2core.cli.output import counted, picked, print_json, print_rows
 from sd2core.errors import Sd2Error
 
@@ -23,7 +23,6 @@ def add_recover(kinds: argparse._SubParsersAction) -> None:
     text = "the labelled recording, or a video that was not saved as one yet"
     parser.add_value("recording", Path, "RECORDING", text, nargs="?")
     parser.add_output("FILE.json", "write the newest of RECORDING, for `convert`", required=False)
-    add_replace(parser)
     parser.add_json()
 
 
@@ -69,7 +68,7 @@ def _write(options: argparse.Namespace, offers: tuple[Offer, ...]) -> None:
         raise Sd2Error(
             f"{options.out} is no .json", "a .json", "`sd2 labels convert` makes other files of it"
         )
-    check_label_output(options.out, replace=options.replace)
+    check_label_output(options.out)
     write_labels(options.out, offers[0].labels, recording=offers[0].recording)
     if options.json:
         print_json({"path": str(options.out)} | _data(offers[0]))

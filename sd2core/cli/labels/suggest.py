@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.command_parser import Options, add_command
 from sd2core.cli.labels.reading import (
-    add_replace,
     check_label_output,
     print_lost,
     recording_clock,
@@ -55,7 +54,6 @@ def add_searched_map(parser: Options, kinds: tuple[MapName, ...]) -> None:
         "--of", kinds, "which map of a recording (default: synthetic where there is a mesh)"
     )
     parser.add_output("FILE", "the labels to write", required=False)
-    add_replace(parser)
 
 
 def _suggest(options: argparse.Namespace) -> None:
@@ -74,7 +72,7 @@ def _suggest(options: argparse.Namespace) -> None:
     from sd2core.labels.suggest import SuggestOptions, motion_energy_db, suggest_spans
 
     if options.out is not None:
-        check_label_output(options.out, replace=options.replace)
+        check_label_output(options.out)
     chosen = SuggestOptions(**given(options, _HELP))
     doppler, clock = map_and_clock(options)
     spans = suggest_spans(doppler, chosen, label=options.label)

@@ -169,7 +169,7 @@ def test_gestures_of_a_map_become_labels(
     assert "2 gestures in the real map" in words.out
     again = sd2("classify", "apply", shown, "--model", model, "--out", out)
     assert again.code == 1
-    assert "--replace" in again.err
+    assert "--overwrite" in again.err
 
 
 def test_a_classifier_is_judged_on_a_labelled_recording(sd2: Sd2, model: Path) -> None:

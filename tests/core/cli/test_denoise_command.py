@@ -85,7 +85,7 @@ def test_by_name(sd2: Sd2, synthetic: Path, model: Path, tmp_path: Path) -> None
     model.rename(tmp_path / "own" / "mine.safetensors")
     outcome = sd2("denoise", synthetic, "--out", tmp_path / "d.npz", "--model", "mine")
     assert outcome.code == 0, outcome.err
-    outcome = sd2("denoise", synthetic, "--out", tmp_path / "d.npz", "--model", "yours")
+    outcome = sd2("denoise", synthetic, "--out", tmp_path / "e.npz", "--model", "yours")
     assert outcome.code == 1
     assert "no model called 'yours'" in outcome.err
     assert "mine" in outcome.err
@@ -117,11 +117,11 @@ def test_what_is_no_map_is_named(
 def test_no_file_is_overwritten_by_mistake(
     sd2: Sd2, synthetic: Path, model: Path, tmp_path: Path
 ) -> None:
-    outcome = sd2("denoise", synthetic, "--out", model, "--model", model)
+    outcome = sd2("denoise", synthetic, "--out", model, "--model", model, "--overwrite")
     assert outcome.code == 1
     mesh = tmp_path / "mesh.npz"
     np.savez(mesh, vertices=np.zeros((2, 3, 3)), times_s=[0, 1])
-    outcome = sd2("denoise", synthetic, "--out", mesh, "--model", model)
+    outcome = sd2("denoise", synthetic, "--out", mesh, "--model", model, "--overwrite")
     assert outcome.code == 1
     assert "is a mesh" in outcome.err
 

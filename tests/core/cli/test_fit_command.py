@@ -248,7 +248,9 @@ class TestOutput:
         (tmp_path / "group.zarr").mkdir()
         (tmp_path / "taken.npz.partial").mkdir()
         (tmp_path / "taken.npz.partial" / "thesis.tex").touch()
-        outcome = sd2("fit", tmp_path / "clip.mp4", "--out", tmp_path / name, "--restart")
+        outcome = sd2(
+            "fit", tmp_path / "clip.mp4", "--out", tmp_path / name, "--restart", "--overwrite"
+        )
         assert outcome.code == 1
         assert said in outcome.err
         assert (tmp_path / "taken.npz.partial" / "thesis.tex").exists()

@@ -74,7 +74,7 @@ def test_synth_adds_how_well_values_are_known(sd2: Sd2, fitted: Path, tmp_path: 
     out = tmp_path / "map.npz"
     assert sd2("synth", fitted, "--out", out).code == 0
     assert DopplerMap.load(out).uncertainty is None
-    said = sd2("synth", fitted, "--out", out, "--uncertainty")
+    said = sd2("synth", fitted, "--out", out, "--uncertainty", "--overwrite")
     assert said.code == 0
     known = DopplerMap.load(out).uncertainty
     assert known is not None
@@ -84,7 +84,7 @@ def test_synth_adds_how_well_values_are_known(sd2: Sd2, fitted: Path, tmp_path: 
 def test_synth_and_info_state_one_accuracy(sd2: Sd2, fitted: Path, tmp_path: Path) -> None:
     out = tmp_path / "map.npz"
     for wish in ((), ("--tolerance", "20%")):
-        said = sd2("synth", fitted, "--out", out, *wish)
+        said = sd2("synth", fitted, "--out", out, "--overwrite", *wish)
         assert said.code == 0
         accuracy = DopplerMap.load(out).accuracy
         assert accuracy.total == math.hypot(accuracy.body, accuracy.arithmetic or 0.0)
@@ -124,7 +124,9 @@ def test_synth_spreads_what_is_not_known(sd2: Sd2, fitted: Path, tmp_path: Path)
     assert spread.meta["count"] == "expected"
     assert np.abs(spread.values - DopplerMap.load(plain).values).max() > 0.01
     assert spread.uncertainty is not None
-    chosen = sd2("synth", fitted, "--out", out, "--count", "plain", "--tolerance", "5%")
+    chosen = sd2(
+        *("synth", fitted, "--out", out, "--count", "plain", "--tolerance", "5%", "--overwrite")
+    )
     assert chosen.code == 0, chosen.err
     assert DopplerMap.load(out).meta["count"] == "plain"
     said = sd2("ladder", fitted, "--count", "plain", "--quick", "--tolerance", "5%")
@@ -138,6 +140,6 @@ def test_vid2doppler_counts_plainly(sd2: Sd2, fitted: Path, tmp_path: Path) -> N
     out = tmp_path / "map.npz"
     assert sd2("synth", fitted, "--out", out, "--preset", "vid2doppler").code == 0
     assert DopplerMap.load(out).meta["count"] == "plain"
-    said = sd2("synth", fitted, "--out", out, "--preset", "vid2doppler", "--count", "expected")
+    said = sd2("synth", fitted, "--preset", "vid2doppler", "--count", "expected", "--out", "b.npz")
     assert said.code == 1
     assert "that tool counts each vertex in one bin" in said.err

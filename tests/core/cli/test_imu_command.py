@@ -77,7 +77,7 @@ def test_a_recording_and_a_vertex(sd2: Sd2, body: Path, tmp_path: Path) -> None:
     recording = Recording.create(tmp_path / "a.sd2", mesh=body).folder
     found = []
     for source in (recording, body):
-        out = tmp_path / "spot.sto"
+        out = tmp_path / f"{source.stem}-spot.sto"
         told = sd2("imu", source, "--at", 321, "--rate", 30, "--out", out, "--json")
         assert told.code == 0, told.err
         said = json.loads(told.out)
@@ -92,14 +92,14 @@ def test_a_file_of_something_else_is_not_replaced(sd2: Sd2, body: Path, tmp_path
     labels.write_text("start_s,end_s,label\n0,1,swipe\n", encoding="utf-8")
     for out in (body, labels):
         before = out.read_bytes()
-        told = sd2("imu", body, "--at", "head", "--out", out)
+        told = sd2("imu", body, "--at", "head", "--out", out, "--overwrite")
         assert told.code == 1
         assert "holds no samples of an inertial sensor" in told.err
         assert out.read_bytes() == before
     out = tmp_path / "head.csv"
     out.touch()
     for _ in range(2):  # an empty file, then its own
-        assert sd2("imu", body, "--at", "head", "--out", out).code == 0
+        assert sd2("imu", body, "--at", "head", "--out", out, "--overwrite").code == 0
 
 
 @pytest.mark.parametrize(

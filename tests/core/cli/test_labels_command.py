@@ -316,10 +316,12 @@ def test_a_figure_of_maps_with_labels(sd2: Sd2, moving_recording: Path, tmp_path
     text = out.read_text("utf-8")
     assert "swing (simulated)" in text
     assert "wave" in text
-    sd2("labels", "figure", moving_recording, "--out", out, "--from-s", 1.2)
+    sd2("labels", "figure", moving_recording, "--out", out, "--from-s", 1.2, "--overwrite")
     assert ">wave<" not in out.read_text("utf-8")
     for maps, said in (("real", "each once"), ("radar", "no radar")):
-        refused = sd2("labels", "figure", moving_recording, "--out", out, "--maps", maps)
+        refused = sd2(
+            "labels", "figure", moving_recording, "--out", tmp_path / "b.svg", "--maps", maps
+        )
         assert refused.code == 1
         assert said in refused.err
 
@@ -340,7 +342,7 @@ def test_spans_are_cut_out(sd2: Sd2, moving_recording: Path, tmp_path: Path) -> 
     other = ("labels", "cut", moving_recording, "--out", out, "--parts", "mesh")
     refused = sd2(*other)
     assert refused.code == 1
-    assert "--replace" in refused.err
+    assert "--overwrite" in refused.err
     assert "2 spans cut out" in sd2(*other, "--replace").out
     assert not (made / "synthetic.npz").exists()
     refused = sd2("labels", "cut", moving_recording, "--out", out, "--label", "push")

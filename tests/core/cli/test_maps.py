@@ -118,7 +118,7 @@ def test_the_share_beyond_the_axis_is_said(sd2: Sd2, plate: Path, tmp_path: Path
 
 def test_from_behind_it_recedes(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
     out = tmp_path / "map.npz"
-    arguments = ("synth", plate, "--out", out, "--visibility", "none", "--sensor")
+    arguments = ("synth", plate, "--out", out, "--overwrite", "--visibility", "none", "--sensor")
     assert sd2(*arguments, "0,0,9").code == 0
     assert (DopplerMap.load(out).mean_velocity_mps() < -1.0).all()
     assert sd2(*arguments, "-0.5,0,0").code == 0
@@ -199,7 +199,9 @@ def test_an_axis_beyond_the_radar_is_said(sd2: Sd2, shared_data: Path, tmp_path:
     outcome = sd2("radar", capture, "--out", out, "--v-max", "4")
     assert "this radar only ±3.14 m/s" in " ".join(outcome.out.split())
     assert "unseen bins" in outcome.out
-    data = json.loads(sd2("radar", capture, "--out", out, "--v-max", "4", "--json").out)
+    data = json.loads(
+        sd2("radar", capture, "--v-max", "4", "--json", "--out", out, "--overwrite").out
+    )
     assert data["unseen_bins"] == [0, 1, 2, 29, 30, 31]
     assert data["limits"]["v_max_mps"] == pytest.approx(3.138, abs=1e-3)
 

@@ -28,7 +28,8 @@ class TestOutput:
         before = plate.read_bytes()
         Recording.create(tmp_path / "a.sd2", mesh=plate)
         source = tmp_path / "a.sd2" if of_recording else plate
-        outcome = sd2("synth", source, "--out", plate)
+        assert f"{plate} exists" in sd2("synth", source, "--out", plate).err
+        outcome = sd2("synth", source, "--out", plate, "--overwrite")
         assert outcome.code == 1
         assert f"{plate} exists and is a mesh" in outcome.err
         assert plate.read_bytes() == before
@@ -36,7 +37,7 @@ class TestOutput:
     def test_nor_by_a_link_to_it(self, sd2: Sd2, plate: Path, tmp_path: Path) -> None:
         before = plate.read_bytes()
         (tmp_path / "link.npz").symlink_to(plate)
-        assert sd2("synth", plate, "--out", tmp_path / "link.npz").code == 1
+        assert sd2("synth", plate, "--out", tmp_path / "link.npz", "--overwrite").code == 1
         assert plate.read_bytes() == before
 
     def test_a_map_and_an_empty_file_are_replaced(
@@ -44,8 +45,8 @@ class TestOutput:
     ) -> None:
         out = tmp_path / "map.npz"
         out.touch()
-        for bins in (16, 32):
-            assert sd2("synth", plate, "--out", out, "--bins", bins).code == 0
+        for bins, words in ((16, ()), (32, ("--overwrite",))):
+            assert sd2("synth", plate, "--out", out, "--bins", bins, *words).code == 0
             assert DopplerMap.load(out).axis.bins == bins
 
     @pytest.mark.parametrize("command", ["synth", "radar"])
@@ -144,4 +145,7 @@ def test_the_nulled_velocities_are_said(sd2: Sd2, plate: Path, tmp_path: Path) -
         (("--v-max", "10"), "15, 16: -0.625 to 0.625 m/s"),
         (("--null-bins", "0,15"), "0, 15: -2 to -1.875, -0.125 to 0 m/s"),
     ):
-        assert f"nulled bins  {said}\n" in sd2("synth", plate, "--out", out, *arguments).out
+        assert (
+            f"nulled bins  {said}\n"
+            in sd2("synth", plate, "--out", out, "--overwrite", *arguments).out
+        )

@@ -13,6 +13,13 @@ from sd2core.cli.output_folders import OUTPUTS
 WITHOUT_FACTS = {"labels figure", "strip", "warm-up", "fetch-models", "open", "demo"}
 """Commands that print nothing but what they wrote, or open a window."""
 
+GO_ON = {
+    *("classify table", "export", "labels cut", "pairs mars", "pairs recordings"),
+    *("simulate campaign", "train", "listen"),
+    *("import",),  # and `demo`: recordings are never overwritten
+}
+"""Commands that go on with what is there. All others refuse it, unless told to overwrite."""
+
 FURTHER_OUTPUTS = {
     "--figure": "FILE",
     "--markdown": "FILE.md",
@@ -150,3 +157,10 @@ def test_a_unit_in_the_name_is_that_of_the_value() -> None:
 def test_values_have_a_name_or_are_listed() -> None:
     for name, argument in OPTIONS_WITH_VALUE:
         assert argument.choices or isinstance(argument.metavar, str), name
+
+
+def test_outputs_that_exist_are_refused_by_all_commands_alike() -> None:
+    for name, parser in COMMANDS.items():
+        actions = {action.dest for action in parser._actions}
+        if actions & {*OUTPUTS}:
+            assert ("overwrite" in actions) == (name not in GO_ON), name

@@ -34,6 +34,25 @@ def test_they_are_made_before_the_work(tmp_path: Path, name: str) -> None:
     assert output.exists()
 
 
+@pytest.mark.parametrize("name", OUTPUTS)
+def test_what_exists_is_replaced_only_where_it_is_said(tmp_path: Path, name: str) -> None:
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "folder" / "inside").touch()
+    (tmp_path / "file").write_text("mine")
+    (tmp_path / "empty").touch()  # as `mktemp` leaves it
+    done = []
+    for output, overwrite, code in (
+        ("folder", False, 1), ("file", False, 1), ("empty", False, 0), ("new", False, 0),
+        ("folder", True, 0), ("file", True, 0), ("file", None, 0),
+    ):  # fmt: skip
+        parser = parser_of(lambda options: done.append(options), **{name: tmp_path / output})
+        if overwrite is not None:
+            parser.set_defaults(overwrite=overwrite)
+        assert run(parser, []) == code, (output, overwrite)
+    assert len(done) == 5
+    assert (tmp_path / "file").read_text() == "mine"
+
+
 def test_where_nothing_is_written_none_is_left(tmp_path: Path) -> None:
     def write_one_and_fail(options: argparse.Namespace) -> None:
         assert options.out.parent.is_dir()

@@ -56,7 +56,7 @@ def test_one_channel_is_chosen(sd2: Sd2, tmp_path: Path) -> None:
     assert {"Receiver 2 only.", "Transmitter 1 only."} <= set(one.meta["notes"])
     outcome = sd2("info", out)
     assert "60.54 GHz" in outcome.out
-    outcome = sd2("radar", path, "--out", out, "--receiver", 3)
+    outcome = sd2("radar", path, "--out", out, "--receiver", 3, "--overwrite")
     assert outcome.code == 1
     assert "Receiver 3" in outcome.err
     assert "1 to 2" in outcome.err
@@ -82,7 +82,7 @@ def test_a_recording_keeps_the_channel_that_is_chosen(
         (("--receiver", 1), {"Receiver 1 only."}),
         (("--transmitter", 2), {"Receiver 2 only.", "Transmitter 2 only."}),
     ):
-        assert sd2("radar", folder, "--out", out, *options).code == 0
+        assert sd2("radar", folder, "--out", out, "--overwrite", *options).code == 0
         only = {note for note in DopplerMap.load(out).meta["notes"] if note.endswith(" only.")}
         assert only == notes
         printed = json.loads(sd2("radar", folder, *options, "--json").out)["notes"]
@@ -204,7 +204,7 @@ def test_a_radar_is_simulated_by_its_name(sd2: Sd2, tmp_path: Path, plate: Path,
     direct = tmp_path / "direct.npz"
     assert sd2("synth", plate, "--method", "fmcw", "--radar", name, "--out", direct).code == 0
     assert DopplerMap.load(direct).carrier_hz == doppler.carrier_hz
-    outcome = sd2("radar", folder, "--out", tmp_path / "map.npz", "--range", "0.5,4")
+    outcome = sd2("radar", folder, "--out", tmp_path / "near.npz", "--range", "0.5,4")
     if name == "wifi-5ghz":
         assert outcome.code == 1
         assert "tells no ranges apart" in outcome.err

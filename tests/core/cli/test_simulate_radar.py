@@ -104,7 +104,7 @@ def test_nothing_else_is_overwritten(sd2: Sd2, plate: Path, tmp_path: Path) -> N
     mine = tmp_path / "mine"
     mine.mkdir()
     (mine / "notes.txt").write_text("keep")
-    outcome = sd2("simulate", "radar", plate, "--out", mine)
+    outcome = sd2("simulate", "radar", plate, "--out", mine, "--overwrite")
     assert outcome.code == 1
     assert "is not a radar recording" in outcome.err
     assert [path.name for path in mine.iterdir()] == ["notes.txt"]
