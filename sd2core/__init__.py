@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from sd2core.maps import DopplerMap
     from sd2core.mesh.sequence import MeshSequence
     from sd2core.radar_config import PAPER_RADAR, RadarConfig
-    from sd2core.recording.recording import Recording, Span, open_recording
+    from sd2core.recording.recording import Recording, Span, open_recording, open_sample
     from sd2core.sensor import VelocityAxis, VirtualSensor
     from sd2core.timebase import Timebase
 
@@ -56,6 +56,7 @@ __all__ = [
     "load_mesh",
     "load_model",
     "open_recording",
+    "open_sample",
     "open_video",
     "save_mesh",
     "virtual_imu",
@@ -82,6 +83,7 @@ _HOME = {
     "load_mesh": "io.mesh",
     "load_model": "denoise.files",
     "open_recording": "recording.recording",
+    "open_sample": "recording.recording",
     "open_video": "io.video",
     "save_mesh": "io.mesh",
     "virtual_imu": "imu.virtual",

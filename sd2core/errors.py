@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from typing import TypeVar
+
+Value = TypeVar("Value")
+_LONGEST = 60
+
 
 class Sd2Error(Exception):
     """Something the user can act on.
@@ -44,3 +49,12 @@ class Sd2Error(Exception):
         if self.remedy:
             parts.append(self.remedy)
         return " ".join(part.rstrip(".") + "." for part in parts)
+
+
+def wanted(value: object, kind: type[Value], example: str) -> Value:
+    """Return a value that is of a type; otherwise raise Sd2Error with an example of one."""
+    if isinstance(value, kind):
+        return value
+    shown = " ".join(repr(value).split())
+    shown = shown if len(shown) <= _LONGEST else f"{shown[:_LONGEST]}…"
+    raise Sd2Error(f"{shown} is given, a {type(value).__name__}", f"a {kind.__name__}", example)

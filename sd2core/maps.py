@@ -6,7 +6,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +14,16 @@ from numpy.typing import NDArray
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
 from sd2core.files.numpy_files import open_npz_file
+from sd2core.map_cells import draw_cells
 from sd2core.mesh.presence import Presence, checked
 from sd2core.mesh.vertex_parts import JOINTS, KINEMATICS, QUANTITIES
 from sd2core.numerics.map_accuracy import MapAccuracy
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from xarray import DataArray
 
 MapKind = Literal["synthetic", "simulated", "real", "denoised"]
 """synthetic: counted from a mesh; simulated: a computed radar signal; real: a capture."""
@@ -183,6 +188,8 @@ class DopplerMap:
     >>> doppler = sd2.DopplerMap(values, sd2.VelocityAxis(), times, kind="synthetic", unit="count")
     >>> float(doppler.axis.centres_mps[doppler.values[:, 0].argmax()])
     0.5625
+    >>> doppler.within(1.0)
+    <DopplerMap synthetic, 16 bins over ±1 m/s · 3 frames, 0.100 s, 30.00 frames/s · count>
     """
 
     values: NDArray[np.float32]
@@ -229,6 +236,85 @@ class DopplerMap:
             )
 
     @property
+    def shape(self) -> tuple[int, int]:
+        """Number of bins and of frames."""
+        return self.axis.bins, len(self.timebase)
+
+    def __array__(
+        self, dtype: np.dtype[Any] | None = None, copy: bool | None = None
+    ) -> NDArray[Any]:
+        return np.array(self.values, dtype=dtype, copy=copy)
+
+    def __repr__(self) -> str:
+        emptied = len(self.null_bins)
+        said = [
+            f"{self.kind}, {self.axis.bins} bins over ±{self.axis.v_max_mps:g} m/s",
+            self.timebase.words,
+            *([self.unit] if self.unit else []),
+            *([f"{emptied} bins emptied"] if emptied else []),
+            *(["by parts of the body"] if self.limbs is not None else []),
+        ]
+        return f"<DopplerMap {' · '.join(said)}>"
+
+    def db(self, reference: float | None = None) -> NDArray[np.float64]:
+        """Levels in dB, (bins, frames); -inf where a cell is empty, NaN where it was emptied.
+
+        0 dB is the strongest cell, or ``reference``, an energy above 0.
+        """
+        most = float(self.values.max(initial=0.0)) if reference is None else float(reference)
+        if not (most > 0 and np.isfinite(most)):
+            raise Sd2Error(
+                f"0 dB is an energy of {most:g}" + ("" if reference is not None else ": no cell"),
+                "a finite energy above 0",
+                "Give a reference",
+            )
+        with np.errstate(divide="ignore"):
+            level = 10.0 * np.log10(self.values.astype(np.float64) / most)
+        level[[*self.null_bins, *self.unseen_bins]] = np.nan
+        return np.asarray(level)
+
+    def plot(self, axes: Axes | None = None, *, low_db: float = -30.0) -> Axes:
+        """Draw the map with matplotlib, by default into pyplot's axes, and return these.
+
+        Velocities are positive when approaching. Colours go from ``low_db``, below 0, to the strongest cell.
+        """
+        if axes is None:
+            from matplotlib import pyplot
+
+            axes = pyplot.gca()
+        level = np.clip(self.db(), low_db, 0.0)
+        clock = self.timebase
+        shown = draw_cells(axes, level, self.axis, clock, self.present, low=low_db, high=0.0)
+        axes.figure.colorbar(shown, ax=axes, label="level (dB)")
+        radar = {"real": "radar", "simulated": "radar (simulated)"}.get(self.kind, self.kind)
+        axes.set(xlabel="time (s)", ylabel="velocity (m/s)", title=radar)
+        return axes
+
+    def to_xarray(self) -> DataArray:
+        """Return an ``xarray.DataArray`` with velocities and times as coordinates.
+
+        It is sliced by both: ``a.sel(time_s=slice(1, 2), velocity_mps=slice(0, None))``.
+        """
+        try:
+            from xarray import DataArray
+        except ModuleNotFoundError:
+            raise Sd2Error(
+                "xarray is not installed",
+                "the package xarray",
+                'Install it: pip install "sd2-core[notebook]"',
+            ) from None
+        return DataArray(
+            self.values,
+            {
+                "velocity_mps": ("velocity_mps", self.axis.centres_mps, {"units": "m/s"}),
+                "time_s": ("time_s", self.times_s, {"units": "s"}),
+            },
+            ("velocity_mps", "time_s"),
+            self.kind,
+            {"units": self.unit, "kind": self.kind, "null_bins": list(self.null_bins)},
+        )
+
+    @property
     def carrier_hz(self) -> float | None:
         """Centre frequency of the radar that the map is of; None if its provenance names none."""
         match self.meta.get("radar"):
@@ -261,6 +347,46 @@ class DopplerMap:
             present=None if self.present is None else self.present[start:stop],
             uncertainty=None if known is None else known.between(start, stop),
             limbs=None if self.limbs is None else self.limbs.between(start, stop),
+        )
+
+    def during(self, start_s: float, end_s: float) -> DopplerMap:
+        """Map of the frames from one time to another (exclusive)."""
+        start, stop = np.searchsorted(self.times_s, [start_s, end_s]).tolist()
+        if start >= stop:
+            raise Sd2Error(
+                f"The map has no frame from {start_s:g} to {end_s:g} s",
+                f"times between {self.times_s[0]:g} and {self.timebase.end_s:g} s",
+            )
+        return self.between(start, stop)
+
+    def within(self, v_mps: float) -> DopplerMap:
+        """Map of the bins whose velocities are between -v and v, on an axis of its own."""
+        left_out = int((self.axis.edges_mps < -v_mps - 1e-9).sum())
+        bins = self.axis.bins - 2 * left_out
+        if bins < 2:
+            raise Sd2Error(
+                f"The map has {max(bins, 0)} bins within ±{v_mps:g} m/s",
+                f"2 or more; a bin is {self.axis.bin_width_mps:g} m/s wide",
+            )
+        kept = slice(left_out, left_out + bins)
+
+        def of(numbers: Sequence[int]) -> tuple[int, ...]:
+            return tuple(one - left_out for one in numbers if 0 <= one - left_out < bins)
+
+        known = self.uncertainty
+        return replace(
+            self,
+            values=self.values[kept],
+            axis=VelocityAxis(bins, self.axis.v_max_mps * bins / self.axis.bins),
+            null_bins=of(self.null_bins),
+            unseen_bins=of(self.unseen_bins),
+            uncertainty=None
+            if known is None
+            else CellUncertainty(known.expected[kept], known.sd[kept]),
+            # Kinematics are of the whole body.
+            limbs=None
+            if self.limbs is None
+            else LimbMaps(self.limbs.parts, self.limbs.values[:, kept], self.limbs.kinematics),
         )
 
     def mean_velocity_mps(self) -> NDArray[np.float64]:

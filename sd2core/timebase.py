@@ -69,6 +69,15 @@ class Timebase:
             raise Sd2Error(f"The frame rate is {frames_per_s}", "a positive number of frames per s")
         return cls(start_s + np.arange(frames) / frames_per_s)
 
+    def __repr__(self) -> str:
+        return f"<Timebase {self.words}>"
+
+    @property
+    def words(self) -> str:
+        """Number, length and rate of the frames: ``450 frames, 15.000 s, 30.00 frames/s``."""
+        rate = f"{self.duration_s:.3f} s, {self.frames_per_s:.2f} frames/s"
+        return f"{len(self)} frames, {rate}"
+
     def __len__(self) -> int:
         return len(self.times_s)
 

@@ -11,7 +11,7 @@ from sd2core.denoise.card import ModelCard
 from sd2core.denoise.weights import SUFFIX, Shapes, read_header, read_network, write_weights
 from sd2core.errors import Sd2Error
 from sd2core.files.limits import check_regular
-from sd2core.files.paths import user_data
+from sd2core.files.paths import as_path, user_data
 from sd2core.files.resources import bundled_files
 
 if TYPE_CHECKING:
@@ -97,7 +97,7 @@ def find_model(model: Path | str) -> Path:
 
     Raises Sd2Error if there is no such model.
     """
-    path = Path(model)
+    path = as_path(model)
     check_regular(path)
     if path.is_file():
         return path

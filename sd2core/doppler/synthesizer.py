@@ -19,7 +19,7 @@ from sd2core.doppler.options import PRESETS, SynthesisOptions
 from sd2core.doppler.parallel import Ticket, run_jobs, run_light_jobs
 from sd2core.doppler.prepared import Block, ByteBudget, PreparedMesh
 from sd2core.doppler.smoothing import frames_within_reach, smooth
-from sd2core.errors import Sd2Error
+from sd2core.errors import Sd2Error, wanted
 from sd2core.maps import CellUncertainty, DopplerMap, LimbMaps
 from sd2core.mesh.presence import gaps_in_words, runs
 from sd2core.mesh.sequence import MeshSequence
@@ -103,6 +103,9 @@ _LIGHT_PAIRS = 500_000
 """Moving vertices, frames together, that are counted about as soon as other threads wake."""
 
 
+_A_SENSOR = "Make one with sd2.VirtualSensor(position_m=(0.0, 0.0, 0.0))"
+
+
 class Synthesizer:
     """Doppler maps of one mesh for any sensor position.
 
@@ -151,6 +154,7 @@ class Synthesizer:
         block_frames: int | None = None,
         blocks_of: Synthesizer | None = None,
     ) -> None:
+        wanted(mesh, MeshSequence, 'Read one with sd2.load_mesh("walk.npz")')
         if isinstance(preset, str) and preset not in PRESETS:
             raise Sd2Error(f"The preset is {preset!r}", f"one of {', '.join(PRESETS)}")
         options = PRESETS[preset] if isinstance(preset, str) else preset
@@ -216,7 +220,7 @@ class Synthesizer:
 
     def map(
         self,
-        sensor: VirtualSensor,
+        sensor: VirtualSensor | None = None,
         *,
         visibility: Visibility | None = None,
         frames: tuple[int, int] | None = None,
@@ -226,6 +230,8 @@ class Synthesizer:
 
         Parameters
         ----------
+        sensor : VirtualSensor, optional
+            Where the radar is; by default at the camera.
         visibility : {"none", "facing", "depth", "exact", "frozen"}, optional
             Otherwise that of the options.
         progress : Progress
@@ -242,7 +248,7 @@ class Synthesizer:
             is empty. ``present`` is False in frames without a person, and in one
             that stands alone: what moves how fast is not known there.
         """
-        return self._map(sensor, None, visibility, frames, progress)
+        return self._map(sensor or VirtualSensor(), None, visibility, frames, progress)
 
     def limb_maps(
         self,
@@ -298,6 +304,7 @@ class Synthesizer:
         frames: tuple[int, int] | None,
         progress: Progress,
     ) -> DopplerMap:
+        wanted(sensor, VirtualSensor, _A_SENSOR)
         start, stop = frames or (0, self.mesh.frame_count)
         stretch = self.stretch(sensor, start, stop, visibility, progress, parts)
         assert stretch.visible_share is not None

@@ -14,8 +14,8 @@ from sd2core.errors import Sd2Error
 from sd2core.files.figure_files import save_figure
 from sd2core.labels.formats.rows import apart
 from sd2core.labels.spans import Labels, Span
+from sd2core.map_cells import draw_cells
 from sd2core.maps import DopplerMap
-from sd2core.mesh.presence import runs
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 Scale = Literal["dB", "linear"]
 
 _WIDTH_IN, _ROW_IN, _PIXELS_PER_INCH = 8.0, 1.55, 200
-_NOTHING, _MUTED = "#e9ebee", "#5a6370"
+_MUTED = "#5a6370"
 _DIFFERENCE = ["#b4520b", "#f7f8f9", "#0b7a5b"]
 """Colours of negative, no and positive differences."""
 LANE_IN = 0.2
@@ -211,23 +211,11 @@ def _in_view(row: MapRow, start_s: float, end_s: float) -> MapRow:
 def _draw(
     axes: Axes, row: MapRow, level: NDArray[np.float64], colours: Any, low: float, high: float
 ) -> Any:
-    """The cells of a map; grey where it says nothing."""
     doppler = row.doppler
-    times_s = np.append(doppler.times_s, doppler.timebase.end_s) + row.offset_s
-    axes.set_facecolor(_NOTHING)
-    shown = axes.pcolormesh(
-        times_s,
-        doppler.axis.edges_mps,
-        np.ma.masked_invalid(level),
-        cmap=colours,
-        vmin=low,
-        vmax=high,
-        rasterized=True,
+    clock = doppler.timebase.shifted(row.offset_s)
+    return draw_cells(
+        axes, level, doppler.axis, clock, doppler.present, low=low, high=high, colours=colours
     )
-    for start, stop in () if doppler.present is None else runs(~doppler.present):
-        axes.axvspan(times_s[start], times_s[stop], facecolor=_NOTHING, edgecolor=_MUTED,
-                     hatch="////", linewidth=0)  # fmt: skip
-    return shown
 
 
 def _draw_difference(

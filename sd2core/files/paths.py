@@ -8,7 +8,7 @@ import shutil
 from itertools import chain, count, takewhile
 from pathlib import Path, PurePath, PurePosixPath, PureWindowsPath
 
-from sd2core.errors import Sd2Error
+from sd2core.errors import Sd2Error, wanted
 from sd2core.progress import Progress
 
 PICKLE_SUFFIXES = frozenset({".pkl", ".pickle", ".joblib"})
@@ -27,6 +27,13 @@ def user_cache(name: str) -> Path:
     import platformdirs
 
     return Path(platformdirs.user_cache_dir("sd2-studio", appauthor=False)) / name
+
+
+def as_path(path: object) -> Path:
+    """Path of what a user gave; Sd2Error if it is none."""
+    if isinstance(path, os.PathLike):
+        return Path(path)
+    return Path(wanted(path, str, "Give the name of a file or folder"))
 
 
 def plain_path(path: Path) -> Path:

@@ -24,7 +24,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.errors import Sd2Error
+from sd2core.errors import Sd2Error, wanted
 from sd2core.fmcw.chain import Chain, FrameChain, ProcessingOptions, Window
 from sd2core.io.radar.capture import RadarCapture
 from sd2core.maps import DopplerMap
@@ -102,6 +102,7 @@ def doppler_map(
     >>> doppler.kind, doppler.values.shape
     ('simulated', (32, 450))
     """
+    wanted(capture, RadarCapture, 'Read one with sd2.load_capture("recording/")')
     options = ProcessingOptions(clutter, clutter_window_s, range_m, window)
     config = capture.config
     axis = _axis(config, axis, bins, v_max_mps)

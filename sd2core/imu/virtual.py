@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sd2core.errors import Sd2Error
+from sd2core.errors import Sd2Error, wanted
 from sd2core.imu.mounting import mounted
 from sd2core.imu.sensor_errors import SensorErrors
 from sd2core.imu.signals import LEAST_FRAMES, UP, InertialSignals, felt, usual_cutoff_hz
@@ -69,6 +69,7 @@ def virtual_imu(
     >>> wrist.acceleration_mps2.shape, wrist.turn_rate_radps.shape
     ((1497, 3), (1497, 3))
     """
+    wanted(mesh, MeshSequence, 'Read one with sd2.load_mesh("walk.npz")')
     if not 0 < rate_hz <= _MOST_HZ:
         raise Sd2Error(f"The rate is {rate_hz:g} Hz", f"above 0, up to {_MOST_HZ:,.0f} Hz")
     cutoff_hz = usual_cutoff_hz(mesh.timebase.frames_per_s) if cutoff_hz is None else cutoff_hz

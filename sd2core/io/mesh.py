@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.errors import Sd2Error
-from sd2core.files.paths import PICKLE_SUFFIXES, is_pattern
+from sd2core.errors import Sd2Error, wanted
+from sd2core.files.paths import PICKLE_SUFFIXES, as_path, is_pattern
 from sd2core.files.texts import errors_in
 from sd2core.io.fitted import fitted_doubts
 from sd2core.io.mesh_arrays import RawMesh, read_npz, read_zarr, write_npz, write_zarr
@@ -90,7 +90,7 @@ def load_mesh(
     >>> mesh.frame_count, mesh.vertex_count
     (450, 5000)
     """
-    path = Path(path)
+    path = as_path(path)
     if scale is not None and not (np.isfinite(scale) and scale > 0):
         raise Sd2Error(f"The scale is {scale}", "a positive factor to metres, such as 0.001")
     raw = _read(path, person, image_size, focal_px, distance_m, progress)
@@ -134,7 +134,8 @@ def save_mesh(mesh: MeshSequence, path: Path | str, progress: Progress = silent)
     ...     sd2.load_mesh(Path(folder) / "points.npz").vertex_count
     20
     """
-    path = Path(path)
+    path = as_path(path)
+    wanted(mesh, MeshSequence, 'Read one with sd2.load_mesh("walk.npz")')
     if not path.absolute().parent.is_dir():
         raise Sd2Error(
             f"The folder {path.absolute().parent} does not exist", "an existing folder for the mesh"

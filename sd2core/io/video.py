@@ -14,6 +14,7 @@ from av.video.reformatter import VideoReformatter
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
+from sd2core.files.paths import as_path
 from sd2core.io.video_index import FrameIndex, build_index, decoded_frames, open_stream
 from sd2core.progress import Progress, silent
 from sd2core.timebase import Timebase
@@ -278,5 +279,5 @@ def open_video(path: Path | str, progress: Progress = silent) -> VideoReader:
     ...     len(video), video.width, video.height
     (450, 640, 480)
     """
-    path = Path(path)
+    path = as_path(path)
     return VideoReader(path, build_index(path, progress))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field, replace
 from operator import attrgetter
@@ -173,6 +174,13 @@ class Labels:
                 raise Sd2Error(
                     f"{span.words()} is on the track {span.track!r}", f"one of {', '.join(names)}"
                 )
+
+    def __repr__(self) -> str:
+        counts = Counter(span.label for span in self.spans)
+        named = ", ".join(f"{label} {count:,}" for label, count in counts.most_common(6))
+        more = f" and {len(counts) - 6} other labels" if len(counts) > 6 else ""
+        tracks = ", ".join(track.name for track in self.tracks)
+        return f"<Labels {len(self.spans):,} spans on {tracks}: {named or 'none'}{more}>"
 
     @property
     def next_id(self) -> int:

@@ -132,6 +132,15 @@ class MeshSequence:
             )
         object.__setattr__(self, "faces", faces)
 
+    def __repr__(self) -> str:
+        faces = "no triangles" if self.faces is None else f"{len(self.faces):,} triangles"
+        said = [
+            f"{self.vertex_count:,} vertices, {faces}",
+            self.timebase.words,
+            *([self.source] if self.source else []),
+        ]
+        return f"<MeshSequence {' · '.join(said)}>"
+
     @property
     def frame_count(self) -> int:
         """Number of frames T."""

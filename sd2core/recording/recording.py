@@ -19,6 +19,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_json, full_disk_named
 from sd2core.files.paths import (
     PICKLE_SUFFIXES,
+    as_path,
     free_path,
     is_absolute,
     located_path,
@@ -35,6 +36,7 @@ from sd2core.files.recording_json import (
     Span,
     read_document,
 )
+from sd2core.files.resources import resource_path
 from sd2core.files.texts import errors_in
 from sd2core.labels.files import FILE_NAME as LABELS_NAME
 from sd2core.labels.files import labels_of, read_labels, write_labels
@@ -544,7 +546,7 @@ def open_recording(path: Path) -> Recording:
     >>> len(recording.labelled.spans)
     8
     """
-    path = Path(path)
+    path = as_path(path)
     folder = plain_path(path.parent if path.name == FILE_NAME else path)
     # Taken first: what is written while it is read counts as another's.
     digests = digests_of([folder / FILE_NAME])
@@ -575,6 +577,18 @@ def open_recording(path: Path) -> Recording:
     recording.read_labels_again()
     recording._base = recording.state()
     return recording
+
+
+def open_sample() -> Recording:
+    """Open the recording that comes with the program, all of it simulated; it stays as it is.
+
+    Examples
+    --------
+    >>> import sd2core as sd2
+    >>> sd2.open_sample().load_mesh().frame_count
+    450
+    """
+    return open_recording(resource_path("swipes.sd2"))
 
 
 def folder_named(path: Path | str) -> Path:

@@ -120,7 +120,7 @@ def describe_video(path: Path, video: VideoReader) -> Description:
         **_clock_data(video.timebase),
         "notes": list(video.notes),
     }
-    facts = {"picture": f"{video.width} x {video.height} pixels", "time": _clock(video.timebase)}
+    facts = {"picture": f"{video.width} x {video.height} pixels", "time": video.timebase.words}
     return Description(f"Video {path}", data, facts, video.notes)
 
 
@@ -145,7 +145,7 @@ def describe_mesh(path: Path, mesh: MeshSequence) -> Description:
     facts = {
         "surface": f"{mesh.vertex_count:,} vertices, "
         + (f"{face_count:,} triangles" if face_count else "no triangles: a point cloud"),
-        "time": _clock(mesh.timebase),
+        "time": mesh.timebase.words,
         "no person": _gaps(mesh.present, mesh.timebase),
         "velocities": _known_to(mesh),
         "first frame": ", ".join(
@@ -258,7 +258,7 @@ def describe_capture(path: Path, capture: RadarCapture) -> Description:
         "samples": f"{config.samples_per_chirp} {'' if config.sampling == 'real' else 'complex '}"
         f"per chirp, {config.chirps_per_frame} chirps per frame, receivers: {config.receivers}"
         + (f", transmitters: {config.transmitters}" if config.transmitters > 1 else ""),
-        "time": _clock(capture.timebase),
+        "time": capture.timebase.words,
         **limit_facts(config),
     }
     return Description(f"Radar capture {path}", data, facts, tuple(capture.notes))
@@ -286,7 +286,7 @@ def describe_map(path: Path, doppler: DopplerMap) -> Description:
         "kind": doppler.kind,
         "carrier": "" if doppler.carrier_hz is None else f"{doppler.carrier_hz / 1e9:.4g} GHz",
         "velocity": axis_in_words(doppler.axis),
-        "time": _clock(doppler.timebase),
+        "time": doppler.timebase.words,
         "no person": _gaps(doppler.present, doppler.timebase),
         "unit": doppler.unit,
         "nulled bins": bins_in_words(doppler.axis, doppler.null_bins),
@@ -404,12 +404,6 @@ def _labels(recording: Recording) -> str:
     for span in recording.labelled.spans:
         counts[span.label] = counts.get(span.label, 0) + 1
     return ", ".join(f"{count} x {label}" for label, count in counts.items())
-
-
-def _clock(timebase: Timebase) -> str:
-    return (
-        f"{len(timebase)} frames, {timebase.duration_s:.3f} s, {timebase.frames_per_s:.2f} frames/s"
-    )
 
 
 def _clock_data(timebase: Timebase) -> dict[str, float]:

@@ -52,9 +52,7 @@ def _set(options: argparse.Namespace) -> None:
     if (options.use is None) != (options.out is None):
         raise Sd2Error("One of --use and --out is given", "both of them, or none")
     there = {
-        path: check_label_output(path)
-        for path in (options.export, options.out)
-        if path is not None
+        path: check_label_output(path) for path in (options.export, options.out) if path is not None
     }
     labels, clock = read_named(options)
     written, lost = [], []

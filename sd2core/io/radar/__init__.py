@@ -9,6 +9,7 @@ from pathlib import Path
 
 from sd2core.errors import Sd2Error
 from sd2core.files.hdf5_files import open_hdf5_file
+from sd2core.files.paths import as_path
 from sd2core.io.kinds import RADAR_MAP_SUFFIXES
 from sd2core.io.radar import dca1000
 from sd2core.io.radar.acconeer import is_acconeer, load_acconeer
@@ -81,7 +82,7 @@ def load_capture(path: Path | str) -> RadarCapture:
     >>> capture.simulated, capture.samples.shape
     (True, (450, 3, 64, 32))
     """
-    path = Path(path).expanduser()
+    path = as_path(path).expanduser()
     if not path.exists():
         raise Sd2Error(f"{path} does not exist", SUPPORTED, "Check the path")
     if is_growing(path):

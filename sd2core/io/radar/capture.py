@@ -128,6 +128,12 @@ class RadarCapture:
                 "one time per frame",
             )
 
+    def __repr__(self) -> str:
+        radar = self.config.name or "a radar without a name"
+        kind = "simulated" if self.simulated else "real"
+        said = [f"{kind}, {radar}", self.timebase.words, *([self.source] if self.source else [])]
+        return f"<RadarCapture {' · '.join(said)}>"
+
     @property
     def frame_count(self) -> int:
         """Number of frames."""
