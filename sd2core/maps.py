@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
 from sd2core.files.numpy_files import open_npz_file
-from sd2core.map_cells import draw_cells
-from sd2core.mesh.presence import Presence, checked
+from sd2core.mesh.presence import Presence, checked, runs
 from sd2core.mesh.vertex_parts import JOINTS, KINEMATICS, QUANTITIES
 from sd2core.numerics.map_accuracy import MapAccuracy
 from sd2core.sensor import VelocityAxis
@@ -29,6 +28,9 @@ MapKind = Literal["synthetic", "simulated", "real", "denoised"]
 """synthetic: counted from a mesh; simulated: a computed radar signal; real: a capture."""
 
 FORMAT_VERSION = 1
+
+_NOTHING, _MUTED = "#e9ebee", "#5a6370"
+"""Colours of what is not known."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -276,7 +278,8 @@ class DopplerMap:
     def plot(self, axes: Axes | None = None, *, low_db: float = -30.0) -> Axes:
         """Draw the map with matplotlib, by default into pyplot's axes, and return these.
 
-        Velocities are positive when approaching. Colours go from ``low_db``, below 0, to the strongest cell.
+        Velocities are positive when approaching. Colours go from ``low_db``, below 0, to the
+        strongest cell.
         """
         if axes is None:
             from matplotlib import pyplot
@@ -489,6 +492,38 @@ class DopplerMap:
             raise Sd2Error(
                 f"{path}: its description is damaged ({error!r})", "the meta written by `sd2 synth`"
             ) from error
+
+
+def draw_cells(
+    axes: Axes,
+    level: NDArray[np.float64],
+    axis: VelocityAxis,
+    timebase: Timebase,
+    present: NDArray[np.bool_] | None,
+    *,
+    low: float,
+    high: float,
+    colours: Any = "viridis",
+) -> Any:
+    """Draw levels (bins, frames) over seconds and m/s; grey where nothing is known.
+
+    Returns what a colour bar is made for. ``present`` is False in frames without a person.
+    """
+    times_s = np.append(timebase.times_s, timebase.end_s)
+    axes.set_facecolor(_NOTHING)
+    shown = axes.pcolormesh(
+        times_s,
+        axis.edges_mps,
+        np.ma.masked_invalid(level),
+        cmap=colours,
+        vmin=low,
+        vmax=high,
+        rasterized=True,
+    )
+    for start, stop in () if present is None else runs(~present):
+        axes.axvspan(times_s[start], times_s[stop], facecolor=_NOTHING, edgecolor=_MUTED,
+                     hatch="////", linewidth=0)  # fmt: skip
+    return shown
 
 
 def peak_velocity_mps(

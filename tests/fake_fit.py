@@ -64,6 +64,7 @@ def main() -> int:
     parser.add_argument("command", choices=["fit"])
     parser.add_argument("video", type=Path)
     parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--overwrite", action="store_true")
     parser.add_argument("--progress-json", action="store_true", required=True)
     parser.add_argument("--stature-m", type=float)
     parser.add_argument("--focal-px", type=float)

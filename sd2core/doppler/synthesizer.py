@@ -154,9 +154,9 @@ class Synthesizer:
         block_frames: int | None = None,
         blocks_of: Synthesizer | None = None,
     ) -> None:
-        wanted(mesh, MeshSequence, 'Read one with sd2.load_mesh("walk.npz")')
         if isinstance(preset, str) and preset not in PRESETS:
             raise Sd2Error(f"The preset is {preset!r}", f"one of {', '.join(PRESETS)}")
+        wanted(mesh, MeshSequence, 'Read one with sd2.load_mesh("walk.npz")')
         options = PRESETS[preset] if isinstance(preset, str) else preset
         if mesh.faces is None and options.weight != "count":
             raise _no_surface(mesh, "Area weighting")

@@ -14,8 +14,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.figure_files import save_figure
 from sd2core.labels.formats.rows import apart
 from sd2core.labels.spans import Labels, Span
-from sd2core.map_cells import draw_cells
-from sd2core.maps import DopplerMap
+from sd2core.maps import DopplerMap, draw_cells
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

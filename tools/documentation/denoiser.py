@@ -101,8 +101,8 @@ Wanted, for the fit: peak −25 %, mean −40 %.
 {clips} rendered videos of people who move as recorded people did whom nothing here learnt from; the
 radar is **simulated**, drawn for each clip: rough or smooth, 1 to 12 looks. *Exact*: the true body;
 *fitted*: what `sd2 fit` makes of the video. *Worse*: share of clips in which peak / mean / map are
-worse than without a denoiser by more than 5 %; the worst ratio in brackets. Of maps the shape counts
-(L1 at equal energy: no map made from a mesh knows the radar's gain).
+worse than without a denoiser by more than 5 %; the worst ratio in brackets. Of maps the shape
+counts (L1 at equal energy: no map made from a mesh knows the radar's gain).
 
 {motion}
 
