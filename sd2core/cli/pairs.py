@@ -22,6 +22,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     kinds = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     _add_mars(kinds)
     _add_recordings(kinds)
+    _add_label(kinds)
 
 
 def _add_recordings(kinds: argparse._SubParsersAction) -> None:
@@ -31,6 +32,57 @@ def _add_recordings(kinds: argparse._SubParsersAction) -> None:
     parser.add_count()
     text = "subject of each recording, separated by commas (default: each shows another person)"
     parser.add_value("--subjects", lambda text: tuple(text.split(",")), "LIST", text)
+
+
+def _add_label(kinds: argparse._SubParsersAction) -> None:
+    parser = add_command(kinds, "label", handler=_label)
+    parser.add_value("pairs", Path, "PAIRS.zarr", "the pairs to label")
+    text = "subject,take,label[,start_s,end_s]: a row for each label; * is any subject or take"
+    parser.add_value("--table", Path, "TABLE.csv", text)
+    text = "labels of one take, in any format that `sd2 labels convert` reads; several times"
+    parser.add_value("--take", str, "SUBJECT/TAKE=FILE", text, [], action="append")
+    parser.add_json()
+
+
+def _label(options: argparse.Namespace) -> None:
+    """Put labels on pairs, in place of those that are there.
+
+    A row without times labels a whole take; later rows lie over earlier ones, and frames
+    without a label are background. Classifiers, studies and exports use the labels.
+
+      sd2 pairs label mars.zarr --table movements.csv
+      sd2 pairs label mine.zarr --take anna/walk-1=anna.eaf
+    """
+    from sd2core.errors import Sd2Error
+    from sd2core.labels.formats import read_labels
+    from sd2core.pairs.labelling import TakeLabel, label_pairs, read_take_labels
+    from sd2core.pairs.store import read_pairs
+    from sd2core.timebase import Timebase
+
+    rows = [] if options.table is None else read_take_labels(options.table)
+    clocks = {}
+    if options.take:
+        takes = read_pairs(options.pairs).takes
+        clocks = {f"{take.subject}/{take.name}": Timebase(take.times_s) for take in takes}
+    for said in options.take:
+        name, sign, file = said.partition("=")
+        if not sign:
+            raise Sd2Error(f"--take is {said}", "SUBJECT/TAKE=FILE")
+        if name not in clocks:
+            raise Sd2Error(f"{options.pairs} has no take {name}", f"one of {', '.join(clocks)}")
+        subject, _, take = name.rpartition("/")
+        rows += [
+            TakeLabel(subject, take, span.label, span.start_s, span.end_s)
+            for span in read_labels(Path(file), clocks[name]).spans
+            if span.origin != "suggestion"
+        ]
+    if not rows:
+        raise Sd2Error("There are no labels to put on pairs", "--table, or --take with a file")
+    counts = label_pairs(options.pairs, rows)
+    if options.json:
+        print_json({"pairs": str(options.pairs), "frames_of_label": counts})
+        return
+    print_facts(str(options.pairs), {name: f"{count:,} frames" for name, count in counts.items()})
 
 
 def _add_pairs(parser: Options, usual_null_bins: str) -> None:

@@ -424,6 +424,8 @@ def _reopened(path: Path, header: dict[str, Any]) -> Any:
         raise Sd2Error(f"{path} is there and holds no pairs", "a new or empty folder")
     group = open_group(path, "r+")
     there = dict(group.attrs)
+    # Labels may have been put on it since (:mod:`sd2core.pairs.labelling`).
+    there["labels"] = there.get("labels", [])[: len(header["labels"])]
     for name, value in header.items():
         if there.get(name, []) != value:
             raise Sd2Error(

@@ -1,0 +1,101 @@
+"""Labels put on the takes of pairs that are there: from a table, or spans of each take."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+import numpy as np
+
+from sd2core.errors import Sd2Error
+from sd2core.files.stores import open_group
+from sd2core.files.texts import read_text
+from sd2core.pairs.store import open_takes
+
+_NEEDED = ("subject", "take", "label")
+_EXPECTED = "columns subject, take, label, and start_s, end_s where a label is not of a whole take"
+
+
+@dataclass(frozen=True)
+class TakeLabel:
+    """Label of a take, or from one time to another on its clock."""
+
+    subject: str  # A name, or a pattern as of files: ``*`` is anybody.
+    take: str  # Likewise.
+    label: str
+    start_s: float = 0.0
+    end_s: float = math.inf  # Exclusive.
+
+    def __post_init__(self) -> None:
+        if not self.label.strip() or not self.start_s < self.end_s:
+            raise Sd2Error(
+                f"{self.subject}/{self.take}: the label {self.label!r} from {self.start_s:g} to"
+                f" {self.end_s:g} s",
+                "a name, and a start before the end",
+            )
+
+
+def read_take_labels(path: Path) -> list[TakeLabel]:
+    """Read a table (CSV) with a row per label: ``subject,take,label[,start_s,end_s]``."""
+    rows = csv.DictReader(read_text(path, _EXPECTED).splitlines(), skipinitialspace=True)
+    missing = [name for name in _NEEDED if name not in (rows.fieldnames or ())]
+    if missing:
+        raise Sd2Error(f"{path} has no column {', '.join(missing)}", _EXPECTED)
+    found = []
+    for number, row in enumerate(rows, start=2):
+        try:
+            subject, take, label = ((row[name] or "").strip() for name in _NEEDED)
+            start_s, end_s = float(row.get("start_s") or 0.0), float(row.get("end_s") or math.inf)
+            found.append(TakeLabel(subject, take, label, start_s, end_s))
+        except (ValueError, TypeError) as error:
+            raise Sd2Error(f"{path}: line {number} is {list(row.values())}", _EXPECTED) from error
+        except Sd2Error as error:
+            raise error.within(f"{path}: line {number}") from error
+    if not found:
+        raise Sd2Error(f"{path} has no row", "one for each label")
+    return found
+
+
+def label_pairs(path: Path, rows: Sequence[TakeLabel]) -> dict[str, int]:
+    """Put labels on a store of pairs in place of those there; return the frames of each.
+
+    Later rows lie over earlier ones; frames without a label are background. All placements of a
+    take get the same. Raises Sd2Error, and changes nothing, if a row is of no take.
+    """
+    header, index, arrays = open_takes(path)
+    labels = list(header["labels"])
+    labels += [name for name in dict.fromkeys(row.label for row in rows) if name not in labels]
+    if len(labels) > np.iinfo(np.int8).max:
+        raise Sd2Error(f"There are {len(labels)} labels", f"up to {np.iinfo(np.int8).max}")
+    values = np.zeros(max(entry["stop"] for entry in index), np.int8)
+    used: set[int] = set()
+    for entry in index:
+        frames = slice(entry["start"], entry["stop"])
+        times_s = np.asarray(arrays["times_s"][frames])
+        for number, row in enumerate(rows):
+            if _is(entry["subject"], row.subject) and _is(entry["name"], row.take):
+                used.add(number)
+                inside = (times_s >= row.start_s) & (times_s < row.end_s)
+                values[frames][inside] = labels.index(row.label)
+    unused = [row for number, row in enumerate(rows) if number not in used]
+    if unused:
+        takes = ", ".join(f"{one['subject']}/{one['name']}" for one in index[:4])
+        raise Sd2Error(
+            f"{path} has no take {unused[0].subject}/{unused[0].take}",
+            f"takes such as {takes}",
+            "Correct the table; `sd2 info --json` lists all takes",
+        )
+    group = open_group(path, "r+")
+    # First the names: no number is ever without one.
+    group.attrs["labels"] = labels
+    group["label"][: len(values)] = values
+    counts = np.bincount(values, minlength=len(labels))
+    return {name: int(count) for name, count in zip(labels, counts, strict=True) if count}
+
+
+def _is(name: str, wanted: str) -> bool:
+    return name == wanted or fnmatchcase(name, wanted)
