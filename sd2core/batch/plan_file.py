@@ -6,9 +6,9 @@ import json
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
 from sd2core.batch.plan import STEPS, BatchPlan
 from sd2core.errors import Sd2Error
@@ -18,6 +18,7 @@ from sd2core.files.texts import parse_toml, read_text
 from sd2core.files.toml import toml_lines
 from sd2core.radar_profiles import RADARS
 
+Plan = TypeVar("Plan", bound=BaseModel)
 _HEADER = re.compile(r"\s*\[+\s*([^\[\]]+?)\s*\]+")
 _KEY = re.compile(r"""\s*([A-Za-z0-9_."'* /\\-]+?)\s*=""")
 _HINT = "docs/formats.md says what a plan holds"
@@ -39,6 +40,13 @@ def plan_from_text(text: str, folder: Path, source: str = "The plan") -> BatchPl
 
     Raises Sd2Error as :func:`read_plan`.
     """
+    return _with_paths(
+        parsed(BatchPlan, text, source), lambda stored: str(located_path(stored, folder))
+    )
+
+
+def parsed(kind: type[Plan], text: str, source: str) -> Plan:
+    """Check a plan of any kind in TOML; Sd2Error names source, line and key."""
     try:
         # Strict as JSON is: lists are lists and numbers are numbers. TOML's dates are neither.
         content = json.dumps(parse_toml(text, source, "TOML", _HINT))
@@ -47,10 +55,9 @@ def plan_from_text(text: str, folder: Path, source: str = "The plan") -> BatchPl
             f"{source} holds a date or a time ({error})", "texts, numbers, lists and tables", _HINT
         ) from error
     try:
-        plan = BatchPlan.model_validate_json(content)
+        return kind.model_validate_json(content)
     except ValidationError as error:
         raise _in_words(error, text, source) from error
-    return _with_paths(plan, lambda stored: str(located_path(stored, folder)))
 
 
 def plan_text(plan: BatchPlan, folder: Path) -> str:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from sd2core.runs.pace import Kind
 
-MODELS = ("lstm", "s4")
-"""The paper's network, and one of the denoiser's S4 layers."""
+MODELS = ("lstm", "s4", "kernel")
+"""The paper's network, one of the denoiser's S4 layers, and one in closed form for few data."""
 
 WIDTH = 32
 """Units or channels of every layer (the paper's: 16)."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from importlib import import_module
 from typing import Any
 
 import torch
@@ -26,6 +27,8 @@ class Classifier(nn.Module):
 
     whole: bool = False
     """Whether it learns from whole stretches at once instead of piece by piece."""
+    closed_form: bool = False
+    """Whether it is fitted at once, instead of by steps."""
 
     def __init__(self, width: int, classes: int, dropout: float) -> None:
         super().__init__()
@@ -111,10 +114,13 @@ class S4Classifier(S4Stack, Classifier):
         )
 
 
-_MODELS: Mapping[str, type[Classifier]] = {"lstm": LstmClassifier, "s4": S4Classifier}
+_MODELS = {"lstm": "models.LstmClassifier", "s4": "models.S4Classifier",
+           "kernel": "kernel.KernelClassifier"}  # fmt: skip
 _OPTIONS: Mapping[str, Mapping[str, Any]] = {
     "lstm": {"width": WIDTH, "depth": 2, "dropout": 0.2},
     "s4": {"width": WIDTH, "depth": 2, "state_size": 16, "dropout": 0.2},
+    # The frames follow from the delay.
+    "kernel": {"frames": 29, "references": 1024},
 }
 
 _LARGEST = 1024
@@ -136,7 +142,10 @@ def build(name: str, size: int, classes: int, **given: Any) -> Classifier:
     known = options(name)
     for option, value in given.items():
         check_option(f"classifier {name}", option, value, known, _LARGEST)
-    return _MODELS[name](size, classes, **{**known, **given})
+    module, _, class_name = _MODELS[name].partition(".")
+    made = getattr(import_module(f"sd2core.classify.{module}"), class_name)
+    built: Classifier = made(size, classes, **{**known, **given})
+    return built
 
 
 def parameter_groups(network: Classifier, rate: float, ssm_rate: float) -> list[dict[str, Any]]:

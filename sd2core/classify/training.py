@@ -125,11 +125,26 @@ def train(
         events.append({"event": event, **content})
         watch(events[-1])
 
+    own = _options_of(chosen, delay_frames)
     with _one_thread(), torch.random.fork_rng(devices=[]):
         torch.manual_seed(chosen.seed)
-        network = build(chosen.model, features.size, len(known.classes), **chosen.options)
+        network = build(chosen.model, features.size, len(known.classes), **own)
         shown = some_noisy(training, known.null_bins, chosen.noisy_share, chosen.seed)
+        if network.closed_form:  # It has no second look at a clip.
+            noisy = zip(shown, training, strict=True)
+            shown = [*training, *(one for one, clean in noisy if one is not clean)]
         material = Material.of(shown, features, delay_frames)
+        if network.closed_form:
+            say("start", steps=1, clips=len(training), frames=sum(map(len, training)))
+            network.fit(
+                [torch.from_numpy(one) for one in material.features],
+                [torch.from_numpy(one) for one in material.labels],
+                weights,
+                chosen.seed,
+            )
+            say("end", best_step=1, interrupted=False)
+            card = _card(chosen, own, features, known, training, delay_frames, about, 1)
+            return Trained(TrainedClassifier(network, card), events, False)
         learning = _Learning(network, material, weights, chosen)
         chosen_by = Material.of(validation, features, delay_frames)
         say("start", steps=chosen.steps, clips=len(training), frames=sum(map(len, training)))
@@ -159,16 +174,37 @@ def train(
         # Stopped before the first look, it is as far as it came.
         if best_at > 0:
             network.load_state_dict(kept)
-    card = ClassifierCard(
+    card = _card(chosen, own, features, known, training, delay_frames, about, best_at)
+    return Trained(TrainedClassifier(network, card), events, interrupted)
+
+
+def _options_of(chosen: TrainOptions, delay_frames: int) -> dict[str, Any]:
+    """Options of the network; windows are twice as long as the delay."""
+    given = {name: value for name, value in chosen.options.items() if name in options(chosen.model)}
+    if "frames" in options(chosen.model):
+        given["frames"] = 2 * delay_frames + 1
+    return given
+
+
+def _card(
+    chosen: TrainOptions,
+    own: Mapping[str, Any],
+    features: Features,
+    known: ClipSet,
+    training: Sequence[Clip],
+    delay_frames: int,
+    about: Mapping[str, Any] | None,
+    best_at: int,
+) -> ClassifierCard:
+    return ClassifierCard(
         chosen.model,
-        {**options(chosen.model), **chosen.options},
+        {**options(chosen.model), **own},
         features,
         known.classes,
         tuple(dict.fromkeys(clip.kind for clip in training)),
         delay_frames,
         about={**(about or {}), "best_step": best_at, "training": chosen.to_json()},
     )
-    return Trained(TrainedClassifier(network, card), events, interrupted)
 
 
 class _Learning:

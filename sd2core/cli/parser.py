@@ -26,6 +26,7 @@ from sd2core.cli import (
     runs,
     simulate,
     strip,
+    study,
     synth,
     train,
 )
@@ -54,6 +55,7 @@ examples:
   sd2 train pairs.zarr --out runs/s4          teach a denoiser from pairs
   sd2 classify train pairs.zarr --out g.safetensors    teach a classifier of gestures
   sd2 export walk.sd2 --out walk.zarr         a data set of segments to learn from
+  sd2 study study.toml                        does synthetic data help on a real radar?
   sd2 batch plan.toml                         all of that for many recordings and places
   sd2 ladder walk.npz --quick                 what accuracy this scene requires
 
@@ -95,6 +97,7 @@ def build_parser(examples: str = "") -> tuple[argparse.ArgumentParser, argparse.
         train,
         runs,
         eval,
+        study,
         batch,
         preparing,
     )

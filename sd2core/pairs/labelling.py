@@ -5,16 +5,17 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.files.stores import open_group
 from sd2core.files.texts import read_text
-from sd2core.pairs.store import open_takes
+from sd2core.pairs.store import PairSet, open_takes
 
 _NEEDED = ("subject", "take", "label")
 _EXPECTED = "columns subject, take, label, and start_s, end_s where a label is not of a whole take"
@@ -67,35 +68,71 @@ def label_pairs(path: Path, rows: Sequence[TakeLabel]) -> dict[str, int]:
     take get the same. Raises Sd2Error, and changes nothing, if a row is of no take.
     """
     header, index, arrays = open_takes(path)
-    labels = list(header["labels"])
-    labels += [name for name in dict.fromkeys(row.label for row in rows) if name not in labels]
-    if len(labels) > np.iinfo(np.int8).max:
-        raise Sd2Error(f"There are {len(labels)} labels", f"up to {np.iinfo(np.int8).max}")
+    labels = _together(header["labels"], rows)
     values = np.zeros(max(entry["stop"] for entry in index), np.int8)
     used: set[int] = set()
     for entry in index:
         frames = slice(entry["start"], entry["stop"])
         times_s = np.asarray(arrays["times_s"][frames])
-        for number, row in enumerate(rows):
-            if _is(entry["subject"], row.subject) and _is(entry["name"], row.take):
-                used.add(number)
-                inside = (times_s >= row.start_s) & (times_s < row.end_s)
-                values[frames][inside] = labels.index(row.label)
-    unused = [row for number, row in enumerate(rows) if number not in used]
-    if unused:
-        takes = ", ".join(f"{one['subject']}/{one['name']}" for one in index[:4])
-        raise Sd2Error(
-            f"{path} has no take {unused[0].subject}/{unused[0].take}",
-            f"takes such as {takes}",
-            "Correct the table; `sd2 info --json` lists all takes",
-        )
+        values[frames] = _numbers(entry["subject"], entry["name"], times_s, rows, labels, used)
+    takes = [(entry["subject"], entry["name"]) for entry in index]
+    _refuse_unused(str(path), rows, used, takes)
     group = open_group(path, "r+")
     # First the names: no number is ever without one.
-    group.attrs["labels"] = labels
+    group.attrs["labels"] = list(labels)
     group["label"][: len(values)] = values
     counts = np.bincount(values, minlength=len(labels))
     return {name: int(count) for name, count in zip(labels, counts, strict=True) if count}
 
 
+def labelled(pairs: PairSet, rows: Sequence[TakeLabel]) -> PairSet:
+    """Pairs with labels in place of their own, as :func:`label_pairs` puts them on a store."""
+    labels = _together(pairs.labels, rows)
+    used: set[int] = set()
+    takes = tuple(
+        replace(take, label=_numbers(take.subject, take.name, take.times_s, rows, labels, used))
+        for take in pairs.takes
+    )
+    _refuse_unused("The pairs", rows, used, [take.key[:2] for take in takes])
+    return replace(pairs, labels=labels, takes=takes)
+
+
+def _together(there: Sequence[str], rows: Sequence[TakeLabel]) -> tuple[str, ...]:
+    labels = tuple(dict.fromkeys([*there, *(row.label for row in rows)]))
+    if len(labels) > np.iinfo(np.int8).max:
+        raise Sd2Error(f"There are {len(labels)} labels", f"up to {np.iinfo(np.int8).max}")
+    return labels
+
+
+def _numbers(
+    subject: str,
+    name: str,
+    times_s: NDArray[np.float64],
+    rows: Sequence[TakeLabel],
+    labels: Sequence[str],
+    used: set[int],
+) -> NDArray[np.int8]:
+    """Label of every frame of a take; rows that are of it are noted as used."""
+    values = np.zeros(len(times_s), np.int8)
+    for number, row in enumerate(rows):
+        if _is(subject, row.subject) and _is(name, row.take):
+            used.add(number)
+            inside = (times_s >= row.start_s) & (times_s < row.end_s)
+            values[inside] = labels.index(row.label)
+    return values
+
+
 def _is(name: str, wanted: str) -> bool:
     return name == wanted or fnmatchcase(name, wanted)
+
+
+def _refuse_unused(
+    where: str, rows: Sequence[TakeLabel], used: set[int], takes: Sequence[tuple[str, ...]]
+) -> None:
+    unused = [row for number, row in enumerate(rows) if number not in used]
+    if unused:
+        raise Sd2Error(
+            f"{where}: there is no take {unused[0].subject}/{unused[0].take}",
+            f"takes such as {', '.join('/'.join(one) for one in takes[:4])}",
+            "Correct the table",
+        )

@@ -68,6 +68,9 @@ PAGES = {
     "real-pairs.md": Measured(
         "python -m tools.documentation.real_pairs", ("sd2core/pairs", *_LEARNING)
     ),
+    "studies.md": Measured(
+        "python -m tools.documentation.studies", ("sd2core/study", "sd2core/pairs", *_LEARNING)
+    ),
     "classifier.md": Measured("make classifier", _CLASSIFIERS),
     "real-gestures.md": Measured("make real-gestures", _SUGGESTIONS),
     "whole-loop.md": Measured("make whole-loop", _CLASSIFIERS),

@@ -10,7 +10,7 @@ from sd2app.widgets.model_page import ModelPage, about_sections, map_and_file_ro
 from sd2app.widgets.text import about, exact_text
 from sd2core.classify.card import ClassifierCard
 
-MODEL_WORDS = {"lstm": "LSTM (the paper's)", "s4": "S4"}
+MODEL_WORDS = {"lstm": "LSTM (the paper's)", "s4": "S4", "kernel": "kernel (few recordings)"}
 FEATURE_WORDS = {"columns": "whole columns", "peak": "strongest bin (the paper's)"}
 _KINDS = {
     "simulated": "simulated radar",

@@ -46,7 +46,8 @@ def add_train(kinds: argparse._SubParsersAction) -> None:
 def add_network(parser: Options) -> None:
     """Add model, features, width and delay."""
     group = parser.add_argument_group("network")
-    text = "two LSTM layers (the paper's), or two S4 layers"
+    text = "two LSTM layers (the paper's), two S4 layers, or kernel ridge regression on windows of"
+    text += " twice the delay, which learns most of few recordings"
     group.add_choice("--model", MODELS, text, MODELS[0])
     text = "input per frame: whole columns (the default), or the strongest bin (the paper's)"
     group.add_choice("--features", ("columns", "peak"), text, "columns")

@@ -153,3 +153,18 @@ def test_other_classes_or_axes_are_not_judged(known: ClipSet) -> None:
         judge(made.classifier, known.clips, replace(known, frame_rate_hz=10.0))
     with pytest.raises(Sd2Error, match="no clip"):
         judge(made.classifier, (), known)
+
+
+def test_a_classifier_in_closed_form_is_sure_of_what_it_was_fitted_to(known: ClipSet) -> None:
+    """With fewer references than frames, more, and again: the same, and better than chance."""
+    found = []
+    for references in (40, 1024):
+        options = TrainOptions("kernel", delay_s=0.3, options={"references": references})
+        made, again = (train(known.clips, (), known, options) for _ in range(2))
+        assert [event["event"] for event in made.events] == ["start", "end"]
+        assert made.classifier.card.options["frames"] == 2 * made.classifier.card.delay_frames + 1
+        for name, values in made.classifier.network.state_dict().items():
+            assert torch.equal(values, again.classifier.network.state_dict()[name])
+        found.append(judge(made.classifier, known.clips, known).mean_recall)
+    assert 0.5 < found[0] <= found[1]
+    assert found[1] > 0.85

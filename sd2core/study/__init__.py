@@ -1,0 +1,1 @@
+"""Studies of whether synthetic data help a classifier on a real radar."""

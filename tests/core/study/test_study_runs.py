@@ -1,0 +1,134 @@
+"""A study from its plan to its page: stopped, continued, nothing left out without a word."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from small_pairs import write_pairs
+
+from sd2core.cli import build_parser, run
+from sd2core.pairs.labelling import TakeLabel, label_pairs
+from sd2core.study import run as study_run
+from sd2core.study.plan import StudyPlan, read_study
+from sd2core.study.report import findings_of, untried, write_report
+from sd2core.study.run import REAL, run_study
+
+
+@pytest.fixture
+def plan(tmp_path: Path) -> Path:
+    pairs = write_pairs(tmp_path / "pairs.zarr", takes=4, frames=90, kind="real", limbs=True)
+    label_pairs(pairs, [TakeLabel("*", f"t{number}", "ab"[number % 2]) for number in range(4)])
+    path = tmp_path / "study.toml"
+    path.write_text(
+        'title = "Small"\nout = "made"\npairs = ["pairs.zarr"]\nshares = [0.2, 1.0]\nseeds = 1\n'
+        'added = ["synthetic", "radar"]\nwindow_s = 1.0\n'
+    )
+    return path
+
+
+@pytest.fixture
+def in_this_process(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Dask's workers are not started; what is made is counted."""
+    from concurrent.futures import Future
+    from contextlib import contextmanager
+
+    made: list[int] = []
+
+    class Client:
+        def submit(self, work, *arguments, pure):
+            made.append(1)
+            future: Future = Future()
+            future.set_result(work(*arguments))
+            return future
+
+    @contextmanager
+    def client(*_: object):
+        yield Client()
+
+    monkeypatch.setattr(study_run, "_client", client)
+    monkeypatch.setattr("distributed.as_completed", list)
+    return made
+
+
+def test_a_study_is_whole_and_goes_on(plan: Path, in_this_process: list[int]) -> None:
+    chosen = read_study(plan)
+    steps: list[tuple[int, int]] = []
+    results = run_study(chosen, progress=lambda done, total: steps.append((done, total)))
+    assert len(results.runs) == len(in_this_process) == 6 * 2
+    assert steps[-1] == (12, 12)
+    assert results.kind == "real"
+    for one in results.runs:
+        assert set(one.scores) == {REAL, "synthetic", "radar"}
+        for scores in one.scores.values():
+            assert set(scores) == {f"{one.fold.judged}/t{number}" for number in range(4)}
+            assert all(0 <= value <= 1 for pair in scores.values() for value in pair)
+    (Path(chosen.out) / "runs").glob("*.json").__next__().unlink()
+    again = run_study(chosen)
+    assert len(in_this_process) == 13  # only what was missing
+    assert again.runs == results.runs
+    other = chosen.model_copy(update={"window_s": 2.0})
+    run_study(other)
+    assert len(in_this_process) == 13 + 12
+
+
+def test_the_page_says_what_was_found_and_what_was_not_tried(
+    plan: Path, in_this_process: list[int]
+) -> None:
+    chosen = read_study(plan)
+    results = run_study(chosen)
+    said = write_report(results, Path(chosen.out))
+    page = (Path(chosen.out) / "study.md").read_text(encoding="utf-8")
+    assert said in page
+    assert "A real radar" in page
+    assert "adding denoised with texture maps" in page
+    assert "| 20% |" in page
+    content = json.loads((Path(chosen.out) / "study.json").read_text(encoding="utf-8"))
+    assert content["conclusion"] == said
+    assert len(content["runs"]) == 12
+    assert (Path(chosen.out) / "curve.png").stat().st_size > 10_000
+    findings = findings_of(results)
+    assert [one.added for one in findings] == ["synthetic", "radar"] * 2
+    assert any("mirrored" in one for one in untried(results))
+
+
+def test_a_denoiser_that_cannot_learn_is_said(
+    plan: Path, in_this_process: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def failed(folder, text, digest, *draw):
+        place = study_run._model_folder(folder, StudyPlan.model_validate_json(text), digest, *draw)
+        place.mkdir(parents=True)
+        (place / "done").write_text(json.dumps({"reason": "too few frames"}))
+
+    monkeypatch.setattr(study_run, "_train", failed)
+    chosen = read_study(plan).model_copy(update={"added": ("denoised", "synthetic+texture")})
+    results = run_study(chosen)
+    assert all(set(one.scores) == {REAL} for one in results.runs)
+    assert all("too few frames" in reason for one in results.runs
+               for reason in one.missing.values())  # fmt: skip
+    assert any("too few frames" in one for one in untried(results))
+    assert "Nothing was added" in write_report(results, Path(chosen.out))
+
+
+@pytest.mark.slow
+def test_denoisers_learn_within_their_fold(plan: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = plan.read_text().replace('["synthetic", "radar"]', '["denoised", "denoised+texture"]')
+    text = text.replace("[0.2, 1.0]", "[1.0]")
+    plan.write_text(
+        text + "[denoiser]\nmodel = 's4d'\nminutes = 0.05\n"
+        "options = {channels = 8, depth = 1, live = false}\n"
+    )
+    assert run(build_parser()[0], ["study", str(plan), "--workers", "2"]) == 0
+    chosen = read_study(plan)
+    assert "study.md" in capsys.readouterr().out
+    content = json.loads((Path(chosen.out) / "study.json").read_text(encoding="utf-8"))
+    assert all("denoised" in one["scores"] for one in content["runs"])
+    folders = list((Path(chosen.out) / "denoisers").iterdir())
+    assert len(folders) == 3  # one for each person whose radar is there
+    for folder in folders:
+        made = json.loads((folder / "run" / "run.json").read_text(encoding="utf-8"))
+        assert made
+        subjects = {json.loads(line)["subject"] for line in
+                    (folder / "pairs.zarr" / "takes.jsonl").read_text().splitlines()}  # fmt: skip
+        assert len(subjects) == 1
