@@ -38,7 +38,8 @@ def network_of(condition: Condition) -> str:
     network = condition.network
     shown = "columns" if network.features == "columns" else "strongest bin"
     late = f"after {network.delay_s:g} s" if network.delay_s else "at once"
-    return f"{network.model.upper()} {network.width}, {shown}, {late}"
+    name = "kernel" if network.model == "kernel" else f"{network.model.upper()} {network.width}"
+    return f"{name}, {shown}, {late}"
 
 
 def as_json(table: Table) -> dict[str, Any]:

@@ -36,8 +36,6 @@ class KernelClassifier(Classifier):
     closed_form = True
     mean: Tensor
     scale: Tensor
-    windows: Tensor
-    weights: Tensor
 
     def __init__(self, size: int, classes: int, *, frames: int, references: int) -> None:
         nn.Module.__init__(self)  # there is no head
@@ -45,8 +43,8 @@ class KernelClassifier(Classifier):
         numbers = 2 * size * len(range(0, frames, _EVERY))
         self.register_buffer("mean", torch.zeros(numbers))
         self.register_buffer("scale", torch.ones(numbers))
-        self.register_buffer("windows", torch.zeros(references, numbers))
-        self.register_buffer("weights", torch.zeros(references, classes))
+        self.windows = nn.Parameter(torch.zeros(references, numbers), requires_grad=False)
+        self.weights = nn.Parameter(torch.zeros(references, classes), requires_grad=False)
         self._size = size
 
     def initial_state(self, batch: int = 1) -> State:
@@ -89,7 +87,7 @@ class KernelClassifier(Classifier):
             else torch.arange(count) % len(x)
         )
         known = torch.unique(drawn) if len(x) <= count else drawn
-        self.windows = x[drawn]
+        self.windows.data = x[drawn]
         own = self.windows[: len(known)].double()
         weight = (weights[y] / weights[y].mean()).double()
         normal = _RIDGE * self._kernel(own, own)
@@ -103,7 +101,7 @@ class KernelClassifier(Classifier):
         normal += 1e-6 * torch.eye(len(known), dtype=torch.float64)
         found = torch.zeros(count, wanted.shape[1])
         found[: len(known)] = torch.linalg.solve(normal, wanted).float()
-        self.weights = found
+        self.weights.data = found
 
     def _of_clip(self, features: Tensor) -> Tensor:
         before = self.initial_state(1)[0]

@@ -196,6 +196,10 @@ def _card(
     about: Mapping[str, Any] | None,
     best_at: int,
 ) -> ClassifierCard:
+    training_said = {**chosen.to_json(), "options": {**options(chosen.model), **own}}
+    if chosen.model == "kernel":  # There are no steps.
+        used = ("model", "features", "delay_s", "options", "noisy_share", "seed")
+        training_said = {name: training_said[name] for name in used}
     return ClassifierCard(
         chosen.model,
         {**options(chosen.model), **own},
@@ -203,7 +207,7 @@ def _card(
         known.classes,
         tuple(dict.fromkeys(clip.kind for clip in training)),
         delay_frames,
-        about={**(about or {}), "best_step": best_at, "training": chosen.to_json()},
+        about={**(about or {}), "best_step": best_at, "training": training_said},
     )
 
 

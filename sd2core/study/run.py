@@ -157,7 +157,7 @@ def _made(
             }
             from distributed import as_completed
 
-            for future in as_completed(futures):
+            for future in as_completed(futures, loop=client.loop):
                 content = json.dumps(asdict(future.result()), ensure_ascii=False)
                 atomic_write_text(paths[futures[future]], content + "\n")
                 done += 1

@@ -37,6 +37,8 @@ def in_this_process(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     made: list[int] = []
 
     class Client:
+        loop = None
+
         def submit(self, work, *arguments, pure):
             made.append(1)
             future: Future = Future()
@@ -48,7 +50,7 @@ def in_this_process(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         yield Client()
 
     monkeypatch.setattr(study_run, "_client", client)
-    monkeypatch.setattr("distributed.as_completed", list)
+    monkeypatch.setattr("distributed.as_completed", lambda futures, loop: list(futures))
     return made
 
 
