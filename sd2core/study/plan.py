@@ -61,6 +61,8 @@ class StudyPlan(_Section):
     added: tuple[Added, ...] = ADDED
     seeds: Annotated[int, Field(ge=1, le=1000)] = 3
     """Draws of the real frames, with a denoiser of its own each."""
+    added_weight: Annotated[FiniteFloat, Field(gt=0, le=10)] = 0.3
+    """Weight of all added frames together, beside 1 of the real ones."""
     window_s: Annotated[FiniteFloat, Field(gt=0, le=60)] = 3.0
     """Time that the classifier looks at."""
     denoiser: Denoiser = Field(default_factory=Denoiser)

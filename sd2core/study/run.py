@@ -211,7 +211,7 @@ def _hash(*content: Any) -> str:
 def _run_path(
     folder: Path, plan: StudyPlan, digest: str, fold: Fold, share: float, seed: int
 ) -> Path:
-    used = plan.model_dump(mode="json", include={"classes", "added", "window_s"})
+    used = plan.model_dump(mode="json", include={"classes", "added", "added_weight", "window_s"})
     used["denoiser"] = plan.denoiser.model_dump(mode="json") if _learns(plan) else None
     key = _hash(digest, used, asdict(fold), share, seed)
     return folder / "runs" / f"{key}.json"
@@ -325,7 +325,8 @@ def _run(plan_text: str, folder: str, digest: str, fold: Fold, share: float, see
             missing[condition] = str(error)
             continue
         added = _seen(plan_text, fold.video) if condition == "radar" else shown(maps)
-        ridge = _fitted([*real, *video], [*known, *added], len(real), len(names))
+        weights = (1.0, plan.added_weight)
+        ridge = _fitted([*real, *video], [*known, *added], len(real), weights, len(names))
         scores[condition] = {
             one.title: _score(ridge.scores(features), one.classes)
             for one, features in zip(judged, asked, strict=True)
@@ -368,16 +369,20 @@ def _added_map(
 
 
 def _fitted(
-    takes: Sequence[Labelled], features: Sequence[Features], real: int, classes: int
+    takes: Sequence[Labelled],
+    features: Sequence[Features],
+    real: int,
+    whole: tuple[float, float],
+    classes: int,
 ) -> Ridge:
-    """Learn from real and added takes; both count the same together."""
+    """Learn from real and added takes, whose frames weigh together what ``whole`` says."""
     weights = []
     counts = [
         sum(int((one.classes != UNKNOWN).sum()) for one in part)
         for part in (takes[:real], takes[real:])
     ]
     for number, one in enumerate(takes):
-        weight = 1.0 / max(counts[number >= real], 1)
+        weight = whole[number >= real] / max(counts[number >= real], 1)
         weights.append(np.full(len(one.classes), weight))
     known = [one.classes != UNKNOWN for one in takes]
     return Ridge.fitted(
