@@ -47,6 +47,11 @@ class Labelled:
         """Name in results."""
         return f"{self.take.subject}/{self.take.name}"
 
+    def at_speed(self, speed: float) -> Labelled:
+        """Return the classes as of a map that is played faster; its own maps stay as they are."""
+        frames = np.arange(0.0, len(self.classes) - 0.5, speed).astype(int)
+        return Labelled(self.take, self.classes[frames])
+
     def part(self, frames: slice) -> Labelled:
         """Return some of its frames."""
         return Labelled(self.take.part(frames), self.classes[frames])

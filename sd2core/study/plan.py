@@ -59,6 +59,8 @@ class StudyPlan(_Section):
     shares: Annotated[tuple[Share, ...], Field(min_length=1)] = (0.05, 0.1, 0.25, 0.5, 1.0)
     """Of the real frames of each class."""
     added: tuple[Added, ...] = ADDED
+    speeds: tuple[Annotated[FiniteFloat, Field(ge=0.25, le=4)], ...] = ()
+    """Added maps are also played at these speeds: twice as fast, velocities are twice as large."""
     seeds: Annotated[int, Field(ge=1, le=1000)] = 3
     """Draws of the real frames, with a denoiser of its own each."""
     added_weight: Annotated[FiniteFloat, Field(gt=0, le=10)] = 0.3

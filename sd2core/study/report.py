@@ -35,7 +35,7 @@ _UNTRIED = (
     "other classifiers than ridge regression on windows",
     "more than one person's video at a time",
     "places of the sensor other than the radar's own",
-    "bodies of other shape, other speeds",
+    "bodies of other shape",
     "mirrored movements",
 )
 
@@ -130,6 +130,7 @@ def page(results: Results, findings: Sequence[Finding]) -> str:
     plan = results.plan
     people = ", ".join(f"{one} ({count} takes)" for one, count in results.takes.items())
     folds = len({run.fold for run in results.runs})
+    speeds = ", ".join(f"{one:g}" for one in plan.speeds)
     parts = [
         f"# {plan.title}",
         f"**{conclusion(results, findings)}**",
@@ -137,7 +138,8 @@ def page(results: Results, findings: Sequence[Finding]) -> str:
         f" {1 / len(results.classes):.0%}. Every ordered pair of people is a fold ({folds}): one is"
         " judged, of another there is only video, of all others there is a share of the real"
         f" radar's data, equally much of every class. {plan.seeds} draws each. The denoiser of a"
-        " fold learns from those same real data alone.",
+        " fold learns from those same real data alone."
+        + (f" Added maps are also played {speeds} times as fast." if speeds else ""),
         "## Found",
         "Per cent of frames (of whole movements), mean over people:",
         _table_of_scores(results),
@@ -165,7 +167,8 @@ def untried(results: Results) -> list[str]:
         for name, reason in run.missing.items()
     )
     inputs = [one for one in ("map", "limbs", "kinematics") if one != plan.denoiser.inputs]
-    return [*left, *reasons, f"denoisers that take {' or '.join(inputs)}", *_UNTRIED]
+    speeds = [] if plan.speeds else ["other speeds"]
+    return [*left, *reasons, f"denoisers that take {' or '.join(inputs)}", *speeds, *_UNTRIED]
 
 
 def draw_curve(results: Results) -> Figure:

@@ -31,7 +31,7 @@ from sd2core.progress import Progress, silent
 from sd2core.runs.folder import RunFolder
 from sd2core.study.folds import UNKNOWN, Fold, Labelled, folds_of, labelled_takes, share_of
 from sd2core.study.plan import Added, StudyPlan
-from sd2core.study.windows import Ridge, window_features
+from sd2core.study.windows import Ridge, at_speed, window_features
 from sd2core.train.data import read_mixed
 
 VERSION = 1
@@ -108,7 +108,7 @@ def run_study(
     lock = folder.lock()
     try:
         folder.set_state("running")
-        results = _made(plan, folder.path, processes, scheduler, progress)
+        results = _made(_with_pairs(plan), folder.path, processes, scheduler, progress)
         folder.set_state("finished")
         return results
     except BaseException:
@@ -116,6 +116,20 @@ def run_study(
         raise
     finally:
         lock.release()
+
+
+def _with_pairs(plan: StudyPlan) -> StudyPlan:
+    """The same study of pairs; those of recordings are made, or gone on with."""
+    if not plan.recordings:
+        return plan
+    from sd2core.doppler import PRESETS
+    from sd2core.mocap.recording_pairs import make_recording_pairs
+
+    made = Path(plan.out) / "pairs.zarr"
+    recordings = [Path(path) for path in plan.recordings]
+    subjects = plan.subjects or None
+    make_recording_pairs(recordings, made, PRESETS["paper"], subjects=subjects, limbs=True)
+    return plan.model_copy(update={"pairs": (str(made),), "recordings": (), "subjects": ()})
 
 
 def _made(
@@ -175,17 +189,7 @@ def _learns(plan: StudyPlan) -> bool:
 @lru_cache(maxsize=1)
 def _pairs(plan_text: str) -> PairSet:
     plan = StudyPlan.model_validate_json(plan_text)
-    stores = [Path(path) for path in plan.pairs]
-    if plan.recordings:
-        from sd2core.doppler import PRESETS
-        from sd2core.mocap.recording_pairs import make_recording_pairs
-
-        stores = [Path(plan.out) / "pairs.zarr"]
-        recordings = [Path(path) for path in plan.recordings]
-        make_recording_pairs(
-            recordings, stores[0], PRESETS["paper"], subjects=plan.subjects or None, limbs=True
-        )
-    pairs = read_mixed(stores)
+    pairs = read_mixed([Path(path) for path in plan.pairs])
     if plan.labels is None:
         return pairs
     return labelled(pairs, read_take_labels(Path(plan.labels)))
@@ -212,6 +216,8 @@ def _run_path(
     folder: Path, plan: StudyPlan, digest: str, fold: Fold, share: float, seed: int
 ) -> Path:
     used = plan.model_dump(mode="json", include={"classes", "added", "added_weight", "window_s"})
+    if plan.speeds:
+        used["speeds"] = list(plan.speeds)
     used["denoiser"] = plan.denoiser.model_dump(mode="json") if _learns(plan) else None
     key = _hash(digest, used, asdict(fold), share, seed)
     return folder / "runs" / f"{key}.json"
@@ -325,6 +331,11 @@ def _run(plan_text: str, folder: str, digest: str, fold: Fold, share: float, see
             missing[condition] = str(error)
             continue
         added = _seen(plan_text, fold.video) if condition == "radar" else shown(maps)
+        if condition != "radar":
+            for speed in plan.speeds if video else ():
+                played = [at_speed(one, pairs.axis, speed) for one in maps]
+                added = [*added, *shown(played)]
+                video = [*video, *(one.at_speed(speed) for one in of[fold.video])]
         weights = (1.0, plan.added_weight)
         ridge = _fitted([*real, *video], [*known, *added], len(real), weights, len(names))
         scores[condition] = {

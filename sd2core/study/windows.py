@@ -70,6 +70,23 @@ def window_features(
     return np.array(rows)
 
 
+def at_speed(
+    energies: NDArray[np.float32], axis: VelocityAxis, speed: float
+) -> NDArray[np.float32]:
+    """Play a map faster or slower, (frames, bins) → (frames / speed, bins).
+
+    Velocities grow by the same factor; what passes the end of the axis is lost.
+    """
+    frames = np.arange(0.0, len(energies) - 0.5, speed)
+    before = frames.astype(int)
+    after = np.minimum(before + 1, len(energies) - 1)
+    part = (frames - before)[:, None]
+    played = (1.0 - part) * energies[before] + part * energies[after]
+    inside = axis.centres_mps / speed
+    moved = [np.interp(inside, axis.centres_mps, row, left=0.0, right=0.0) for row in played]
+    return (np.array(moved) / speed).astype(np.float32)
+
+
 @dataclass(frozen=True, eq=False)
 class Ridge:
     """Linear scores of classes from features."""

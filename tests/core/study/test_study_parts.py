@@ -11,12 +11,14 @@ from hypothesis import strategies as st
 from small_pairs import AXIS, write_pairs
 
 from sd2core.errors import Sd2Error
+from sd2core.maps import mean_velocity_mps
 from sd2core.pairs.labelling import TakeLabel, labelled
 from sd2core.pairs.store import PairSet, read_pairs
+from sd2core.sensor import VelocityAxis
 from sd2core.study.certainty import adjusted, gain_of
 from sd2core.study.folds import folds_of, labelled_takes, share_of
 from sd2core.study.plan import read_study
-from sd2core.study.windows import Ridge, window_features
+from sd2core.study.windows import Ridge, at_speed, window_features
 
 
 @pytest.fixture(scope="module")
@@ -92,6 +94,21 @@ def test_features_do_not_depend_on_the_gain_and_tell_movements_apart() -> None:
         assert (ridge.scores(features).argmax(axis=1) == label).mean() > 0.9
     empty = window_features(np.zeros((20, AXIS.bins), np.float32), AXIS, 30.0, 1.0)
     assert np.isfinite(empty).all()
+
+
+@given(st.floats(0.5, 2.0))
+@settings(max_examples=20, deadline=None)
+def test_a_map_played_faster_has_its_velocities_and_times_scaled(speed: float) -> None:
+    axis = VelocityAxis(64, 2.0)
+    centre = 0.4 * np.sin(np.arange(200) / 15.0)
+    values = np.exp(-(((axis.centres_mps[None] - centre[:, None]) / 0.2) ** 2)).astype(np.float32)
+    played = at_speed(values, axis, speed)
+    assert len(played) == pytest.approx(200 / speed, abs=1)
+    wanted = speed * 0.4 * np.sin(np.arange(len(played)) * speed / 15.0)
+    found = mean_velocity_mps(played, axis)
+    inside = np.abs(wanted) < 1.2
+    np.testing.assert_allclose(found[inside], wanted[inside], atol=0.08)
+    np.testing.assert_array_equal(at_speed(values, axis, 1.0), values)
 
 
 def test_nothing_gained_is_nothing_certain() -> None:
