@@ -43,14 +43,17 @@ def gain_of(gains: Gains, seed: int = 0) -> Gain:
     """
     people = [np.asarray(values, np.float64) for values in gains.values()]
     rng = np.random.default_rng(seed)
-    mean = _mean(people)
-    takes = [_mean([rng.choice(own, len(own)) for own in people]) for _ in range(_DRAWS)]
-    others = []
-    for _ in range(_DRAWS):
-        drawn = [people[number] for number in rng.integers(len(people), size=len(people))]
-        others.append(_mean([rng.choice(own, len(own)) for own in drawn]))
-    turned = [_mean([own * rng.choice((-1.0, 1.0), len(own)) for own in people])
-              for _ in range(_DRAWS)]  # fmt: skip
+    mean = float(np.mean([own.mean() for own in people]))
+    takes = np.mean([_drawn(own, _DRAWS, rng) for own in people], axis=0)
+    others = np.zeros(_DRAWS)
+    for _ in people:
+        chosen = rng.integers(len(people), size=_DRAWS)
+        for number, own in enumerate(people):
+            mine = chosen == number
+            others[mine] += _drawn(own, int(mine.sum()), rng) / len(people)
+    turned = np.mean(
+        [(own * rng.choice((-1.0, 1.0), (_DRAWS, len(own)))).mean(axis=1) for own in people], axis=0
+    )
     more = int((np.abs(turned) >= abs(mean) - 1e-12).sum())
     return Gain(mean, _interval(takes), _interval(others), (more + 1) / (_DRAWS + 1))
 
@@ -66,10 +69,11 @@ def adjusted(values: Sequence[float]) -> list[float]:
     return found
 
 
-def _mean(people: Sequence[NDArray[np.float64]]) -> float:
-    return float(np.mean([own.mean() for own in people]))
+def _drawn(own: NDArray[np.float64], times: int, rng: np.random.Generator) -> NDArray[np.float64]:
+    """Means of takes drawn anew, with replacement."""
+    return np.asarray(own[rng.integers(len(own), size=(times, len(own)))].mean(axis=1))
 
 
-def _interval(values: Sequence[float]) -> tuple[float, float]:
+def _interval(values: NDArray[np.float64]) -> tuple[float, float]:
     low, high = np.percentile(values, _INSIDE)
     return float(low), float(high)
