@@ -58,7 +58,7 @@ class TableOptions:
         replace(PAPER, features="columns"),
         Network(delay_s=0.0),
         Network("s4"),
-        Network("kernel", delay_s=1.1),
+        Network("kernel", delay_s=0.9),
     )
     training: TrainOptions = field(default_factory=TrainOptions)
     """Equal for all; its network and its seed are ignored."""
