@@ -26,8 +26,6 @@ OLD = {
     "performance.md": "needs an idle machine for an hour",
     "scale.md": "needs an idle machine; batches changed in what they check",
     "fitting.md": "ten idle minutes; only how its commands are declared has changed",
-    "real-gestures.md": "five minutes; suggestions were rearranged, none of them changed",
-    "denoiser.md": "minutes on an idle machine; labels can be put on pairs now",
     "range-synthesis.md": _HOURS,
     "real-pairs.md": "a quarter of an hour; nothing that it measures was meant to change",
     "classifier.md": _HOURS,
