@@ -111,8 +111,11 @@ def run_study(
         results = _made(_with_pairs(plan), folder.path, processes, scheduler, progress)
         folder.set_state("finished")
         return results
-    except BaseException:
+    except KeyboardInterrupt:
         folder.set_state("stopped")
+        raise
+    except BaseException:
+        folder.set_state("failed")
         raise
     finally:
         lock.release()
@@ -245,9 +248,9 @@ def _train(
     """Have the denoiser of a draw learnt, in a process of its own; a reason is kept if it fails."""
     plan = StudyPlan.model_validate_json(plan_text)
     place = _model_folder(folder, plan, digest, real, share, seed)
-    if (place / "done").exists():
+    if (place / "done").exists() and (place / "run" / "best.safetensors").exists():
         return
-    if place.exists():
+    if place.exists():  # It failed, or was stopped.
         remove(place)
     place.mkdir(parents=True)
     chosen = plan.denoiser

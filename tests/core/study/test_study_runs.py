@@ -9,6 +9,7 @@ import pytest
 from small_pairs import write_pairs
 
 from sd2core.cli import build_parser, run
+from sd2core.errors import Sd2Error
 from sd2core.pairs.labelling import TakeLabel, label_pairs
 from sd2core.study import run as study_run
 from sd2core.study.plan import StudyPlan, read_study
@@ -73,6 +74,18 @@ def test_a_study_is_whole_and_goes_on(plan: Path, in_this_process: list[int]) ->
     other = chosen.model_copy(update={"window_s": 2.0})
     run_study(other)
     assert len(in_this_process) == 13 + 12
+
+
+def test_a_study_that_cannot_be_is_no_study_that_was_stopped(
+    plan: Path, in_this_process: list[int]
+) -> None:
+    chosen = read_study(plan)
+    with pytest.raises(Sd2Error, match="nothing such"):
+        run_study(chosen.model_copy(update={"classes": {"nothing such": "x"}}))
+    folder = study_run.StudyFolder(Path(chosen.out))
+    assert folder.state() == "failed"
+    run_study(chosen)
+    assert folder.state() == "finished"
 
 
 def test_the_page_says_what_was_found_and_what_was_not_tried(
