@@ -35,7 +35,7 @@ help:
 	@echo "make fitting      docs/fitting.md, measured (some ten minutes)"
 	@echo "make denoiser     docs/denoiser.md, trained and measured (an hour and more; after make fitting)"
 	@echo "make range-synthesis  docs/range-synthesis.md, trained (half an hour)"
-	@echo "make classifier   docs/classifier.md, trained (an hour)"
+	@echo "make classifier   docs/classifier.md, trained (two hours)"
 	@echo "make real-gestures  docs/real-gestures.md: real radar, suggestions and classifiers (five minutes)"
 	@echo "make whole-loop   docs/whole-loop.md: from a recording to a classifier (20 minutes)"
 	@echo "make paper        docs/paper.md: the paper's figures and tables (half an hour after make classifier)"

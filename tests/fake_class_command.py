@@ -1,7 +1,7 @@
 """Keeps a folder as ``sd2core.cli.background --folder`` does, and learns nothing.
 
 ``fake_class_command.py [--step-s S] [--fail TEXT] [--die-at N] FOLDER classify train|table
-DATA… --out OUT …``.
+DATA… --out OUT …``, or ``… FOLDER study PLAN``.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ def main() -> int:
     parser.add_argument("--fail", default="")
     parser.add_argument("--die-at", type=int, default=0)
     parser.add_argument("folder", type=Path)
-    parser.add_argument("command", nargs=2)
-    parser.add_argument("data", nargs="+", type=Path)
+    parser.add_argument("command")
+    parser.add_argument("data", nargs="+")
     parser.add_argument("--out", type=Path)
-    for name in ("--quick", "--progress-json"):
+    for name in ("--quick", "--radar-only", "--same-people", "--progress-json"):
         parser.add_argument(name, action="store_true")
     for name in ("--model", "--features", "--maps", "--steps", "--seed", "--width", "--delay-s"):
         parser.add_argument(name)
@@ -49,7 +49,7 @@ def work(options, folder) -> int:
     if options.fail:
         print(f"sd2: {options.fail}", file=sys.stderr)
         return 1
-    table, code = options.command[1] == "table", 0
+    table, code = options.command == "study" or options.data[0] == "table", 0
     if not table:
         say("start", steps=STEPS, clips=3, frames=900)
     for step in range(1, STEPS + 1):
@@ -66,8 +66,9 @@ def work(options, folder) -> int:
             code = 130
             break
     if table and code == 0:
-        options.out.mkdir()
-        (options.out / "table.json").write_text("{}")
+        out = options.out or Path(options.data[0]).parent / "made"
+        out.mkdir(exist_ok=True)
+        (out / "study.json").write_text(json.dumps({"conclusion": "It helped."}))
     if not table:
         say("end", best_step=4, interrupted=code == 130)
         options.out.write_bytes(b"a model")

@@ -51,11 +51,13 @@ Share = Annotated[FiniteFloat, Field(gt=0, le=1)]
 NotNegative = Annotated[FiniteFloat, Field(ge=0)]
 
 
-class _Section(BaseModel):
+class Section(BaseModel):
+    """Base of the sections of plans: strict, and nothing unknown."""
+
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
-class Recordings(_Section):
+class Recordings(Section):
     """Section ``[recordings]``: the input files and their subjects."""
 
     files: Annotated[tuple[Text, ...], Field(min_length=1)]
@@ -69,7 +71,7 @@ class Recordings(_Section):
     holds."""
 
 
-class Fit(_Section):
+class Fit(Section):
     """Section ``[fit]``: options of ``sd2 fit`` for videos without a mesh."""
 
     resolution: Resolution = "medium"
@@ -81,7 +83,7 @@ class Fit(_Section):
     models: Text | None = None  # folder of the landmark models
 
 
-class Synthesise(_Section):
+class Synthesise(Section):
     """Section ``[synthesise]``: options of ``sd2 synth``.
 
     Options that are not given come from the preset, see
@@ -136,21 +138,21 @@ class Synthesise(_Section):
         return chosen_options(self.preset, self.bins, self.v_max_mps, given)
 
 
-class Denoise(_Section):
+class Denoise(Section):
     """Section ``[denoise]``: options of ``sd2 denoise``."""
 
     # A file, or the name of an installed model; None: the bundled one for what is synthesised.
     model: Text | None = None
 
 
-class Simulate(_Section):
+class Simulate(Section):
     """Section ``[simulate]``: options of ``sd2 export --simulate``."""
 
     radar: Text = "paper"  # a name, or the config.json of a capture
     seed: Annotated[int, Field(ge=0)] = 0  # of phases and noise
 
 
-class Export(_Section):
+class Export(Section):
     """Section ``[export]``: options of ``sd2 export``."""
 
     format: Literal["zarr", "h5", "npz"] = "zarr"
@@ -178,7 +180,7 @@ class Export(_Section):
         return self
 
 
-class BatchPlan(_Section):
+class BatchPlan(Section):
     """Plan of a batch. A step whose section is absent is not done."""
 
     format: Literal["sd2-batch-plan"] = FORMAT
@@ -238,7 +240,7 @@ class BatchPlan(_Section):
         return ({0: own} if with_own else {}) | dict(enumerate(others, start=1))
 
 
-class _Positions(_Section):
+class _Positions(Section):
     kind: Literal["positions"]
     positions_m: Annotated[
         tuple[tuple[FiniteFloat, FiniteFloat, FiniteFloat], ...], Field(min_length=1)

@@ -7,7 +7,7 @@ import queue
 import signal
 import time
 import uuid
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import count
@@ -259,22 +259,39 @@ def _security() -> Any:
 @contextmanager
 def scheduler_pool(folder: BatchFolder, address: str) -> Iterator[Pool]:
     """Open the workers of a running ``dask-scheduler``."""
+    with _dask_log(folder), _scheduler_client(address) as client:
+        # Workers of a cluster may be taken away at any time.
+        yield Pool(client, folder, most_deaths=4)
+
+
+@contextmanager
+def study_client(
+    scratch: Path, processes: int, scheduler: str | None
+) -> Iterator[tuple[Any, Callable[[Iterable[Any]], Iterable[Any]]]]:
+    """Return a client of this machine or of a scheduler, and what yields futures when done."""
+    from distributed import as_completed
+
+    opened = _scheduler_client(scheduler) if scheduler else local_client(scratch, processes)
+    with opened as client:
+        yield client, lambda futures: as_completed(futures, loop=client.loop)
+
+
+@contextmanager
+def _scheduler_client(address: str) -> Iterator[Any]:
     from distributed import Client
 
-    with _dask_log(folder):
-        try:
-            client = Client(address, timeout=_CONNECT_S, set_as_default=False)
-        except (OSError, ValueError, TimeoutError) as error:
-            raise Sd2Error(
-                f"No scheduler answers at {address} ({error})",
-                "the address of a dask-scheduler, such as tcp://10.0.0.5:8786",
-                "Start one with `dask scheduler`",
-            ) from error
-        try:
-            # Workers of a cluster may be taken away at any time.
-            yield Pool(client, folder, most_deaths=4)
-        finally:
-            client.close(timeout=_CLOSE_S)
+    try:
+        client = Client(address, timeout=_CONNECT_S, set_as_default=False)
+    except (OSError, ValueError, TimeoutError) as error:
+        raise Sd2Error(
+            f"No scheduler answers at {address} ({error})",
+            "the address of a dask-scheduler, such as tcp://10.0.0.5:8786",
+            "Start one with `dask scheduler`",
+        ) from error
+    try:
+        yield client
+    finally:
+        client.close(timeout=_CLOSE_S)
 
 
 @contextmanager

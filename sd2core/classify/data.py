@@ -123,17 +123,21 @@ def gesture_classes(labels: Sequence[str]) -> tuple[str, ...]:
 
 
 def clips_of_pairs(
-    pairs: PairSet, kind: MapKind, denoiser: TrainedDenoiser | None = None
+    pairs: PairSet,
+    kind: MapKind,
+    denoiser: TrainedDenoiser | None = None,
+    names: Sequence[str] | None = None,
 ) -> ClipSet:
     """Return the clips of one kind of maps in a store of pairs.
 
     The radar's are simulated or real, as the pairs say; denoised ones need the denoiser.
+    ``names`` gives the class of every label; by default :func:`gesture_classes`.
     """
     if kind in ("simulated", "real") and kind != pairs.kind:
         raise Sd2Error(f"The pairs hold a {pairs.kind} radar", f"a {kind} one")
     if kind == "denoised":
         _check_denoiser(pairs, denoiser)
-    names = gesture_classes(pairs.labels)
+    names = gesture_classes(pairs.labels) if names is None else names
     classes = in_order(names)
     table = np.array([classes.index(name) for name in names], np.int8)
     clips = []

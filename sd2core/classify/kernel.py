@@ -63,24 +63,35 @@ class KernelClassifier(Classifier):
         return _SHARPNESS * torch.cat(found, dim=1), kept
 
     def fit(
-        self, features: Sequence[Tensor], labels: Sequence[Tensor], weights: Tensor, seed: int
+        self,
+        features: Sequence[Tensor],
+        labels: Sequence[Tensor],
+        weights: Tensor,
+        of_clips: Sequence[float],
+        seed: int,
     ) -> None:
         """Fit to clips: features (frames, size), labels (frames,), below 0 where unknown.
 
-        ``weights`` are those of the classes.
+        ``weights`` are those of the classes, ``of_clips`` those of a frame of each clip.
         """
         described = [
             self._of_clip(one)[label >= 0] for one, label in zip(features, labels, strict=True)
         ]
         x = torch.cat(described)
         y = torch.cat([label[label >= 0] for label in labels])
+        own_weights = torch.cat(
+            [
+                torch.full((int((label >= 0).sum()),), weight)
+                for label, weight in zip(labels, of_clips, strict=True)
+            ]
+        )
         deviation, self.mean = torch.std_mean(x, dim=0, correction=0)
         self.scale = 1.0 / deviation.clamp(min=_LEAST_DEVIATION)
         x = (x - self.mean) * self.scale
         generator = torch.Generator().manual_seed(seed)
         count = len(self.windows)
         # Of every class alike, as far as there are so many; of few all, and again.
-        chance = weights[y].clamp(min=1e-9)
+        chance = (weights[y] * own_weights).clamp(min=1e-9)
         drawn = (
             torch.multinomial(chance, count, generator=generator)
             if len(x) > count
@@ -89,7 +100,8 @@ class KernelClassifier(Classifier):
         known = torch.unique(drawn) if len(x) <= count else drawn
         self.windows.data = x[drawn]
         own = self.windows[: len(known)].double()
-        weight = (weights[y] / weights[y].mean()).double()
+        weight = weights[y] * own_weights
+        weight = (weight / weight.mean()).double()
         normal = _RIDGE * self._kernel(own, own)
         wanted = torch.zeros(len(known), self.weights.shape[1], dtype=torch.float64)
         for start in range(0, len(x), _BLOCK):

@@ -105,6 +105,7 @@ def train(
     known: ClipSet,
     chosen: TrainOptions | None = None,
     *,
+    weights: Sequence[float] | None = None,
     about: Mapping[str, Any] | None = None,
     watch: Watch = lambda event: None,
 ) -> Trained:
@@ -113,10 +114,12 @@ def train(
     The loss is the cross entropy, every class weighted by the inverse of its number of
     frames, so that all of them count the same. The clips are shuffled again when all have
     been seen. The best on validation is the one with the highest mean recall of frames;
-    without validation the last one is taken. ``about`` goes onto the card.
+    without validation the last one is taken. ``weights`` say how much a frame of each training
+    clip counts, by default all the same. ``about`` goes onto the card.
     """
     chosen = chosen or TrainOptions()
-    weights = _class_weights(training, known.classes)
+    own_weights = np.ones(len(training)) if weights is None else np.asarray(weights, np.float64)
+    of_classes = _class_weights(training, own_weights, known.classes)
     features = Features(chosen.features, known.axis, known.null_bins, known.frame_rate_hz)
     delay_frames = round(chosen.delay_s * known.frame_rate_hz)
     events: list[dict[str, Any]] = []
@@ -132,20 +135,24 @@ def train(
         shown = some_noisy(training, known.null_bins, chosen.noisy_share, chosen.seed)
         if network.closed_form:  # It has no second look at a clip.
             noisy = zip(shown, training, strict=True)
-            shown = [*training, *(one for one, clean in noisy if one is not clean)]
+            again = [number for number, (one, clean) in enumerate(noisy) if one is not clean]
+            own_weights = np.concatenate([own_weights, own_weights[again]])
+            shown = [*training, *(shown[number] for number in again)]
         material = Material.of(shown, features, delay_frames)
         if network.closed_form:
             say("start", steps=1, clips=len(training), frames=sum(map(len, training)))
             network.fit(
                 [torch.from_numpy(one) for one in material.features],
                 [torch.from_numpy(one) for one in material.labels],
-                weights,
+                of_classes,
+                own_weights.tolist(),
                 chosen.seed,
             )
             say("end", best_step=1, interrupted=False)
-            card = _card(chosen, own, features, known, training, delay_frames, about, 1)
+            card = _card(chosen, own, features, known, training, delay_frames, about, 1, True)
             return Trained(TrainedClassifier(network, card), events, False)
-        learning = _Learning(network, material, weights, chosen)
+        drawn = None if weights is None else own_weights * [len(clip) for clip in training]
+        learning = _Learning(network, material, of_classes, chosen, drawn)
         chosen_by = Material.of(validation, features, delay_frames)
         say("start", steps=chosen.steps, clips=len(training), frames=sum(map(len, training)))
         interrupted = False
@@ -174,7 +181,7 @@ def train(
         # Stopped before the first look, it is as far as it came.
         if best_at > 0:
             network.load_state_dict(kept)
-    card = _card(chosen, own, features, known, training, delay_frames, about, best_at)
+    card = _card(chosen, own, features, known, training, delay_frames, about, best_at, False)
     return Trained(TrainedClassifier(network, card), events, interrupted)
 
 
@@ -195,9 +202,10 @@ def _card(
     delay_frames: int,
     about: Mapping[str, Any] | None,
     best_at: int,
+    closed_form: bool,
 ) -> ClassifierCard:
     training_said = {**chosen.to_json(), "options": {**options(chosen.model), **own}}
-    if chosen.model == "kernel":  # There are no steps.
+    if closed_form:  # There are no steps.
         used = ("model", "features", "delay_s", "options", "noisy_share", "seed")
         training_said = {name: training_said[name] for name in used}
     return ClassifierCard(
@@ -215,10 +223,17 @@ class _Learning:
     """Loop over batches with the optimiser."""
 
     def __init__(
-        self, network: Classifier, material: Material, weights: torch.Tensor, chosen: TrainOptions
+        self,
+        network: Classifier,
+        material: Material,
+        weights: torch.Tensor,
+        chosen: TrainOptions,
+        chances: NDArray[np.float64] | None,
     ) -> None:
         self._network, self._material, self._weights = network, material, weights
         self._chosen = chosen
+        # Of each clip to be drawn; without any all are shown in turn.
+        self._chances = None if chances is None else chances / chances.sum()
         self._rng = np.random.default_rng([chosen.seed, 1])
         groups = parameter_groups(network, chosen.learning_rate, chosen.ssm_learning_rate)
         self._optimiser = torch.optim.AdamW(groups, weight_decay=chosen.weight_decay)
@@ -232,6 +247,9 @@ class _Learning:
             for group, rate in zip(self._optimiser.param_groups, self._highest, strict=True):
                 group["lr"] = share * rate
             drawn: list[int] = []
+            if self._chances is not None:
+                batch = self._chosen.batch
+                drawn = self._rng.choice(len(self._chances), batch, p=self._chances).tolist()
             while len(drawn) < self._chosen.batch:
                 if not waiting:
                     waiting = self._rng.permutation(len(self._material.labels)).tolist()
@@ -311,12 +329,16 @@ def _score(network: Classifier, material: Material, classes: int) -> float:
     return mean_recall(confusion)
 
 
-def _class_weights(clips: Sequence[Clip], classes: tuple[str, ...]) -> torch.Tensor:
-    counts = frame_counts(clips, len(classes))
+def _class_weights(
+    clips: Sequence[Clip], weights: NDArray[np.float64], classes: tuple[str, ...]
+) -> torch.Tensor:
+    counts = np.zeros(len(classes))
+    for clip, weight in zip(clips, weights, strict=True):
+        counts += weight * frame_counts([clip], len(classes))
     if not counts.sum():
         raise Sd2Error("There is no labelled frame to learn from", "clips with labels")
     # A class without a frame is never in the loss.
-    weights = np.where(counts > 0, counts.sum() / np.maximum(counts, 1), 0.0)
+    weights = np.where(counts > 0, counts.sum() / np.maximum(counts, 1e-9), 0.0)
     return torch.from_numpy((weights / weights[counts > 0].mean()).astype(np.float32))
 
 

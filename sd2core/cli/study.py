@@ -4,50 +4,81 @@ from __future__ import annotations
 
 import argparse
 import os
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from sd2core.cli.command_parser import add_command
+from sd2core.cli.command_parser import Options, add_command
 from sd2core.cli.options import positive_int
-from sd2core.cli.output import print_json, progress_bar
+from sd2core.cli.output import print_event, print_json, progress_bar
+
+if TYPE_CHECKING:
+    from sd2core.progress import Progress
+    from sd2core.study.plan import StudyPlan
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``study``."""
     parser = add_command(commands, "study", handler=_study)
     parser.add_value("plan", Path, "STUDY.toml", "plan of the study")
+    add_running(parser)
+
+
+def add_running(parser: Options) -> None:
+    """Add the options for where a study runs, and what it prints."""
     where = parser.add_mutually_exclusive_group()
     text = "processes on this machine (default: one per core)"
     where.add_value("--workers", positive_int, "N", text)
     where.add_value("--scheduler", str, "ADDRESS", "use the workers of this dask-scheduler")
-    parser.add_json()
+    parser.add_json_and_progress()
 
 
 def _study(options: argparse.Namespace) -> None:
     """Find out whether synthetic data help a classifier on a real radar.
 
-    Of a real radar's pairs every ordered pair of people makes a fold: one is judged, of
-    another there is only video, and of all others a share of the radar's data is there. A
-    classifier learns from these alone, and with the filmed person's maps added:
-    synthetic, denoised by a denoiser that learnt from the same real data, each
-    also with the radar's texture, and, as a yardstick, what the radar saw of them.
+    Every ordered pair of people makes a fold: one is judged, of another there is only
+    video, and of all others a share of the radar's data is there. A classifier learns
+    from these alone, and with the filmed person's maps added: synthetic, denoised by a
+    denoiser that learnt from the same real data, each also with the radar's texture, and,
+    as a yardstick, what the radar saw of them. Movements of one person may be kept
+    apart instead, and simulated movements of other bodies be added.
 
     The folder `out` of the plan gets study.md with tables, intervals over takes and people, a
-    paired test and a conclusion, study.json with every score, and curve.png. Every
-    training is kept: the same command goes on where it was stopped.
+    paired test and a conclusion, study.json with every score, curve.png and confusion.png.
+    Every training is kept: the same command goes on where it was stopped.
 
       sd2 study mars.toml
     """
     from sd2core.study.plan import read_study
+
+    make_study(read_study(options.plan), options)
+
+
+def make_study(plan: StudyPlan, options: argparse.Namespace) -> None:
+    """Run a study, write its page, and print what it found."""
     from sd2core.study.report import findings_of, write_report
     from sd2core.study.run import run_study
 
-    plan = read_study(options.plan)
     workers = options.workers or os.cpu_count() or 1
-    with progress_bar("Studying", "run") as progress:
+    with _events() if options.progress_json else progress_bar("Studying", "run") as progress:
         results = run_study(plan, processes=workers, scheduler=options.scheduler, progress=progress)
     said = write_report(results, Path(plan.out))
-    if options.json:
+    if options.progress_json:
+        print_event("written", folder=plan.out)
+    elif options.json:
         print_json({"out": plan.out, "conclusion": said, "findings": len(findings_of(results))})
-        return
-    print(said)
-    print(f"\nWrote {Path(plan.out) / 'study.md'}")
+    else:
+        print(f"{said}\n\nWrote {Path(plan.out) / 'study.md'}")
+
+
+@contextmanager
+def _events() -> Iterator[Progress]:
+    """Print a JSON line for every denoiser and run that is done."""
+    begun_s = time.monotonic()
+
+    def report(done: int, total: int) -> None:
+        print_event("run", done=done, total=total, elapsed_s=time.monotonic() - begun_s)
+
+    yield report

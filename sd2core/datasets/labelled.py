@@ -30,6 +30,14 @@ class LabelledSource(NamedTuple):
     path: Path
     subject: str = ""
 
+    @classmethod
+    def parsed(cls, text: str) -> LabelledSource:
+        """Parse ``PATH`` or ``PERSON=PATH``."""
+        name, sign, path = text.partition("=")
+        if sign and name and path and "/" not in name and not Path(text).exists():
+            return cls(Path(path), name)
+        return cls(Path(text))
+
 
 class Grid(NamedTuple):
     """Grid that maps must share to be trained on together."""

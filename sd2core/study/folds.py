@@ -1,7 +1,8 @@
-"""Folds of a study: who is judged, of whom there is only video, and whose radar is there.
+"""Folds of a study: what is judged, of what there is only video, and whose radar is there.
 
-Every ordered pair of people is a fold: one is judged, of the other there is only video, and of
-all others there are maps of the radar. Of these a share is taken, equally much of every class.
+Groups are people, or parts into which all movements are dealt. One is judged, of another there is
+only video, and of all others there are maps of the radar. Of these a share is taken, equally much
+of every class.
 """
 
 from __future__ import annotations
@@ -9,115 +10,99 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import permutations
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sd2core.classify.card import BACKGROUND
+from sd2core.classify.data import UNKNOWN, ClipSet
+from sd2core.classify.metrics import gesture_runs
+from sd2core.classify.splitting import dealt, rarest
 from sd2core.errors import Sd2Error
-from sd2core.pairs.store import PairSet, Take
+from sd2core.study.material import Movement
 
-_LEAST_PEOPLE = 3
-UNKNOWN = -1
-"""Of a frame whose label is of no class."""
+Group = str
+NOBODY: Group = ""
 
 
 @dataclass(frozen=True)
 class Fold:
-    """Division of people."""
+    """Division of the groups."""
 
-    judged: str
-    video: str  # Person whose radar is not looked at, but for the yardstick.
-    real: tuple[str, ...]
-
-    @property
-    def title(self) -> str:
-        """Name for messages and files."""
-        return f"{self.judged}-judged-{self.video}-on-video"
+    judged: Group
+    video: Group  # Whose radar is not looked at, but for the yardstick; perhaps nobody.
+    real: tuple[Group, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class Labelled:
-    """Take with the class of every frame."""
-
-    take: Take
-    classes: NDArray[np.int64]  # Index, or UNKNOWN.
-
-    @property
-    def title(self) -> str:
-        """Name in results."""
-        return f"{self.take.subject}/{self.take.name}"
-
-    def at_speed(self, speed: float) -> Labelled:
-        """Return the classes as of a map that is played faster; its own maps stay as they are."""
-        frames = np.arange(0.0, len(self.classes) - 0.5, speed).astype(int)
-        return Labelled(self.take, self.classes[frames])
-
-    def part(self, frames: slice) -> Labelled:
-        """Return some of its frames."""
-        return Labelled(self.take.part(frames), self.classes[frames])
-
-
-def folds_of(people: Sequence[str]) -> list[Fold]:
-    """Return all folds of some people."""
-    if len(people) < _LEAST_PEOPLE:
+def folds_of(
+    groups: Sequence[Group], *, filmed: bool, turns: Literal["all", "once"] = "all"
+) -> list[Fold]:
+    """Return the folds of some groups, with a group that is ``filmed`` or without."""
+    least = 3 if filmed else 2
+    if len(groups) < least:
         raise Sd2Error(
-            f"The study has {len(people)} people: {', '.join(people)}",
-            "three or more: one is judged, one is filmed only, of the others there is a radar",
+            f"The study has {len(groups)} people: {', '.join(groups)}",
+            "three or more: one is judged, one is filmed only, of the others there is a radar"
+            if filmed
+            else "two or more: one is judged, the others are learnt from",
+            'Keep movements of the same people apart: folds = "files"',
         )
+    if not filmed:
+        pairs = [(one, NOBODY) for one in groups]
+    elif turns == "all":
+        pairs = list(permutations(groups, 2))
+    else:
+        pairs = list(zip(groups, [*groups[1:], groups[0]], strict=True))
     return [
-        Fold(judged, video, tuple(one for one in people if one not in (judged, video)))
-        for judged, video in permutations(people, 2)
+        Fold(judged, video, tuple(one for one in groups if one not in (judged, video)))
+        for judged, video in pairs
     ]
 
 
-def labelled_takes(
-    pairs: PairSet, classes: Mapping[str, str]
-) -> tuple[tuple[str, ...], list[Labelled]]:
-    """Return the classes and all takes with a frame of one, as seen by their own sensor.
+def groups_of(
+    known: ClipSet, movements: Sequence[Movement], parts: int | None, seed: int
+) -> Mapping[tuple[str, str], Group]:
+    """Return the group of every movement: its person, or one of so many parts."""
+    clips = [one.clip for one in movements]
+    if parts is None:
+        return {clip.key: clip.subject for clip in clips}
+    return {key: f"part {number + 1}" for key, number in dealt(known, clips, parts, seed).items()}
 
-    ``classes`` gives the class of labels; empty: each label is one, but for the background.
+
+def share_of(
+    known: ClipSet, movements: Sequence[Movement], share: float, seed: int
+) -> list[Movement]:
+    """Draw a share of every class; a larger one of the same seed includes a smaller one.
+
+    Of movements beside background whole ones are drawn. Without background there are runs of one
+    class, in random order; of these the last is cut short.
     """
-    unknown = [label for label in classes if label not in pairs.labels]
-    if unknown:
-        raise Sd2Error(
-            f"No frame is labelled {', '.join(unknown)}", f"some of {', '.join(pairs.labels)}"
-        )
-    named = dict(classes) or {label: label for label in pairs.labels[1:]}
-    there = {pairs.labels[number] for take in pairs.takes for number in np.unique(take.label)}
-    names = tuple(dict.fromkeys(named[label] for label in pairs.labels if label in named and
-                                label in there))  # fmt: skip
-    if len(names) < 2:
-        raise Sd2Error(
-            f"The pairs hold the classes {', '.join(names) or 'none'}",
-            "two or more",
-            "Label them with `sd2 pairs label`",
-        )
-    table = np.array(
-        [names.index(named[one]) if named.get(one) in names else UNKNOWN for one in pairs.labels]
-    )
-    found = [Labelled(take, table[take.label]) for take in pairs.placements(first_only=True).takes]
-    return names, [one for one in found if (one.classes != UNKNOWN).any()]
-
-
-def share_of(takes: Sequence[Labelled], share: float, seed: int) -> list[Labelled]:
-    """Draw a share of the frames of every class: whole runs in random order, the last cut short.
-
-    A larger share of the same seed includes a smaller one.
-    """
-    runs: dict[int, list[Labelled]] = {}
-    for take in takes:
-        edges = np.flatnonzero(np.diff(take.classes)) + 1
-        for start, stop in zip([0, *edges], [*edges, len(take.classes)], strict=True):
-            number = int(take.classes[start])
-            if number != UNKNOWN:
-                runs.setdefault(number, []).append(take.part(slice(int(start), int(stop))))
+    if BACKGROUND in known.classes:
+        return _whole(known, movements, share, seed)
+    found_runs: dict[int, list[Movement]] = {}
+    for one in movements:
+        for start, stop, number in gesture_runs(one.clip.label, UNKNOWN):
+            found_runs.setdefault(number, []).append(one.part(slice(start, stop)))
     found = []
-    for number, own in sorted(runs.items()):
+    for number, own in sorted(found_runs.items()):
         order = np.random.default_rng([seed, number]).permutation(len(own))
-        left = max(1, round(share * sum(len(one.classes) for one in own)))
+        left = max(1, round(share * sum(len(one.clip) for one in own)))
         for one in (own[place] for place in order):
             if left <= 0:
                 break
-            found.append(one if len(one.classes) <= left else one.part(slice(left)))
-            left -= len(found[-1].classes)
+            found.append(one if len(one.clip) <= left else one.part(slice(left)))
+            left -= len(found[-1].clip)
     return found
+
+
+def _whole(
+    known: ClipSet, movements: Sequence[Movement], share: float, seed: int
+) -> list[Movement]:
+    by_class: dict[int, list[tuple[str, str]]] = {}
+    for key, number in rarest(known, [one.clip for one in movements]).items():
+        by_class.setdefault(number, []).append(key)
+    drawn: set[tuple[str, str]] = set()
+    for number, keys in by_class.items():
+        order = np.random.default_rng([seed, number]).permutation(len(keys))
+        drawn |= {keys[place] for place in order[: max(1, round(share * len(keys)))]}
+    return [one for one in movements if one.clip.key in drawn]

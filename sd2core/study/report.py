@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.classify.confusion_figure import confusion_figure
+from sd2core.classify.metrics import Score, mean_recall, shares
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.figure_files import save_figure
 from sd2core.files.tables import markdown_table
 from sd2core.study.certainty import Gain, adjusted, gain_of
-from sd2core.study.plan import ADDED
-from sd2core.study.run import REAL, Results, Run
+from sd2core.study.plan import OF_VIDEO
+from sd2core.study.run import Results
+from sd2core.study.trial import REAL, Run
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,17 +30,12 @@ TITLES = {
     "synthetic+texture": "+ synthetic with texture",
     "denoised": "+ denoised",
     "denoised+texture": "+ denoised with texture",
-    "radar": "+ the radar's of the same person",
+    "simulated": "+ simulated radar",
+    "radar": "+ the radar's of the same",
 }
-_MEASURES = ("frames", "movements")
-_COLOURS = ("#444444", "#7f9bc4", "#2166ac", "#e0a36c", "#b35806", "#1b7837")
-_UNTRIED = (
-    "other classifiers than ridge regression on windows",
-    "more than one person's video at a time",
-    "places of the sensor other than the radar's own",
-    "bodies of other shape",
-    "mirrored movements",
-)
+_COLOURS = ("#444444", "#7f9bc4", "#2166ac", "#e0a36c", "#b35806", "#762a83", "#1b7837")
+_UNTRIED = ("more than one group's video at a time",)
+FORMAT, VERSION = "sd2-study-results", 2
 
 
 @dataclass(frozen=True)
@@ -54,45 +52,73 @@ class Finding:
 def findings_of(results: Results) -> list[Finding]:
     """Return all gains, by share and condition."""
     found = []
-    for share in results.plan.shares:
-        for added in results.plan.added:
-            gains = [_gain(results, added, share, measure) for measure in (0, 1)]
-            if gains[0] is not None and gains[1] is not None:
-                found.append(Finding(added, share, gains[0], gains[1], 1.0))
-    tests = [one for one in found if one.added != "radar"]
-    values = dict(zip(map(id, tests), adjusted([one.frames.p for one in tests]), strict=True))
-    return [
-        Finding(one.added, one.share, one.frames, one.movements, values.get(id(one), one.frames.p))
-        for one in found
-    ]
+    for share in sorted(results.plan.shares):
+        for added in results.plan.wanted:
+            frames, whole = (_gain(results, added, share, measure) for measure in (0, 1))
+            if frames is not None and whole is not None:
+                found.append(Finding(added, share, frames, whole, frames.p))
+    tests = [number for number, one in enumerate(found) if one.added != "radar"]
+    for number, p in zip(tests, adjusted([found[one].frames.p for one in tests]), strict=True):
+        found[number] = replace(found[number], p=p)
+    return found
 
 
 def write_report(results: Results, folder: Path) -> str:
-    """Write ``study.md``, ``study.json`` and ``curve.png``; return the conclusion."""
+    """Write ``study.md``, ``study.json``, ``curve.png`` and ``confusion.png``.
+
+    Returns the conclusion.
+    """
     findings = findings_of(results)
-    text = page(results, findings)
-    atomic_write_text(folder / "study.md", text)
+    said = conclusion(results, findings)
+    totals = totals_of(results)
+    atomic_write_text(folder / "study.md", page(results, findings, said, totals))
+    runs = [{**one.to_json(), "scores": None} for one in results.runs]
     content = {
-        "format": "sd2-study-results",
-        "version": 1,
+        "format": FORMAT,
+        "version": VERSION,
         "plan": results.plan.model_dump(mode="json"),
         "radar": results.kind,
         "classes": list(results.classes),
-        "takes": dict(results.takes),
-        "conclusion": conclusion(results, findings),
+        "takes": results.takes,
+        "conclusion": said,
         "findings": [asdict(one) for one in findings],
-        "runs": [asdict(one) for one in results.runs],
+        "curve": [
+            {"added": name, "title": TITLES[name], "share": share, **_summary(values)}
+            for name in (REAL, *results.plan.wanted)
+            for share in sorted(results.plan.shares)
+            if (values := _values(results, name, share, 0))
+        ],
+        "totals": [
+            {"title": TITLES.get(title, title), "seeds": [one.to_json() for one in own]}
+            for title, own in totals.items()
+        ],
+        "runs": runs,
     }
     atomic_write_text(folder / "study.json", json.dumps(content, ensure_ascii=False) + "\n")
-    save_figure(draw_curve(results), folder / "curve.png", {"study": results.plan.title})
-    return conclusion(results, findings)
+    note = {"study": results.plan.title}
+    save_figure(draw_curve(results), folder / "curve.png", note)
+    save_figure(draw_confusions(results, totals), folder / "confusion.png", note)
+    return said
+
+
+def totals_of(results: Results) -> dict[str, list[Score]]:
+    """Return scores with all real data, of every seed, by condition and by classifier."""
+    largest = max(results.plan.shares)
+    found: dict[str, dict[int, Score]] = {}
+    for run in results.runs:
+        if run.task.share == largest:
+            for name, one in run.scores.items():
+                own = found.setdefault(name, {})
+                seed = run.task.seed
+                own[seed] = own[seed] + one if seed in own else one
+    return {name: list(own.values()) for name, own in found.items()}
 
 
 def conclusion(results: Results, findings: Sequence[Finding]) -> str:
     """Say in a sentence or two whether added maps helped, and with what certainty."""
     own = [one for one in findings if one.added != "radar"]
     if not own:
-        return "Nothing was added that could be compared."
+        return "Nothing was added that could be compared." + _best(results)
     sure = [one for one in own if one.frames.certain and one.p < 0.05]
     helped = [one for one in sure if one.frames.certain > 0]
     harmed = [one for one in sure if one.frames.certain < 0]
@@ -125,50 +151,117 @@ def conclusion(results: Results, findings: Sequence[Finding]) -> str:
     return " ".join(said)
 
 
-def page(results: Results, findings: Sequence[Finding]) -> str:
+def _best(results: Results) -> str:
+    """Say which of several classifiers finds most."""
+    first = results.plan.classifiers[0].title
+    found = {
+        first if name in TITLES else name: 100.0 * np.mean([one.mean_recall for one in own])
+        for name, own in totals_of(results).items()
+    }
+    if len(found) < 2:
+        return ""
+    best = max(found, key=lambda name: found[name])
+    return f" Of {len(found)} classifiers {best} finds most, {found[best]:.1f} % of the frames."
+
+
+def page(
+    results: Results, findings: Sequence[Finding], said: str, totals: dict[str, list[Score]]
+) -> str:
     """Return the page in Markdown."""
     plan = results.plan
-    people = ", ".join(f"{one} ({count} takes)" for one, count in results.takes.items())
-    folds = len({run.fold for run in results.runs})
-    speeds = ", ".join(f"{one:g}" for one in plan.speeds)
+    people = ", ".join(f"{one} ({count} movements)" for one, count in results.takes.items())
+    chance = f"{1 / len(results.classes):.0%}"
     parts = [
         f"# {plan.title}",
-        f"**{conclusion(results, findings)}**",
-        f"A {results.kind} radar; people {people}; classes {', '.join(results.classes)}, by chance"
-        f" {1 / len(results.classes):.0%}. Every ordered pair of people is a fold ({folds}): one is"
-        " judged, of another there is only video, of all others there is a share of the real"
-        f" radar's data, equally much of every class. {plan.seeds} draws each. The denoiser of a"
-        " fold learns from those same real data alone."
-        + (f" Added maps are also played {speeds} times as fast." if speeds else ""),
+        f"**{said}**",
+        f"A {results.kind} radar; {people}; classes {', '.join(results.classes)}, by chance"
+        f" {chance}. {_folds_in_words(results)}",
         "## Found",
-        "Per cent of frames (of whole movements), mean over people:",
+        f"By {plan.classifiers[0].title}: per cent of frames (of whole movements), mean over the"
+        " classes of a movement, movements, and people:",
         _table_of_scores(results),
-        "## Gained",
-        "Points of frames over real data alone, with 95 % intervals over takes of these people,"
-        " and over people and takes; p by turning signs of takes by chance, adjusted for all"
-        " these comparisons (Holm); then points of whole movements.",
-        _table_of_gains(findings),
-        "![Learning curve](curve.png)",
+    ]
+    if findings:
+        over_people = (
+            ", and over people and takes" if len(results.takes) > 1 else "; it is one person"
+        )
+        parts += [
+            "## Gained",
+            "Points of frames over real data alone, with 95 % intervals over takes of these people"
+            f"{over_people}; p by turning signs of takes by chance, adjusted for all these"
+            " comparisons (Holm); then points of whole movements.",
+            _table_of_gains(findings, len(results.takes) > 1),
+        ]
+    parts += ["![Learning curve](curve.png)", "## With all real data"]
+    parts += [
+        "Mean recall over the classes of all frames, and of whole movements, in per cent, ±"
+        " standard deviation over seeds; and the time until a gesture is recognised (median).",
+        _table_of_totals(results, totals),
+        "![Confusion matrices](confusion.png)",
         "## Not tried",
         "\n".join(f"- {one}" for one in untried(results)),
     ]
     return "\n\n".join(parts) + "\n"
 
 
+def _folds_in_words(results: Results) -> str:
+    plan = results.plan
+    folds = len({run.task.fold for run in results.runs})
+    who = "person" if plan.folds == "people" else f"one of {plan.parts} parts"
+    filmed = any(run.task.fold.video for run in results.runs)
+    draws = f"{plan.seeds} draws each" + (
+        ", the parts dealt anew." if plan.folds == "files" else "."
+    )
+    if filmed:
+        turns = (
+            f"Every ordered pair, each a {who}, is"
+            if plan.turns == "all"
+            else f"Every {who} is once"
+        )
+        text = (
+            f"{turns} a fold ({folds}): one is judged, of another there is only video, of all"
+            f" others there is a share of the real radar's data, of every class alike. {draws}"
+        )
+    else:
+        text = (
+            f"Every {who} is judged once ({folds}); of all others there is a share of the"
+            f" radar's data, of every class alike. {draws}"
+        )
+    if plan.learns_denoisers and filmed:
+        text += " The denoiser of a fold learns from those same real data alone."
+    if results.others:
+        text += f" {results.others} movements of other bodies, of the program's, may be added."
+    if plan.speeds:
+        speeds = ", ".join(f"{one:g}" for one in plan.speeds)
+        text += f" Added maps are also played {speeds} times as fast."
+    if plan.placements:
+        text += " Added maps are also those of other placements of the sensor."
+    return text
+
+
 def untried(results: Results) -> list[str]:
     """List what this study says nothing about."""
     plan = results.plan
     left = [
-        f"adding {TITLES[one].removeprefix('+ ')} maps" for one in ADDED if one not in plan.added
+        f"adding {TITLES[one].removeprefix('+ ')} maps"
+        for one in OF_VIDEO
+        if one not in plan.wanted
     ]
     reasons = dict.fromkeys(
-        f"{TITLES[name]} at {run.share:.0%}: {reason}"
+        f"{TITLES[name]} at {run.task.share:.0%}: {reason}"
         for run in results.runs
         for name, reason in run.missing.items()
     )
     inputs = [one for one in ("map", "limbs", "kinematics") if one != plan.denoiser.inputs]
-    speeds = [] if plan.speeds else ["other speeds"]
-    return [*left, *reasons, f"denoisers that take {' or '.join(inputs)}", *speeds, *_UNTRIED]
+    tried = ", ".join(one.title for one in plan.classifiers)
+    more = [f"other classifiers than {tried}", *_UNTRIED]
+    if plan.learns_denoisers:
+        more.append(f"denoisers that take {' or '.join(inputs)}")
+    if not plan.speeds:
+        more.append("other speeds")
+    if not plan.placements and not plan.video:
+        more.append("other places of the sensor, bodies of other shape, mirrored movements")
+    return [*left, *reasons, *more]
 
 
 def draw_curve(results: Results) -> Figure:
@@ -177,10 +270,10 @@ def draw_curve(results: Results) -> Figure:
 
     figure = Figure(figsize=(7.0, 4.4), dpi=120, layout="constrained")
     axes = figure.subplots()
-    shares = list(results.plan.shares)
-    for number, name in enumerate((REAL, *results.plan.added)):
-        values = {share: _values(results, name, share, 0) for share in shares}
-        there = [share for share in shares if values[share]]
+    given = sorted(results.plan.shares)
+    for number, name in enumerate((REAL, *results.plan.wanted)):
+        values = {share: _values(results, name, share, 0) for share in given}
+        there = [share for share in given if values[share]]
         if not there:
             continue
         found = [gain_of(values[share]) for share in there]
@@ -195,7 +288,7 @@ def draw_curve(results: Results) -> Figure:
         )  # fmt: skip
     axes.axhline(100.0 / len(results.classes), color="0.6", linewidth=0.8, linestyle=":")
     axes.set_xscale("log")
-    axes.set_xticks([100.0 * one for one in shares], [f"{one:.0%}" for one in shares])
+    axes.set_xticks([100.0 * one for one in given], [f"{one:.0%}" for one in given])
     axes.minorticks_off()
     axes.set(
         xlabel=f"share of the {results.kind} radar's data",
@@ -206,11 +299,22 @@ def draw_curve(results: Results) -> Figure:
     return figure
 
 
+def draw_confusions(results: Results, totals: dict[str, list[Score]]) -> Figure:
+    """Draw the confusion of frames of every condition with all real data, a mean over seeds."""
+    shown = {name: own for name, own in totals.items() if name in TITLES and name != "radar"}
+    return confusion_figure(
+        [np.mean([shares(one.frames) for one in own], axis=0) for own in shown.values()],
+        results.classes,
+        [TITLES[name] for name in shown],
+        f"Frames of a {results.kind} radar, mean of {results.plan.seeds} seeds",
+    )
+
+
 def _table_of_scores(results: Results) -> str:
-    names = (REAL, *results.plan.added)
+    names = (REAL, *results.plan.wanted)
     rows = [["real data", "frames", *(TITLES[name] for name in names)]]
-    for share in results.plan.shares:
-        runs = [run for run in results.runs if run.share == share]
+    for share in sorted(results.plan.shares):
+        runs = [run for run in results.runs if run.task.share == share]
         cells = []
         for name in names:
             both = [_values(results, name, share, measure) for measure in (0, 1)]
@@ -224,7 +328,7 @@ def _table_of_scores(results: Results) -> str:
     return "\n".join(markdown_table(rows))
 
 
-def _table_of_gains(findings: Sequence[Finding]) -> str:
+def _table_of_gains(findings: Sequence[Finding], people: bool) -> str:
     head = ["real data", "added", "gain", "over takes", "over people", "p", "movements"]
     rows = [
         [
@@ -232,7 +336,7 @@ def _table_of_gains(findings: Sequence[Finding]) -> str:
             TITLES[one.added],
             f"{100 * one.frames.mean:+.1f}",
             _range(one.frames.over_takes),
-            _range(one.frames.over_people),
+            _range(one.frames.over_people) if people else "–",
             f"{one.p:.3f}",
             f"{100 * one.movements.mean:+.1f} ({_range(one.movements.over_takes)})",
         ]
@@ -241,10 +345,38 @@ def _table_of_gains(findings: Sequence[Finding]) -> str:
     return "\n".join(markdown_table([head, *rows]))
 
 
+def _table_of_totals(results: Results, totals: dict[str, list[Score]]) -> str:
+    first = results.plan.classifiers[0].title
+    rows = [["classifier", "learnt from", "frames", "movements", "latency s"]]
+    for name, own in totals.items():
+        rows.append(
+            [
+                first if name in TITLES else name,
+                TITLES.get(name, TITLES[REAL]),
+                _spread([100.0 * one.mean_recall for one in own], 1),
+                _spread([100.0 * mean_recall(one.gestures) for one in own], 1),
+                _spread([one.latency_s for one in own], 2),
+            ]
+        )
+    return "\n".join(markdown_table(rows))
+
+
+def _spread(values: Sequence[float], digits: int) -> str:
+    if not np.isfinite(values).all():
+        return "–"
+    text = f"{np.mean(values):.{digits}f}"
+    return text if len(values) < 2 else f"{text} ± {np.std(values, ddof=1):.{digits}f}"
+
+
+def _summary(values: dict[str, NDArray[np.float64]]) -> dict[str, Any]:
+    found = gain_of(values)
+    return {"mean": found.mean, "over_takes": found.over_takes}
+
+
 def _gain(results: Results, added: str, share: float, measure: int) -> Gain | None:
-    runs = [run for run in results.runs if run.share == share and added in run.scores]
+    runs = [run for run in results.runs if run.task.share == share and added in run.takes]
     values = _by_person(
-        runs, lambda run, take: run.scores[added][take][measure] - run.scores[REAL][take][measure]
+        results, runs, measure, lambda run, take: run.takes[added][take], minus=REAL
     )
     return gain_of(values) if values else None
 
@@ -252,16 +384,26 @@ def _gain(results: Results, added: str, share: float, measure: int) -> Gain | No
 def _values(
     results: Results, name: str, share: float, measure: int
 ) -> dict[str, NDArray[np.float64]]:
-    runs = [run for run in results.runs if run.share == share and name in run.scores]
-    return _by_person(runs, lambda run, take: run.scores[name][take][measure])
+    runs = [run for run in results.runs if run.task.share == share and name in run.takes]
+    return _by_person(results, runs, measure, lambda run, take: run.takes[name][take])
 
 
-def _by_person(runs: Sequence[Run], of: Any) -> dict[str, NDArray[np.float64]]:
-    """Mean over folds and draws for every take, by the person who is judged."""
+def _by_person(
+    results: Results,
+    runs: Sequence[Run],
+    measure: int,
+    of: Callable[[Run, str], tuple[float, float | None]],
+    minus: str | None = None,
+) -> dict[str, NDArray[np.float64]]:
+    """Mean over folds and draws for every take that has such a score, by person."""
     found: dict[str, dict[str, list[float]]] = {}
     for run in runs:
-        for take in run.scores[REAL]:
-            found.setdefault(run.fold.judged, {}).setdefault(take, []).append(of(run, take))
+        for take in run.takes[REAL]:
+            value = of(run, take)[measure]
+            if value is not None:
+                less = 0.0 if minus is None else run.takes[minus][take][measure] or 0.0
+                own = found.setdefault(results.subject_of[take], {})
+                own.setdefault(take, []).append(value - less)
     return {
         who: np.array([np.mean(values) for values in takes.values()])
         for who, takes in found.items()

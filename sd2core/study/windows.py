@@ -6,12 +6,13 @@ seconds of real data a network learns less.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.classify.data import UNKNOWN, Clip
 from sd2core.errors import Sd2Error
 from sd2core.maps import mean_velocity_mps, peak_velocity_mps
 from sd2core.sensor import VelocityAxis
@@ -98,15 +99,25 @@ class Ridge:
     @classmethod
     def fitted(
         cls,
-        features: Sequence[Features],
-        labels: Sequence[NDArray[np.integer]],
-        weights: Sequence[NDArray[np.float64]],
+        clips: Sequence[Clip],
+        weights: Sequence[float],
         classes: int,
+        describe: Callable[[Clip], Features],
     ) -> Ridge:
-        """Fit to frames of several takes; every class counts the same, as far as it is there."""
-        x, y, w = np.concatenate(features), np.concatenate(labels), np.concatenate(weights)
-        if not len(y):
+        """Fit to clips, whose frames weigh so much; every class counts the same where it occurs."""
+        known = [clip.label != UNKNOWN for clip in clips]
+        if not any(one.any() for one in known):
             raise Sd2Error("There is no labelled frame to learn from", "one at least")
+        x, y, w = (
+            np.concatenate(parts)
+            for parts in zip(
+                *(
+                    (describe(clip)[own], clip.label[own], np.full(int(own.sum()), weight))
+                    for clip, own, weight in zip(clips, known, weights, strict=True)
+                ),
+                strict=True,
+            )
+        )
         w = w / np.maximum(np.bincount(y, w, classes), 1e-12)[y]
         w /= w.sum()
         mean = w @ x

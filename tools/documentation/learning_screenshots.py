@@ -11,14 +11,16 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 from PySide6.QtWidgets import QApplication
 
+from sd2app.background.runs import Runs
 from sd2app.batch.dialog import BatchWindow
-from sd2app.classify.result_dialog import ClassResultDialog
 from sd2app.dataset_export.dialog import ExportDialog
 from sd2app.shell.app import wait_until_settled
 from sd2app.shell.window import MainWindow
+from sd2app.study.result_dialog import ClassResultDialog
 from sd2core.files.resources import resource_path
 from sd2core.placements.placements import PlacementGrid
 from tools.documentation.windows import LIMIT_S, opened, save, wait_for
@@ -67,7 +69,7 @@ def training(application: QApplication, campaign: Path) -> None:
 
 
 def classifier(application: QApplication, sample: Path, campaign: Path) -> None:
-    """A classifier that learnt from the campaign, on the sample; then a quick comparison."""
+    """A classifier that learnt from the campaign, on the sample; then a quick study."""
     window = opened(application, [sample])
     window.resize(1280, 960)
     window.bring_up("Train", "Classifier")
@@ -76,7 +78,7 @@ def classifier(application: QApplication, sample: Path, campaign: Path) -> None:
     model.setup.set_map("denoised", True)
     wait_for(application, lambda: not model.setup.problem)
     model.train()
-    _wait_for_end(application, window)
+    _wait_for_end(application, window, model)
     model.use_model()
     wait_for(application, lambda: classify.track.complete and not classify.busy)
     window.session.playback.seek(3.7)
@@ -85,10 +87,12 @@ def classifier(application: QApplication, sample: Path, campaign: Path) -> None:
     application.processEvents()
     save(window, "classifier.png")
     model.setup.set_value("steps", _COMPARE_STEPS)
-    model.select(None)
-    model.compare()
-    _wait_for_end(application, window)
-    window.features.classify.dialogs.show_result()
+    study = window.features.study
+    window.bring_up("Train", "Study")
+    save(window, "study-page.png")
+    study.runs.begin()
+    _wait_for_end(application, window, study.runs)
+    study.show_result()
     result = window.findChild(ClassResultDialog)
     application.processEvents()
     save(result, "class-result.png")
@@ -127,8 +131,7 @@ def batch(application: QApplication, sample: Path) -> None:
     window.close()
 
 
-def _wait_for_end(application: QApplication, window: MainWindow) -> None:
-    """Until a training or a comparison of classifiers is over."""
-    model = window.features.classify.training
+def _wait_for_end(application: QApplication, window: MainWindow, model: Runs[Any]) -> None:
+    """Until a training or a study is over."""
     wait_for(application, lambda: model.run is not None and not model.under_way, _LONG_S)
     wait_until_settled(application, window, LIMIT_S)

@@ -67,9 +67,10 @@ PAGES = {
         "python -m tools.documentation.real_pairs", ("sd2core/pairs", *_LEARNING)
     ),
     "studies.md": Measured(
-        "python -m tools.documentation.studies", ("sd2core/study", "sd2core/pairs", *_LEARNING)
+        "python -m tools.documentation.studies",
+        ("sd2core/study", "sd2core/classify", "sd2core/pairs", "tools/studies", *_LEARNING),
     ),
-    "classifier.md": Measured("make classifier", _CLASSIFIERS),
+    "classifier.md": Measured("make classifier", ("sd2core/study", *_CLASSIFIERS)),
     "real-gestures.md": Measured("make real-gestures", _SUGGESTIONS),
     "whole-loop.md": Measured("make whole-loop", _CLASSIFIERS),
     "paper.md": Measured("make paper", _CLASSIFIERS),

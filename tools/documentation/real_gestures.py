@@ -18,13 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.accuracy.cache import this_machine
-from sd2core.classify.comparison_report import network_of
 from sd2core.classify.data import ClipSet
-from sd2core.classify.experiment import Condition, Network
 from sd2core.classify.live import TrainedClassifier, judge
 from sd2core.classify.metrics import Score, mean_recall
 from sd2core.classify.spans import SpanOptions, predicted_spans
-from sd2core.classify.splitting import fold, movements
+from sd2core.classify.splitting import dealt
 from sd2core.classify.training import TrainOptions, train
 from sd2core.cli.classify.data import clips_of
 from sd2core.datasets.labelled import LabelledSource, unfolded
@@ -32,12 +30,14 @@ from sd2core.files.tables import markdown_table
 from sd2core.io.radar.kkt import RecordedMap, load_kkt
 from sd2core.labels.matching import match_spans
 from sd2core.labels.suggest import SuggestOptions, suggest_spans
+from sd2core.study.plan import Learner
 from tools.documentation.measured import write_page
 from tools.documentation.places import BUILD, SHARED
 from tools.documentation.runs import sd2
 
 SPLITS = 5
-KERNEL = Network("kernel", delay_s=0.9)
+KERNEL = TrainOptions(model="kernel", delay_s=0.9)
+KERNEL_NAME = "kernel, columns, after 0.9 s"
 SPANS = SpanOptions(0.3, 0.2)
 IOUS = (0.3, 0.4, 0.5, 0.6, 0.7)
 """Options are chosen by the mean F1 over these: with few files F1 at one of them has steps."""
@@ -60,9 +60,8 @@ make real-gestures
 
 on {machine}, with {files} files of KaiKuTek's K60168A ([what they
 hold](formats.md#recordings-of-maps-k60168a)). They are real, and of **one person**; a file lasts
-2.5 s and has one labelled gesture or none (background). Half of the files of every class are for
-choosing or training, the other half for evaluation; {splits} times, the halves drawn anew. Spreads
-are standard deviations over these.
+2.5 s and has one labelled gesture or none (background). Files are divided {splits} times, drawn
+anew; spreads are standard deviations over these.
 
 ## Suggestions from motion
 
@@ -71,14 +70,14 @@ With the default options, all files; matched from an IoU of 0.5 on
 
 {now}
 
-**F1 {default} with the default options, {chosen} with those chosen on the other half of the
-files** out of {grid} combinations. The defaults were found with all of these files in view.
+**F1 {default} in half of the files with the default options, {chosen} with those chosen on the
+other half** out of {grid} combinations. The defaults were found with all of these files in view.
 
 ## Classifiers
 
-`{command}`, in
-per cent: mean over classes of the share of frames found, and of whole gestures, by what most of
-their frames were taken for.
+`{command}`,
+learnt from four fifths of the files, in per cent: mean over classes of the share of frames found,
+and of whole gestures, by what most of their frames were taken for.
 
 {networks}
 
@@ -149,15 +148,17 @@ def main() -> None:
     known = clips_of(sources, None)
     judged = []  # (splits, files)
     for number in range(SPLITS):
-        test = {movement for _, movement in movements(fold(known, number).test)}
-        judged.append(np.array([path.stem in test for path in paths]))
+        part = {
+            movement: own for (_, movement), own in dealt(known, known.clips, 2, number).items()
+        }
+        judged.append(np.array([part[path.stem] == 1 for path in paths]))
     usual = Found.of(recorded, SuggestOptions())
     tried = [Found.of(recorded, one) for one in GRID]
     best = [tried[int(np.argmax([one.f1(~files).mean() for one in tried]))] for files in judged]
     how = ("--seeds", SPLITS, "--shares", "100%")
     sd2("classify", "table", *options.data, "--out", options.folder, *how)
     names = " ".join(folder.name for folder in options.data)
-    told = json.loads((options.folder / "table.json").read_text("utf-8"))
+    told = json.loads((options.folder / "study.json").read_text("utf-8"))
     networks, best_network, classes = _classified(told)
     page = PAGE.format(
         files=len(paths),
@@ -171,7 +172,7 @@ def main() -> None:
         networks="\n".join(markdown_table(networks)),
         best=best_network,
         classes="\n".join(markdown_table(classes)),
-        kernel=network_of(Condition(network=KERNEL)),
+        kernel=KERNEL_NAME,
         shortest=SPANS.min_duration_s,
         gap=SPANS.merge_gap_s,
         spans="\n".join(markdown_table(_found_by_kernel(known, paths, recorded))),
@@ -187,20 +188,15 @@ def _found_by_kernel(
         ["learnt from", "frames", "gestures", "labels", "suggested", "matched", "F1", "and named"]
     ]
     file_of = {path.stem: one for path, one in zip(paths, recorded, strict=True)}
-    held = np.array([int(clip.label.max()) for clip in known.clips])
     for words, parts in (("half", 2), ("four fifths", 5)):
         scores, counts = [], np.zeros(4, int)
         for repeated in range(SPLITS):
-            part = np.zeros(len(held), int)
-            for one in np.unique(held):
-                own = np.flatnonzero(held == one)
-                drawn = np.random.default_rng([repeated, int(one)]).permutation(own)
-                part[drawn] = np.arange(len(own)) % parts
+            part = dealt(known, known.clips, parts, repeated)
             found = []
             for number in range(parts):
-                kept = [clip for clip, own in zip(known.clips, part, strict=True) if own != number]
-                asked = [clip for clip, own in zip(known.clips, part, strict=True) if own == number]
-                made = train(kept, (), known, KERNEL.of(TrainOptions(), 0)).classifier
+                kept = [clip for clip in known.clips if part[clip.key] != number]
+                asked = [clip for clip in known.clips if part[clip.key] == number]
+                made = train(kept, (), known, KERNEL).classifier
                 found.append(judge(made, asked, known))
                 counts += sum(_spans(made, file_of[clip.movement]) for clip in asked)
             scores.append(sum(found[1:], found[0]))
@@ -243,9 +239,10 @@ def _classified(told: dict[str, Any]) -> tuple[list[list[str]], str, list[list[s
     networks = [["network", "frames", "gestures", "latency s"]]
     best, name_of_best = -1.0, ""
     scores_of_best: list[Score] = []
-    for condition in told["conditions"]:
-        name = network_of(Condition(network=Network(**condition["network"])))
-        scores = [Score.from_json(run["score"]) for run in condition["runs"]]
+    first = Learner.model_validate(told["plan"]["classifiers"][0]).title
+    for total in told["totals"]:
+        name = first if total["title"] == "real alone" else total["title"]
+        scores = [Score.from_json(one) for one in total["seeds"]]
         frames = [100.0 * one.mean_recall for one in scores]
         gestures = [100.0 * mean_recall(one.gestures) for one in scores]
         latency = _spread([one.latency_s for one in scores], 2)

@@ -127,15 +127,6 @@ def spread(values: Mapping[str, Any], digits: int = 3) -> str:
     return f"{values['mean']:.{digits}f}" + (f" ± {sd:.{digits}f}" if sd is not None else "")
 
 
-def table_below(text: str, heading: str, *columns: str) -> list[list[str]]:
-    """Rows of a Markdown table below a line: some of its columns."""
-    lines = text.partition(f"{heading}\n\n")[2].partition("\n\n")[0].splitlines()
-    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
-    del rows[1]
-    chosen = [rows[0].index(name) for name in columns]
-    return [[row[at] for at in chosen] for row in rows]
-
-
 def sections(page: str) -> dict[str, str]:
     """Text below every heading of the second level, up to the next."""
     _, *parts = re.split(r"^## (.+)\n", page, flags=re.MULTILINE)

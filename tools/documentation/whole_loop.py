@@ -20,9 +20,9 @@ from textwrap import indent
 
 from sd2core.accuracy.cache import this_machine
 from sd2core.files.resources import resource_path
-from tools.documentation.classifier import added_table
 from tools.documentation.measured import write_page
 from tools.documentation.places import BUILD, IMAGES, REPOSITORY
+from tools.documentation.runs import sections
 
 MINUTES = 12.0
 """Of the campaign."""
@@ -73,9 +73,8 @@ Segments of the data set:
 
 ![Segments of the data set](images/whole-loop-set.png)
 
-The comparison of the last step. Judged are maps of the **simulated** radar of people who were not
-learnt from; numbers are per cent, mean ± standard deviation over 2 seeds. *Frames*: mean share of
-each class's frames that were found.
+The study of the last step. Judged are maps of the **simulated** radar of people who were not
+learnt from; points of frames over real data alone, with 95 % intervals.
 
 {table}
 
@@ -83,7 +82,7 @@ each class's frames that were found.
 
 - With two seeds and {campaign_minutes:g} minutes gains are rough; with more of the radar's data
   they shrink ([the gesture classifier](classifier.md)).
-- Synthetic data have not been shown to help a classifier on a real radar.
+- What synthetic data do for a classifier on a real radar: [studies](studies.md).
 """
 
 
@@ -133,7 +132,7 @@ STEPS = (
     Step(
         "Judge it on a person it has not seen",
         "sd2 classify eval campaign.zarr --model gestures.safetensors",
-        "*Classifier*, *Open a result…*",
+        "*Train* page, *Study*, *Open a result…*",
     ),
     Step(
         "Find gestures in the sample",
@@ -143,7 +142,7 @@ STEPS = (
     Step(
         "What does synthetic data add?",
         "sd2 classify table campaign.zarr --out tables --quick",
-        "*Classifier*, *Compare*",
+        "*Train* page, *Study*",
     ),
 )
 
@@ -169,9 +168,15 @@ def main() -> None:
         minutes=total_s / 60.0,
         steps="\n".join(parts).rstrip(),
         campaign_minutes=MINUTES,
-        table=added_table((folder / "tables" / "table.md").read_text("utf-8")),
+        table=_gained((folder / "tables" / "study.md").read_text("utf-8")),
     )
     write_page("whole-loop.md", page)
+
+
+def _gained(page: str) -> str:
+    """Table of the gains of a study's page."""
+    part = sections(page)["Gained"]
+    return part[part.index("|") : part.index("!")].strip()
 
 
 def _run(command: str, folder: Path) -> float:

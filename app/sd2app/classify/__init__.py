@@ -1,1 +1,1 @@
-"""Gesture classifiers in the window: use, training, comparison."""
+"""Gesture classifiers in the window: use and training."""

@@ -1,4 +1,4 @@
-"""Dialogs of classifiers: files, training data, model card and results."""
+"""Dialogs of classifiers: files, training data and model card."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from sd2core.errors import Sd2Error
 
 _FILES = "Classifiers (*.safetensors)"
 _DATA = "Data sets and labelled radar files (*.h5 *.hdf5 *.npz)"
-_RESULTS = "Results (*.json)"
 
 
 class ClassifyDialogs:
@@ -76,24 +75,3 @@ class ClassifyDialogs:
         """True if the open recording can be learnt from: it is on disk."""
         content = self._session.document.content
         return content is not None and content.recording.folder != UNTITLED
-
-    def show_result(self) -> None:
-        """Show the result of the comparison in view."""
-        run = self._training.run
-        if run is not None and run.result is not None:
-            self._show(run.result)
-
-    def open_result(self) -> None:
-        """Let the user choose a result, and show it."""
-        if path := ask_file(self._parent, "Open a result", _RESULTS):
-            self._show(path)
-
-    def _show(self, path: Path) -> None:
-        # Imported here because a result needs what loads torch.
-        from sd2app.classify.result import read_result
-        from sd2app.classify.result_dialog import ClassResultDialog
-
-        display = self._session.display
-        self.shell.attempt(
-            lambda: ClassResultDialog(read_result(path), display, self._parent).show()
-        )

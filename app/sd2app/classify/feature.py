@@ -1,4 +1,4 @@
-"""Gesture classifiers in the window: use, training, comparison."""
+"""Gesture classifiers in the window: use and training."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ from sd2app.training.text import division_text
 from sd2app.widgets.chart import Chart, ChartView, Curve, Mark, Scale
 from sd2app.widgets.inputs import CheckBox, TypedLine
 from sd2app.widgets.layouts import grid_of, row_of
-from sd2app.widgets.panel import FactRows, outlined, rule, sentence, side_by_side, title
+from sd2app.widgets.panel import FactRows, sentence, side_by_side
 from sd2app.widgets.run_panel import Button, RunPanel, RunView
 from sd2app.widgets.text import counted
 from sd2app.widgets.training_form import Field, TrainingForm, labelled
@@ -40,10 +40,6 @@ _FIELDS = (
     Field("steps", "Steps", 1, 100_000, 50, "Batches that are learnt from"),
     Field("seed", "Seed", 0, 2**31 - 1, 1, "Of weights, order and dropout"),
 )  # fmt: skip
-_COMPARISON = (
-    "Trains again and again on the radar's maps alone and with synthetic ones added, and with less"
-    " and less of the radar's; judged on people who were not learnt from."
-)
 
 
 class ClassSetupView(TrainingForm):
@@ -55,8 +51,6 @@ class ClassSetupView(TrainingForm):
         self._add_labelled_data()
         self._add_network()
         self.add_start(training.train, lambda: training.command)
-        self.column.addWidget(rule())
-        self._add_comparison()
         training.changed.connect(self._refresh)
         self._refresh()
 
@@ -93,23 +87,6 @@ class ClassSetupView(TrainingForm):
             labelled(grid, (3 + row, 2 * column), field, self.number(field))
         self.column.addLayout(grid)
 
-    def _add_comparison(self) -> None:
-        self._quick = CheckBox(
-            "Quick: fewer trainings, to see how it looks",
-            self,
-            lambda on: self._labelled.set_value("quick", "yes" if on else "no"),
-            "Two seeds instead of five, and fewer shares of the radar's data",
-        )
-        tip = "Train and compare in the background"
-        self._compare = outlined(
-            "Compare", tip, partial(self._shell.attempt, self._training.compare), self
-        )
-        tip = "Show a table of sd2 classify table, or a matrix of sd2 classify eval"
-        show = outlined("Open a result…", tip, self._dialogs.open_result, self)
-        for widget in (title("Does synthetic data help?"), sentence(_COMPARISON), self._quick):
-            self.column.addWidget(widget)
-        self.column.addLayout(side_by_side(self._compare, show, spacing_px=6))
-
     def _refresh(self) -> None:
         training, setup = self._training, self._labelled
         if training.run is not None:
@@ -123,13 +100,10 @@ class ClassSetupView(TrainingForm):
         )
         for name, box in self._boxes.items():
             box.show_checked(name in setup.maps)
-        self._quick.show_checked(setup.value("quick") == "yes")
         steps = 0 if setup.problem else setup.value("steps")
         count = f"The data is read first; then {counted(steps, 'step')}"
         self.show_estimate(count, steps, setup.step_s)
         self.show_start(training.why_not_train, can_copy=not setup.train_problem)
-        self._compare.setEnabled(not training.why_not_compare)
-        self._compare.setToolTip(training.why_not_compare or "Train and compare in the background")
 
     def below_row(self, one: DataSource) -> QWidget | None:
         """Make the field for the name of the person, where the user can name one."""
@@ -150,7 +124,7 @@ class ClassSetupView(TrainingForm):
 
 
 class ClassPanel(RunPanel):
-    """Panel of trainings and comparisons of classifiers."""
+    """Panel of trainings of classifiers."""
 
     def __init__(
         self, training: ClassTraining, display: DisplayModel, dialogs: ClassifyDialogs
@@ -159,12 +133,12 @@ class ClassPanel(RunPanel):
             training,
             ClassSetupView(training, dialogs),
             ClassRunView(training, display, dialogs),
-            "Trainings and comparisons: under way, or ended",
+            "Trainings: under way, or ended",
         )
 
 
 class ClassRunView(RunView[ClassRun]):
-    """Recall of a training, and the result of a comparison."""
+    """Recall of a training."""
 
     def __init__(
         self, training: ClassTraining, display: DisplayModel, dialogs: ClassifyDialogs
@@ -174,13 +148,6 @@ class ClassRunView(RunView[ClassRun]):
             Button(
                 "use", "Use this model", "Say with it which gesture each frame shows",
                 partial(shell.attempt, training.use_model), primary=True,
-            ),
-            Button(
-                "show", "Show result", "Both confusion matrices, and the learning curve",
-                dialogs.show_result, primary=True,
-            ),
-            Button(
-                "again", "Resume", "Train what is missing", partial(shell.attempt, training.again)
             ),
         )  # fmt: skip
         super().__init__(training, shell, buttons)
@@ -194,25 +161,20 @@ class ClassRunView(RunView[ClassRun]):
 
     def texts(self, run: ClassRun) -> tuple[str, str, str]:
         """Headline, time, and advice for a run that has ended."""
-        return run_headline(run), run_time_text(run), note(run)
+        return run_headline(run), run_time_text(run, run.history), note(run)
 
     def shown(self, run: ClassRun) -> Collection[str]:
         """Names of the buttons that are of use now."""
         if run.phase in UNDER_WAY:
             return ("stop", "delete")
-        useful = {
-            "use": run.result is not None and not run.compares and not self._training.in_use,
-            "show": run.result is not None and run.compares,
-            "again": run.compares and run.phase != "finished",
-            "delete": True,
-        }
-        return [name for name, is_useful in useful.items() if is_useful]
+        usable = run.result is not None and not self._training.in_use
+        return ("use", "delete") if usable else ("delete",)
 
     def show_made(self, run: ClassRun) -> None:
         """Follow recall and loss."""
         history, best = run.history, run.history.best
         self._curve.show_chart(class_chart(history))
-        self._curve.setVisible(not run.compares and bool(history.losses))
+        self._curve.setVisible(bool(history.losses))
         self._facts.show_facts([] if best is None else [("Best recall", recall_text(best))])
         self._about.setText(run.path.name)
         self._about.setToolTip(str(run.path))

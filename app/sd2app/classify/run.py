@@ -1,4 +1,4 @@
-"""Training or comparison of classifiers: its monitor, and what it told."""
+"""Training of a classifier: its monitor, and what it told."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from sd2core.runs.command_folder import CommandFolder
 from sd2core.runs.pace import Pace
 
 MODEL_NAME = "classifier.safetensors"
-TABLE_NAME = "table"
 
 
 class LossPoint(NamedTuple):
@@ -33,14 +32,12 @@ class CheckPoint(NamedTuple):
     best: bool
 
 
-class ClassHistory(LearningHistory):
-    """Steps and checks of a training; of a comparison, the trainings that are done."""
+class PacedHistory(LearningHistory):
+    """Steps of which the number is known, and the pace at which they are done."""
 
     def __init__(self) -> None:
         super().__init__()
         self.total = 0
-        self.losses: list[LossPoint] = []
-        self.checks: list[CheckPoint] = []
         self._pace = Pace()
 
     @property
@@ -52,6 +49,20 @@ class ClassHistory(LearningHistory):
     def left_s(self) -> float | None:
         """Time left at the pace so far; None until that can be told."""
         return None if self.saving else self._pace.left_s(self.total - self.steps_done)
+
+    def _advance(self, steps: int, elapsed_s: float) -> None:
+        super()._advance(steps, elapsed_s)
+        if self.elapsed_s is not None:
+            self._pace.take(steps, self.elapsed_s)
+
+
+class ClassHistory(PacedHistory):
+    """Steps and checks of a training."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.losses: list[LossPoint] = []
+        self.checks: list[CheckPoint] = []
 
     @property
     def best(self) -> CheckPoint | None:
@@ -72,30 +83,19 @@ class ClassHistory(LearningHistory):
         best = self.best
         self.checks.append(CheckPoint(step, recall, best is None or recall > best.recall))
 
-    def _training_done(self, event: dict[str, Any]) -> None:
-        """Count one of several trainings of a comparison."""
-        self.total, self.begun = int(event["total"]), True
-        self._advance(int(event["done"]), float(event["elapsed_s"]))
-
     def _end(self, event: dict[str, Any]) -> None:
         self.saving = True
-
-    def _advance(self, steps: int, elapsed_s: float) -> None:
-        super()._advance(steps, elapsed_s)
-        if self.elapsed_s is not None:
-            self._pace.take(steps, self.elapsed_s)
 
     readers: ClassVar = {
         "start": _start,
         "step": _step,
         "check": _check,
-        "run": _training_done,
         "end": _end,
     }
 
 
 class ClassRun(RunMonitor[CommandFolder]):
-    """A training or a comparison."""
+    """A training."""
 
     history: ClassHistory
     facts = False  # there is a result
@@ -108,20 +108,10 @@ class ClassRun(RunMonitor[CommandFolder]):
         super().__init__(folder, parent, history=ClassHistory(), process=process)
 
     @property
-    def compares(self) -> bool:
-        """True for a comparison."""
-        return self.about.get("what") == "table"
-
-    @property
     def result(self) -> Path | None:
-        """The model, or the folder with the tables; None where there is none."""
-        return self.path / self._result_name if self.facts else None
+        """The model; None where there is none."""
+        return self.path / MODEL_NAME if self.facts else None
 
     def inspect(self) -> bool:
-        """Check for a model, or a complete table."""
-        result = self.path / self._result_name
-        return (result / "table.json" if self.compares else result).is_file()
-
-    @property
-    def _result_name(self) -> str:
-        return TABLE_NAME if self.compares else MODEL_NAME
+        """Check for a model."""
+        return (self.path / MODEL_NAME).is_file()

@@ -33,11 +33,10 @@ _DEFAULTS: dict[str, Any] = {
     "maps": "radar",
     "steps": 300,
     "seed": 0,
-    "quick": "yes",
 }
-"""Defaults of ``sd2 classify train``; ``quick`` is for a comparison."""
+"""Defaults of ``sd2 classify train``."""
 _DATA, _PEOPLE = "classify/train/data", "classify/train/people"
-_CHOICES = {"model": MODELS, "features": FEATURES, "quick": ("yes", "no")}
+_CHOICES = {"model": MODELS, "features": FEATURES}
 
 
 @dataclass(frozen=True)
@@ -180,14 +179,11 @@ class ClassSetup(RunSetup[DataSource]):
         words += self._others("features", "width", "delay_s", "maps", "seed")
         return [*words, "--out", str(out)]
 
-    def table_arguments(self, out: Path) -> list[str]:
-        """Arguments of ``sd2 classify table`` for the chosen network."""
+    def table_arguments(self) -> list[str]:
+        """Arguments of ``sd2 classify table`` for the data and the chosen network."""
         values = self._values
         words = ["classify", "table", *self._sources, "--steps", f"{values['steps']}"]
-        words += self._others("model", "features", "width", "delay_s")
-        if values["quick"] == "yes":
-            words.append("--quick")
-        return [*words, "--out", str(out)]
+        return [*words, *self._others("model", "features", "width", "delay_s")]
 
     def _others(self, *names: str) -> list[str]:
         """Options for all that differs from the defaults."""

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
-from sd2app.classify.run import ClassRun
+from sd2app.background.run_monitor import RunMonitor
+from sd2app.classify.run import ClassRun, PacedHistory
 from sd2app.classify.track import ClassReading
 from sd2app.widgets.model_page import ModelPage, about_sections, map_and_file_rows, model_title
 from sd2app.widgets.text import about, exact_text
@@ -20,7 +22,7 @@ _KINDS = {
 }
 
 
-_PHASES = {
+PHASES = {
     "starting": "Starting…",
     "stopping": "Stopping…",
     "cancelling": "Cancelling…",
@@ -86,17 +88,13 @@ def run_headline(run: ClassRun) -> str:
     """Current phase of the run in words."""
     history = run.history
     if run.phase != "running":
-        return _PHASES[run.phase]
-    if run.compares:
-        return (
-            f"Comparing: training {min(history.steps_done + 1, history.total)} of {history.total}"
-        )
+        return PHASES[run.phase]
     return f"Training: step {history.steps_done} of {history.total}"
 
 
-def run_time_text(run: ClassRun) -> str:
-    """Elapsed time and time left."""
-    history, parts = run.history, []
+def run_time_text(run: RunMonitor[Any], history: PacedHistory) -> str:
+    """Elapsed time of a run, and time left."""
+    parts = []
     if run.phase == "running" and history.left_s is not None:
         parts.append(f"{about(history.left_s)} left")
     if history.elapsed_s is not None:
@@ -109,8 +107,6 @@ def note(run: ClassRun) -> str:
     """Advice for a run that was stopped or did not reach its end."""
     if run.phase == "died":
         return "It was killed, or the machine was switched off."
-    if run.phase == "stopped" and run.compares:
-        return "What it has trained is kept: Resume trains what is missing."
     if run.phase == "stopped":
         return "The best so far is kept." if run.result else "There was nothing to keep yet."
     return ""

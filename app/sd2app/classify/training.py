@@ -1,15 +1,14 @@
-"""Training and comparing classifiers, in processes that outlive the window."""
+"""Training classifiers, in processes that outlive the window."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 from PySide6.QtCore import QObject
 
 from sd2app.background.runs import KnownRun, Runs, Sentences, free_folder
-from sd2app.classify.run import MODEL_NAME, TABLE_NAME, ClassRun
+from sd2app.classify.run import MODEL_NAME, ClassRun
 from sd2app.classify.setup import ClassSetup
 from sd2app.settings import Settings
 from sd2app.training.model import quoted
@@ -29,7 +28,7 @@ _STATES = {0: "finished", 130: "stopped", None: "not ended"}
 
 
 class ClassTraining(Runs[ClassRun]):
-    """Trainings and comparisons of classifiers, one under way at a time.
+    """Trainings of classifiers, one under way at a time.
 
     ``use`` classifies with a file. ``folder`` is that of the classifiers, with the runs in
     ``runs`` below it. ``command`` is the program that runs ``sd2`` commands in a folder.
@@ -63,11 +62,6 @@ class ClassTraining(Runs[ClassRun]):
         return self.busy or self.setup.train_problem
 
     @property
-    def why_not_compare(self) -> str:
-        """Reason why nothing can be compared; empty when something can."""
-        return self.busy or self.setup.problem
-
-    @property
     def command(self) -> str:
         """Command for a terminal that does what is set up."""
         return quoted(self.setup.train_arguments(Path(MODEL_NAME)))
@@ -83,27 +77,10 @@ class ClassTraining(Runs[ClassRun]):
         """Begin as set up; Sd2Error if it cannot start, OSError if its folder cannot be made."""
         if self.why_not_train:
             raise Sd2Error(self.why_not_train)
-        path = self._new_folder(str(self.setup.value("model")))
-        words = self.setup.train_arguments(path / MODEL_NAME)
-        self._start(path, [*words, "--progress-json"], {"what": "train"})
-
-    def compare(self) -> None:
-        """Begin to compare the radar alone with synthetic data added; raises as :meth:`train`."""
-        if self.why_not_compare:
-            raise Sd2Error(self.why_not_compare)
-        path = self._new_folder("comparison")
-        words = self.setup.table_arguments(path / TABLE_NAME)
-        self._start(path, [*words, "--progress-json"], {"what": "table"})
-
-    def again(self) -> None:
-        """Go on with a comparison that was stopped: what it has trained is kept."""
-        run = self.run
-        if run is None or run.under_way or not run.compares:
-            return
-        if self.busy:
-            raise Sd2Error(self.busy)
-        arguments = [str(word) for word in run.about.get("arguments", ())]
-        self._start(run.path, arguments, {"what": "table"})
+        data = [one.path for one in self.setup.data]
+        path = free_folder(self._folder / "runs", str(self.setup.value("model")), data)
+        words = [*self.setup.train_arguments(path / MODEL_NAME), "--progress-json"]
+        self.follow_new(path, CommandFolder(path).start(words, {"what": "train"}, self._command))
 
     def use_model(self) -> None:
         """Keep the model of the run in view among the classifiers, and classify with it.
@@ -111,7 +88,7 @@ class ClassTraining(Runs[ClassRun]):
         Raises Sd2Error or OSError if it cannot be read or kept.
         """
         run = self.run
-        if run is None or run.result is None or run.compares:
+        if run is None or run.result is None:
             return
         kept = self._folder / f"{run.path.name}.safetensors"
         with atomic_write(kept) as stream:
@@ -120,15 +97,8 @@ class ClassTraining(Runs[ClassRun]):
         self._used = run.path
         self.changed.emit()
 
-    def _start(self, path: Path, arguments: list[str], about: dict[str, Any]) -> None:
-        self.follow_new(path, CommandFolder(path).start(arguments, about, self._command))
-
-    def _new_folder(self, what: str) -> Path:
-        return free_folder(self._folder / "runs", what, [one.path for one in self.setup.data])
-
 
 def _title(folder: CommandFolder) -> str:
     about = folder.facts
-    what = "Comparison" if about.get("what") == "table" else "Training"
     state = "under way" if folder.live else _STATES.get(folder.code, "failed")
-    return f"{clock_text(about.get('started_unix_s', 0.0))} · {what} · {state}"
+    return f"{clock_text(about.get('started_unix_s', 0.0))} · Training · {state}"

@@ -17,6 +17,7 @@ HELP = {
     "Accuracy": "how-to/choose-accuracy.md",
     "Denoiser": "tutorials/train-a-denoiser.md#3-train",
     "Classifier": "how-to/recognise-gestures.md",
+    "Study": "how-to/recognise-gestures.md",
     "Labels": "tutorials/label-fast.md#1-mark-with-keys",
     "Label set": "how-to/use-your-own-label-set.md",
     "Agree": "tutorials/label-fast.md#3-compare-with-a-second-annotator",

@@ -66,7 +66,7 @@ LAYOUT: Mapping[str, tuple[str, ...]] = {
     "Model": (
         "@denoisers", "-", "open_model", "model_card", "-", "difference", "texture",
         "compare_models", "live", "-", "@classifiers", "open_classifier", "classifier_card",
-        "show_classes", "train_classifier",
+        "show_classes", "train_classifier", "study",
     ),
     "Help": ("first_five_minutes", "manual", "keys", "-", "sample", "-", "about"),
 }  # fmt: skip

@@ -36,6 +36,7 @@ from sd2app.session.session import Session
 from sd2app.shell.files import FilesFeature
 from sd2app.shell.parts import Parts
 from sd2app.shell.program import ProgramFeature
+from sd2app.study.feature import StudyFeature
 from sd2app.suggestions.feature import SuggestionsFeature
 from sd2app.training.feature import TrainingFeature
 from sd2app.video.feature import VideoFeature
@@ -94,6 +95,7 @@ class Features:
             lambda finder: self.suggestions.model.start(finder),
             parent,
         )
+        self.study = StudyFeature(session, shell, self.classify.training.setup, parent)
         finders = (self.classify.model,)
         self.suggestions = SuggestionsFeature(session, shell, labels.edits, finders, parent)
         self.agreement = AgreementFeature(session, shell, labels.model, parent)
@@ -137,9 +139,9 @@ class Features:
         )
         self._in_order: tuple[Feature, ...] = (
             self.mesh_comparison, self.sensor, self.suggestions, self.agreement,
-            self.dataset_export, self.fit, self.batch, self.training, self.classify,
-            self.denoise, self.maps, self.accuracy, self.video, self.labels, self.figures,
-            self.live, self.playback, self.program, self.imu, self.files, self.scene,
+            self.dataset_export, self.fit, self.batch, self.training, self.study,
+            self.classify, self.denoise, self.maps, self.accuracy, self.video, self.labels,
+            self.figures, self.live, self.playback, self.program, self.imu, self.files, self.scene,
         )  # fmt: skip
         session.document.opened.connect(lambda: _take_over(session, self))
 
@@ -173,6 +175,7 @@ def side_pages(features: Features, views: Mapping[str, QWidget]) -> dict[str, QW
     train = paged_panel(
         InnerPage("Denoiser", "Train what makes synthetic maps a radar's", denoisers),
         InnerPage("Classifier", "Train what tells gestures apart", classifiers),
+        InnerPage("Study", "Find out whether synthetic data help", features.study.panel()),
     )
     pages = {**views, "Train": train}
     return {name: pages[name] for name in ("Sensor", "Accuracy", "Train", "Labels", "Agree")}

@@ -1,34 +1,27 @@
-"""``sd2 classify table``: confusion matrices and learning curves of many trainings."""
+"""``sd2 classify table``: networks and amounts of data compared, as a study."""
 
 from __future__ import annotations
 
 import argparse
-import json
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from sd2core.cli.classify.data import DATA_HELP, add_sources, clips_of
-from sd2core.cli.classify.train import add_network, network_of
+from sd2core.cli.classify.data import DATA_HELP, add_sources
+from sd2core.cli.classify.train import add_network
 from sd2core.cli.command_parser import add_command
 from sd2core.cli.options import positive_int, share
-from sd2core.cli.output import finite, print_event, print_json, progress_bar
+from sd2core.cli.study import add_running, make_study
 
 if TYPE_CHECKING:
-    from sd2core.classify.comparison import Table, TableOptions
-    from sd2core.classify.data import ClipSet
-    from sd2core.denoise.live import TrainedDenoiser
-    from sd2core.progress import Progress
+    from sd2core.datasets.labelled import LabelledSource
+    from sd2core.study.plan import Learner, StudyPlan
 
 
 def add_table(kinds: argparse._SubParsersAction) -> None:
     """Add ``table``."""
     parser = add_command(kinds, "table", handler=_table, description=DATA_HELP)
     add_sources(parser)
-    parser.add_output("FOLDER", "the tables, figures and models to write", goes_on=True)
-    parser.add_value("--seeds", positive_int, "N", "number of repetitions (default: 5; quick: 2)")
+    parser.add_output("FOLDER", "the study to write", goes_on=True)
+    parser.add_value("--seeds", positive_int, "N", "number of draws (default: 5; quick: 2)")
     text = "shares of the real data for the learning curve (default:"
     text += " 1%%,2%%,5%%,10%%,25%%,50%%,100%%; quick: 10%%,100%%)"
     parser.add_value("--shares", _shares, "LIST", text)
@@ -41,7 +34,7 @@ def add_table(kinds: argparse._SubParsersAction) -> None:
     )
     add_network(parser)
     parser.add_value("--steps", positive_int, "N", "batches per training")
-    parser.add_json_and_progress()
+    add_running(parser)
 
 
 def _shares(text: str) -> tuple[float, ...]:
@@ -49,98 +42,82 @@ def _shares(text: str) -> tuple[float, ...]:
 
 
 def _table(options: argparse.Namespace) -> None:
-    """Compare trainings with and without synthetic data.
+    """Compare networks, and trainings with and without synthetic data.
 
-    Trains on the radar's maps alone, and with synthetic maps of other movements added
-    (0.4 frames for each real one), denoised or not, seen from the radar's own place or
-    from others too; then with less and less of the real data. Everything is evaluated
-    on the radar's maps of people not trained on, other ones for each seed. With one
-    person, movements are kept apart instead.
+    A study (`sd2 study`) in which everybody is judged once: by the chosen network, of the
+    radar's maps alone and with synthetic maps of somebody else added, denoised or not, and
+    with less and less of the real data; and by other networks. With one person, or too few,
+    movements are kept apart instead.
 
-    OUT gets table.md, table.json, confusion.png and curve.png, and a small file for
-    every training: run again, only the missing ones are trained.
+    OUT gets study.toml, to go on from with `sd2 study`, and what that writes: study.md,
+    study.json, confusion.png and curve.png. Run again, only what is missing is trained.
 
       sd2 classify table campaign.zarr --out tables
       sd2 classify table campaign.zarr --out tables --quick
       sd2 classify table anna=a.sd2 ben=b.sd2 --out own --seeds 2
     """
-    from sd2core.classify.comparison import make_table
-    from sd2core.classify.comparison_report import as_json, as_text
-
-    known = clips_of(options.data, ("radar",) if options.radar_only else None)
-    chosen = _options(options)
-    folder: Path = options.out
-    with _lines() if options.progress_json else progress_bar("Training", "run") as progress:
-        table = make_table(folder / "runs", known, chosen, _denoiser(options, known), progress)
-    content = finite(as_json(table))
-    _write(folder, table, content)
-    if options.progress_json:
-        print_event("written", folder=str(folder))
-    elif options.json:
-        print_json(content)
-    else:
-        print(as_text(table))
-        print(f"\nWrote {folder}")
-
-
-@contextmanager
-def _lines() -> Iterator[Progress]:
-    """Print a JSON line for every finished training."""
-    begun_s = time.monotonic()
-
-    def report(done: int, total: int) -> None:
-        print_event("run", done=done, total=total, elapsed_s=time.monotonic() - begun_s)
-
-    yield report
-
-
-def _options(options: argparse.Namespace) -> TableOptions:
-    from sd2core.classify.comparison import QUICK_SHARES, SHARES, TableOptions
-    from sd2core.classify.training import TrainOptions
-
-    training = TrainOptions() if options.steps is None else TrainOptions(steps=options.steps)
-    return TableOptions(
-        same_people=options.same_people,
-        seeds=options.seeds or (2 if options.quick else 5),
-        shares=options.shares or (QUICK_SHARES if options.quick else SHARES),
-        network=network_of(options),
-        training=training,
-    )
-
-
-def _denoiser(options: argparse.Namespace, known: ClipSet) -> TrainedDenoiser | None:
-    """Load the denoiser named, or the bundled one where it is made for such maps."""
-    from sd2core.classify.comparison import fits
-    from sd2core.classify.experiment import has_synthetic
-    from sd2core.denoise.files import MAP_MODEL, load_model
-    from sd2core.errors import Sd2Error
-
-    if not has_synthetic(known):
-        return None
-    denoiser = load_model(options.denoiser or MAP_MODEL)
-    if fits(known, denoiser):
-        return denoiser
-    if options.denoiser is not None:
-        raise Sd2Error(
-            f"The denoiser {options.denoiser} does not know maps of {known.axis.bins} bins up to"
-            f" ±{known.axis.v_max_mps:g} m/s at {known.frame_rate_hz:.4g} frames/s alone",
-            "a denoiser for such maps",
-        )
-    return None
-
-
-def _write(folder: Path, table: Table, content: dict[str, Any]) -> None:
-    from sd2core.classify.comparison_report import (
-        as_markdown,
-        curve_conditions,
-        draw_confusions,
-        draw_curve,
-    )
     from sd2core.files.atomic import atomic_write_text
-    from sd2core.files.figure_files import save_figure
+    from sd2core.files.paths import make_folder
+    from sd2core.study.plan import study_text
 
-    atomic_write_text(folder / "table.json", json.dumps(content, indent=1) + "\n")
-    atomic_write_text(folder / "table.md", as_markdown(table))
-    save_figure(draw_confusions(table), folder / "confusion.png")
-    if len({one.share for one in curve_conditions(table)}) > 1:
-        save_figure(draw_curve(table), folder / "curve.png")
+    plan = _plan(options)
+    make_folder(options.out)
+    atomic_write_text(options.out / "study.toml", study_text(plan, options.out))
+    make_study(plan, options)
+
+
+def _plan(options: argparse.Namespace) -> StudyPlan:
+    from sd2core.denoise.files import MAP_MODEL
+    from sd2core.study.plan import Denoiser, StudyPlan
+
+    quick = options.quick
+    plan = StudyPlan(
+        title=f"Gestures of {', '.join(one.path.stem for one in options.data)}",
+        out=str(options.out.absolute()),
+        data=tuple(map(_source, options.data)),
+        turns="once",
+        seeds=options.seeds or (2 if quick else 5),
+        shares=options.shares or ((0.1, 1.0) if quick else (0.01, 0.02, 0.05, 0.1, 0.25, 0.5, 1.0)),
+        added=() if options.radar_only else ("synthetic", "denoised", "radar"),
+        added_weight=1.0,
+        classifiers=_learners(options),
+        denoiser=Denoiser(file=options.denoiser or MAP_MODEL),
+    )
+    return _fitting(plan, options.same_people)
+
+
+def _source(one: LabelledSource) -> str:
+    path = one.path.absolute()
+    return f"{one.subject}={path}" if one.subject else str(path)
+
+
+def _learners(options: argparse.Namespace) -> tuple[Learner, ...]:
+    """The chosen network, then those that it is compared with."""
+    from sd2core.study.plan import Learner
+
+    steps = options.steps
+    chosen = Learner(
+        model=options.model, features=options.features, width=options.width,
+        delay_s=options.delay_s, steps=steps,
+    )  # fmt: skip
+    paper = Learner(model="lstm", features="peak", width=16, delay_s=0.0, steps=steps)
+    others = (
+        paper,
+        paper.model_copy(update={"features": "columns"}),
+        Learner(model="lstm", delay_s=0.0, steps=steps),
+        Learner(model="s4", steps=steps),
+        Learner(model="kernel", delay_s=0.9),
+        Learner(),
+    )
+    return (chosen, *(one for one in others if one != chosen))
+
+
+def _fitting(plan: StudyPlan, same_people: bool) -> StudyPlan:
+    """Leave out what the data do not hold; keep movements apart where there are too few people."""
+    from sd2core.study.material import material_of
+
+    material = material_of(plan.model_dump_json())
+    added = plan.added if material.filmed else ()
+    least = 3 if added else 2
+    folds = "files" if same_people or len(material.people) < least else "people"
+    return plan.model_copy(update={"added": added, "folds": folds})

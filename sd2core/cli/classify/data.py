@@ -36,10 +36,7 @@ def source(text: str) -> LabelledSource:
     """Parse ``PATH`` or ``PERSON=PATH``."""
     from sd2core.datasets.labelled import LabelledSource
 
-    name, sign, path = text.partition("=")
-    if sign and name and path and "/" not in name and not Path(text).exists():
-        return LabelledSource(Path(path), name)
-    return LabelledSource(Path(text), "")
+    return LabelledSource.parsed(text)
 
 
 def add_data(parser: Options) -> None:

@@ -18,7 +18,6 @@ from sd2core.cli.output import finite, print_event, print_facts, print_json
 from sd2core.processes import INTERRUPTED
 
 if TYPE_CHECKING:
-    from sd2core.classify.experiment import Network
     from sd2core.classify.training import TrainOptions, Watch
 
 
@@ -56,13 +55,6 @@ def add_network(parser: Options) -> None:
     text = "classify a frame so much later, with the frames after it known (default:"
     text += f" {DELAY_S:g}; the paper's: 0, at once)"
     group.add_value("--delay-s", not_negative_float, "S", text, DELAY_S)
-
-
-def network_of(options: argparse.Namespace) -> Network:
-    """Return the network chosen by the options."""
-    from sd2core.classify.experiment import Network
-
-    return Network(options.model, options.features, options.width, options.delay_s)
 
 
 def _train(options: argparse.Namespace) -> int:
@@ -126,8 +118,11 @@ def _train(options: argparse.Namespace) -> int:
 def _options(options: argparse.Namespace) -> TrainOptions:
     from sd2core.classify.training import TrainOptions
 
-    chosen = TrainOptions(**given(options, ("steps", "patience", "learning_rate")))
-    return network_of(options).of(chosen, options.seed)
+    return TrainOptions(
+        options={"width": options.width},
+        **given(options, ("model", "features", "delay_s", "seed")),
+        **given(options, ("steps", "patience", "learning_rate")),
+    )
 
 
 def _kept_out(

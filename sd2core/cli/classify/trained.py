@@ -80,7 +80,7 @@ def _eval(options: argparse.Namespace) -> None:
     else:
         _say(found, known, subjects, sorted(learnt))
     if options.figure is not None:
-        from sd2core.classify.comparison_report import confusion_figure
+        from sd2core.classify.confusion_figure import confusion_figure
         from sd2core.classify.metrics import shares
 
         figure = confusion_figure(

@@ -1,4 +1,4 @@
-"""Classifiers trained and compared beside the window, by a command that learns nothing."""
+"""Classifiers trained beside the window, by a command that learns nothing."""
 
 from __future__ import annotations
 
@@ -80,17 +80,15 @@ def test_what_is_set_up_is_the_command(set_up):
         "--delay-s", "0.25", "--maps", "radar,denoised", "--seed", "7", "--out", "m.safetensors",
     ]  # fmt: skip
     assert model.command.startswith("sd2 classify train")
-    # A comparison takes its seeds and maps itself.
-    assert model.setup.table_arguments(Path("t"))[3:] == [
-        "--steps", "50", "--model", "s4", "--features", "peak", "--width", "16",
-        "--delay-s", "0.25", "--quick", "--out", "t",
+    # A study takes its seeds and maps itself.
+    assert model.setup.table_arguments() == [
+        "classify", "table", data, "--steps", "50", "--model", "s4", "--features", "peak",
+        "--width", "16", "--delay-s", "0.25",
     ]  # fmt: skip
-    model.setup.set_value("quick", "no")
-    assert "--quick" not in model.setup.table_arguments(Path("t"))
     for name in ("radar", "denoised"):
         model.setup.set_map(name, False)
     assert model.why_not_train == "Choose maps to learn from."
-    assert not model.why_not_compare
+    assert not model.setup.problem
     # All of it is there the next time.
     again = set_up.training().setup
     assert [one.path for one in again.data] == [set_up.data]
@@ -107,7 +105,7 @@ def test_the_command_is_one_that_the_program_has(set_up):
     set_up.ready(model)
     for words in (
         model.setup.train_arguments(Path("m.safetensors")),
-        model.setup.table_arguments(Path("t")),
+        [*model.setup.table_arguments(), "--out", "t"],
     ):
         full_parser().parse_args([*words, "--progress-json"])
 
@@ -173,7 +171,7 @@ def test_what_does_not_go_together_is_named(set_up, tmp_path, qtbot):
     assert not model.why_not_train
     setup.set_map("denoised", True)
     assert model.why_not_train == "set.zarr has no denoised maps: choose others, or leave it out."
-    assert not model.why_not_compare
+    assert not model.setup.problem
 
 
 def test_how_long_it_takes_is_known_once_it_was_measured(set_up):
@@ -202,7 +200,7 @@ def test_a_training_is_followed_to_its_end_and_its_model_is_used(set_up, qtbot):
     model.train()
     assert model.why_not_train.endswith("Wait for it, or stop it.")
     with pytest.raises(Sd2Error, match="is under way"):
-        model.compare()
+        model.train()
     set_up.ended(model)
     run = model.run
     assert run.phase == "finished"
@@ -212,7 +210,7 @@ def test_a_training_is_followed_to_its_end_and_its_model_is_used(set_up, qtbot):
         (0.5, True), (0.8, True), (0.7, False),
     ]  # fmt: skip
     assert recall_text(run.history.best) == "80.0 %, at step 4"
-    assert run_time_text(run) == "took 0:12"
+    assert run_time_text(run, run.history) == "took 0:12"
     assert not model.in_use
     model.use_model()
     (kept,) = set_up.used
@@ -298,26 +296,6 @@ def test_another_window_finds_what_is_under_way(set_up, qtbot):
     second.run.stop()
     set_up.ended(first)
     assert first.run.phase == "stopped"
-
-
-@pytest.mark.slow
-def test_a_comparison_that_was_stopped_goes_on_in_its_folder(set_up, qtbot):
-    model = set_up.training("--step-s", "0.5")
-    set_up.ready(model)
-    model.compare()
-    qtbot.waitUntil(lambda: model.run.history.steps_done >= 1, timeout=20_000)
-    assert run_headline(model.run).startswith("Comparing: training")
-    model.run.stop()
-    set_up.ended(model)
-    assert model.run.result is None
-    assert "Resume" in note(model.run)
-    folder = model.run.folder.path
-    model._command = FAKE
-    model.again()
-    set_up.ended(model)
-    assert model.run.folder.path == folder
-    assert model.run.phase == "finished"
-    assert (model.run.result / "table.json").is_file()
 
 
 @pytest.mark.slow

@@ -36,7 +36,7 @@ def classifier(
     if network.closed_form:  # There is nothing in it before.
         values, _ = shown.of(energies(300, seed=5))
         label = torch.arange(300) // 10 % len(CLASSES)
-        network.fit([torch.from_numpy(values)], [label], torch.ones(len(CLASSES)), seed)
+        network.fit([torch.from_numpy(values)], [label], torch.ones(len(CLASSES)), [1.0], seed)
     return TrainedClassifier(
         network, ClassifierCard(model, {}, shown, CLASSES, ("simulated",), **card)
     )

@@ -188,48 +188,47 @@ def test_a_capture_of_a_recording_is_seen_as_the_classifier_learnt(sd2: Sd2, mod
 
 
 @pytest.mark.slow
-def test_a_table_is_made_once(sd2: Sd2, store: Path, tmp_path: Path) -> None:
+def test_a_table_is_a_study_that_is_made_once(sd2: Sd2, store: Path, tmp_path: Path) -> None:
     arguments = ("classify", "table", store, "--out", tmp_path, "--seeds", 1, "--steps", 2)
-    first = sd2(*arguments, "--shares", "50%,100%")
-    assert first.code == 0
-    assert "simulated radar" in first.out
+    arguments = (*arguments, "--shares", "50%,100%", "--same-people", "--workers", 1)
+    first = sd2(*arguments)
+    assert first.code == 0, first.err
     runs = {path: path.stat().st_mtime_ns for path in (tmp_path / "runs").iterdir()}
-    again = sd2(*arguments, "--shares", "50%,100%", "--json")
+    assert len(runs) == 2 * 5
+    told = json.loads(sd2(*arguments, "--json").out)
     assert {path: path.stat().st_mtime_ns for path in (tmp_path / "runs").iterdir()} == runs
-    told = json.loads(again.out)
-    assert len(told["conditions"]) == len(runs)
-    assert told == json.loads((tmp_path / "table.json").read_text("utf-8"))
-    for name in ("table.md", "confusion.png", "curve.png"):
+    assert told["conclusion"] in first.out
+    for name in ("study.md", "study.json", "confusion.png", "curve.png"):
         assert (tmp_path / name).stat().st_size
+    # The plan of the study is there to go on from.
+    again = sd2("study", tmp_path / "study.toml", "--json", "--workers", 1)
+    assert json.loads(again.out) == told
+    content = json.loads((tmp_path / "study.json").read_text("utf-8"))
+    assert content["radar"] == "simulated"
+    assert {"real alone", "+ synthetic", "kernel, columns, after 0.9 s"} <= {
+        one["title"] for one in content["totals"]
+    }
 
 
 @pytest.mark.slow
-def test_networks_are_compared_on_the_radar_alone(sd2: Sd2, store: Path, tmp_path: Path) -> None:
-    how = ("--radar-only", "--seeds", 1, "--steps", 2, "--shares", "100%", "--width", 4)
-    told = json.loads(sd2("classify", "table", store, "--out", tmp_path, *how, "--json").out)
-    assert {one["added"] for one in told["conditions"]} == {"nothing"}
-    assert told["network"] in [one["network"] for one in told["conditions"]]
-    assert told["network"]["width"] == 4
-    # Nothing may be added, so all of the two people's takes are there as the radar saw them.
-    assert {sum(run["real"].values()) for c in told["conditions"] for run in c["runs"]} == {360}
-    assert not told["by_movement"]
-    same = sd2("classify", "table", store, "--out", tmp_path, *how, "--same-people", "--json")
-    assert json.loads(same.out)["by_movement"]
-
-
 def test_real_radar_files_have_classes_of_their_own(
     sd2: Sd2, shared_data: Path, tmp_path: Path
 ) -> None:
     folder = shared_data / "radar" / "kkt_gestures"
     told = sd2(
         *("classify", "table", folder, "--out", tmp_path, "--seeds", 1, "--steps", 2),
-        *("--shares", "100%", "--json"),
+        *("--shares", "100%", "--workers", 1, "--progress-json"),
     )
-    found = json.loads(told.out)
+    events = [json.loads(line) for line in told.out.splitlines()]
+    assert events[0] == {"event": "run", "done": 0, "total": 5, "elapsed_s": 0.0} | {
+        "elapsed_s": events[0]["elapsed_s"]
+    }
+    assert events[-1]["event"] == "written"
+    found = json.loads((tmp_path / "study.json").read_text("utf-8"))
     assert found["classes"] == ["background", "FirstGesture", "SecondGesture", "ThirdGesture"]
     assert found["radar"] == "real"
-    assert found["by_movement"]
-    assert {one["added"] for one in found["conditions"]} == {"nothing"}
+    assert found["takes"] == {"one person": 8}
+    assert found["findings"] == []
 
 
 @pytest.mark.parametrize(
@@ -249,7 +248,7 @@ def test_real_radar_files_have_classes_of_their_own(
         (("apply", "STORE", "--model", "MODEL"), "is a pairs"),
         (("apply", "MAP", "--model", "DENOISER"), "is a denoiser"),
         (("apply", "MAP", "--of", "radar", "--model", "MODEL"), "--of"),
-        (("table", "MAP", "--out", "t"), "nothing with labels"),
+        (("table", "MAP", "--out", "t"), "is a map"),
     ],
 )
 def test_what_cannot_be_done_is_explained(

@@ -10,66 +10,118 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_pairs import AXIS, write_pairs
 
+from sd2core.classify.data import Clip
 from sd2core.errors import Sd2Error
 from sd2core.maps import mean_velocity_mps
-from sd2core.pairs.labelling import TakeLabel, labelled
-from sd2core.pairs.store import PairSet, read_pairs
+from sd2core.pairs.labelling import TakeLabel, label_pairs
 from sd2core.sensor import VelocityAxis
 from sd2core.study.certainty import adjusted, gain_of
-from sd2core.study.folds import folds_of, labelled_takes, share_of
-from sd2core.study.plan import read_study
+from sd2core.study.folds import folds_of, groups_of, share_of
+from sd2core.study.material import Material, material_of
+from sd2core.study.plan import StudyPlan, read_study, study_text
 from sd2core.study.windows import Ridge, at_speed, window_features
 
 
 @pytest.fixture(scope="module")
-def pairs(tmp_path_factory: pytest.TempPathFactory) -> PairSet:
-    whole = read_pairs(write_pairs(tmp_path_factory.mktemp("p") / "pairs.zarr", takes=4))
+def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = write_pairs(tmp_path_factory.mktemp("p") / "pairs.zarr", takes=4)
     rows = [TakeLabel("*", f"t{number}", "ab"[number % 2]) for number in range(4)]
-    return labelled(whole, [*rows, TakeLabel("s1", "t0", "c", 2.0, 3.0)])
+    label_pairs(path, [*rows, TakeLabel("s1", "t0", "c", 2.0, 3.0)])
+    return path
+
+
+def plan_of(store: Path, **more: object) -> StudyPlan:
+    return StudyPlan(title="t", out=str(store.parent / "out"), data=(str(store),), **more)
+
+
+@pytest.fixture(scope="module")
+def material(store: Path) -> Material:
+    return material_of(plan_of(store).model_dump_json())
 
 
 def test_everybody_is_judged_beside_everybody_else() -> None:
-    folds = folds_of(["p", "q", "r", "s"])
+    folds = folds_of(["p", "q", "r", "s"], filmed=True)
     assert len(folds) == 12
     for one in folds:
         assert {one.judged, one.video, *one.real} == {"p", "q", "r", "s"}
         assert one.judged != one.video
         assert len(one.real) == 2
+    once = folds_of(["p", "q", "r", "s"], filmed=True, turns="once")
+    assert [one.judged for one in once] == ["p", "q", "r", "s"]
+    assert set(once) <= set(folds)
+    alone = folds_of(["p", "q"], filmed=False)
+    assert [(one.judged, one.video, one.real) for one in alone] == [
+        ("p", "", ("q",)), ("q", "", ("p",)),
+    ]  # fmt: skip
     with pytest.raises(Sd2Error, match="2 people"):
-        folds_of(["p", "q"])
+        folds_of(["p", "q"], filmed=True)
 
 
-def test_labels_become_classes_or_are_left_out(pairs: PairSet) -> None:
-    names, takes = labelled_takes(pairs, {})
-    assert names == ("a", "b", "c")
-    assert len(takes) == 12
-    names, takes = labelled_takes(pairs, {"a": "x", "c": "x", "b": "y"})
-    assert names == ("x", "y")
-    assert (takes[0].classes == 0).all()
-    with pytest.raises(Sd2Error, match="nothing such"):
-        labelled_takes(pairs, {"nothing such": "x"})
-    with pytest.raises(Sd2Error, match="two or more"):
-        labelled_takes(pairs, {"a": "x"})
+@given(st.integers(2, 6), st.integers(0, 9))
+@settings(max_examples=20, deadline=None)
+def test_movements_are_dealt_into_parts_of_every_class(
+    material: Material, parts: int, seed: int
+) -> None:
+    group = groups_of(material.known, material.real, parts, seed)
+    assert set(group) == {one.clip.key for one in material.real}
+    assert len(set(group.values())) == parts
+    sizes = [list(group.values()).count(one) for one in set(group.values())]
+    assert max(sizes) - min(sizes) <= 1
+
+
+def test_labels_become_classes_or_are_left_out(store: Path, material: Material) -> None:
+    assert material.known.classes == ("a", "b", "c")
+    assert len(material.real) == len(material.filmed) == 12
+    classes = {"a": "x", "c": "x", "b": "y"}
+    fewer = material_of(plan_of(store, classes=classes).model_dump_json())
+    assert fewer.known.classes == ("x", "y")
+    assert (fewer.real[0].clip.label == 0).all()
+    for classes, words in (({"nothing such": "x"}, "nothing such"), ({"a": "x"}, "two or more")):
+        with pytest.raises(Sd2Error, match=words):
+            material_of(plan_of(store, classes=classes).model_dump_json())
+
+
+def test_more_video_is_of_its_people_or_of_others(store: Path, tmp_path: Path) -> None:
+    more = write_pairs(tmp_path / "more.zarr", ("s1", "stranger"), takes=1)
+    label_pairs(more, [TakeLabel("*", "*", "b")])
+    found = material_of(plan_of(store, video=(str(more),)).model_dump_json())
+    assert [one.title for one in found.others] == ["stranger/t0"]
+    assert len(found.filmed) == 13
+    assert all(one.clip.label.max() == 1 for one in found.others)
+    assert len(found.real) == 12  # What is filmed only is never judged.
+
+
+def test_radar_files_are_one_persons_movements(shared_data: Path, tmp_path: Path) -> None:
+    folder = shared_data / "radar" / "kkt_gestures"
+    plan = StudyPlan(title="t", out=str(tmp_path), data=(str(folder),), folds="files")
+    found = material_of(plan.model_dump_json())
+    assert found.known.classes[0] == "background"
+    assert len(found.real) == 8
+    assert (found.kind, found.pairs, found.filmed) == ("real", None, ())
+    half = share_of(found.known, found.real, 0.5, 0)
+    # Whole movements, of every class one of two.
+    assert sorted(int(one.clip.label.max()) for one in half) == [0, 1, 2, 3]
+    assert all(len(one.clip) == 70 for one in half)
 
 
 @given(st.floats(0.01, 1.0), st.floats(0.01, 1.0), st.integers(0, 5))
 @settings(max_examples=25, deadline=None)
 def test_a_share_is_of_every_class_and_within_a_larger_one(
-    pairs: PairSet, one: float, other: float, seed: int
+    material: Material, one: float, other: float, seed: int
 ) -> None:
-    _, takes = labelled_takes(pairs, {})
+    takes = material.real
     low, high = sorted((one, other))
     held = []
     for share in (low, high):
-        found = share_of(takes, share, seed)
+        found = share_of(material.known, takes, share, seed)
         frames = {
             (each.title, float(time_s)): int(number)
             for each in found
-            for time_s, number in zip(each.take.times_s, each.classes, strict=True)
+            for time_s, number in zip(each.take.times_s, each.clip.label, strict=True)
         }
-        assert sum(len(each.classes) for each in found) == len(frames)  # none twice
+        assert sum(len(each.clip) for each in found) == len(frames)  # none twice
         for number in range(3):
-            total = sum(int((each.classes == number).sum()) for each in takes)
+            total = sum(int((each.clip.label == number).sum()) for each in takes)
             assert sum(value == number for value in frames.values()) == max(1, round(share * total))
         held.append(frames)
     assert held[0].items() <= held[1].items()
@@ -85,13 +137,19 @@ def test_features_do_not_depend_on_the_gain_and_tell_movements_apart() -> None:
         away = AXIS.centres_mps[None] - centre[:, None]
         maps.append(np.exp(-((away / 0.4) ** 2)).astype(np.float32))
         labels.append(np.full(120, towards))
-    shown = [window_features(one, AXIS, 30.0, 1.0) for one in maps]
+    clips = [
+        Clip("s", str(number), "real", one, label.astype(np.int8))
+        for number, (one, label) in enumerate(zip(maps, labels, strict=True))
+    ]
+
+    def shown(clip: Clip) -> np.ndarray:
+        return window_features(clip.energies, AXIS, 30.0, 1.0)
+
     louder = window_features(7.0 * maps[0], AXIS, 30.0, 1.0)
-    np.testing.assert_allclose(louder, shown[0], atol=1e-5)
-    weights = [np.ones(120) for _ in range(4)]
-    ridge = Ridge.fitted(shown[:4], labels[:4], weights, 2)
-    for features, label in zip(shown[4:], labels[4:], strict=True):
-        assert (ridge.scores(features).argmax(axis=1) == label).mean() > 0.9
+    np.testing.assert_allclose(louder, shown(clips[0]), atol=1e-5)
+    ridge = Ridge.fitted(clips[:4], [1.0] * 4, 2, shown)
+    for clip in clips[4:]:
+        assert (ridge.scores(shown(clip)).argmax(axis=1) == clip.label).mean() > 0.9
     empty = window_features(np.zeros((20, AXIS.bins), np.float32), AXIS, 30.0, 1.0)
     assert np.isfinite(empty).all()
 
@@ -147,16 +205,18 @@ def test_holm_is_monotonic_and_no_smaller(values: list[float]) -> None:
     assert (np.diff(np.array(found)[order]) >= 0).all()
 
 
-PLAN = 'title = "t"\nout = "made"\npairs = ["a.zarr"]\n'
+PLAN = 'title = "t"\nout = "made"\ndata = ["a.zarr", "eve=b.sd2"]\n'
 
 
 def test_paths_of_a_plan_are_beside_it(tmp_path: Path) -> None:
     (tmp_path / "s.toml").write_text(PLAN + 'labels = "l.csv"\n')
     plan = read_study(tmp_path / "s.toml")
     assert Path(plan.out) == tmp_path / "made"
-    assert plan.pairs == (str(tmp_path / "a.zarr"),)
+    assert plan.data == (str(tmp_path / "a.zarr"), f"eve={tmp_path / 'b.sd2'}")
     assert plan.labels == str(tmp_path / "l.csv")
-    assert len(plan.added) == 5
+    assert len(plan.wanted) == 5
+    (tmp_path / "again.toml").write_text(study_text(plan, tmp_path))
+    assert read_study(tmp_path / "again.toml") == plan
 
 
 @pytest.mark.parametrize(
@@ -165,8 +225,8 @@ def test_paths_of_a_plan_are_beside_it(tmp_path: Path) -> None:
         (PLAN + "shares = [0.0]\n", "line 4: shares"),
         (PLAN + 'added = ["luck"]\n', "line 4: added"),
         (PLAN + "people = 3\n", "people is not known"),
-        ('title = "t"\nout = "made"\n', "either pairs or recordings"),
-        (PLAN.replace("pairs", "recordings") + 'subjects = ["a", "b"]\n', "a subject for each"),
+        ('title = "t"\nout = "made"\n', "data"),
+        (PLAN + "[[classifiers]]\nmodel = 'oracle'\n", "classifiers"),
         (PLAN + "[denoiser]\nminutes = 0\n", "line 5: denoiser.minutes"),
     ],
 )

@@ -12,9 +12,10 @@ from sd2core.cli import build_parser, run
 from sd2core.errors import Sd2Error
 from sd2core.pairs.labelling import TakeLabel, label_pairs
 from sd2core.study import run as study_run
-from sd2core.study.plan import StudyPlan, read_study
+from sd2core.study.plan import Learner, read_study
 from sd2core.study.report import findings_of, untried, write_report
-from sd2core.study.run import REAL, run_study
+from sd2core.study.run import run_study
+from sd2core.study.trial import REAL
 
 
 @pytest.fixture
@@ -23,8 +24,8 @@ def plan(tmp_path: Path) -> Path:
     label_pairs(pairs, [TakeLabel("*", f"t{number}", "ab"[number % 2]) for number in range(4)])
     path = tmp_path / "study.toml"
     path.write_text(
-        'title = "Small"\nout = "made"\npairs = ["pairs.zarr"]\nshares = [0.2, 1.0]\nseeds = 1\n'
-        'added = ["synthetic", "radar"]\nwindow_s = 1.0\n'
+        'title = "Small"\nout = "made"\ndata = ["pairs.zarr"]\nshares = [0.2, 1.0]\nseeds = 1\n'
+        'added = ["synthetic", "radar"]\n[[classifiers]]\nwindow_s = 1.0\n'
     )
     return path
 
@@ -38,8 +39,6 @@ def in_this_process(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     made: list[int] = []
 
     class Client:
-        loop = None
-
         def submit(self, work, *arguments, pure):
             made.append(1)
             future: Future = Future()
@@ -48,10 +47,9 @@ def in_this_process(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
     @contextmanager
     def client(*_: object):
-        yield Client()
+        yield Client(), list
 
-    monkeypatch.setattr(study_run, "_client", client)
-    monkeypatch.setattr("distributed.as_completed", lambda futures, loop: list(futures))
+    monkeypatch.setattr(study_run, "study_client", client)
     return made
 
 
@@ -63,15 +61,15 @@ def test_a_study_is_whole_and_goes_on(plan: Path, in_this_process: list[int]) ->
     assert steps[-1] == (12, 12)
     assert results.kind == "real"
     for one in results.runs:
-        assert set(one.scores) == {REAL, "synthetic", "radar"}
-        for scores in one.scores.values():
-            assert set(scores) == {f"{one.fold.judged}/t{number}" for number in range(4)}
-            assert all(0 <= value <= 1 for pair in scores.values() for value in pair)
+        assert set(one.takes) == set(one.scores) == {REAL, "synthetic", "radar"}
+        for takes in one.takes.values():
+            assert set(takes) == {f"{one.task.fold.judged}/t{number}" for number in range(4)}
+            assert all(0 <= value <= 1 for pair in takes.values() for value in pair)
     (Path(chosen.out) / "runs").glob("*.json").__next__().unlink()
     again = run_study(chosen)
     assert len(in_this_process) == 13  # only what was missing
-    assert again.runs == results.runs
-    other = chosen.model_copy(update={"window_s": 2.0})
+    assert [one.to_json() for one in again.runs] == [one.to_json() for one in results.runs]
+    other = chosen.model_copy(update={"speeds": (0.8,)})
     run_study(other)
     assert len(in_this_process) == 13 + 12
 
@@ -111,19 +109,51 @@ def test_the_page_says_what_was_found_and_what_was_not_tried(
 def test_a_denoiser_that_cannot_learn_is_said(
     plan: Path, in_this_process: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def failed(folder, text, digest, *draw):
-        place = study_run._model_folder(folder, StudyPlan.model_validate_json(text), digest, *draw)
+    def failed(place, *_):
         place.mkdir(parents=True)
         (place / "done").write_text(json.dumps({"reason": "too few frames"}))
 
-    monkeypatch.setattr(study_run, "_train", failed)
+    monkeypatch.setattr(study_run, "learn_denoiser", failed)
     chosen = read_study(plan).model_copy(update={"added": ("denoised", "synthetic+texture")})
     results = run_study(chosen)
-    assert all(set(one.scores) == {REAL} for one in results.runs)
+    assert all(set(one.takes) == {REAL} for one in results.runs)
     assert all("too few frames" in reason for one in results.runs
                for reason in one.missing.values())  # fmt: skip
     assert any("too few frames" in one for one in untried(results))
     assert "Nothing was added" in write_report(results, Path(chosen.out))
+
+
+def test_movements_of_one_person_are_kept_apart_and_classifiers_compared(
+    plan: Path, in_this_process: list[int]
+) -> None:
+    kernel = Learner(model="kernel", delay_s=0.3)
+    chosen = read_study(plan).model_copy(
+        update={"folds": "files", "parts": 3, "turns": "once", "shares": (1.0,), "added": (),
+                "classifiers": (Learner(), kernel)}
+    )  # fmt: skip
+    results = run_study(chosen)
+    assert len(results.runs) == 3
+    judged = [take for one in results.runs for take in one.takes[REAL]]
+    assert sorted(judged) == sorted(results.subject_of)  # Each once.
+    assert all({*one.takes} == {REAL, kernel.title} for one in results.runs)
+    said = write_report(results, Path(chosen.out))
+    assert "Of 2 classifiers" in said
+    assert kernel.title in (Path(chosen.out) / "study.md").read_text(encoding="utf-8")
+
+
+def test_bodies_that_no_radar_saw_are_added_in_every_fold(
+    plan: Path, in_this_process: list[int], tmp_path: Path
+) -> None:
+    more = write_pairs(tmp_path / "more.zarr", ("stranger",), takes=2, limbs=True)
+    label_pairs(more, [TakeLabel("*", f"t{number}", "ab"[number]) for number in range(2)])
+    update = {"video": (str(more),), "added": ("simulated", "synthetic"), "shares": (1.0,)}
+    results = run_study(read_study(plan).model_copy(update=update))
+    assert results.others == 2
+    assert all({*one.takes} == {REAL, "simulated", "synthetic"} for one in results.runs)
+    assert not any(one.missing for one in results.runs)
+    alone = read_study(plan).model_copy(update={**update, "added": ("simulated",)})
+    # Without a person who is filmed, each of three is judged once.
+    assert {len(one.task.fold.real) for one in run_study(alone).runs} == {2}
 
 
 @pytest.mark.slow
@@ -138,7 +168,7 @@ def test_denoisers_learn_within_their_fold(plan: Path, capsys: pytest.CaptureFix
     chosen = read_study(plan)
     assert "study.md" in capsys.readouterr().out
     content = json.loads((Path(chosen.out) / "study.json").read_text(encoding="utf-8"))
-    assert all("denoised" in one["scores"] for one in content["runs"])
+    assert all("denoised" in one["takes"] for one in content["runs"])
     folders = list((Path(chosen.out) / "denoisers").iterdir())
     assert len(folders) == 3  # one for each person whose radar is there
     for folder in folders:

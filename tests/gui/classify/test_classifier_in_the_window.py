@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 import sys
 from dataclasses import replace
@@ -11,7 +10,6 @@ import fake_class_command
 import numpy as np
 import pytest
 from answering import answer, once_asked
-from class_tables import a_table
 from dropping import drop, hover
 from fake_classifiers import CLASSES, expected
 from label_hands import CONTROL, LEFT, SHIFT, key
@@ -21,7 +19,6 @@ from small_pairs import write_pairs
 from window_models import models_of
 
 from sd2app.classify.panel import ClassPanel
-from sd2app.classify.result_dialog import ClassResultDialog, ConfusionView
 from sd2app.classify.strip import ClassPlot, ClassReadout, ClassStrip, stacked_image
 from sd2app.labels.timeline import LabelTimeline
 from sd2app.suggestions.bar import SuggestionBar
@@ -356,27 +353,3 @@ def test_stopped_by_a_click(trainable, qtbot):
     qtbot.waitUntil(lambda: not training.run.under_way, timeout=20_000)
     assert training.run.phase == "stopped"
     assert training.run.result is not None
-
-
-def test_a_result_is_opened_and_looked_at(window, tmp_path, qtbot, monkeypatch):
-    from sd2core.classify.comparison_report import as_json
-    from sd2core.cli.output import finite
-
-    path = tmp_path / "table.json"
-    path.write_text(json.dumps(finite(as_json(a_table()))))
-    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (str(path), ""))
-    window.features.classify.dialogs.open_result()
-    dialog = window.findChild(ClassResultDialog)
-    left, right = dialog.findChildren(ConfusionView)
-    assert left.matrix.title == "radar only"
-    assert right.matrix.title == "+ denoised synthetic"
-    assert "horizontal taken for horizontal: 81.0 ± 1.0 %" in left.accessibleDescription()
-    choice = dialog.findChild(Choice)
-    choice.setFocus()
-    qtbot.keyClick(choice, Qt.Key.Key_Up)
-    assert right.matrix.title == "+ synthetic"
-    dialog.grab()
-    dialog.close()
-    path.write_text("{}")
-    window.features.classify.dialogs.open_result()
-    assert "is no such result" in window.messages.text

@@ -1,4 +1,4 @@
-"""Results of comparisons, as the library writes them; no window."""
+"""Results of studies and evaluations, as the library writes them; no window."""
 
 from __future__ import annotations
 
@@ -6,41 +6,35 @@ import json
 
 import numpy as np
 import pytest
-from class_tables import CLASSES, a_score, a_table
+from study_results import CLASSES, S4, a_score, some_results
 
-from sd2app.classify.result import Spread, read_result
-from sd2core.classify.comparison_report import as_json, mean_confusion
-from sd2core.classify.experiment import Condition
+from sd2app.study.result import Spread, read_result
 from sd2core.classify.metrics import shares
 from sd2core.cli.output import finite
 from sd2core.errors import Sd2Error
+from sd2core.study.report import totals_of, write_report
 
 
 @pytest.fixture
 def written(tmp_path):
-    table = a_table()
-    (tmp_path / "table.json").write_text(json.dumps(finite(as_json(table))))
-    return table, tmp_path
+    results = some_results(tmp_path)
+    return results, write_report(results, tmp_path), tmp_path
 
 
 def test_matrices_are_means_over_seeds_with_their_spread(written):
-    table, folder = written
+    results, _, folder = written
     result = read_result(folder)
-    assert result.path == folder / "table.json"
-    assert result.heading == ("Frames of a simulated radar, mean ± standard deviation of 3 seeds")
+    assert result.path == folder / "study.json"
+    assert result.heading == "Frames of a simulated radar, mean ± standard deviation of 3 seeds"
     assert [matrix.title for matrix in result.matrices] == [
-        "radar only", "+ synthetic", "+ denoised synthetic",
+        "real alone", "+ synthetic", "+ denoised", S4.title,
     ]  # fmt: skip
-    for condition, matrix in zip(
-        (Condition(), Condition(added="synthetic"), Condition(added="denoised")),
-        result.matrices,
-        strict=True,
-    ):
-        np.testing.assert_allclose(matrix.mean, mean_confusion(table, condition))
-        each = [shares(run.score.frames) for run in table.of(condition)]
+    for seeds, matrix in zip(totals_of(results).values(), result.matrices, strict=True):
+        each = [shares(one.frames) for one in seeds]
+        np.testing.assert_allclose(matrix.mean, np.mean(each, axis=0))
         np.testing.assert_allclose(matrix.sd, np.std(each, axis=0, ddof=1))
         np.testing.assert_allclose(matrix.mean.sum(axis=1), 1.0)
-    plain, _, denoised = result.matrices
+    plain, _, denoised, _ = result.matrices
     # Of 80, 81 and 82 per cent the mean is 81 and the standard deviation 1.
     assert plain.recall.text() == "81.0 ± 1.0"
     assert plain.gain is None
@@ -50,18 +44,18 @@ def test_matrices_are_means_over_seeds_with_their_spread(written):
     assert plain.cell(0, 0).text() == "81.0 ± 1.0"
 
 
-def test_curves_have_the_whole_at_their_end(written):
-    result = read_result(written[1])
+def test_curves_and_the_conclusion_are_the_reports(written):
+    _, said, folder = written
+    result = read_result(folder)
     assert [
         [(one.share, round(one.recall.mean, 6)) for one in curve] for curve in result.curves
     ] == [
         [(0.1, 0.61), (1.0, 0.81)],
+        [(0.1, 0.61), (1.0, 0.83)],
         [(0.1, 0.71), (1.0, 0.86)],
     ]
-    assert result.summary == (
-        "+ denoised synthetic: +10.0 points with 10 %, +5.0 points with 100 % of the simulated"
-        " radar's data."
-    )
+    assert result.summary == said
+    assert "+10.0 points" in said
 
 
 def test_what_eval_writes_is_shown_as_well(tmp_path):
@@ -97,7 +91,7 @@ def test_a_class_without_frames_has_no_share(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "text", ["", "[]", "{}", '{"conditions": []}', '{"classes": ["a"], "frames": [[1, 2]]}', "1"]
+    "text", ["", "[]", "{}", '{"totals": []}', '{"classes": ["a"], "frames": [[1, 2]]}', "1"]
 )
 def test_what_is_no_result_is_refused_in_words(tmp_path, text):
     path = tmp_path / "other.json"
@@ -109,5 +103,5 @@ def test_what_is_no_result_is_refused_in_words(tmp_path, text):
 def test_what_is_not_there_is_refused_in_words(tmp_path):
     with pytest.raises(Sd2Error, match=r"gone.json does not exist"):
         read_result(tmp_path / "gone.json")
-    with pytest.raises(Sd2Error, match=r"holds no table.json"):
+    with pytest.raises(Sd2Error, match=r"holds no study.json"):
         read_result(tmp_path)

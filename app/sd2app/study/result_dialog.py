@@ -1,4 +1,4 @@
-"""Results of a comparison of classifiers: two confusion matrices and learning curves."""
+"""Results of a study: two confusion matrices and learning curves."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPen
 from PySide6.QtWidgets import QDialog, QLabel, QSizePolicy, QWidget
 
-from sd2app.classify.result import ClassResult, Matrix
 from sd2app.manual.help import help_button
 from sd2app.session.display import DisplayModel
+from sd2app.study.result import ClassResult, Matrix
 from sd2app.widgets.canvas import AT_RIGHT, Canvas
 from sd2app.widgets.chart import Chart, ChartView, Curve, Mark, Scale
 from sd2app.widgets.dialogs import closing
@@ -127,7 +127,7 @@ class ClassResultDialog(QDialog):
             self._right = _MatrixColumn(display, self._what_else(others))
             self._choose(_usual(others))
             columns.append(self._right)
-        layout = column_of(row_of((title(result.heading), 1), help_button("Classifier", self)))
+        layout = column_of(row_of((title(result.heading), 1), help_button("Study", self)))
         self.setLayout(layout)  # first, so that the keyboard goes from top to bottom
         if result.summary:
             layout.addWidget(sentence(result.summary))
@@ -176,7 +176,7 @@ class _MatrixColumn(QWidget):
 def _usual(matrices: Sequence[Matrix]) -> int:
     """Default choice: denoised synthetic maps of the radar's own place, if present."""
     titles = [matrix.title for matrix in matrices]
-    return titles.index("+ denoised synthetic") if "+ denoised synthetic" in titles else 0
+    return titles.index("+ denoised") if "+ denoised" in titles else 0
 
 
 class _LearningCurves(ChartView):

@@ -1,9 +1,9 @@
-"""Confusion matrices and learning curves, read from what ``sd2 classify`` wrote."""
+"""Confusion matrices and learning curves, read from what commands wrote."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,19 +11,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.classify.metrics import shares
+from sd2core.classify.metrics import mean_recall, shares
 from sd2core.errors import Sd2Error
 from sd2core.files.texts import read_json
 
 _EXPECTED = (
-    "table.json of `sd2 classify table`, or a file of what `sd2 classify eval --json` prints"
+    "study.json of `sd2 study` or `sd2 classify table`, or a file of what"
+    " `sd2 classify eval --json` prints"
 )
-_TABLE = "table.json"
+_STUDY = "study.json"
 
 
 @dataclass(frozen=True)
 class Spread:
-    """Mean and standard deviation over seeds; NaN where there is none."""
+    """Mean and standard deviation over seeds, or half an interval; NaN where there is none."""
 
     mean: float
     sd: float
@@ -64,7 +65,7 @@ class CurvePoint:
 
 @dataclass(frozen=True)
 class ClassResult:
-    """Results of a comparison, or of the evaluation of a classifier."""
+    """Results of a study, or of the evaluation of a classifier."""
 
     path: Path
     kind: str  # kind of the judged maps, such as simulated
@@ -85,86 +86,77 @@ class ClassResult:
 
     @property
     def summary(self) -> str:
-        """Conclusion in words: whether the added data helps."""
-        parts = []
-        plain = {point.share: point.recall.mean for point in next(iter(self.curves), ())}
-        for curve in self.curves[1:]:
-            known = [point for point in curve if point.share in plain]
-            gains = []
-            for point in dict.fromkeys((*known[:1], *known[-1:])):
-                gain = 100 * (point.recall.mean - plain[point.share])
-                text = f"{gain:+.1f}".replace("-", "−")
-                gains.append(f"{text} points with {100 * point.share:g} %")
-            if gains:
-                of = f"of the {self.kind} radar's data"
-                parts.append(f"{curve[0].title}: {', '.join(gains)} {of}.")
+        """Conclusion in words, and what it does not say."""
+        parts = [*self.notes]
         if self.by_movement:
             parts.append("All data is of one person: how it is with others stays unknown.")
-        parts += self.notes
         return "\n".join(parts)
 
 
 def read_result(path: Path) -> ClassResult:
-    """Read a file, or a folder with a table; Sd2Error if there is none or it is something else."""
+    """Read a file, or the folder of a study; Sd2Error if there is none or it is something else."""
     path = Path(path)
     if path.is_dir():
-        inside = next(
-            (one for one in (path / _TABLE, path / "table" / _TABLE) if one.is_file()), None
-        )
-        if inside is None:
-            raise Sd2Error(f"{path} holds no {_TABLE}", _EXPECTED)
-        path = inside
+        path = path / _STUDY
+        if not path.is_file():
+            raise Sd2Error(f"{path.parent} holds no {_STUDY}", _EXPECTED)
     try:
         content = read_json(path, _EXPECTED)
-        if "conditions" in content:
-            return _of_table(path, content)
+        if "totals" in content:
+            return _of_study(path, content)
         return _of_score(path, content)
     except (ValueError, KeyError, TypeError, IndexError, AttributeError) as error:
         raise Sd2Error(f"{path} is no such result ({error!r})", _EXPECTED) from error
 
 
-def _of_table(path: Path, content: Mapping[str, Any]) -> ClassResult:
+def _of_study(path: Path, content: Mapping[str, Any]) -> ClassResult:
     classes = tuple(map(str, content["classes"]))
-    conditions = list(content["conditions"])
-    own = [one for one in conditions if one["network"] == content["network"]]
-    whole = [one for one in own if one["share"] == 1.0]
-    matrices = tuple(_matrix(one, len(classes)) for one in whole)
-    if not matrices:
-        raise KeyError("no condition with all real data")
-    titles = list(dict.fromkeys(_title(one) for one in own if one["share"] < 1.0))
-    curves = tuple(
-        tuple(
-            CurvePoint(title, float(one["share"]), _spread(one["mean_recall_frames"]))
-            for one in sorted(own, key=lambda one: one["share"])
-            if _title(one) == title
-        )
-        for title in titles
-    )
+    totals = [
+        (str(one["title"]), [np.array(seed["frames"], np.int64) for seed in one["seeds"]])
+        for one in content["totals"]
+    ]
+    plain = [mean_recall(counts) for counts in totals[0][1]]
+    matrices = tuple(_matrix(title, seeds, classes, plain) for title, seeds in totals)
+    curves: dict[str, list[CurvePoint]] = {}
+    for one in content["curve"]:
+        low, high = one["over_takes"]
+        recall = Spread(float(one["mean"]), 0.5 * (high - low))
+        point = CurvePoint(str(one["title"]), float(one["share"]), recall)
+        curves.setdefault(point.title, []).append(point)
     return ClassResult(
         path,
         str(content["radar"]),
         classes,
-        int(content["seeds"]),
+        len(totals[0][1]),
         matrices,
-        curves,
-        bool(content["by_movement"]),
+        tuple(tuple(one) for one in curves.values()),
+        len(content["takes"]) < 2,
+        (str(content["conclusion"]),),
     )
 
 
-def _matrix(condition: Mapping[str, Any], classes: int) -> Matrix:
-    each = np.array(
-        [shares(np.array(run["score"]["frames"], np.int64)) for run in condition["runs"]]
-    )
-    if each.shape[1:] != (classes, classes):
+def _matrix(
+    title: str,
+    seeds: Sequence[NDArray[np.int64]],
+    classes: tuple[str, ...],
+    plain: Sequence[float],
+) -> Matrix:
+    each = np.array([shares(counts) for counts in seeds])
+    if each.shape[1:] != (len(classes), len(classes)):
         raise ValueError(f"a matrix of shape {each.shape[1:]}")
-    sd = each.std(axis=0, ddof=1) if len(each) > 1 else np.zeros((classes, classes))
-    return Matrix(
-        _title(condition),
-        each.mean(axis=0),
-        sd,
-        _spread(condition["mean_recall_frames"]),
-        None if condition["added"] == "nothing" else _spread(condition["gain"]),
-    )
+    recalls = [mean_recall(counts) for counts in seeds]
+    gains = [own - other for own, other in zip(recalls, plain, strict=True)]
+    gain = _spread(gains) if any(gains) else None
+    return Matrix(title, each.mean(axis=0), _sd(each), _spread(recalls), gain)
+
+
+def _sd(each: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(each.std(axis=0, ddof=1) if len(each) > 1 else np.zeros(each.shape[1:]))
+
+
+def _spread(values: Sequence[float]) -> Spread:
+    each = np.array(values)
+    return Spread(float(each.mean()), float(_sd(each)))
 
 
 def _of_score(path: Path, content: Mapping[str, Any]) -> ClassResult:
@@ -198,12 +190,3 @@ def _notes(content: Mapping[str, Any]) -> tuple[str, ...]:
             f" {int(content['missed'])} of {gestures} never."
         )
     return tuple(found)
-
-
-def _title(condition: Mapping[str, Any]) -> str:
-    return str(condition["title"])
-
-
-def _spread(value: Mapping[str, Any]) -> Spread:
-    mean, sd = value["mean"], value["sd"]
-    return Spread(math.nan if mean is None else float(mean), 0.0 if sd is None else float(sd))

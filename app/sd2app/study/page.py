@@ -1,0 +1,140 @@
+"""Page of studies: one to be set up, one under way, or what one found."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from functools import partial
+from pathlib import Path
+
+from PySide6.QtWidgets import QApplication, QWidget
+
+from sd2app.background.run_monitor import UNDER_WAY
+from sd2app.classify.text import PHASES, run_time_text
+from sd2app.feature import Shell
+from sd2app.study.runs import SWITCHES, TABLE_NAME, StudyRun, StudyRuns
+from sd2app.training.model import quoted
+from sd2app.widgets.inputs import CheckBox
+from sd2app.widgets.layouts import STRETCH, column_of
+from sd2app.widgets.panel import outlined, rule, sentence, show_words, side_by_side, title
+from sd2app.widgets.run_panel import Button, RunPanel, RunView
+from sd2app.widgets.text import counted
+
+_ABOUT = (
+    "Trains again and again on a radar's maps alone and with other maps added, and with less and"
+    " less of the radar's; judged on people, or movements, that were not learnt from. Gains come"
+    " with intervals."
+)
+_TEXTS = {
+    "quick": ("Quick", "Two draws instead of five, and 10 and 100 % of the radar's data"),
+    "radar_only": ("The radar alone", "Add nothing: compare networks, and amounts of data"),
+    "same_people": (
+        "The same people",
+        "Judge other movements of the people who are learnt from, instead of other people",
+    ),
+}
+
+
+class StudySetupView(QWidget):
+    """What is studied, and how to begin."""
+
+    def __init__(
+        self, runs: StudyRuns, shell: Shell, open_plan: Callable[[], object],
+        open_result: Callable[[], object],
+    ) -> None:  # fmt: skip
+        super().__init__()
+        self._runs = runs
+        self._data, self._problem = sentence(""), sentence("", "warning")
+        self._switches = {
+            name: CheckBox(text, self, partial(runs.turn, name), tip)
+            for name, (text, tip) in _TEXTS.items()
+        }
+        self._start = outlined(
+            "Start", "", partial(shell.attempt, runs.begin), self, look="primary"
+        )
+        copy = partial(shell.attempt, self._copy_command)
+        self._copy = outlined("Copy command", "The same for a terminal", copy, self)
+        tip = "Run a STUDY.toml, or go on with it: folds, shares, denoisers, speeds, more video"
+        plan = outlined("Run a plan…", tip, open_plan, self)
+        tip = "Show a study.json, or a matrix of sd2 classify eval"
+        show = outlined("Open a result…", tip, open_result, self)
+        self.setLayout(
+            column_of(
+                title("Do synthetic data help?"), sentence(_ABOUT), self._data, self._problem,
+                *self._switches.values(), side_by_side(self._start, self._copy, spacing_px=6),
+                rule(), side_by_side(plan, show, spacing_px=6), STRETCH, spacing_px=8, margins_px=0,
+            )
+        )  # fmt: skip
+        runs.changed.connect(self._refresh)
+        self._refresh()
+
+    def _copy_command(self) -> None:
+        QApplication.clipboard().setText(quoted(self._runs.arguments(Path(TABLE_NAME))))
+
+    def _refresh(self) -> None:
+        runs = self._runs
+        count = len(runs.data.data)
+        self._data.setText(
+            f"Of the Classifier page's {counted(count, 'source')} of labelled data, with its"
+            " network." if count else "Of the labelled data of the Classifier page."
+        )  # fmt: skip
+        show_words(self._problem, runs.why_not)
+        for name in SWITCHES:
+            self._switches[name].show_checked(runs.is_on(name))
+        self._start.setEnabled(not runs.why_not)
+        self._start.setToolTip(runs.why_not or "Train and compare in the background")
+        self._copy.setEnabled(not runs.data.problem)
+
+
+class StudyRunView(RunView[StudyRun]):
+    """Progress of a study, and what it found."""
+
+    def __init__(self, runs: StudyRuns, shell: Shell, show_result: Callable[[], object]) -> None:
+        tip = "Gains, learning curve and confusion matrices"
+        buttons = (
+            Button("show", "Show result", tip, show_result, primary=True),
+            Button("again", "Resume", "Train what is missing", partial(shell.attempt, runs.again)),
+        )
+        super().__init__(runs, shell, buttons)
+        self._found, self._about = sentence("", "plain"), sentence("")
+        for part in (self._found, self._about):
+            self.column.addWidget(part)
+        self.refresh()
+
+    def texts(self, run: StudyRun) -> tuple[str, str, str]:
+        """Headline, time, and advice for a study that was stopped."""
+        headline = PHASES.get(run.phase, "")
+        if run.phase == "running":
+            history = run.history
+            now = min(history.steps_done + 1, history.total)
+            headline = f"Studying: training {now} of {history.total}"
+        stopped = run.phase == "stopped"
+        note = "What it has trained is kept: Resume trains what is missing." if stopped else ""
+        return headline, run_time_text(run, run.history), note
+
+    def shown(self, run: StudyRun) -> Collection[str]:
+        """Names of the buttons that are of use now."""
+        if run.phase in UNDER_WAY:
+            return ("stop", "delete")
+        useful = {"show": run.result is not None, "again": run.phase != "finished", "delete": True}
+        return [name for name, is_useful in useful.items() if is_useful]
+
+    def show_made(self, run: StudyRun) -> None:
+        """Show the conclusion."""
+        show_words(self._found, run.conclusion)
+        self._about.setText(str(run.out))
+
+
+def study_panel(
+    runs: StudyRuns,
+    shell: Shell,
+    open_plan: Callable[[], object],
+    open_result: Callable[[], object],
+    show_result: Callable[[], object],
+) -> RunPanel:
+    """Make the page."""
+    return RunPanel(
+        runs,
+        StudySetupView(runs, shell, open_plan, open_result),
+        StudyRunView(runs, shell, show_result),
+        "Studies: under way, or ended",
+    )

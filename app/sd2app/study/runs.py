@@ -1,0 +1,163 @@
+"""Studies, in processes that outlive the window."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, ClassVar
+
+from PySide6.QtCore import QObject
+
+from sd2app.background.run_monitor import RunMonitor
+from sd2app.background.runs import KnownRun, Runs, Sentences, free_folder
+from sd2app.classify.run import PacedHistory
+from sd2app.classify.setup import ClassSetup
+from sd2app.settings import Settings, StoredChoices
+from sd2app.widgets.text import clock_text
+from sd2core.classify.files import user_classifiers_folder
+from sd2core.errors import Sd2Error
+from sd2core.files.texts import read_json
+from sd2core.processes import ProcessId
+from sd2core.runs.command_folder import COMMAND_IN_FOLDER, CommandFolder, commands_in
+
+RESULT_NAME = "study.json"
+TABLE_NAME = "study"
+SWITCHES = ("quick", "radar_only", "same_people")
+"""Options of ``sd2 classify table`` that are on or off."""
+
+_SENTENCES = Sentences(
+    busy="{} is under way. Wait for it, or stop it.",
+    found="{} is under way. The Train panel shows it.",
+    finished="{} is done. The Train panel shows what it found.",
+    failed="{} did not come to its end. The Train panel says more.",
+)
+_STATES = {0: "finished", 130: "stopped", None: "not ended"}
+
+
+class StudyHistory(PacedHistory):
+    """Trainings that are done, of all."""
+
+    def _done(self, event: dict[str, Any]) -> None:
+        self.total, self.begun = int(event["total"]), True
+        self._advance(int(event["done"]), float(event["elapsed_s"]))
+
+    readers: ClassVar = {"run": _done}
+
+
+class StudyRun(RunMonitor[CommandFolder]):
+    """A study under way, or one that has ended."""
+
+    history: StudyHistory
+    facts = False  # there is a result
+
+    def __init__(
+        self, path: Path, parent: QObject | None = None, *, process: ProcessId | None = None
+    ) -> None:
+        folder = CommandFolder(path)
+        self.about = folder.facts
+        super().__init__(folder, parent, history=StudyHistory(), process=process)
+
+    @property
+    def out(self) -> Path:
+        """Folder of what it found."""
+        return Path(str(self.about.get("out", self.path / TABLE_NAME)))
+
+    @property
+    def result(self) -> Path | None:
+        """What it found; None where there is nothing yet."""
+        return self.out / RESULT_NAME if self.facts else None
+
+    @property
+    def conclusion(self) -> str:
+        """Sentence of its page; empty without one."""
+        try:
+            return "" if self.result is None else str(read_json(self.result)["conclusion"])
+        except (Sd2Error, KeyError, TypeError):
+            return ""
+
+    def inspect(self) -> bool:
+        """Check for a result."""
+        return (self.out / RESULT_NAME).is_file()
+
+
+class StudyRuns(Runs[StudyRun]):
+    """Studies, one under way at a time: of the labelled data of a set-up, or of a plan."""
+
+    def __init__(
+        self,
+        settings: Settings,
+        data: ClassSetup,
+        parent: QObject,
+        folder: Path | None = None,
+        command: Sequence[str] = COMMAND_IN_FOLDER,
+    ) -> None:
+        super().__init__(StudyRun, settings, "study/run", _SENTENCES, parent)
+        self.data, self._command = data, tuple(command)
+        self._folder = (folder or user_classifiers_folder()) / "studies"
+        defaults = {name: "yes" if name == "quick" else "no" for name in SWITCHES}
+        self._switches = StoredChoices(
+            settings, "study", defaults, dict.fromkeys(SWITCHES, ("yes", "no"))
+        )
+        data.changed.connect(self.changed)
+
+    @property
+    def why_not(self) -> str:
+        """Reason why the labelled data cannot be studied; empty when they can."""
+        return self.busy or self.data.problem
+
+    def is_on(self, switch: str) -> bool:
+        """True if one of :data:`SWITCHES` is on."""
+        return bool(self._switches[switch] == "yes")
+
+    def turn(self, switch: str, on: bool) -> None:
+        """Turn a switch on or off."""
+        self._switches.set(switch, "yes" if on else "no")
+        self.changed.emit()
+
+    def arguments(self, out: Path) -> list[str]:
+        """Arguments of ``sd2 classify table`` for what is set up."""
+        words = self.data.table_arguments()
+        words += [f"--{name.replace('_', '-')}" for name in SWITCHES if self.is_on(name)]
+        return [*words, "--out", str(out)]
+
+    def find(self) -> Sequence[KnownRun]:
+        """Read the folder of studies."""
+        return [KnownRun(one.path, _title(one), one.live) for one in commands_in(self._folder)]
+
+    def begin(self) -> None:
+        """Study the labelled data; Sd2Error if it cannot start, OSError without a folder."""
+        if self.why_not:
+            raise Sd2Error(self.why_not)
+        path = free_folder(self._folder, "study", [one.path for one in self.data.data])
+        out = path / TABLE_NAME
+        self._start(path, [*self.arguments(out), "--progress-json"], out)
+
+    def begin_plan(self, plan: Path) -> None:
+        """Run a plan, or go on with it; raises as :meth:`begin`, also if the plan is wrong."""
+        from sd2core.study.plan import read_study
+
+        if self.busy:
+            raise Sd2Error(self.busy)
+        out = Path(read_study(plan).out)
+        path = free_folder(self._folder, plan.stem, [plan])
+        self._start(path, ["study", str(plan.absolute()), "--progress-json"], out)
+
+    def again(self) -> None:
+        """Go on with the study in view, which was stopped: what it has trained is kept."""
+        run = self.run
+        if run is None or run.under_way:
+            return
+        if self.busy:
+            raise Sd2Error(self.busy)
+        self._start(run.path, [str(word) for word in run.about.get("arguments", ())], run.out)
+
+    def _start(self, path: Path, arguments: list[str], out: Path) -> None:
+        about = {"what": "study", "out": str(out)}
+        self.follow_new(path, CommandFolder(path).start(arguments, about, self._command))
+
+
+def _title(folder: CommandFolder) -> str:
+    about = folder.facts
+    state = "under way" if folder.live else _STATES.get(folder.code, "failed")
+    started = clock_text(about.get("started_unix_s", 0.0))
+    return f"{started} · {folder.path.name} · {state}"

@@ -1,0 +1,95 @@
+"""Denoisers of a study: learnt from a draw of real data alone, each in a process of its own."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.denoise.files import load_model
+from sd2core.errors import Sd2Error
+from sd2core.files.atomic import atomic_write_text
+from sd2core.files.paths import remove
+from sd2core.files.texts import read_json
+from sd2core.pairs.segments import OVERLAP
+from sd2core.pairs.store import PairSet, PairWriter, Take
+from sd2core.study.plan import Denoiser
+
+
+def learn_denoiser(
+    place: Path, chosen: Denoiser, pairs: PairSet, takes: Sequence[Take], seed: int
+) -> None:
+    """Have a denoiser learnt in a folder, if it is not there; a reason is kept if it fails."""
+    if (place / "done").exists() and (place / "run" / "best.safetensors").exists():
+        return
+    if place.exists():  # It failed, or was stopped.
+        remove(place)
+    place.mkdir(parents=True)
+    long = [one for one in takes if len(one.times_s) >= chosen.segment_frames]
+    first = long[0].limbs if long else None
+    writer = PairWriter(
+        place / "pairs.zarr",
+        kind=pairs.kind,
+        axis=pairs.axis,
+        null_bins=pairs.null_bins,
+        frame_rate_hz=pairs.frame_rate_hz,
+        labels=pairs.labels,
+        provenance=pairs.provenance,
+        parts=() if first is None else first.parts,
+    )
+    for number, take in enumerate(long):
+        # Pieces of one take are kept apart by their names.
+        writer.append(replace(take, name=f"{take.name}-{number}"))
+    words = [sys.executable, "-m", "sd2core.cli", "train", str(place / "pairs.zarr")]
+    words += ["--out", str(place / "run"), "--model", chosen.model, "--inputs", chosen.inputs]
+    words += ["--minutes", f"{chosen.minutes:g}", "--segment-frames", str(chosen.segment_frames)]
+    words += ["--overlap-frames", str(min(OVERLAP, chosen.segment_frames // 4))]
+    words += ["--velocity-weight", f"{chosen.velocity_weight:g}", "--batch-size", "16"]
+    words += ["--test-subjects", "none", "--threads", "1", "--seed", str(seed)]
+    for name, value in chosen.options.items():
+        words += ["--set", f"{name}={json.dumps(value)}"]
+    done = subprocess.run(
+        words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, check=False
+    )
+    reason = done.stderr.strip().splitlines()[-1] if done.returncode and done.stderr else ""
+    if done.returncode < 0 or done.returncode == 130:
+        raise KeyboardInterrupt
+    atomic_write_text(place / "done", json.dumps({"reason": reason}))
+
+
+def denoiser_in(place: Path) -> tuple[Any, str]:
+    """Return the denoiser that was learnt in a folder; or none, and the reason."""
+    model = place / "run" / "best.safetensors"
+    if model.exists():
+        return load_model(model), ""
+    return None, str(read_json(place / "done").get("reason", "")) or "it could not be trained"
+
+
+def added_map(
+    condition: str, take: Take, model: Any, reason: str, seed: tuple[int, int]
+) -> NDArray[np.float32]:
+    """Return the map of a take that is added, of a condition that is not the radar's.
+
+    Raises Sd2Error with the ``reason`` where it needs a denoiser and there is none.
+    """
+    if condition == "synthetic":
+        return take.synthetic
+    if model is None:
+        raise Sd2Error(f"The fold has no denoiser ({reason})", "one for denoised maps and textures")
+    card = model.card
+    denoised: NDArray[np.float32]
+    if condition.startswith("denoised"):
+        denoised = model.denoise_values(take.inputs(card.parts))
+    else:
+        denoised = np.float32(1.0 if card.known is None else card.known.gain) * take.synthetic
+    if not condition.endswith("+texture"):
+        return denoised
+    drawn: NDArray[np.float32] = card.needed_texture().drawn(np.ascontiguousarray(denoised), seed)
+    return drawn

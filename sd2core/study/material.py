@@ -1,0 +1,277 @@
+"""Material of a study: what a radar saw, of which movements there is video, and the classes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from sd2core.classify.data import (
+    UNKNOWN,
+    Clip,
+    ClipSet,
+    clips_of_map,
+    clips_of_pairs,
+    gesture_classes,
+    merged,
+    seen_first,
+)
+from sd2core.datasets.clips import clips_of_dataset
+from sd2core.datasets.labelled import ONE_PERSON, LabelledSource, unfolded
+from sd2core.datasets.reading import open_dataset
+from sd2core.datasets.recording_sources import radar_map
+from sd2core.doppler import PRESETS
+from sd2core.errors import Sd2Error
+from sd2core.io.kinds import kind_of
+from sd2core.io.radar import holds_map, load_recorded_map
+from sd2core.mocap.recording_pairs import make_recording_pairs
+from sd2core.pairs.labelling import TakeLabel, labelled, read_take_labels
+from sd2core.pairs.store import PairSet, Take, read_pairs
+from sd2core.recording.recording import Recording, open_recording
+from sd2core.study.plan import StudyPlan
+from sd2core.train.data import read_mixed
+
+_NEITHER = "\n"
+"""Class of labels that the plan leaves out."""
+
+
+@dataclass(frozen=True, eq=False)
+class Movement:
+    """What a radar saw of a movement, or a simulated one would, and its input where known."""
+
+    clip: Clip  # The radar's map, and the class of every frame.
+    take: Take | None = None  # With the synthetic map.
+
+    @property
+    def title(self) -> str:
+        """Name in results."""
+        return self.clip.title
+
+    def part(self, frames: slice) -> Movement:
+        """Return some of its frames."""
+        clip = replace(
+            self.clip, energies=self.clip.energies[frames], label=self.clip.label[frames]
+        )
+        return Movement(clip, None if self.take is None else self.take.part(frames))
+
+
+@dataclass(frozen=True, eq=False)
+class Material:
+    """Movements that share an axis, a frame rate and classes."""
+
+    known: ClipSet  # Without its clips; the classes of all.
+    real: tuple[Movement, ...]  # As each movement's own sensor saw it.
+    # Of which there is only video where their people are filmed.
+    filmed: tuple[Movement, ...]
+    # Likewise, of people whom no radar saw.
+    others: tuple[Movement, ...]
+    pairs: PairSet | None  # Without its takes; None where there is no input to learn from.
+
+    @property
+    def kind(self) -> str:
+        """Kind of the radar."""
+        kinds = {one.clip.kind for one in self.real}
+        return "simulated" if "simulated" in kinds else "real"
+
+    @property
+    def people(self) -> tuple[str, ...]:
+        """People whom the radar saw."""
+        return tuple(dict.fromkeys(one.clip.subject for one in self.real))
+
+
+@lru_cache(maxsize=1)
+def material_of(plan_text: str) -> Material:
+    """Read the material of a plan (JSON), whose paths are absolute."""
+    plan = StudyPlan.model_validate_json(plan_text)
+    stores, sets, inputs = _sources(plan)
+    movements: dict[tuple[str, str, int], Take] = dict(inputs)
+    names = {name for one in sets for name in one.classes}
+    pairs = None
+    if stores:
+        pairs = _labelled(read_mixed(stores), plan)
+        names |= {*pairs.labels}
+        sets.append(_clips(pairs, plan))
+        movements |= {(one.subject, one.name, one.placement): one for one in pairs.takes}
+    if strange := [label for label in plan.classes if label not in names]:
+        raise Sd2Error(
+            f"No frame is labelled {', '.join(strange)}", f"some of {', '.join(sorted(names))}"
+        )
+    seen = _without_unknown(merged(sets), plan)
+    found = [
+        Movement(clip, movements.get((clip.subject, clip.movement, clip.placement)))
+        for clip in seen.clips
+    ]
+    first = seen_first(seen.clips)
+    filmed = [one for one in found if one.take is not None and (plan.placements or first(one.clip))]
+    others: list[Movement] = []
+    people = set(seen.subjects)
+    for path in plan.video:
+        for one in _filmed(Path(path), plan, seen):
+            (filmed if one.clip.subject in people else others).append(one)
+    return Material(
+        replace(seen, clips=()),
+        tuple(one for one in found if first(one.clip)),
+        tuple(filmed),
+        tuple(others),
+        None if pairs is None else replace(pairs, takes=()),
+    )
+
+
+def _sources(
+    plan: StudyPlan,
+) -> tuple[list[Path], list[ClipSet], dict[tuple[str, str, int], Take]]:
+    """Stores of pairs, sets of what only a radar saw, and inputs that data sets hold."""
+    stores: list[Path] = []
+    sets: list[ClipSet] = []
+    inputs: dict[tuple[str, str, int], Take] = {}
+    with_mesh: list[tuple[Path, str]] = []
+    for one in unfolded([LabelledSource.parsed(text) for text in plan.data]):
+        rate_hz = sets[0].frame_rate_hz if sets else None
+        kind = kind_of(one.path)
+        if kind == "pairs":
+            stores.append(one.path)
+        elif kind == "dataset":
+            radar, synthetic = _of_dataset(one.path)
+            sets.append(radar)
+            inputs |= synthetic
+        elif holds_map(one.path):
+            file = load_recorded_map(one.path)
+            who = one.subject or ONE_PERSON
+            sets.append(
+                clips_of_map(
+                    file.doppler, file.labels, subject=who, movement=one.path.stem,
+                    frame_rate_hz=rate_hz,
+                )
+            )  # fmt: skip
+        elif kind == "recording":
+            recording = open_recording(one.path)
+            if recording.mesh is not None and not recording.holds_radar_map:
+                with_mesh.append((one.path, one.subject or recording.title))
+            else:
+                sets.append(_of_recording(recording, one.subject, rate_hz))
+        else:
+            raise Sd2Error(
+                f"{one.path} is a {kind}",
+                "pairs, data sets, labelled recordings with a radar, or labelled radar files",
+            )
+    if with_mesh:
+        made = Path(plan.out) / "pairs.zarr"
+        paths, names = zip(*with_mesh, strict=True)
+        make_recording_pairs(paths, made, PRESETS["paper"], subjects=names, limbs=True)
+        stores.append(made)
+    return stores, sets, inputs
+
+
+def _of_recording(recording: Recording, subject: str, rate_hz: float | None) -> ClipSet:
+    labels = recording.effective_labels()
+    if not any(span.origin != "suggestion" for span in labels.spans):
+        raise Sd2Error(
+            f"{recording.folder} has no labels",
+            "a recording in which gestures are labelled",
+            "Label it in the window, or leave it out",
+        )
+    return clips_of_map(
+        radar_map(recording, None), labels, subject=subject or recording.title,
+        movement=recording.folder.stem, frame_rate_hz=rate_hz,
+    )  # fmt: skip
+
+
+def _of_dataset(path: Path) -> tuple[ClipSet, dict[tuple[str, str, int], Take]]:
+    """What the radar saw, and the synthetic maps of the same movements."""
+    with open_dataset(path) as dataset:
+        kind = next((one for one in dataset.header.kinds if one in ("real", "simulated")), None)
+        if kind is None:
+            raise Sd2Error(f"{path} holds no maps of a radar", "maps that a radar saw")
+        seen = clips_of_dataset(dataset, kind)
+        if "synthetic" not in dataset.header.kinds:
+            return seen, {}
+        shown = clips_of_dataset(dataset, "synthetic")
+    radar = {(*clip.key, clip.placement): clip for clip in seen.clips}
+    takes = {}
+    for clip in shown.clips:
+        own = radar.get((*clip.key, clip.placement))
+        if own is not None and own.energies.shape == clip.energies.shape:
+            takes[(*clip.key, clip.placement)] = Take(
+                clip.subject, clip.movement, clip.energies, own.energies,
+                np.arange(len(clip)) / seen.frame_rate_hz,
+                np.zeros(len(clip), np.int8), np.zeros(3), clip.placement,
+            )  # fmt: skip
+    return seen, takes
+
+
+def _filmed(path: Path, plan: StudyPlan, seen: ClipSet) -> list[Movement]:
+    """Movements of pairs or a data set of which there is only video."""
+    if kind_of(path) == "dataset":
+        made, takes = _of_dataset(path)
+        inputs = [takes.get((*clip.key, clip.placement)) for clip in made.clips]
+    else:
+        pairs = read_pairs(path)
+        rows = [] if plan.labels is None else read_take_labels(Path(plan.labels))
+        own = [row for row in rows if any(_is_of(row, one) for one in pairs.takes)]
+        pairs = labelled(pairs, own) if own else pairs
+        made, inputs = _clips(pairs, plan), list(pairs.takes)
+    _check_alike(path, made, seen)
+    return [
+        Movement(clip, take)
+        for clip, take in zip(_renumbered(made, seen.classes), inputs, strict=True)
+        if (clip.label != UNKNOWN).any()
+    ]
+
+
+def _is_of(row: TakeLabel, take: Take) -> bool:
+    return fnmatchcase(take.subject, row.subject) and fnmatchcase(take.name, row.take)
+
+
+def _labelled(pairs: PairSet, plan: StudyPlan) -> PairSet:
+    if plan.labels is None:
+        return pairs
+    return labelled(pairs, read_take_labels(Path(plan.labels)))
+
+
+def _clips(pairs: PairSet, plan: StudyPlan) -> ClipSet:
+    """What the radar saw; labels have the classes of the plan, or the usual ones."""
+    names: Sequence[str] = gesture_classes(pairs.labels)
+    if plan.classes:
+        names = [plan.classes.get(label, _NEITHER) for label in pairs.labels]
+    return clips_of_pairs(pairs, pairs.kind, names=names)
+
+
+def _without_unknown(found: ClipSet, plan: StudyPlan) -> ClipSet:
+    """Keep the classes of the plan that occur, and clips with a frame of one."""
+    there = {found.classes[n] for clip in found.clips for n in np.unique(clip.label) if n >= 0}
+    given: Mapping[str, str] = {**plan.classes, **{one: one for one in plan.classes.values()}}
+    names = [given.get(one, _NEITHER) if plan.classes else one for one in found.classes]
+    kept = tuple(dict.fromkeys(
+        name for one, name in zip(found.classes, names, strict=True)
+        if name != _NEITHER and one in there
+    ))  # fmt: skip
+    if len(kept) < 2:
+        raise Sd2Error(
+            f"The data hold the classes {', '.join(kept) or 'none'}",
+            "two or more",
+            "Label pairs with `sd2 pairs label`, recordings in the window",
+        )
+    clips = _renumbered(replace(found, classes=tuple(names)), kept)
+    used = tuple(one for one in clips if (one.label != UNKNOWN).any())
+    return replace(found, classes=kept, clips=used)
+
+
+def _renumbered(found: ClipSet, classes: Sequence[str]) -> list[Clip]:
+    """Give frames the numbers of other classes; those of none are unknown."""
+    numbers = [classes.index(one) if one in classes else UNKNOWN for one in found.classes]
+    table = np.array([*numbers, UNKNOWN], np.int8)
+    return [replace(clip, label=table[clip.label]) for clip in found.clips]
+
+
+def _check_alike(path: Path, more: ClipSet, seen: ClipSet) -> None:
+    if more.axis != seen.axis or abs(more.frame_rate_hz / seen.frame_rate_hz - 1.0) > 0.01:
+        raise Sd2Error(
+            f"{path} has {more.axis.bins} bins up to ±{more.axis.v_max_mps:g} m/s at"
+            f" {more.frame_rate_hz:.4g} frames/s",
+            f"{seen.axis.bins} bins up to ±{seen.axis.v_max_mps:g} m/s at"
+            f" {seen.frame_rate_hz:.4g} frames/s, as the data have",
+        )

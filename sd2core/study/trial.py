@@ -1,0 +1,246 @@
+"""One trial of a study: all conditions of one fold, share and draw, in a worker."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sd2core.classify.card import BACKGROUND
+from sd2core.classify.data import Clip
+from sd2core.classify.metrics import Score, mean_recall, score
+from sd2core.denoise.files import load_model
+from sd2core.denoise.resample_to_model import SAME_RATE
+from sd2core.errors import Sd2Error
+from sd2core.study.denoisers import added_map, denoiser_in
+from sd2core.study.folds import Fold, folds_of, groups_of, share_of
+from sd2core.study.learners import Describe, describing, learnt
+from sd2core.study.material import Material, Movement, material_of
+from sd2core.study.plan import Learner, StudyPlan
+from sd2core.study.windows import Features, at_speed
+
+REAL = "real"
+"""Condition of nothing added."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """What is drawn of the data."""
+
+    fold: Fold
+    share: float
+    seed: int
+
+    @classmethod
+    def from_json(cls, content: Mapping[str, Any]) -> Task:
+        """Parse what :func:`dataclasses.asdict` gave."""
+        fold = content["fold"]
+        return cls(
+            Fold(fold["judged"], fold["video"], tuple(fold["real"])),
+            content["share"],
+            content["seed"],
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """Scores of all conditions of one task."""
+
+    task: Task
+    real_frames: int
+    # Of each condition, and each judged movement: recall of its frames over its classes, and share
+    # of its gestures that are found (None of background alone).
+    takes: Mapping[str, Mapping[str, tuple[float, float | None]]]
+    scores: Mapping[str, Score]  # Of all judged movements.
+    missing: Mapping[str, str]  # Conditions that could not be tried, and why.
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the content of a run's file."""
+        return {
+            **asdict(self.task),
+            "real_frames": self.real_frames,
+            "takes": {name: dict(found) for name, found in self.takes.items()},
+            "scores": {name: found.to_json() for name, found in self.scores.items()},
+            "missing": dict(self.missing),
+        }
+
+    @classmethod
+    def from_json(cls, content: Mapping[str, Any]) -> Run:
+        """Parse :meth:`to_json`; raises KeyError, TypeError or ValueError."""
+        takes = {
+            name: {take: (found[0], found[1]) for take, found in own.items()}
+            for name, own in content["takes"].items()
+        }
+        scores = {name: Score.from_json(one) for name, one in content["scores"].items()}
+        missing = dict(content["missing"])
+        return cls(Task.from_json(content), int(content["real_frames"]), takes, scores, missing)
+
+
+def drawn(plan: StudyPlan, material: Material, real: Sequence[str], share: float, seed: int
+          ) -> list[Movement]:  # fmt: skip
+    """Return the real movements that are learnt from."""
+    group = grouped(plan, material, seed)
+    own = [one for one in material.real if group[one.clip.key] in real]
+    return share_of(material.known, own, share, seed)
+
+
+def grouped(plan: StudyPlan, material: Material, seed: int) -> Mapping[tuple[str, str], str]:
+    """Return the group of every movement."""
+    parts = None if plan.folds == "people" else plan.parts
+    return groups_of(material.known, material.real, parts, seed)
+
+
+def run_task(plan_text: str, denoiser: str | None, task: Task) -> Run:
+    """Judge all conditions of a task; ``denoiser`` is the folder of its own."""
+    plan = StudyPlan.model_validate_json(plan_text)
+    material = material_of(plan_text)
+    group = grouped(plan, material, task.seed)
+    real = drawn(plan, material, task.fold.real, task.share, task.seed)
+    judged = [one for one in material.real if group[one.clip.key] == task.fold.judged]
+    filmed = [one for one in material.filmed if group.get(one.clip.key) == task.fold.video]
+    model, reason = _denoiser(plan, material, denoiser)
+    found: dict[str, list[tuple[str, Score]]] = {}
+    missing: dict[str, str] = {}
+    learner = plan.classifiers[0]
+    describe = _kept(plan_text, learner)
+    for condition in (REAL, *plan.wanted):
+        try:
+            added = _added(plan, material, condition, filmed, model, reason, task.seed)
+        except Sd2Error as error:
+            missing[condition] = str(error)
+            continue
+        if condition != REAL and not added:
+            missing[condition] = "the data hold no such maps to add"
+            continue
+        found[condition] = _judged(
+            learner, plan, material, real, added, judged, task.seed, describe
+        )
+    if task.share == max(plan.shares):
+        for other in plan.classifiers[1:]:
+            found[other.title] = _judged(
+                other, plan, material, real, [], judged, task.seed, _kept(plan_text, other)
+            )
+    return Run(
+        task,
+        sum(int((one.clip.label >= 0).sum()) for one in real),
+        {name: {title: _of_take(one) for title, one in own} for name, own in found.items()},
+        {name: sum((one for _, one in own[1:]), own[0][1]) for name, own in found.items()},
+        missing,
+    )
+
+
+def _added(
+    plan: StudyPlan,
+    material: Material,
+    condition: str,
+    filmed: Sequence[Movement],
+    model: Any,
+    reason: str,
+    seed: int,
+) -> list[Clip]:
+    """Clips that are added to the real ones."""
+    if condition == REAL:
+        return []
+    if condition == "radar":
+        own = {id(one) for one in material.real}
+        return [one.clip for one in filmed if id(one) in own]
+    if condition == "simulated":
+        made = [one.clip for one in material.others if one.clip.kind == "simulated"]
+    else:
+        made = [
+            replace(one.clip, energies=added_map(condition, one.take, model, reason, (seed, at)))
+            for at, one in enumerate([*filmed, *material.others])
+            if one.take is not None
+        ]
+    known = material.known
+    return [*made, *(_played(one, known, speed) for speed in plan.speeds for one in made)]
+
+
+def _played(clip: Clip, known: Any, speed: float) -> Clip:
+    frames = np.arange(0.0, len(clip) - 0.5, speed).astype(int)
+    return replace(
+        clip, energies=at_speed(clip.energies, known.axis, speed), label=clip.label[frames]
+    )
+
+
+def _judged(
+    learner: Learner,
+    plan: StudyPlan,
+    material: Material,
+    real: Sequence[Movement],
+    added: Sequence[Clip],
+    judged: Sequence[Movement],
+    seed: int,
+    describe: Describe,
+) -> list[tuple[str, Score]]:
+    """Scores of all judged movements, by title; clips of one movement are taken together."""
+    known = material.known
+    own = [one.clip for one in real]
+    scores_of = learnt(learner, known, own, added, plan.added_weight, seed, describe)
+    late_s = 0.0 if learner.model == "ridge" else learner.delay_s
+    background = known.classes.index(BACKGROUND) if BACKGROUND in known.classes else None
+    found: dict[str, Score] = {}
+    for one in judged:
+        answers = scores_of(one.clip).argmax(axis=1)
+        rate_hz = known.frame_rate_hz
+        this = score([one.clip.label], [answers], known.classes, rate_hz, background, late_s)
+        found[one.title] = found[one.title] + this if one.title in found else this
+    return list(found.items())
+
+
+def _of_take(found: Score) -> tuple[float, float | None]:
+    whole = int(found.gestures.sum())
+    return (
+        mean_recall(found.frames),
+        float(np.trace(found.gestures)) / whole if whole else None,
+    )
+
+
+def _denoiser(plan: StudyPlan, material: Material, folder: str | None) -> tuple[Any, str]:
+    """The denoiser of a fold, or none and the reason."""
+    known = material.known
+    if plan.denoiser.file is None:
+        return (None, "no pairs to learn from") if folder is None else denoiser_in(Path(folder))
+    model = load_model(plan.denoiser.file)
+    if (
+        model.card.axis != known.axis
+        or abs(known.frame_rate_hz / model.card.frame_rate_hz - 1.0) > SAME_RATE
+        or not {*known.null_bins} <= {*model.card.null_bins}
+    ):
+        return None, f"{plan.denoiser.file} is made for other maps"
+    return model, ""
+
+
+@lru_cache(maxsize=8)
+def _kept(plan_text: str, learner: Learner) -> Describe:
+    """Describe clips for ridge regression; what the radar saw of whole movements only once."""
+    material = material_of(plan_text)
+    describe = describing(learner, material.known)
+    whole = {id(one.clip) for one in material.real}
+    kept: dict[int, Features] = {}
+
+    def described(clip: Clip) -> Features:
+        if id(clip) not in whole:
+            return describe(clip)
+        if id(clip) not in kept:
+            kept[id(clip)] = describe(clip)
+        return kept[id(clip)]
+
+    return described
+
+
+def all_tasks(plan: StudyPlan, material: Material) -> list[Task]:
+    """Return the tasks of a study, small shares first."""
+    groups = dict.fromkeys(grouped(plan, material, 0).values())
+    filmed = bool(material.filmed) and any(one != "simulated" for one in plan.wanted)
+    folds = folds_of(list(groups), filmed=filmed, turns=plan.turns)
+    return [
+        Task(fold, share, seed)
+        for share in sorted(plan.shares)
+        for fold in folds
+        for seed in range(plan.seeds)
+    ]
