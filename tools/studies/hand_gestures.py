@@ -52,16 +52,16 @@ SYNTHESIS = replace(PRESETS["paper"], axis=AXIS, null_bins=(), visibility="facin
 RESOLUTION: Resolution = "low"
 _RADIUS_M = (0.12, 0.5)
 """Nearest the wrist comes to the sensor."""
-_STROKES_S = {1: (0.45, 1.0), 2: (0.3, 0.7), 3: (0.3, 0.6)}
+_STROKES_S = {1: (0.5, 1.0), 2: (0.45, 0.9), 3: (0.4, 0.8)}
 _NEAREST = {1: (0.15, 0.5), 2: (0.35, 0.65)}
 """Share of the way at which the hand is nearest."""
 _SPREAD = np.array([8.0, 6.0, 0.03, 0.1, 0.1, 0.1, 15.0, 10.0, 2.0])
-_SIZES = {1: (0.35, 0.8), 2: (0.6, 1.0), 3: (0.5, 1.0)}
+_SIZES = {1: (0.4, 0.8), 2: (0.7, 1.0), 3: (0.4, 0.9)}
 """Share of the way that is gone."""
-_BACK_S = (0.12, 0.35)
-_STILL_DB = (-25.0, 3.0)
+_BACK_S = (0.15, 0.5)
+_STILL_DB = (-10.0, 3.0)
 """Echo of what stands still, against the loudest moving cell of the take."""
-_NOISE_DB = (-32.0, -24.0)
+_NOISE_DB = (-30.0, -22.0)
 
 
 def _pose(azimuth_deg: float, elevation_deg: float, reach_m: float) -> Floats:
@@ -114,7 +114,9 @@ def drawn_deed(rng: np.random.Generator, number: int, times_s: Floats) -> Deed:
     else:
         nearest_s = begin_s + length_s * float(rng.uniform(*_NEAREST[number]))
     late_s = float(rng.uniform(0.15, 0.5))
-    label[(times_s >= begin_s - 0.1) & (times_s < end_s + late_s)] = number
+    label[(times_s >= begin_s + float(rng.uniform(-0.05, 0.1))) & (times_s < end_s + late_s)] = (
+        number
+    )
     back_s = end_s + late_s + float(rng.uniform(0.0, 0.4))
     if rng.random() < 0.6:
         move(back_s, float(rng.uniform(0.5, 1.0)), way[0])

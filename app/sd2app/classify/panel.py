@@ -11,7 +11,7 @@ from sd2app.background.run_monitor import UNDER_WAY
 from sd2app.classify.dialogs import ClassifyDialogs
 from sd2app.classify.run import CheckPoint, ClassHistory, ClassRun
 from sd2app.classify.setup import MAPS, DataSource
-from sd2app.classify.text import FEATURE_WORDS, MODEL_WORDS, note, run_headline, run_time_text
+from sd2app.classify.text import FEATURE_WORDS, MODEL_WORDS, note, run_headline
 from sd2app.classify.training import ClassTraining
 from sd2app.session.display import DisplayModel
 from sd2app.training.text import division_text
@@ -161,7 +161,7 @@ class ClassRunView(RunView[ClassRun]):
 
     def texts(self, run: ClassRun) -> tuple[str, str, str]:
         """Headline, time, and advice for a run that has ended."""
-        return run_headline(run), run_time_text(run, run.history), note(run)
+        return run_headline(run), run.time_text, note(run)
 
     def shown(self, run: ClassRun) -> Collection[str]:
         """Names of the buttons that are of use now."""

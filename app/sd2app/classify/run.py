@@ -6,13 +6,7 @@ import math
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
-from PySide6.QtCore import QObject
-
-from sd2app.background.run_monitor import RunMonitor
-from sd2app.training.run import LearningHistory
-from sd2core.processes import ProcessId
-from sd2core.runs.command_folder import CommandFolder
-from sd2core.runs.pace import Pace
+from sd2app.training.command_runs import CommandRun, PacedHistory
 
 MODEL_NAME = "classifier.safetensors"
 
@@ -30,30 +24,6 @@ class CheckPoint(NamedTuple):
     step: int
     recall: float
     best: bool
-
-
-class PacedHistory(LearningHistory):
-    """Steps of which the number is known, and the pace at which they are done."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.total = 0
-        self._pace = Pace()
-
-    @property
-    def share(self) -> float | None:
-        """Share of the whole that is done; None while that is not known."""
-        return min(self.steps_done / self.total, 1.0) if self.total else None
-
-    @property
-    def left_s(self) -> float | None:
-        """Time left at the pace so far; None until that can be told."""
-        return None if self.saving else self._pace.left_s(self.total - self.steps_done)
-
-    def _advance(self, steps: int, elapsed_s: float) -> None:
-        super()._advance(steps, elapsed_s)
-        if self.elapsed_s is not None:
-            self._pace.take(steps, self.elapsed_s)
 
 
 class ClassHistory(PacedHistory):
@@ -94,18 +64,11 @@ class ClassHistory(PacedHistory):
     }
 
 
-class ClassRun(RunMonitor[CommandFolder]):
+class ClassRun(CommandRun):
     """A training."""
 
     history: ClassHistory
-    facts = False  # there is a result
-
-    def __init__(
-        self, path: Path, parent: QObject | None = None, *, process: ProcessId | None = None
-    ) -> None:
-        folder = CommandFolder(path)
-        self.about = folder.facts
-        super().__init__(folder, parent, history=ClassHistory(), process=process)
+    histories = ClassHistory
 
     @property
     def result(self) -> Path | None:

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
 
-from sd2app.background.run_monitor import RunMonitor
-from sd2app.classify.run import ClassRun, PacedHistory
+from sd2app.classify.run import ClassRun
 from sd2app.classify.track import ClassReading
+from sd2app.training.command_runs import PHASES
 from sd2app.widgets.model_page import ModelPage, about_sections, map_and_file_rows, model_title
-from sd2app.widgets.text import about, exact_text
 from sd2core.classify.card import ClassifierCard
 
 MODEL_WORDS = {"lstm": "LSTM (the paper's)", "s4": "S4", "kernel": "kernel (few recordings)"}
@@ -19,18 +17,6 @@ _KINDS = {
     "real": "real radar",
     "synthetic": "synthetic",
     "denoised": "denoised synthetic",
-}
-
-
-PHASES = {
-    "starting": "Starting…",
-    "stopping": "Stopping…",
-    "cancelling": "Cancelling…",
-    "finished": "Finished",
-    "stopped": "Stopped",
-    "failed": "It failed",
-    "died": "Its process is gone",
-    "gone": "",
 }
 
 
@@ -90,17 +76,6 @@ def run_headline(run: ClassRun) -> str:
     if run.phase != "running":
         return PHASES[run.phase]
     return f"Training: step {history.steps_done} of {history.total}"
-
-
-def run_time_text(run: RunMonitor[Any], history: PacedHistory) -> str:
-    """Elapsed time of a run, and time left."""
-    parts = []
-    if run.phase == "running" and history.left_s is not None:
-        parts.append(f"{about(history.left_s)} left")
-    if history.elapsed_s is not None:
-        passed = exact_text(history.elapsed_s)
-        parts.append(f"{passed} so far" if run.under_way else f"took {passed}")
-    return " · ".join(parts)
 
 
 def note(run: ClassRun) -> str:

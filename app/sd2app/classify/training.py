@@ -7,24 +7,16 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject
 
-from sd2app.background.runs import KnownRun, Runs, Sentences, free_folder
+from sd2app.background.runs import KnownRun, Runs, free_folder
 from sd2app.classify.run import MODEL_NAME, ClassRun
 from sd2app.classify.setup import ClassSetup
 from sd2app.settings import Settings
+from sd2app.training.command_runs import SENTENCES, known_commands
 from sd2app.training.model import quoted
-from sd2app.widgets.text import clock_text
 from sd2core.classify.files import user_classifiers_folder
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
-from sd2core.runs.command_folder import COMMAND_IN_FOLDER, CommandFolder, commands_in
-
-_SENTENCES = Sentences(
-    busy="{} is under way. Wait for it, or stop it.",
-    found="{} is under way. The Train panel shows it.",
-    finished="{} is done. The Train panel shows what came of it.",
-    failed="{} did not come to its end. The Train panel says more.",
-)
-_STATES = {0: "finished", 130: "stopped", None: "not ended"}
+from sd2core.runs.command_folder import COMMAND_IN_FOLDER, CommandFolder
 
 
 class ClassTraining(Runs[ClassRun]):
@@ -42,7 +34,7 @@ class ClassTraining(Runs[ClassRun]):
         folder: Path | None = None,
         command: Sequence[str] = COMMAND_IN_FOLDER,
     ) -> None:
-        super().__init__(ClassRun, settings, "classify/train/run", _SENTENCES, parent)
+        super().__init__(ClassRun, settings, "classify/train/run", SENTENCES, parent)
         self._use, self._command = use, tuple(command)
         self._folder = folder or user_classifiers_folder()
         self.setup = ClassSetup(settings, self)
@@ -70,8 +62,7 @@ class ClassTraining(Runs[ClassRun]):
 
     def find(self) -> Sequence[KnownRun]:
         """Read the folder of runs."""
-        found = commands_in(self._folder / "runs")
-        return [KnownRun(one.path, _title(one), one.live) for one in found]
+        return known_commands(self._folder / "runs", "Training")
 
     def train(self) -> None:
         """Begin as set up; Sd2Error if it cannot start, OSError if its folder cannot be made."""
@@ -96,9 +87,3 @@ class ClassTraining(Runs[ClassRun]):
         self._use(kept)
         self._used = run.path
         self.changed.emit()
-
-
-def _title(folder: CommandFolder) -> str:
-    about = folder.facts
-    state = "under way" if folder.live else _STATES.get(folder.code, "failed")
-    return f"{clock_text(about.get('started_unix_s', 0.0))} · Training · {state}"

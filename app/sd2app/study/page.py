@@ -9,9 +9,9 @@ from pathlib import Path
 from PySide6.QtWidgets import QApplication, QWidget
 
 from sd2app.background.run_monitor import UNDER_WAY
-from sd2app.classify.text import PHASES, run_time_text
 from sd2app.feature import Shell
 from sd2app.study.runs import SWITCHES, TABLE_NAME, StudyRun, StudyRuns
+from sd2app.training.command_runs import PHASES
 from sd2app.training.model import quoted
 from sd2app.widgets.inputs import CheckBox
 from sd2app.widgets.layouts import STRETCH, column_of
@@ -109,7 +109,7 @@ class StudyRunView(RunView[StudyRun]):
             headline = f"Studying: training {now} of {history.total}"
         stopped = run.phase == "stopped"
         note = "What it has trained is kept: Resume trains what is missing." if stopped else ""
-        return headline, run_time_text(run, run.history), note
+        return headline, run.time_text, note
 
     def shown(self, run: StudyRun) -> Collection[str]:
         """Names of the buttons that are of use now."""

@@ -8,30 +8,19 @@ from typing import Any, ClassVar
 
 from PySide6.QtCore import QObject
 
-from sd2app.background.run_monitor import RunMonitor
-from sd2app.background.runs import KnownRun, Runs, Sentences, free_folder
-from sd2app.classify.run import PacedHistory
+from sd2app.background.runs import KnownRun, Runs, free_folder
 from sd2app.classify.setup import ClassSetup
 from sd2app.settings import Settings, StoredChoices
-from sd2app.widgets.text import clock_text
+from sd2app.training.command_runs import SENTENCES, CommandRun, PacedHistory, known_commands
 from sd2core.classify.files import user_classifiers_folder
 from sd2core.errors import Sd2Error
 from sd2core.files.texts import read_json
-from sd2core.processes import ProcessId
-from sd2core.runs.command_folder import COMMAND_IN_FOLDER, CommandFolder, commands_in
+from sd2core.runs.command_folder import COMMAND_IN_FOLDER, CommandFolder
 
 RESULT_NAME = "study.json"
 TABLE_NAME = "study"
 SWITCHES = ("quick", "radar_only", "same_people")
 """Options of ``sd2 classify table`` that are on or off."""
-
-_SENTENCES = Sentences(
-    busy="{} is under way. Wait for it, or stop it.",
-    found="{} is under way. The Train panel shows it.",
-    finished="{} is done. The Train panel shows what it found.",
-    failed="{} did not come to its end. The Train panel says more.",
-)
-_STATES = {0: "finished", 130: "stopped", None: "not ended"}
 
 
 class StudyHistory(PacedHistory):
@@ -44,18 +33,10 @@ class StudyHistory(PacedHistory):
     readers: ClassVar = {"run": _done}
 
 
-class StudyRun(RunMonitor[CommandFolder]):
+class StudyRun(CommandRun):
     """A study under way, or one that has ended."""
 
-    history: StudyHistory
-    facts = False  # there is a result
-
-    def __init__(
-        self, path: Path, parent: QObject | None = None, *, process: ProcessId | None = None
-    ) -> None:
-        folder = CommandFolder(path)
-        self.about = folder.facts
-        super().__init__(folder, parent, history=StudyHistory(), process=process)
+    histories = StudyHistory
 
     @property
     def out(self) -> Path:
@@ -91,7 +72,7 @@ class StudyRuns(Runs[StudyRun]):
         folder: Path | None = None,
         command: Sequence[str] = COMMAND_IN_FOLDER,
     ) -> None:
-        super().__init__(StudyRun, settings, "study/run", _SENTENCES, parent)
+        super().__init__(StudyRun, settings, "study/run", SENTENCES, parent)
         self.data, self._command = data, tuple(command)
         self._folder = (folder or user_classifiers_folder()) / "studies"
         defaults = {name: "yes" if name == "quick" else "no" for name in SWITCHES}
@@ -122,7 +103,7 @@ class StudyRuns(Runs[StudyRun]):
 
     def find(self) -> Sequence[KnownRun]:
         """Read the folder of studies."""
-        return [KnownRun(one.path, _title(one), one.live) for one in commands_in(self._folder)]
+        return known_commands(self._folder)
 
     def begin(self) -> None:
         """Study the labelled data; Sd2Error if it cannot start, OSError without a folder."""
@@ -154,10 +135,3 @@ class StudyRuns(Runs[StudyRun]):
     def _start(self, path: Path, arguments: list[str], out: Path) -> None:
         about = {"what": "study", "out": str(out)}
         self.follow_new(path, CommandFolder(path).start(arguments, about, self._command))
-
-
-def _title(folder: CommandFolder) -> str:
-    about = folder.facts
-    state = "under way" if folder.live else _STATES.get(folder.code, "failed")
-    started = clock_text(about.get("started_unix_s", 0.0))
-    return f"{started} · {folder.path.name} · {state}"

@@ -13,7 +13,7 @@ import pytest
 from small_pairs import write_pairs
 
 from sd2app.classify.panel import recall_text
-from sd2app.classify.text import note, run_headline, run_time_text
+from sd2app.classify.text import note, run_headline
 from sd2app.classify.training import ClassTraining
 from sd2app.command_line import main
 from sd2app.settings import Settings
@@ -210,7 +210,7 @@ def test_a_training_is_followed_to_its_end_and_its_model_is_used(set_up, qtbot):
         (0.5, True), (0.8, True), (0.7, False),
     ]  # fmt: skip
     assert recall_text(run.history.best) == "80.0 %, at step 4"
-    assert run_time_text(run, run.history) == "took 0:12"
+    assert run.time_text == "took 0:12"
     assert not model.in_use
     model.use_model()
     (kept,) = set_up.used

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import fake_class_command
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QFileDialog, QLabel, QToolButton
 from small_pairs import write_pairs
 from study_results import some_results
@@ -50,8 +50,7 @@ def said(page) -> str:
 def test_begun_by_clicks_and_its_conclusion_read(window, page, qtbot):
     runs = window.features.study.runs
     (same,) = [one for one in page.findChildren(CheckBox) if one.text() == "The same people"]
-    same.setFocus()
-    qtbot.keyClick(same, Qt.Key.Key_Space)
+    qtbot.mouseClick(same, Qt.MouseButton.LeftButton, pos=QPoint(8, same.height() // 2))
     assert runs.is_on("same_people")
     assert "1 source" in said(page)
     press(page, "Start", qtbot)
