@@ -13,7 +13,7 @@ TESTS = system-packages-for-tests .venv/.with-test $(COMPILED) landmark-models
 # Among them every module in KERNEL_MODULES of sd2core/numerics/compiled.py.
 KERNELS := $(wildcard sd2core/numerics/*.py sd2core/body/*.py sd2core/scattering/*.py sd2core/doppler/*.py sd2core/fmcw/*.py)
 
-.PHONY: help setup demo test test-slow lint pins fresh-machine docs format bench fuzz wheel bundle screenshots moving-picture accuracy fitting denoiser range-synthesis scale classifier real-gestures whole-loop paper soak clean
+.PHONY: help setup demo test test-slow lint pins fresh-machine docs format bench fuzz wheel bundle screenshots moving-picture accuracy fitting denoiser range-synthesis scale classifier real-gestures paper soak clean
 
 help:
 	@echo "make demo         set up, and open the sample recording in the window"
@@ -35,9 +35,8 @@ help:
 	@echo "make fitting      docs/fitting.md, measured (some ten minutes)"
 	@echo "make denoiser     docs/denoiser.md, trained and measured (an hour and more; after make fitting)"
 	@echo "make range-synthesis  docs/range-synthesis.md, trained (half an hour)"
-	@echo "make classifier   docs/classifier.md, trained (two hours)"
+	@echo "make classifier   docs/classifier.md, trained (an hour)"
 	@echo "make real-gestures  docs/real-gestures.md: real radar, suggestions and classifiers (five minutes)"
-	@echo "make whole-loop   docs/whole-loop.md: from a recording to a classifier (20 minutes)"
 	@echo "make paper        docs/paper.md: the paper's figures and tables (half an hour after make classifier)"
 	@echo "make scale        docs/scale.md, measured (some ten minutes)"
 	@echo "make soak         an hour of use of the window: memory, threads, event loop (MINUTES=60)"
@@ -140,9 +139,6 @@ classifier: setup
 
 real-gestures: setup
 	$(BIN)/python -m tools.documentation.real_gestures
-
-whole-loop: setup
-	$(BIN)/python -m tools.documentation.whole_loop
 
 paper: setup
 	$(BIN)/python -m tools.documentation.paper

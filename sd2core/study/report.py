@@ -25,13 +25,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 TITLES = {
-    REAL: "real alone",
+    REAL: "radar alone",
     "synthetic": "+ synthetic",
     "synthetic+texture": "+ synthetic with texture",
     "denoised": "+ denoised",
     "denoised+texture": "+ denoised with texture",
     "simulated": "+ simulated radar",
-    "radar": "+ the radar's of the same",
+    "radar": "+ radar of the same",
 }
 _COLOURS = ("#444444", "#7f9bc4", "#2166ac", "#e0a36c", "#b35806", "#762a83", "#1b7837")
 _UNTRIED = ("more than one group's video at a time",)
@@ -133,8 +133,8 @@ def conclusion(results: Results, findings: Sequence[Finding]) -> str:
         )
         said.append(
             f"It helped in {len(helped)} of {len(own)} comparisons, most"
-            f" {TITLES[best.added].removeprefix('+ ')} maps at {best.share:.0%} of the real data:"
-            f" {_points(best.frames)} of the frames; {people}."
+            f" {TITLES[best.added].removeprefix('+ ')} maps at {best.share:.0%} of the"
+            f" {results.kind} radar's data: {_points(best.frames)} of the frames; {people}."
         )
     if harmed:
         worst = min(harmed, key=lambda one: one.frames.mean)
@@ -187,12 +187,12 @@ def page(
         )
         parts += [
             "## Gained",
-            "Points of frames over real data alone, with 95 % intervals over takes of these people"
+            "Points of frames over the radar alone, with 95 % intervals over takes of these people"
             f"{over_people}; p by turning signs of takes by chance, adjusted for all these"
             " comparisons (Holm); then points of whole movements.",
             _table_of_gains(findings, len(results.takes) > 1),
         ]
-    parts += ["![Learning curve](curve.png)", "## With all real data"]
+    parts += ["![Learning curve](curve.png)", "## With all of the radar's data"]
     parts += [
         "Mean recall over the classes of all frames, and of whole movements, in per cent, ±"
         " standard deviation over seeds; and the time until a gesture is recognised (median).",
@@ -220,7 +220,7 @@ def _folds_in_words(results: Results) -> str:
         )
         text = (
             f"{turns} a fold ({folds}): one is judged, of another there is only video, of all"
-            f" others there is a share of the real radar's data, of every class alike. {draws}"
+            f" others there is a share of the radar's data, of every class alike. {draws}"
         )
     else:
         text = (
@@ -228,7 +228,7 @@ def _folds_in_words(results: Results) -> str:
             f" radar's data, of every class alike. {draws}"
         )
     if plan.learns_denoisers and filmed:
-        text += " The denoiser of a fold learns from those same real data alone."
+        text += " The denoiser of a fold learns from those same data alone."
     if results.others:
         text += f" {results.others} movements of other bodies, of the program's, may be added."
     if plan.speeds:
@@ -312,7 +312,7 @@ def draw_confusions(results: Results, totals: dict[str, list[Score]]) -> Figure:
 
 def _table_of_scores(results: Results) -> str:
     names = (REAL, *results.plan.wanted)
-    rows = [["real data", "frames", *(TITLES[name] for name in names)]]
+    rows = [["radar's data", "frames", *(TITLES[name] for name in names)]]
     for share in sorted(results.plan.shares):
         runs = [run for run in results.runs if run.task.share == share]
         cells = []
@@ -329,7 +329,7 @@ def _table_of_scores(results: Results) -> str:
 
 
 def _table_of_gains(findings: Sequence[Finding], people: bool) -> str:
-    head = ["real data", "added", "gain", "over takes", "over people", "p", "movements"]
+    head = ["radar's data", "added", "gain", "over takes", "over people", "p", "movements"]
     rows = [
         [
             f"{one.share:.0%}",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -21,7 +21,7 @@ from sd2core.files.texts import read_json
 from sd2core.progress import Progress, silent
 from sd2core.runs.folder import RunFolder
 from sd2core.study.denoisers import learn_denoiser
-from sd2core.study.material import Material, material_of
+from sd2core.study.material import Material, Movement, material_of
 from sd2core.study.plan import StudyPlan
 from sd2core.study.trial import Run, Task, all_tasks, drawn, run_task
 
@@ -92,8 +92,10 @@ def _made(
     text = plan.model_dump_json()
     material = material_of(text)
     tasks = all_tasks(plan, material)
-    digest = _digest(material)
-    paths = [_run_path(folder, plan, digest, task) for task in tasks]
+    known = dict.fromkeys([*material.real, *material.filmed, *material.others])
+    content = _digest(material, known)
+    paths = [_run_path(folder, plan, content, task) for task in tasks]
+    digest = _digest(material, material.real)  # Denoisers learn from nothing else.
     learns = plan.learns_denoisers and material.pairs is not None
     models = {
         _model_folder(folder, plan, digest, task): task for task in tasks if learns
@@ -124,8 +126,8 @@ def _made(
             for future in finished(futures):
                 run = future.result()
                 runs[futures[future]] = run
-                content = json.dumps(run.to_json(), ensure_ascii=False)
-                atomic_write_text(futures[future], content + "\n")
+                text_of_run = json.dumps(run.to_json(), ensure_ascii=False)
+                atomic_write_text(futures[future], text_of_run + "\n")
                 done += 1
                 progress(done, total)
     subject_of = {one.title: one.clip.subject for one in material.real}
@@ -141,12 +143,12 @@ def _learn(place: Path, plan: StudyPlan, material: Material, task: Task) -> None
     learn_denoiser(place, plan.denoiser, material.pairs, takes, task.seed)
 
 
-def _digest(material: Material) -> str:
+def _digest(material: Material, movements: Iterable[Movement]) -> str:
     sums = hashlib.blake2b(digest_size=16)
     known = material.known
     head = [material.kind, known.classes, known.null_bins, known.axis.v_max_mps]
     sums.update(json.dumps([*head, known.frame_rate_hz]).encode())
-    for one in dict.fromkeys([*material.real, *material.filmed, *material.others]):
+    for one in movements:
         sums.update(json.dumps([*one.clip.key, one.clip.placement, one.clip.kind]).encode())
         arrays = [one.clip.energies, one.clip.label]
         if one.take is not None:

@@ -1,4 +1,4 @@
-"""Makes ``classifier.md`` and its pictures: ``make classifier``, two hours.
+"""Makes ``classifier.md`` and its pictures: ``make classifier``, an hour.
 
 Studies on simulated campaigns. Campaigns and runs stay in ``build/classifier``; what is there is
 not made again.
@@ -14,8 +14,8 @@ from tools.documentation.studies import PLANS, study_section
 
 FOLDER = BUILD / "classifier"
 CAMPAIGNS = {
-    "varied": ("--minutes", 18, "--sensors", 2, "--seed", 2),
-    "to-and-fro": ("--minutes", 54, "--protocol", "paper", "--seed", 5),
+    "varied": ("--minutes", 18, "--seed", 2),
+    "to-and-fro": ("--minutes", 18, "--protocol", "paper", "--seed", 5),
 }
 """Options of ``sd2 simulate campaign`` for the data of a plan."""
 

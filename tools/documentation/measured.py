@@ -29,7 +29,6 @@ OLD = {
     "range-synthesis.md": _HOURS,
     "real-pairs.md": "a quarter of an hour; nothing that it measures was meant to change",
     "classifier.md": _HOURS,
-    "whole-loop.md": _HOURS,
     "paper.md": _HOURS,
 }
 """Pages that may be older than the program, and why they were not measured anew."""
@@ -72,7 +71,6 @@ PAGES = {
     ),
     "classifier.md": Measured("make classifier", ("sd2core/study", *_CLASSIFIERS)),
     "real-gestures.md": Measured("make real-gestures", _SUGGESTIONS),
-    "whole-loop.md": Measured("make whole-loop", _CLASSIFIERS),
     "paper.md": Measured("make paper", _CLASSIFIERS),
 }
 

@@ -47,7 +47,7 @@ PIXELS_PER_INCH = 110
 SEED = 5
 RANDOM = replace(PAPER, order="random")
 CLASSES = ("horizontal", "vertical", "background")
-ADDED = {"radar only": "real alone", "+ denoised": "+ denoised"}
+ADDED = {"radar only": "radar alone", "+ denoised": "+ denoised"}
 """The paper's training data, and ours in a study."""
 GIVEN = {
     "radar only": [[87.3, 5.3, 7.4], [6.8, 89.1, 4.1], [3.8, 4.1, 92.1]],
@@ -359,7 +359,7 @@ def tables_2_and_3(classes: Sequence[str], totals: Mapping[str, Any]) -> str:
         for row, given, found in zip(rows[1:], GIVEN[words], ours, strict=False):
             row += [" / ".join(f"{value:.1f}" for value in values) for values in (given, found)]
         rows[-2] += [f"{np.diagonal(GIVEN[words]).mean():.1f}", mean(title)]
-        rows[-1] += ["", mean(PAPER_NETWORK) if title == "real alone" else ""]
+        rows[-1] += ["", mean(PAPER_NETWORK) if title == "radar alone" else ""]
     return "\n".join(markdown_table(rows))
 
 

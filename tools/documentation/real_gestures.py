@@ -241,7 +241,7 @@ def _classified(told: dict[str, Any]) -> tuple[list[list[str]], str, list[list[s
     scores_of_best: list[Score] = []
     first = Learner.model_validate(told["plan"]["classifiers"][0]).title
     for total in told["totals"]:
-        name = first if total["title"] == "real alone" else total["title"]
+        name = first if total["title"] == "radar alone" else total["title"]
         scores = [Score.from_json(one) for one in total["seeds"]]
         frames = [100.0 * one.mean_recall for one in scores]
         gestures = [100.0 * mean_recall(one.gestures) for one in scores]

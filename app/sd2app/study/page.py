@@ -137,4 +137,5 @@ def study_panel(
         StudySetupView(runs, shell, open_plan, open_result),
         StudyRunView(runs, shell, show_result),
         "Studies: under way, or ended",
+        new="New study",
     )

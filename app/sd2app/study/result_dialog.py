@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import cycle
 
 from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPen
@@ -24,7 +25,7 @@ _STRONGEST = 120
 """Tint of a cell that holds all; text on it stays legible in both themes."""
 _CELL_PX = (92, 40)
 _GAP_PX = 6
-_COLOURS = ("real", "synthetic", "denoised", "before")
+_COLOURS = ("real", "synthetic", "denoised", "before", "inertial", "warning", "muted")
 _ASIDE_PX = 8
 """Shift between learning curves, so that their bars do not cover each other."""
 _PAD = 1.15
@@ -191,7 +192,7 @@ def learning_chart(result: ClassResult) -> Chart:
     least = max(math.floor(10 * low) / 10, 0.0)
     shares = sorted({100 * point.share for point in points})
     curves, marks = [], []
-    for number, (curve, colour) in enumerate(zip(result.curves, _COLOURS, strict=False)):
+    for number, (curve, colour) in enumerate(zip(result.curves, cycle(_COLOURS), strict=False)):
         aside_px = _ASIDE_PX * (number - (len(result.curves) - 1) / 2)
         places = [(100 * point.share, 100 * point.recall.mean) for point in curve]
         bars = [100 * point.recall.sd for point in curve]

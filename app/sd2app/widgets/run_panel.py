@@ -19,13 +19,12 @@ from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import outlined, sentence, show_words, title
 from sd2app.widgets.progress_bar import ProgressBar
 
-_NEW = "New training"
-
 
 class RunPanel(QWidget):
     """The list of runs on top; below it the run in view, or the setup of a new one.
 
-    ``tip`` describes the list. ``open_other`` lets the user choose a run of another folder.
+    ``tip`` describes the list, ``new`` what is set up. ``open_other`` lets the user choose a run
+    of another folder.
     """
 
     def __init__(
@@ -35,16 +34,17 @@ class RunPanel(QWidget):
         run: QWidget,
         tip: str,
         open_other: Callable[[], object] | None = None,
+        new: str = "New training",
     ) -> None:
         super().__init__()
         self.setObjectName("page")
         self._runs, self._setup, self._run = runs, setup, run
-        self._tip, self._open = tip, open_other
+        self._tip, self._open, self._what = tip, open_other, new
         self._paths: list[Path | None] = [None]
         self._list = Choice(tip, self)
         self._list.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self._list.activated.connect(self._choose)
-        self._new = outlined("New", "Set up another training", lambda: runs.select(None), self)
+        self._new = outlined("New", "Set up another one", lambda: runs.select(None), self)
         head = row_of((self._list, 1), self._new, spacing_px=6)
         self.setLayout(column_of(head, setup, run, STRETCH, spacing_px=8, margins_px=(8, 4, 8, 6)))
         runs.changed.connect(self._refresh)
@@ -56,7 +56,7 @@ class RunPanel(QWidget):
         self._run.setVisible(here is not None)
         self._new.setVisible(here is not None)
         self._paths = [None, *(one.path for one in self._runs.known)]
-        self._texts = [_NEW, *(one.title for one in self._runs.known)]
+        self._texts = [self._what, *(one.title for one in self._runs.known)]
         if here is not None and here not in self._paths:
             # Just begun: it is not in the list yet.
             self._paths.insert(1, here)

@@ -27,7 +27,7 @@ def test_matrices_are_means_over_seeds_with_their_spread(written):
     assert result.path == folder / "study.json"
     assert result.heading == "Frames of a simulated radar, mean ± standard deviation of 3 seeds"
     assert [matrix.title for matrix in result.matrices] == [
-        "real alone", "+ synthetic", "+ denoised", S4.title,
+        "radar alone", "+ synthetic", "+ denoised", S4.title,
     ]  # fmt: skip
     for seeds, matrix in zip(totals_of(results).values(), result.matrices, strict=True):
         each = [shares(one.frames) for one in seeds]

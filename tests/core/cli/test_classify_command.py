@@ -205,7 +205,7 @@ def test_a_table_is_a_study_that_is_made_once(sd2: Sd2, store: Path, tmp_path: P
     assert json.loads(again.out) == told
     content = json.loads((tmp_path / "study.json").read_text("utf-8"))
     assert content["radar"] == "simulated"
-    assert {"real alone", "+ synthetic", "kernel, columns, after 0.9 s"} <= {
+    assert {"radar alone", "+ synthetic", "kernel, columns, after 0.9 s"} <= {
         one["title"] for one in content["totals"]
     }
 

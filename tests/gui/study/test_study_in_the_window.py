@@ -66,7 +66,7 @@ def test_a_result_is_opened_and_looked_at(window, page, tmp_path, qtbot, monkeyp
     press(page, "Open a result…", qtbot)
     dialog = window.findChild(ClassResultDialog)
     left, right = dialog.findChildren(ConfusionView)
-    assert left.matrix.title == "real alone"
+    assert left.matrix.title == "radar alone"
     assert right.matrix.title == "+ denoised"
     assert "horizontal taken for horizontal: 81.0 ± 1.0 %" in left.accessibleDescription()
     choice = dialog.findChild(Choice)
