@@ -34,7 +34,7 @@ TITLES = {
     "radar": "+ radar of the same",
 }
 _COLOURS = ("#444444", "#7f9bc4", "#2166ac", "#e0a36c", "#b35806", "#762a83", "#1b7837")
-_UNTRIED = ("more than one group's video at a time",)
+_FEW = 5
 FORMAT, VERSION = "sd2-study-results", 2
 
 
@@ -126,11 +126,11 @@ def conclusion(results: Results, findings: Sequence[Finding]) -> str:
     if helped:
         best = max(helped, key=lambda one: one.frames.mean)
         low, high = (100.0 * value for value in best.frames.over_people)
-        people = (
-            "also counting that people differ"
-            if low > 0
-            else f"other people might differ ({low:+.1f} to {high:+.1f})"
-        )
+        people = f"other people might differ ({low:+.1f} to {high:+.1f})"
+        if len(results.takes) < 2:
+            people = "of other people it says nothing"
+        elif low > 0:
+            people = "also counting that people differ"
         said.append(
             f"It helped in {len(helped)} of {len(own)} comparisons, most"
             f" {TITLES[best.added].removeprefix('+ ')} maps at {best.share:.0%} of the"
@@ -206,27 +206,20 @@ def page(
 
 def _folds_in_words(results: Results) -> str:
     plan = results.plan
-    folds = len({run.task.fold for run in results.runs})
-    who = "person" if plan.folds == "people" else f"one of {plan.parts} parts"
+    by_person = plan.folds == "people"
     filmed = any(run.task.fold.video for run in results.runs)
-    draws = f"{plan.seeds} draws each" + (
-        ", the parts dealt anew." if plan.folds == "files" else "."
-    )
-    if filmed:
-        turns = (
-            f"Every ordered pair, each a {who}, is"
-            if plan.turns == "all"
-            else f"Every {who} is once"
-        )
+    if filmed and plan.turns == "all":
+        count = len({run.task.fold for run in results.runs})
         text = (
-            f"{turns} a fold ({folds}): one is judged, of another there is only video, of all"
-            f" others there is a share of the radar's data, of every class alike. {draws}"
+            f"Every ordered pair of {'people' if by_person else 'parts'} is a fold ({count}): one"
         )
     else:
-        text = (
-            f"Every {who} is judged once ({folds}); of all others there is a share of the"
-            f" radar's data, of every class alike. {draws}"
-        )
+        count = len(results.takes) if by_person else plan.parts
+        text = f"Each of {count} {'people' if by_person else 'parts of the movements'}"
+    text += " is judged"
+    text += ", of another there is only video, and of all others" if filmed else "; of all others"
+    text += f" there is a share of the radar's data, of every class alike. {plan.seeds} draws each"
+    text += "." if by_person else ", the parts dealt anew."
     if plan.learns_denoisers and filmed:
         text += " The denoiser of a fold learns from those same data alone."
     if results.others:
@@ -254,11 +247,13 @@ def untried(results: Results) -> list[str]:
     )
     inputs = [one for one in ("map", "limbs", "kinematics") if one != plan.denoiser.inputs]
     tried = ", ".join(one.title for one in plan.classifiers)
-    more = [f"other classifiers than {tried}", *_UNTRIED]
+    more = [f"other classifiers than {tried}", "the video of several at a time"]
     if plan.learns_denoisers:
         more.append(f"denoisers that take {' or '.join(inputs)}")
     if not plan.speeds:
         more.append("other speeds")
+    if few := [who for who, count in results.takes.items() if count < _FEW]:
+        more.append(f"more movements of {', '.join(few)}: over so few, intervals are too narrow")
     if not plan.placements and not plan.video:
         more.append("other places of the sensor, bodies of other shape, mirrored movements")
     return [*left, *reasons, *more]

@@ -350,7 +350,8 @@ def tables_2_and_3(classes: Sequence[str], totals: Mapping[str, Any]) -> str:
 
     def mean(title: str) -> str:
         values = [100.0 * mean_recall(one) for one in confusions(title)]
-        return f"{np.mean(values):.1f} ± {np.std(values, ddof=1):.1f}"
+        sd = f" ± {np.std(values, ddof=1):.1f}" if len(values) > 1 else ""
+        return f"{np.mean(values):.1f}{sd}"
 
     rows = [["true"], *([name] for name in CLASSES), ["mean"], ["the paper's network, mean"]]
     for words, title in ADDED.items():
