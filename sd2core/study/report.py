@@ -15,7 +15,7 @@ from sd2core.classify.confusion_figure import confusion_figure
 from sd2core.classify.metrics import Score, mean_recall, shares
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.figure_files import save_figure
-from sd2core.files.tables import markdown_table
+from sd2core.files.tables import counted, markdown_table
 from sd2core.study.certainty import Gain, adjusted, gain_of
 from sd2core.study.plan import OF_VIDEO
 from sd2core.study.run import Results
@@ -169,7 +169,9 @@ def page(
 ) -> str:
     """Return the page in Markdown."""
     plan = results.plan
-    people = ", ".join(f"{one} ({count} movements)" for one, count in results.takes.items())
+    people = ", ".join(
+        f"{one} ({counted(count, 'movement')})" for one, count in results.takes.items()
+    )
     chance = f"{1 / len(results.classes):.0%}"
     parts = [
         f"# {plan.title}",
@@ -218,7 +220,7 @@ def _folds_in_words(results: Results) -> str:
         text = f"Each of {count} {'people' if by_person else 'parts of the movements'}"
     text += " is judged"
     text += ", of another there is only video, and of all others" if filmed else "; of all others"
-    text += f" there is a share of the radar's data, of every class alike. {plan.seeds} draws each"
+    text += f" there is a share of the radar's data, of every class alike. {counted(plan.seeds, 'draw')} each"
     text += "." if by_person else ", the parts dealt anew."
     if plan.learns_denoisers and filmed:
         text += " The denoiser of a fold learns from those same data alone."

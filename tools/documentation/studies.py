@@ -47,7 +47,7 @@ that errors of fits are not in it. `tools/studies/k60168a.toml`: one person's ge
 
 {studies}
 
-By the kernel classifier, which finds more, nothing is gained: at {share:.0%} of the radar's data
+With the kernel classifier, which finds more, nothing is gained: at {share:.0%} of the radar's data
 {kernel}.
 
 ## What each kind of added data gives
@@ -85,7 +85,7 @@ def by_kernel(share: float) -> str:
     plan = read_study(PLANS / "k60168a.toml")
     kernel = (plan.classifiers[-1],)
     gains = _gains(plan.model_copy(update={"shares": (share,), "classifiers": kernel}))
-    return " and ".join(f"{_gain(gain)} points {TITLES[name]}" for name, gain in gains.items())
+    return " and ".join(f"by {name} maps {_gain(gain)} points" for name, gain in gains.items())
 
 
 def _gains(plan: StudyPlan) -> dict[str, Gain]:
