@@ -220,7 +220,8 @@ def _folds_in_words(results: Results) -> str:
         text = f"Each of {count} {'people' if by_person else 'parts of the movements'}"
     text += " is judged"
     text += ", of another there is only video, and of all others" if filmed else "; of all others"
-    text += f" there is a share of the radar's data, of every class alike. {counted(plan.seeds, 'draw')} each"
+    text += " there is a share of the radar's data, of every class alike."
+    text += f" {counted(plan.seeds, 'draw')} each"
     text += "." if by_person else ", the parts dealt anew."
     if plan.learns_denoisers and filmed:
         text += " The denoiser of a fold learns from those same data alone."
