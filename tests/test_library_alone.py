@@ -119,7 +119,7 @@ for name in sd2core.__all__:
         getattr(sd2core, name)
     except ModuleNotFoundError as error:
         assert error.name == "torch", error
-rooms = ("classify", "datasets", "denoise", "train")
+rooms = ("classify", "datasets", "denoise", "study", "train")
 for module in pkgutil.walk_packages(sd2core.__path__, "sd2core."):
     if module.name.split(".")[1] not in rooms and not module.name.endswith("__main__"):
         __import__(module.name)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -243,11 +244,17 @@ def untried(results: Results) -> list[str]:
         for one in OF_VIDEO
         if one not in plan.wanted
     ]
-    reasons = dict.fromkeys(
-        f"{TITLES[name]} at {run.task.share:.0%}: {reason}"
+    runs = Counter(run.task.share for run in results.runs)
+    reasons = Counter(
+        (name, run.task.share, reason)
         for run in results.runs
         for name, reason in run.missing.items()
     )
+    failed = [
+        f"adding {TITLES[name].removeprefix('+ ')} maps in {count} of {runs[share]} runs at"
+        f" {share:.0%}: {reason}"
+        for (name, share, reason), count in reasons.items()
+    ]
     inputs = [one for one in ("map", "limbs", "kinematics") if one != plan.denoiser.inputs]
     tried = ", ".join(one.title for one in plan.classifiers)
     more = [f"other classifiers than {tried}", "the video of several at a time"]
@@ -259,7 +266,7 @@ def untried(results: Results) -> list[str]:
         more.append(f"more movements of {', '.join(few)}: over so few, intervals are too narrow")
     if not plan.placements and not plan.video:
         more.append("other places of the sensor, bodies of other shape, mirrored movements")
-    return [*left, *reasons, *more]
+    return [*left, *failed, *more]
 
 
 def draw_curve(results: Results) -> Figure:
