@@ -28,7 +28,6 @@ OLD = {
     "fitting.md": "ten idle minutes; only how its commands are declared has changed",
     "range-synthesis.md": _HOURS,
     "real-pairs.md": "a quarter of an hour; nothing that it measures was meant to change",
-    "classifier.md": _HOURS,
     "paper.md": _HOURS,
 }
 """Pages that may be older than the program, and why they were not measured anew."""
