@@ -87,28 +87,28 @@ class Material:
 def material_of(plan_text: str) -> Material:
     """Read the material of a plan (JSON), whose paths are absolute."""
     plan = StudyPlan.model_validate_json(plan_text)
-    stores, sets, inputs = _sources(plan)
-    movements: dict[tuple[str, str, int], Take] = dict(inputs)
+    stores, sets, takes = _sources(plan)
     names = {name for one in sets for name in one.classes}
     pairs = None
     if stores:
         pairs = _labelled(read_mixed(stores), plan)
         names |= {*pairs.labels}
         sets.append(_clips(pairs, plan))
-        movements |= {(one.subject, one.name, one.placement): one for one in pairs.takes}
+        takes += pairs.takes
     if strange := [label for label in plan.classes if label not in names]:
         raise Sd2Error(
             f"No frame is labelled {', '.join(strange)}", f"some of {', '.join(sorted(names))}"
         )
-    seen = _without_unknown(merged(sets), plan)
+    seen = _of_the_classes(merged(sets), plan)
     found = [
-        Movement(clip, movements.get((clip.subject, clip.movement, clip.placement)))
-        for clip in seen.clips
+        Movement(clip, take)
+        for clip, take in zip(seen.clips, takes, strict=True)
+        if (clip.label != UNKNOWN).any()
     ]
-    first = seen_first(seen.clips)
+    first = seen_first(one.clip for one in found)
     filmed = [one for one in found if one.take is not None and (plan.placements or first(one.clip))]
     others: list[Movement] = []
-    people = set(seen.subjects)
+    people = {one.clip.subject for one in found}
     for path in plan.video:
         for one in _filmed(Path(path), plan, seen):
             (filmed if one.clip.subject in people else others).append(one)
@@ -121,13 +121,11 @@ def material_of(plan_text: str) -> Material:
     )
 
 
-def _sources(
-    plan: StudyPlan,
-) -> tuple[list[Path], list[ClipSet], dict[tuple[str, str, int], Take]]:
-    """Stores of pairs, sets of what only a radar saw, and inputs that data sets hold."""
+def _sources(plan: StudyPlan) -> tuple[list[Path], list[ClipSet], list[Take | None]]:
+    """Stores of pairs, sets of what a radar saw, and a take for each of their clips or none."""
     stores: list[Path] = []
     sets: list[ClipSet] = []
-    inputs: dict[tuple[str, str, int], Take] = {}
+    takes: list[Take | None] = []
     with_mesh: list[tuple[Path, str]] = []
     for one in unfolded([LabelledSource.parsed(text) for text in plan.data]):
         rate_hz = sets[0].frame_rate_hz if sets else None
@@ -135,9 +133,9 @@ def _sources(
         if kind == "pairs":
             stores.append(one.path)
         elif kind == "dataset":
-            radar, synthetic = _of_dataset(one.path)
+            radar, inputs = _of_dataset(one.path)
             sets.append(radar)
-            inputs |= synthetic
+            takes += inputs
         elif holds_map(one.path):
             file = load_recorded_map(one.path)
             who = one.subject or ONE_PERSON
@@ -158,12 +156,13 @@ def _sources(
                 f"{one.path} is a {kind}",
                 "pairs, data sets, labelled recordings with a radar, or labelled radar files",
             )
+        takes += [None] * (sum(len(each.clips) for each in sets) - len(takes))
     if with_mesh:
         made = Path(plan.out) / "pairs.zarr"
         paths, names = zip(*with_mesh, strict=True)
         make_recording_pairs(paths, made, PRESETS["paper"], subjects=names, limbs=True)
         stores.append(made)
-    return stores, sets, inputs
+    return stores, sets, takes
 
 
 def _of_recording(recording: Recording, subject: str, rate_hz: float | None) -> ClipSet:
@@ -180,34 +179,40 @@ def _of_recording(recording: Recording, subject: str, rate_hz: float | None) -> 
     )  # fmt: skip
 
 
-def _of_dataset(path: Path) -> tuple[ClipSet, dict[tuple[str, str, int], Take]]:
-    """What the radar saw, and the synthetic maps of the same movements."""
+def _of_dataset(path: Path) -> tuple[ClipSet, list[Take | None]]:
+    """What the radar saw, and a take with the synthetic map of each clip, where there is one."""
     with open_dataset(path) as dataset:
         kind = next((one for one in dataset.header.kinds if one in ("real", "simulated")), None)
         if kind is None:
             raise Sd2Error(f"{path} holds no maps of a radar", "maps that a radar saw")
         seen = clips_of_dataset(dataset, kind)
         if "synthetic" not in dataset.header.kinds:
-            return seen, {}
+            return seen, [None] * len(seen.clips)
         shown = clips_of_dataset(dataset, "synthetic")
-    radar = {(*clip.key, clip.placement): clip for clip in seen.clips}
-    takes = {}
+    waiting: dict[tuple[str, str, int], list[Clip]] = {}
     for clip in shown.clips:
-        own = radar.get((*clip.key, clip.placement))
-        if own is not None and own.energies.shape == clip.energies.shape:
-            takes[(*clip.key, clip.placement)] = Take(
-                clip.subject, clip.movement, clip.energies, own.energies,
-                np.arange(len(clip)) / seen.frame_rate_hz,
-                np.zeros(len(clip), np.int8), np.zeros(3), clip.placement,
-            )  # fmt: skip
+        waiting.setdefault((*clip.key, clip.placement), []).append(clip)
+    takes: list[Take | None] = []
+    for clip in seen.clips:
+        alike = waiting.get((*clip.key, clip.placement), [])
+        # A movement may have several clips; those of both kinds are cut alike, and in order.
+        at = next((n for n, one in enumerate(alike) if np.array_equal(one.label, clip.label)), None)
+        takes.append(None if at is None else _take(alike.pop(at), clip, seen.frame_rate_hz))
     return seen, takes
+
+
+def _take(shown: Clip, seen: Clip, rate_hz: float) -> Take:
+    frames = len(seen)
+    return Take(
+        seen.subject, seen.movement, shown.energies, seen.energies, np.arange(frames) / rate_hz,
+        np.zeros(frames, np.int8), np.zeros(3), seen.placement,
+    )  # fmt: skip
 
 
 def _filmed(path: Path, plan: StudyPlan, seen: ClipSet) -> list[Movement]:
     """Movements of pairs or a data set of which there is only video."""
     if kind_of(path) == "dataset":
-        made, takes = _of_dataset(path)
-        inputs = [takes.get((*clip.key, clip.placement)) for clip in made.clips]
+        made, inputs = _of_dataset(path)
     else:
         pairs = read_pairs(path)
         rows = [] if plan.labels is None else read_take_labels(Path(plan.labels))
@@ -240,8 +245,8 @@ def _clips(pairs: PairSet, plan: StudyPlan) -> ClipSet:
     return clips_of_pairs(pairs, pairs.kind, names=names)
 
 
-def _without_unknown(found: ClipSet, plan: StudyPlan) -> ClipSet:
-    """Keep the classes of the plan that occur, and clips with a frame of one."""
+def _of_the_classes(found: ClipSet, plan: StudyPlan) -> ClipSet:
+    """Keep the classes of the plan that occur; frames of others are unknown."""
     there = {found.classes[n] for clip in found.clips for n in np.unique(clip.label) if n >= 0}
     given: Mapping[str, str] = {**plan.classes, **{one: one for one in plan.classes.values()}}
     names = [given.get(one, _NEITHER) if plan.classes else one for one in found.classes]
@@ -256,8 +261,7 @@ def _without_unknown(found: ClipSet, plan: StudyPlan) -> ClipSet:
             "Label pairs with `sd2 pairs label`, recordings in the window",
         )
     clips = _renumbered(replace(found, classes=tuple(names)), kept)
-    used = tuple(one for one in clips if (one.label != UNKNOWN).any())
-    return replace(found, classes=kept, clips=used)
+    return replace(found, classes=kept, clips=tuple(clips))
 
 
 def _renumbered(found: ClipSet, classes: Sequence[str]) -> list[Clip]:

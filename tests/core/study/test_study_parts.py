@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from small_pairs import AXIS, write_pairs
 
 from sd2core.classify.data import Clip
+from sd2core.cli import build_parser, run
 from sd2core.errors import Sd2Error
 from sd2core.maps import mean_velocity_mps
 from sd2core.pairs.labelling import TakeLabel, label_pairs
@@ -234,3 +235,23 @@ def test_a_plan_that_cannot_be_names_the_line(tmp_path: Path, text: str, said: s
     (tmp_path / "s.toml").write_text(text)
     with pytest.raises(Sd2Error, match=said):
         read_study(tmp_path / "s.toml")
+
+
+def test_a_data_set_gives_what_the_radar_saw_with_its_synthetic_maps(
+    store: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "set.zarr"
+    words = ["export", str(store), "--out", str(out), "--segment-frames", "30", "--kinds"]
+    assert run(build_parser()[0], [*words, "synthetic,simulated", "--overlap-frames", "0"]) == 0
+    material = material_of(plan_of(store, folds="files").model_dump_json())
+    found = material_of(
+        StudyPlan(title="t", out=str(tmp_path), data=(str(out),), folds="files").model_dump_json()
+    )
+    assert found.known.classes == material.known.classes
+    assert {one.clip.subject for one in found.real} == {"s1", "s2", "s3"}
+    for one in found.real:
+        assert one.take is not None
+        np.testing.assert_array_equal(one.take.radar, one.clip.energies)
+        (own,) = [each.take for each in material.real if each.title == one.title]
+        frames = len(one.clip)
+        np.testing.assert_array_equal(one.take.synthetic, own.synthetic[:frames])
