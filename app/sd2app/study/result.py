@@ -56,7 +56,7 @@ class Matrix:
 
 @dataclass(frozen=True)
 class CurvePoint:
-    """Recall after learning from a share of the radar's data."""
+    """Share of frames found after learning from a share of the radar's data."""
 
     title: str
     share: float
@@ -80,7 +80,7 @@ class ClassResult:
     def heading(self) -> str:
         """Title of the results."""
         text = f"Frames of a {self.kind} radar" if self.seeds else f"Judged on {self.kind} maps"
-        if self.seeds:
+        if self.seeds > 1:
             text += f", mean ± standard deviation of {self.seeds} seeds"
         return text
 

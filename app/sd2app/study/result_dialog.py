@@ -185,7 +185,7 @@ class _LearningCurves(ChartView):
 
 
 def learning_chart(result: ClassResult) -> Chart:
-    """Mean recall with bars of one standard deviation over the share of real data."""
+    """Frames found, with half an interval over movements, by the share of the radar's data."""
     points = [point for curve in result.curves for point in curve]
     low = min(point.recall.mean - point.recall.sd for point in points)
     high = max(point.recall.mean + point.recall.sd for point in points)
@@ -204,7 +204,7 @@ def learning_chart(result: ClassResult) -> Chart:
                 x,
                 y,
                 f"{point.title}, {x:g} % of the {result.kind} radar's data\n"
-                f"Mean recall {point.recall.text()} %",
+                f"Frames found {point.recall.text()} %",
                 aside_px,
             )
             for (x, y), point in zip(places, curve, strict=True)
@@ -213,7 +213,7 @@ def learning_chart(result: ClassResult) -> Chart:
         Scale(shares[0] / _PAD, 100 * _PAD, log=True, values=tuple(shares), text="{:g} %".format),
         Scale(100 * least, 100 * max(min(math.ceil(10 * high) / 10, 1.0), least + 0.1)),
         f"share of the {result.kind} radar's data that is learnt from",
-        "mean recall, %",
+        "frames found, mean over movements, %",
         curves,
         marks,
         scattered=True,
