@@ -101,7 +101,12 @@ def run_task(plan_text: str, denoiser: str | None, task: Task) -> Run:
     group = grouped(plan, material, task.seed)
     real = drawn(plan, material, task.fold.real, task.share, task.seed)
     judged = [one for one in material.real if group[one.clip.key] == task.fold.judged]
-    filmed = [one for one in material.filmed if group.get(one.clip.key) == task.fold.video]
+    filmed = [
+        one
+        for one in material.filmed
+        # Of a movement that no radar saw the person tells; of parts it is in none.
+        if group.get(one.clip.key, one.clip.subject) == task.fold.video
+    ]
     model, reason = _denoiser(plan, material, denoiser)
     found: dict[str, list[tuple[str, Score]]] = {}
     missing: dict[str, str] = {}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -48,13 +49,18 @@ class StudyRun(CommandRun):
         """What it found; None where there is nothing yet."""
         return self.out / RESULT_NAME if self.facts else None
 
+    @cached_property
+    def _conclusion(self) -> str:
+        # Read once: the page asks at every step, and the file may have megabytes.
+        try:
+            return str(read_json(self.out / RESULT_NAME)["conclusion"])
+        except (Sd2Error, KeyError, TypeError):
+            return ""
+
     @property
     def conclusion(self) -> str:
         """Sentence of its page; empty without one."""
-        try:
-            return "" if self.result is None else str(read_json(self.result)["conclusion"])
-        except (Sd2Error, KeyError, TypeError):
-            return ""
+        return "" if self.result is None else self._conclusion
 
     def inspect(self) -> bool:
         """Check for a result."""

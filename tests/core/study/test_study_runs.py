@@ -12,6 +12,7 @@ from sd2core.cli import build_parser, run
 from sd2core.errors import Sd2Error
 from sd2core.pairs.labelling import TakeLabel, label_pairs
 from sd2core.study import run as study_run
+from sd2core.study import trial
 from sd2core.study.plan import Learner, read_study
 from sd2core.study.report import findings_of, untried, write_report
 from sd2core.study.run import run_study
@@ -154,6 +155,26 @@ def test_bodies_that_no_radar_saw_are_added_in_every_fold(
     alone = read_study(plan).model_copy(update={**update, "added": ("simulated",)})
     # Without a person who is filmed, each of three is judged once.
     assert {len(one.task.fold.real) for one in run_study(alone).runs} == {2}
+
+
+def test_more_video_of_a_person_is_added_where_that_person_is_filmed(
+    plan: Path, in_this_process: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    more = write_pairs(tmp_path / "more.zarr", ("s1",), takes=5, limbs=True)
+    label_pairs(more, [TakeLabel("*", f"t{number}", "ab"[number % 2]) for number in range(5)])
+    added: list[list[str]] = []
+    learn = trial.learnt
+
+    def learnt(*arguments):
+        added.append([clip.title for clip in arguments[3]])
+        return learn(*arguments)
+
+    monkeypatch.setattr(trial, "learnt", learnt)
+    update = {"video": (str(more),), "added": ("synthetic",), "shares": (1.0,)}
+    run_study(read_study(plan).model_copy(update=update))
+    # Its last take is of a movement that no radar saw.
+    assert sorted({len(one) for one in added}) == [0, 4, 9]
+    assert all(("s1/t4" in one) == (len(one) == 9) for one in added)
 
 
 @pytest.mark.slow
