@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,7 +20,7 @@ from sd2core.files.tables import counted, markdown_table
 from sd2core.study.certainty import Gain, adjusted, gain_of
 from sd2core.study.plan import OF_VIDEO
 from sd2core.study.run import Results
-from sd2core.study.trial import REAL, Run
+from sd2core.study.trial import REAL
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -134,13 +134,13 @@ def conclusion(results: Results, findings: Sequence[Finding]) -> str:
             people = "also counting that people differ"
         said.append(
             f"It helped in {len(helped)} of {len(own)} comparisons, most"
-            f" {TITLES[best.added].removeprefix('+ ')} maps at {best.share:.0%} of the"
+            f" {_maps(best.added)} at {best.share:.0%} of the"
             f" {results.kind} radar's data: {_points(best.frames)} of the frames; {people}."
         )
     if harmed:
         worst = min(harmed, key=lambda one: one.frames.mean)
         said.append(
-            f"It harmed in {len(harmed)}, most {TITLES[worst.added].removeprefix('+ ')} maps at"
+            f"It harmed in {len(harmed)}, most {_maps(worst.added)} at"
             f" {worst.share:.0%}: {_points(worst.frames)}."
         )
     rest = len(own) - len(sure)
@@ -150,6 +150,10 @@ def conclusion(results: Results, findings: Sequence[Finding]) -> str:
             " be chance."
         )
     return " ".join(said)
+
+
+def _maps(added: str) -> str:
+    return f"{TITLES[added].removeprefix('+ ')} maps"
 
 
 def _best(results: Results) -> str:
@@ -239,11 +243,7 @@ def _folds_in_words(results: Results) -> str:
 def untried(results: Results) -> list[str]:
     """List what this study says nothing about."""
     plan = results.plan
-    left = [
-        f"adding {TITLES[one].removeprefix('+ ')} maps"
-        for one in OF_VIDEO
-        if one not in plan.wanted
-    ]
+    left = [f"adding {_maps(one)}" for one in OF_VIDEO if one not in plan.wanted]
     runs = Counter(run.task.share for run in results.runs)
     reasons = Counter(
         (name, run.task.share, reason)
@@ -251,8 +251,7 @@ def untried(results: Results) -> list[str]:
         for name, reason in run.missing.items()
     )
     failed = [
-        f"adding {TITLES[name].removeprefix('+ ')} maps in {count} of {runs[share]} runs at"
-        f" {share:.0%}: {reason}"
+        f"adding {_maps(name)} in {count} of {runs[share]} runs at {share:.0%}: {reason}"
         for (name, share, reason), count in reasons.items()
     ]
     inputs = [one for one in ("map", "limbs", "kinematics") if one != plan.denoiser.inputs]
@@ -379,32 +378,20 @@ def _summary(values: dict[str, NDArray[np.float64]]) -> dict[str, Any]:
 
 
 def _gain(results: Results, added: str, share: float, measure: int) -> Gain | None:
-    runs = [run for run in results.runs if run.task.share == share and added in run.takes]
-    values = _by_person(
-        results, runs, measure, lambda run, take: run.takes[added][take], minus=REAL
-    )
+    values = _values(results, added, share, measure, minus=REAL)
     return gain_of(values) if values else None
 
 
 def _values(
-    results: Results, name: str, share: float, measure: int
-) -> dict[str, NDArray[np.float64]]:
-    runs = [run for run in results.runs if run.task.share == share and name in run.takes]
-    return _by_person(results, runs, measure, lambda run, take: run.takes[name][take])
-
-
-def _by_person(
-    results: Results,
-    runs: Sequence[Run],
-    measure: int,
-    of: Callable[[Run, str], tuple[float, float | None]],
-    minus: str | None = None,
+    results: Results, name: str, share: float, measure: int, minus: str | None = None
 ) -> dict[str, NDArray[np.float64]]:
     """Mean over folds and draws for every take that has such a score, by person."""
     found: dict[str, dict[str, list[float]]] = {}
-    for run in runs:
-        for take in run.takes[REAL]:
-            value = of(run, take)[measure]
+    for run in results.runs:
+        if run.task.share != share:
+            continue
+        for take, scores in run.takes.get(name, {}).items():
+            value = scores[measure]
             if value is not None:
                 less = 0.0 if minus is None else run.takes[minus][take][measure] or 0.0
                 own = found.setdefault(results.subject_of[take], {})

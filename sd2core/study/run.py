@@ -91,15 +91,14 @@ def _made(
 ) -> Results:
     text = plan.model_dump_json()
     material = material_of(text)
-    tasks = all_tasks(plan, material)
     known = dict.fromkeys([*material.real, *material.filmed, *material.others])
     content = _digest(material, known)
-    paths = [_run_path(folder, plan, content, task) for task in tasks]
+    tasks = {_run_path(folder, plan, content, one): one for one in all_tasks(plan, material)}
     digest = _digest(material, material.real)  # Denoisers learn from nothing else.
     learns = plan.learns_denoisers and material.pairs is not None
-    models = {
-        _model_folder(folder, plan, digest, task): task for task in tasks if learns
-    }  # Of the same real groups the same.
+    # Tasks of the same real groups have the same.
+    places = {path: _model_folder(folder, plan, digest, one) for path, one in tasks.items()}
+    models = {places[path]: one for path, one in tasks.items() if learns}
     total = len(models) + len(tasks)
     progress(0, total)
     with ThreadPoolExecutor(processes) as threads:
@@ -113,16 +112,15 @@ def _made(
             for job in jobs:
                 job.cancel()
             raise
-    runs = {path: _read(path) for path in paths}
+    runs = {path: _read(path) for path in tasks}
     missing = [path for path, run in runs.items() if run is None]
     done = total - len(missing)
     if missing:
-        of = dict(zip(paths, tasks, strict=True))
         with study_client(folder / "begun", processes, scheduler) as (client, finished):
             futures = {}
             for path in missing:
-                place = str(_model_folder(folder, plan, digest, of[path])) if learns else None
-                futures[client.submit(run_task, text, place, of[path], pure=False)] = path
+                place = str(places[path]) if learns else None
+                futures[client.submit(run_task, text, place, tasks[path], pure=False)] = path
             for future in finished(futures):
                 run = future.result()
                 runs[futures[future]] = run

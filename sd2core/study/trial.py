@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, reduce
+from operator import add
 from pathlib import Path
 from typing import Any
 
@@ -108,7 +109,7 @@ def run_task(plan_text: str, denoiser: str | None, task: Task) -> Run:
         if group.get(one.clip.key, one.clip.subject) == task.fold.video
     ]
     model, reason = _denoiser(plan, material, denoiser)
-    found: dict[str, list[tuple[str, Score]]] = {}
+    found: dict[str, dict[str, Score]] = {}
     missing: dict[str, str] = {}
     learner = plan.classifiers[0]
     describe = _kept(plan_text, learner)
@@ -132,8 +133,8 @@ def run_task(plan_text: str, denoiser: str | None, task: Task) -> Run:
     return Run(
         task,
         sum(int((one.clip.label >= 0).sum()) for one in real),
-        {name: {title: _of_take(one) for title, one in own} for name, own in found.items()},
-        {name: sum((one for _, one in own[1:]), own[0][1]) for name, own in found.items()},
+        {name: {title: _of_take(one) for title, one in own.items()} for name, own in found.items()},
+        {name: reduce(add, own.values()) for name, own in found.items()},
         missing,
     )
 
@@ -181,7 +182,7 @@ def _judged(
     judged: Sequence[Movement],
     seed: int,
     describe: Describe,
-) -> list[tuple[str, Score]]:
+) -> dict[str, Score]:
     """Scores of all judged movements, by title; clips of one movement are taken together."""
     known = material.known
     own = [one.clip for one in real]
@@ -194,7 +195,7 @@ def _judged(
         rate_hz = known.frame_rate_hz
         this = score([one.clip.label], [answers], known.classes, rate_hz, background, late_s)
         found[one.title] = found[one.title] + this if one.title in found else this
-    return list(found.items())
+    return found
 
 
 def _of_take(found: Score) -> tuple[float, float | None]:
