@@ -10,19 +10,22 @@ from typing import TYPE_CHECKING
 from sd2core.cli.command_parser import Options, add_command
 from sd2core.cli.options import bin_list, finite_float, given, position
 from sd2core.cli.output import print_facts, print_json, progress_bar
+from sd2core.cli.simulate import add_radar_choice
 
 if TYPE_CHECKING:
+    from sd2core.doppler import SynthesisOptions
     from sd2core.mocap.mars_pairs import MarsChoices
     from sd2core.mocap.radar_place import RadarPlace
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
-    """Make pairs of synthetic and real Doppler to learn from."""
+    """Make pairs of synthetic and radar Doppler to learn from."""
     parser = add_command(commands, "pairs", about=add_commands)
     kinds = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     _add_mars(kinds)
     _add_recordings(kinds)
     _add_label(kinds)
+    _add_vary(kinds)
 
 
 def _add_recordings(kinds: argparse._SubParsersAction) -> None:
@@ -30,8 +33,26 @@ def _add_recordings(kinds: argparse._SubParsersAction) -> None:
     parser.add_value("recordings", Path, "RECORDING", "with a mesh and a radar", nargs="+")
     _add_pairs(parser, "14,15,16 of 32, else none")
     parser.add_count()
+    _add_subjects(parser)
+
+
+def _add_subjects(parser: Options) -> None:
     text = "subject of each recording, separated by commas (default: each shows another person)"
     parser.add_value("--subjects", lambda text: tuple(text.split(",")), "LIST", text)
+
+
+def _add_vary(kinds: argparse._SubParsersAction) -> None:
+    parser = add_command(kinds, "vary", handler=_vary)
+    text = "recordings with a mesh, or folders of MARS, each with one person's parts"
+    parser.add_value("sources", Path, "SOURCE", text, nargs="+")
+    text = "what is another: the sensor's place (within 25 degrees, 0.8 to 1.25 times as far), the"
+    text += " shape of the body, or left and right"
+    kinds_of = ("places", "shapes", "mirrored")
+    parser.add_argument("--by", choices=kinds_of, required=True, help=text)
+    _add_pairs(parser, "14,15,16 of 32, else none; of MARS none")
+    _add_subjects(parser)
+    add_radar_choice(parser)
+    parser.add_value("--seed", int, "N", "seed of all random numbers", 0)
 
 
 def _add_label(kinds: argparse._SubParsersAction) -> None:
@@ -116,20 +137,23 @@ def _add_mars(kinds: argparse._SubParsersAction) -> None:
 
 
 def _choices(options: argparse.Namespace) -> MarsChoices:
-    from sd2core.cli.reading import chosen_axis
     from sd2core.mocap.mars_pairs import MarsChoices
     from sd2core.mocap.radar_place import RadarPlace
 
-    choices = MarsChoices()
-    synthesis = choices.synthesis
-    axis = chosen_axis(options, synthesis.axis)
-    changes = given(options, ("null_bins", "visibility", "weight"))
-    choices = replace(choices, synthesis=replace(synthesis, axis=axis, **changes))
     place = None
     if options.sensor is not None or options.radar_offset_s is not None:
         place = RadarPlace(options.sensor or (0.0, 0.0, 0.0), options.radar_offset_s or 0.0)
-    choices = replace(choices, limbs=options.limbs, place=place)
+    choices = MarsChoices(_mars_synthesis(options), limbs=options.limbs, place=place)
     return replace(choices, target=options.target) if options.target else choices
+
+
+def _mars_synthesis(options: argparse.Namespace) -> SynthesisOptions:
+    from sd2core.cli.reading import chosen_axis
+    from sd2core.mocap.mars_pairs import MarsChoices
+
+    synthesis = MarsChoices().synthesis
+    axis = chosen_axis(options, synthesis.axis)
+    return replace(synthesis, axis=axis, **given(options, ("null_bins", "visibility", "weight")))
 
 
 def _recordings(options: argparse.Namespace) -> None:
@@ -141,16 +165,9 @@ def _recordings(options: argparse.Namespace) -> None:
       sd2 pairs recordings anna.sd2 ben.sd2 carla.sd2 --out mine.zarr
       sd2 pairs recordings a1.sd2 a2.sd2 b1.sd2 --subjects anna,anna,ben --out mine.zarr
     """
-    from sd2core.cli.reading import chosen_axis
-    from sd2core.doppler import PRESETS
     from sd2core.mocap.recording_pairs import make_recording_pairs
 
-    synthesis = PRESETS["paper"]
-    axis = chosen_axis(options, synthesis.axis)
-    if axis != synthesis.axis:
-        # What is nulled by default are bins of the paper's axis.
-        synthesis = replace(synthesis, axis=axis, null_bins=())
-    synthesis = replace(synthesis, **given(options, ("null_bins", "count")))
+    synthesis = replace(_synthesis(options), **given(options, ("count",)))
     with progress_bar("Making pairs", "step") as progress:
         made = make_recording_pairs(
             options.recordings,
@@ -172,6 +189,62 @@ def _recordings(options: argparse.Namespace) -> None:
     }
     if made.left_out_s > 0:
         facts["left out"] = f"{made.left_out_s:.1f} s without a person or a radar frame"
+    print_facts(str(options.out), facts)
+
+
+def _synthesis(options: argparse.Namespace) -> SynthesisOptions:
+    """Choose the synthesis of recordings' maps."""
+    from sd2core.cli.reading import chosen_axis
+    from sd2core.doppler import PRESETS
+
+    synthesis = PRESETS["paper"]
+    axis = chosen_axis(options, synthesis.axis)
+    if axis != synthesis.axis:
+        # What is nulled by default are bins of the paper's axis.
+        synthesis = replace(synthesis, axis=axis, null_bins=())
+    return replace(synthesis, **given(options, ("null_bins",)))
+
+
+def _vary(options: argparse.Namespace) -> None:
+    """Simulated pairs of the same movements as they were not recorded.
+
+    A body moves as in a recording, or as MARS' Kinect saw it, but is seen from another
+    place, is of another shape, or moves left for right. The target is what a simulated
+    radar sees of it, the input its synthetic Doppler. Bodies of other shape are made of
+    meshes of `sd2 fit` alone. In a mirror, labels that say left or right say the other.
+    A study adds these pairs where its plan names them as video.
+
+    It can be stopped at any moment; the same command resumes it.
+
+      sd2 pairs vary anna.sd2 ben.sd2 --by places --out elsewhere.zarr
+      sd2 pairs vary mars_subject1 mars_subject4 --by shapes --limbs --out shapes.zarr
+    """
+    from sd2core.errors import Sd2Error
+    from sd2core.io.radar import named_radar
+    from sd2core.recording.recording import is_recording
+    from sd2core.simulate.variants import VariantOptions, vary_mars, vary_recordings
+
+    recorded = {is_recording(path) for path in options.sources}
+    if len(recorded) > 1:
+        raise Sd2Error(
+            "Some sources are recordings, others not", "recordings, or folders of MARS, at a time"
+        )
+    synthesis = _synthesis(options) if True in recorded else _mars_synthesis(options)
+    chosen = VariantOptions(
+        options.by, synthesis, named_radar(options.radar), options.limbs, options.seed
+    )
+    with progress_bar("Simulating", unit="source") as progress:
+        if True in recorded:
+            pairs = vary_recordings(
+                options.sources, options.out, chosen, subjects=options.subjects, progress=progress
+            )
+        else:
+            pairs = vary_mars(options.sources, options.out, chosen, progress)
+    counts = {name: len(pairs.of([name]).takes) for name in pairs.subjects}
+    if options.json:
+        print_json({"pairs": str(options.out), "simulated": True, "takes_of_subject": counts})
+        return
+    facts = {"radar": "simulated"} | {name: f"{takes} takes" for name, takes in counts.items()}
     print_facts(str(options.out), facts)
 
 

@@ -9,10 +9,12 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from sd2core.classify.data import ClipSet, clips_of_map
 from sd2core.datasets.reading import open_dataset
 from sd2core.errors import Sd2Error
 from sd2core.io.kinds import RADAR_MAP_SUFFIXES, kind_of
 from sd2core.io.radar import holds_map, load_recorded_map
+from sd2core.labels.spans import Labels, Span
 from sd2core.pairs.summary import pair_facts
 from sd2core.recording.recording import SUFFIX, is_recording, open_recording
 
@@ -157,15 +159,33 @@ def _of_dataset(path: Path) -> LabelledFacts:
     )
 
 
-def _of_recording(source: LabelledSource) -> LabelledFacts:
-    recording = open_recording(source.path)
-    spans = [one for one in recording.effective_labels().spans if one.origin != "suggestion"]
+def clips_of_radar_file(source: LabelledSource, frame_rate_hz: float | None) -> ClipSet:
+    """Return the clips of a labelled radar file; see :func:`clips_of_map`."""
+    recorded = load_recorded_map(source.path)
+    return clips_of_map(
+        recorded.doppler,
+        recorded.labels,
+        subject=source.subject or ONE_PERSON,
+        movement=source.path.stem,
+        frame_rate_hz=frame_rate_hz,
+    )
+
+
+def labels_given(labels: Labels, path: Path) -> list[Span]:
+    """Return the labels that are no suggestions; Sd2Error where a recording has none."""
+    spans = [span for span in labels.spans if span.origin != "suggestion"]
     if not spans:
         raise Sd2Error(
-            f"{source.path} has no labels",
+            f"{path} has no labels",
             "a recording in which gestures are labelled",
             "Label it in the window, or leave it out",
         )
+    return spans
+
+
+def _of_recording(source: LabelledSource) -> LabelledFacts:
+    recording = open_recording(source.path)
+    spans = labels_given(recording.effective_labels(), source.path)
     maps: list[str] = []
     if recording.mesh is not None:
         shown_without = recording.denoiser is None and recording.bundled_denoiser == ""

@@ -157,7 +157,7 @@ def make_mars_pairs(
     made = MadePairs({}, {}, {}, {})
     for person in dict.fromkeys(part.subject for part in parts):
         own = [part for part in parts if part.subject == person]
-        stretches = {key: stretch for part in own for key, stretch in _takes_of(part)}
+        stretches = {key: stretch for part in own for key, stretch in takes_of(part)}
         frames = sum(stretch.frame_count for stretch in stretches.values())
         if not stretches.keys() <= writer.done:
 
@@ -181,16 +181,8 @@ def _write(
     """Append those takes of one person that are not there; ``progress`` gets frames done."""
     progress(0)
     person = next(iter(stretches)).subject
-    clips = [skeleton_clip(stretch) for stretch in stretches.values()]
-    puppet = puppet_of(clips, KINECT_MARKERS)
-    driven: list[DrivenClip] = []
-    done = 0
-    for clip in clips:
-        driven.append(puppet.pose(clip, partial(progress, done)))
-        done += len(clip.times_s) - 1  # the rest when the takes are written
-    place = choices.place or estimate_place(
-        [seen_of(one, stretch) for one, stretch in zip(driven, stretches.values(), strict=True)]
-    )
+    driven, place = driven_clips([*stretches.values()], choices.place, progress)
+    done = sum(len(one.clip.times_s) - 1 for one in driven)
     synthesis = choices.synthesis
     for (key, stretch), one in zip(stretches.items(), driven, strict=True):
         if key in writer.done:
@@ -212,13 +204,35 @@ def _write(
             )
         )
     made.places[person] = place
-    made.stature_m[person] = puppet.shape.stature_m
+    made.stature_m[person] = driven[0].puppet.shape.stature_m
     made.residual_m[person] = float(
         np.nanmean(np.concatenate([one.residual_m.ravel() for one in driven]))
     )
 
 
-def seen_of(driven: DrivenClip, stretch: MarsStretch) -> Seen:
+def driven_clips(
+    stretches: Sequence[MarsStretch],
+    place: RadarPlace | None = None,
+    progress: Callable[[int], None] = lambda done: None,
+) -> tuple[list[DrivenClip], RadarPlace]:
+    """Return a person's body in all stretches, and the radar's place, estimated if not given.
+
+    ``progress`` gets the frames that are done, all but the last of every stretch.
+    """
+    clips = [skeleton_clip(stretch) for stretch in stretches]
+    puppet = puppet_of(clips, KINECT_MARKERS)
+    driven: list[DrivenClip] = []
+    done = 0
+    for clip in clips:
+        driven.append(puppet.pose(clip, partial(progress, done)))
+        done += len(clip.times_s) - 1
+    place = place or estimate_place(
+        [_seen_of(one, stretch) for one, stretch in zip(driven, stretches, strict=True)]
+    )
+    return driven, place
+
+
+def _seen_of(driven: DrivenClip, stretch: MarsStretch) -> Seen:
     """What body and radar say of one stretch, to find the radar's place by."""
     clip = driven.clip
     velocity_mps = np.full(stretch.frame_count, np.nan)
@@ -227,7 +241,8 @@ def seen_of(driven: DrivenClip, stretch: MarsStretch) -> Seen:
     return Seen(clip.times_s, points_m.astype(np.float64), velocity_mps)
 
 
-def _takes_of(part: MarsPart) -> list[tuple[TakeKey, MarsStretch]]:
+def takes_of(part: MarsPart) -> list[tuple[TakeKey, MarsStretch]]:
+    """Return the stretches of a part as takes of its person."""
     return [
         (TakeKey(part.subject, f"{part.name}-stretch-{number:02d}", 0), stretch)
         for number, stretch in enumerate(part.stretches, start=1)

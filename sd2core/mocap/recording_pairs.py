@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -28,9 +28,8 @@ from sd2core.version import __version__
 TAKE_S = 15.0
 """Longer stretches are cut: takes can be kept apart even where there is one person."""
 
-_BACKGROUND = "background"
+BACKGROUND = "background"
 _SAME_RATE = 0.01
-"""Steps of progress per recording."""
 
 
 @dataclass(frozen=True)
@@ -62,17 +61,17 @@ def make_recording_pairs(
     Raises Sd2Error if a recording lacks mesh or radar, two are called alike, or frame rates
     or kinds of radar differ.
     """
-    opened = [open_recording(path) for path in recordings]
-    names = _names(opened, subjects)
+    named = named_recordings(recordings, subjects)
+    opened = [recording for recording, _ in named]
     for recording in opened:
         _check(recording)
-    labels = (_BACKGROUND, *sorted({span.label for one in opened for span in one.labelled.spans}))
+    labels = (BACKGROUND, *sorted({span.label for one in opened for span in one.labelled.spans}))
     channels = [one.channel_in_words for one in opened]
     writer: PairWriter | None = None
     first: tuple[Path, float, bool] | None = None
     found: dict[str, tuple[int, int]] = {}
     left_out_s = 0.0
-    for number, (recording, subject) in enumerate(zip(opened, names, strict=True)):
+    for number, (recording, subject) in enumerate(named):
         synthetic, radar = _maps(
             recording, synthesis, limbs, part_of(progress, number, number + 1, len(opened))
         )
@@ -109,21 +108,26 @@ def make_recording_pairs(
     return PairsMade(found, left_out_s)
 
 
-def _names(recordings: Sequence[Recording], subjects: Sequence[str] | None) -> list[str]:
-    folders = [recording.folder.stem for recording in recordings]
+def named_recordings(
+    recordings: Sequence[Path], subjects: Sequence[str] | None = None
+) -> list[tuple[Recording, str]]:
+    """Open recordings, each with its person: by default another in each, named like it.
+
+    Raises Sd2Error if two are called alike, or there is not one person for each.
+    """
+    opened = [open_recording(path) for path in recordings]
+    folders = [recording.folder.stem for recording in opened]
     for name in folders:
         if folders.count(name) > 1:
             raise Sd2Error(
                 f"Two recordings are called {name}", "names that differ", "Rename one of them"
             )
-    if subjects is None:
-        return folders
-    if len(subjects) != len(folders):
+    if subjects is not None and len(subjects) != len(folders):
         raise Sd2Error(
             f"{len(subjects)} people are named for {len(folders)} recordings",
             "one for each, in their order",
         )
-    return list(subjects)
+    return list(zip(opened, folders if subjects is None else subjects, strict=True))
 
 
 def _check(recording: Recording) -> None:
@@ -147,12 +151,19 @@ def _maps(
     return made, radar
 
 
+def check_rates(rates_hz: Mapping[Path, float]) -> None:
+    """Refuse recordings whose frame rates differ, by their folders."""
+    first, first_hz = next(iter(rates_hz.items()))
+    for path, rate_hz in rates_hz.items():
+        if abs(rate_hz / first_hz - 1.0) > _SAME_RATE:
+            raise Sd2Error(
+                f"{path} has {rate_hz:.4g} frames/s, {first} has {first_hz:.4g}",
+                "the same in all recordings",
+            )
+
+
 def _compare(first: tuple[Path, float, bool], this: tuple[Path, float, bool]) -> None:
-    if abs(this[1] / first[1] - 1.0) > _SAME_RATE:
-        raise Sd2Error(
-            f"{this[0]} has {this[1]:.4g} frames/s, {first[0]} has {first[1]:.4g}",
-            "the same in all recordings",
-        )
+    check_rates({first[0]: first[1], this[0]: this[1]})
     if this[2] != first[2]:
         raise Sd2Error(
             f"Of {first[0]} and {this[0]} the radar of one is simulated, of the other real",
@@ -176,33 +187,48 @@ def _takes(
         seen &= synthetic.present
     target = there.values.T.copy()  # (frames, bins)
     target[:, list(synthetic.null_bins)] = 0.0
-    label = np.zeros(len(times_s), np.int8)
-    for span in recording.labelled.spans:
-        label[(times_s >= span.start_s) & (times_s < span.end_s)] = labels.index(span.label)
+    label = [labels.index(name) for name in frame_labels(recording, times_s)]
     rate_hz = synthetic.timebase.frames_per_s
     takes: list[Take] = []
     kept = 0
+    for start, stop in take_frames(seen, rate_hz):
+        kept += stop - start
+        takes.append(
+            Take(
+                subject=subject,
+                name=f"{recording.folder.stem}-{len(takes):03d}",
+                synthetic=np.ascontiguousarray(synthetic.values.T[start:stop]),
+                radar=target[start:stop],
+                times_s=times_s[start:stop] - times_s[start],
+                label=np.array(label[start:stop], np.int8),
+                sensor_position_m=np.asarray(recording.sensor.position_m, np.float64),
+                limbs=synthetic.between(start, stop).limbs,
+            )
+        )
+    return takes, float((len(times_s) - kept) / rate_hz)
+
+
+def take_frames(seen: NDArray[np.bool_], rate_hz: float) -> Iterator[tuple[int, int]]:
+    """Frames ``(start, stop)`` of takes: stretches that are seen, long ones cut equally.
+
+    Those shorter than a second are left out.
+    """
     for begun, ended in runs(seen):
         # Of equal length, so that none is a rest.
         parts = max(1, math.ceil((ended - begun) / (rate_hz * TAKE_S)))
         edges = np.linspace(begun, ended, parts + 1).round().astype(int)
         for start, stop in pairwise(edges.tolist()):
-            if stop - start < rate_hz:
-                continue
-            kept += stop - start
-            takes.append(
-                Take(
-                    subject=subject,
-                    name=f"{recording.folder.stem}-{len(takes):03d}",
-                    synthetic=np.ascontiguousarray(synthetic.values.T[start:stop]),
-                    radar=target[start:stop],
-                    times_s=times_s[start:stop] - times_s[start],
-                    label=label[start:stop],
-                    sensor_position_m=np.asarray(recording.sensor.position_m, np.float64),
-                    limbs=synthetic.between(start, stop).limbs,
-                )
-            )
-    return takes, float((len(times_s) - kept) / rate_hz)
+            if stop - start >= rate_hz:
+                yield start, stop
+
+
+def frame_labels(recording: Recording, times_s: NDArray[np.float64]) -> list[str]:
+    """Label of a recording at some times; the background where it has none."""
+    labels = [BACKGROUND] * len(times_s)
+    for span in recording.labelled.spans:
+        for frame in np.flatnonzero((times_s >= span.start_s) & (times_s < span.end_s)):
+            labels[frame] = span.label
+    return labels
 
 
 def on_clock(radar: DopplerMap, timebase: Timebase) -> DopplerMap:

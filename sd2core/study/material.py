@@ -21,13 +21,19 @@ from sd2core.classify.data import (
     seen_first,
 )
 from sd2core.datasets.clips import clips_of_dataset
-from sd2core.datasets.labelled import ONE_PERSON, LabelledSource, unfolded
+from sd2core.datasets.labelled import (
+    LabelledSource,
+    clips_of_radar_file,
+    labels_given,
+    unfolded,
+)
 from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.recording_sources import radar_map
+from sd2core.denoise.resample_to_model import SAME_RATE
 from sd2core.doppler import PRESETS
 from sd2core.errors import Sd2Error
 from sd2core.io.kinds import kind_of
-from sd2core.io.radar import holds_map, load_recorded_map
+from sd2core.io.radar import holds_map
 from sd2core.mocap.recording_pairs import make_recording_pairs
 from sd2core.pairs.labelling import TakeLabel, labelled, read_take_labels
 from sd2core.pairs.store import PairSet, Take, read_pairs
@@ -83,9 +89,17 @@ class Material:
         return tuple(dict.fromkeys(one.clip.subject for one in self.real))
 
 
+_READ_FOR = {"title", "out", "data", "video", "labels", "classes", "placements"}
+"""Keys of a plan that tell what is read."""
+
+
+def material_of(plan: StudyPlan) -> Material:
+    """Read the material of a plan whose paths are absolute; once for plans of the same data."""
+    return _material_of(plan.model_dump_json(include=_READ_FOR))
+
+
 @lru_cache(maxsize=1)
-def material_of(plan_text: str) -> Material:
-    """Read the material of a plan (JSON), whose paths are absolute."""
+def _material_of(plan_text: str) -> Material:
     plan = StudyPlan.model_validate_json(plan_text)
     stores, sets, takes = _sources(plan)
     names = {name for one in sets for name in one.classes}
@@ -137,14 +151,7 @@ def _sources(plan: StudyPlan) -> tuple[list[Path], list[ClipSet], list[Take | No
             sets.append(radar)
             takes += inputs
         elif holds_map(one.path):
-            file = load_recorded_map(one.path)
-            who = one.subject or ONE_PERSON
-            sets.append(
-                clips_of_map(
-                    file.doppler, file.labels, subject=who, movement=one.path.stem,
-                    frame_rate_hz=rate_hz,
-                )
-            )  # fmt: skip
+            sets.append(clips_of_radar_file(one, rate_hz))
         elif kind == "recording":
             recording = open_recording(one.path)
             if recording.mesh is not None and not recording.holds_radar_map:
@@ -167,12 +174,7 @@ def _sources(plan: StudyPlan) -> tuple[list[Path], list[ClipSet], list[Take | No
 
 def _of_recording(recording: Recording, subject: str, rate_hz: float | None) -> ClipSet:
     labels = recording.effective_labels()
-    if not any(span.origin != "suggestion" for span in labels.spans):
-        raise Sd2Error(
-            f"{recording.folder} has no labels",
-            "a recording in which gestures are labelled",
-            "Label it in the window, or leave it out",
-        )
+    labels_given(labels, recording.folder)
     return clips_of_map(
         radar_map(recording, None), labels, subject=subject or recording.title,
         movement=recording.folder.stem, frame_rate_hz=rate_hz,
@@ -272,7 +274,7 @@ def _renumbered(found: ClipSet, classes: Sequence[str]) -> list[Clip]:
 
 
 def _check_alike(path: Path, more: ClipSet, seen: ClipSet) -> None:
-    if more.axis != seen.axis or abs(more.frame_rate_hz / seen.frame_rate_hz - 1.0) > 0.01:
+    if more.axis != seen.axis or abs(more.frame_rate_hz / seen.frame_rate_hz - 1.0) > SAME_RATE:
         raise Sd2Error(
             f"{path} has {more.axis.bins} bins up to ±{more.axis.v_max_mps:g} m/s at"
             f" {more.frame_rate_hz:.4g} frames/s",

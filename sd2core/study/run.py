@@ -90,7 +90,7 @@ def _made(
     plan: StudyPlan, folder: Path, processes: int, scheduler: str | None, progress: Progress
 ) -> Results:
     text = plan.model_dump_json()
-    material = material_of(text)
+    material = material_of(plan)
     known = dict.fromkeys([*material.real, *material.filmed, *material.others])
     content = _digest(material, known)
     tasks = {_run_path(folder, plan, content, one): one for one in all_tasks(plan, material)}

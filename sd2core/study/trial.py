@@ -98,7 +98,7 @@ def grouped(plan: StudyPlan, material: Material, seed: int) -> Mapping[tuple[str
 def run_task(plan_text: str, denoiser: str | None, task: Task) -> Run:
     """Judge all conditions of a task; ``denoiser`` is the folder of its own."""
     plan = StudyPlan.model_validate_json(plan_text)
-    material = material_of(plan_text)
+    material = material_of(plan)
     group = grouped(plan, material, task.seed)
     real = drawn(plan, material, task.fold.real, task.share, task.seed)
     judged = [one for one in material.real if group[one.clip.key] == task.fold.judged]
@@ -224,7 +224,7 @@ def _denoiser(plan: StudyPlan, material: Material, folder: str | None) -> tuple[
 @lru_cache(maxsize=8)
 def _kept(plan_text: str, learner: Learner) -> Describe:
     """Describe clips for ridge regression; what the radar saw of whole movements only once."""
-    material = material_of(plan_text)
+    material = material_of(StudyPlan.model_validate_json(plan_text))
     describe = describing(learner, material.known)
     whole = {id(one.clip) for one in material.real}
     kept: dict[int, Features] = {}

@@ -23,11 +23,11 @@ from tools.documentation.measured import write_page
 from tools.documentation.places import BUILD, IMAGES, REPOSITORY
 from tools.documentation.runs import sd2
 from tools.studies.hand_gestures import make_pairs
-from tools.studies.mars_variants import VARIANTS, make_variants
 
 FOLDER = BUILD / "studies"
 PLANS = REPOSITORY / "tools" / "studies"
 _SHARE = 0.1
+_VARIANTS = ("places", "shapes", "mirrored")
 
 PAGE = """\
 # Do synthetic data help a real classifier?
@@ -54,7 +54,7 @@ With the kernel classifier, which finds more, nothing is gained: at {share:.0%} 
 
 MARS at {share:.0%} of the radar's data: points of frames over the radar alone, with 95 % intervals
 over takes. Beside the filmed movements, these were added: other *speeds* (0.8, 1.25); the same as
-`tools/studies/mars_variants.py` **simulates** them, seen from other *places*, on bodies of other
+`sd2 pairs vary` **simulates** them, seen from other *places*, on bodies of other
 *shapes*, or *mirrored*.
 
 {augmentations}
@@ -99,7 +99,7 @@ def augmentations(share: float) -> str:
     """Measure what each kind of added data gives, and return a table."""
     plan = read_study(PLANS / "mars.toml")
     added = tuple(one for one in plan.wanted if one != "radar")
-    variants = {name: (str(FOLDER / f"mars-{name}.zarr"),) for name in VARIANTS}
+    variants = {name: (str(FOLDER / f"mars-{name}.zarr"),) for name in _VARIANTS}
     tried: dict[str, dict[str, Any]] = {"nothing": {"speeds": ()}, "speeds": {}}
     tried |= {name: {"speeds": (), "video": video} for name, video in variants.items()}
     tried["speeds and all of these"] = {"video": sum(variants.values(), ())}
@@ -125,8 +125,9 @@ def main() -> None:
     for name in ("mars", "k60168a"):
         sd2("study", PLANS / f"{name}.toml")
         sections.append(study_section(FOLDER / name, name))
-    for variant in VARIANTS:
-        make_variants(MARS, FOLDER / f"mars-{variant}.zarr", variant)
+    for variant in _VARIANTS:
+        out = FOLDER / f"mars-{variant}.zarr"
+        sd2("pairs", "vary", *MARS, "--by", variant, "--limbs", "--out", out)
     page = PAGE.format(
         machine=this_machine(),
         studies="\n\n".join(sections),

@@ -116,7 +116,7 @@ def _fitting(plan: StudyPlan, same_people: bool) -> StudyPlan:
     """Leave out what the data do not hold; keep movements apart where there are too few people."""
     from sd2core.study.material import material_of
 
-    material = material_of(plan.model_dump_json())
+    material = material_of(plan)
     added = plan.added if material.filmed else ()
     least = 3 if added else 2
     folds = "files" if same_people or len(material.people) < least else "people"

@@ -140,23 +140,14 @@ def _single(
 ) -> list[ClipSet]:
     """Return the clips of a recording or a radar file, at the frame rate of the first map."""
     from sd2core.classify.data import clips_of_map
-    from sd2core.datasets.labelled import ONE_PERSON
-    from sd2core.io.radar import holds_map, load_recorded_map
+    from sd2core.datasets.labelled import clips_of_radar_file, labels_given
+    from sd2core.io.radar import holds_map
     from sd2core.recording.recording import is_recording, open_recording
 
     if holds_map(one.path):
         if maps is not None and tuple(maps) != ("radar",):
             raise Sd2Error(f"{one.path} holds a radar's map only", "--maps radar")
-        recorded = load_recorded_map(one.path)
-        return [
-            clips_of_map(
-                recorded.doppler,
-                recorded.labels,
-                subject=one.subject or ONE_PERSON,
-                movement=one.path.stem,
-                frame_rate_hz=frame_rate_hz,
-            )
-        ]
+        return [clips_of_radar_file(one, frame_rate_hz)]
     if not is_recording(one.path):
         raise Sd2Error(
             f"{one.path} holds nothing with labels to learn from",
@@ -166,14 +157,9 @@ def _single(
     from sd2core.doppler import PRESETS
 
     recording, labels = open_recording(one.path), labels_at(one.path)
+    labels_given(labels, one.path)
     # Beside maps of a mesh the radar's is on their axis, so that they can be mixed.
     axis = None if recording.mesh is None else PRESETS["paper"].axis
-    if not any(span.origin != "suggestion" for span in labels.spans):
-        raise Sd2Error(
-            f"{one.path} has no labels",
-            "a recording in which gestures are labelled",
-            "Label it in the window, or leave it out",
-        )
     found: list[ClipSet] = []
     for doppler in maps_of(recording, tuple(maps or usual_maps(recording)), axis=axis).values():
         found.append(

@@ -1,0 +1,252 @@
+"""Movements as they were not recorded: from other places, by other bodies, or left for right."""
+
+from __future__ import annotations
+
+import re
+import zlib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from sd2core.body.parts import synthetic_map
+from sd2core.body.reshaping import coarser, reshaped
+from sd2core.body.shape import ShapeSpace
+from sd2core.doppler import SynthesisOptions, Synthesizer
+from sd2core.errors import Sd2Error
+from sd2core.io.radar.mars import FRAMES_PER_S, MarsStretch, mars_parts, read_mars
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.mesh.vertex_parts import PARTS
+from sd2core.mocap.mars_pairs import driven_clips, takes_of
+from sd2core.mocap.recording_pairs import (
+    BACKGROUND,
+    check_rates,
+    frame_labels,
+    named_recordings,
+    take_frames,
+)
+from sd2core.pairs.store import PairSet, PairWriter, Take, TakeKey, read_pairs
+from sd2core.progress import Progress, silent
+from sd2core.radar_config import PAPER_RADAR, RadarConfig
+from sd2core.recording.recording import Recording
+from sd2core.sensor import VirtualSensor, aimed_at, position_from_spherical, spherical_from_position
+from sd2core.simulate.campaign.radar import radar_at, radar_target
+from sd2core.version import __version__
+
+Variant = Literal["places", "shapes", "mirrored"]
+"""Sensors within 25 degrees to the side and 10 up or down, 0.8 to 1.25 times as far; bodies of
+random shape; or the sensor's mirror image in the upright plane through camera and body."""
+
+_ASIDE_DEG, _ABOVE_DEG, _FARTHER = 25.0, 10.0, (0.8, 1.25)
+_OTHER_SIDE = {"left": "right", "right": "left"}
+
+
+@dataclass(frozen=True)
+class VariantOptions:
+    """Variation of movements, and the maps that are made of them."""
+
+    variant: Variant
+    synthesis: SynthesisOptions
+    """Of the synthetic maps; axis and nulled bins are the simulated radar's, too."""
+    radar: RadarConfig = PAPER_RADAR  # At the frame rate of the movements.
+    limbs: bool = False  # The synthetic maps are also split by the parts of the body.
+    seed: int = 0  # Of all that is drawn; a movement's own numbers also depend on its name.
+
+
+@dataclass(frozen=True, eq=False)
+class _Movement:
+    """A movement before a sensor; positions are in the camera frame."""
+
+    key: TakeKey
+    mesh: MeshSequence
+    position_m: tuple[float, float, float]
+    labels: Sequence[str]  # of its frames
+
+
+def vary_recordings(
+    recordings: Sequence[Path],
+    out: Path,
+    options: VariantOptions,
+    *,
+    subjects: Sequence[str] | None = None,
+    progress: Progress = silent,
+) -> PairSet:
+    """Write simulated pairs of the movements of recordings that have a mesh, and return all.
+
+    Movements are cut and called as in pairs of recordings. What ``out`` holds is not made again.
+
+    Raises Sd2Error if a recording has no mesh, two are called alike, frame rates differ, or
+    (shapes) a mesh has another surface than the bundled body.
+    """
+    named = named_recordings(recordings, subjects)
+    for recording, _ in named:
+        if recording.mesh is None:
+            raise Sd2Error(
+                f"{recording.folder} has no mesh",
+                "a recording with a mesh",
+                "Fit one with `sd2 fit`",
+            )
+    meshes = [recording.load_mesh() for recording, _ in named]
+    rates_hz = [mesh.timebase.frames_per_s for mesh in meshes]
+    check_rates({one.folder: rate for (one, _), rate in zip(named, rates_hz, strict=True)})
+    labels = {span.label for recording, _ in named for span in recording.labelled.spans}
+    labels |= set(map(mirrored_label, labels))
+    sources = [recording.folder.name for recording, _ in named]
+    names = (BACKGROUND, *sorted(labels - {BACKGROUND}))
+    writer = _writer(out, options, round(rates_hz[0], 3), names, sources)
+    for number, ((recording, subject), mesh) in enumerate(zip(named, meshes, strict=True)):
+        progress(number, len(named))
+        _append(writer, options, names, _of_recording(recording, subject, mesh))
+    progress(1, 1)
+    return read_pairs(out)
+
+
+def _of_recording(recording: Recording, subject: str, mesh: MeshSequence) -> Iterator[_Movement]:
+    stretches = take_frames(mesh.presence.there, mesh.timebase.frames_per_s)
+    for number, (start, stop) in enumerate(stretches):
+        yield _Movement(
+            TakeKey(subject, f"{recording.folder.stem}-{number:03d}", 0),
+            mesh.between(start, stop),
+            recording.sensor.position_m,
+            frame_labels(recording, mesh.times_s[start:stop]),
+        )
+
+
+def vary_mars(
+    folders: Sequence[Path], out: Path, options: VariantOptions, progress: Progress = silent
+) -> PairSet:
+    """Write simulated pairs of MARS' movements, each folder with one person's parts.
+
+    Bodies, places of the radar and names of takes are those of
+    :func:`sd2core.mocap.mars_pairs.make_mars_pairs`; there are no labels.
+    """
+    parts = [read_mars(folder, name) for folder in folders for name in mars_parts(folder)]
+    names = (BACKGROUND,)
+    writer = _writer(out, options, FRAMES_PER_S, names, [Path(one.source).name for one in parts])
+    people = dict.fromkeys(part.subject for part in parts)
+    for number, person in enumerate(people):
+        progress(number, len(people))
+        own = dict(take for part in parts if part.subject == person for take in takes_of(part))
+        if not own.keys() <= writer.done:
+            _append(writer, options, names, _of_person(own))
+    progress(1, 1)
+    return read_pairs(out)
+
+
+def _of_person(stretches: Mapping[TakeKey, MarsStretch]) -> Iterator[_Movement]:
+    driven, place = driven_clips([*stretches.values()])
+    for key, one in zip(stretches, driven, strict=True):
+        times_s = one.clip.times_s
+        mesh = one.mesh(times_s + place.offset_s, "low")
+        yield _Movement(key, mesh, place.position_m, [BACKGROUND] * len(times_s))
+
+
+def _writer(
+    out: Path,
+    options: VariantOptions,
+    frame_rate_hz: float,
+    labels: Sequence[str],
+    sources: Sequence[str],
+) -> PairWriter:
+    synthesis = options.synthesis
+    return PairWriter(
+        out,
+        kind="simulated",
+        axis=synthesis.axis,
+        null_bins=synthesis.null_bins,
+        frame_rate_hz=frame_rate_hz,
+        labels=labels,
+        provenance={
+            "made_by": f"SD² Studio {__version__}",
+            **asdict(options),
+            "sources": list(sources),
+        },
+        parts=PARTS if options.limbs else (),
+    )
+
+
+def _append(
+    writer: PairWriter,
+    options: VariantOptions,
+    labels: Sequence[str],
+    movements: Iterable[_Movement],
+) -> None:
+    for movement in movements:
+        if movement.key in writer.done:
+            continue
+        title = f"{movement.key.subject}/{movement.key.name}"
+        rng = np.random.default_rng([options.seed, zlib.crc32(title.encode())])
+        writer.append(_take(varied(movement, options.variant, rng), options, labels, rng))
+
+
+def _take(
+    movement: _Movement,
+    options: VariantOptions,
+    labels: Sequence[str],
+    rng: np.random.Generator,
+) -> Take:
+    """See a movement by the synthetic map and by the simulated radar."""
+    mesh, synthesis = movement.mesh, options.synthesis
+    sensor = aimed_at(VirtualSensor(movement.position_m), _middle_m(mesh))
+    found = synthetic_map(Synthesizer(mesh, synthesis), sensor, limbs=options.limbs)
+    # Echoes of a rough surface depend little on how finely it is cut (decision 26).
+    radar = radar_target(
+        coarser(mesh),
+        radar_at(mesh.timebase.frames_per_s, synthesis.axis.bins, options.radar),
+        sensor,
+        synthesis.axis,
+        synthesis.null_bins,
+        seed=rng.integers(2**31, size=2).tolist(),
+    )
+    return Take(
+        movement.key.subject,
+        movement.key.name,
+        np.ascontiguousarray(found.values.T),
+        radar,
+        mesh.times_s - mesh.times_s[0],
+        np.array([labels.index(label) for label in movement.labels], np.int8),
+        np.array(movement.position_m),
+        0,
+        found.limbs,
+    )
+
+
+def varied(movement: _Movement, variant: Variant, rng: np.random.Generator) -> _Movement:
+    """Another movement of the same kind; see :data:`Variant`."""
+    if variant == "shapes":
+        return replace(movement, mesh=reshaped(movement.mesh, ShapeSpace().random(rng)))
+    x, y, z = movement.position_m
+    middle_m = _middle_m(movement.mesh)
+    if variant == "mirrored":
+        return replace(
+            movement,
+            position_m=(2.0 * middle_m[0] - x, y, z),
+            labels=[mirrored_label(label) for label in movement.labels],
+        )
+    range_m, azimuth_deg, elevation_deg = spherical_from_position(middle_m, movement.position_m)
+    place_m = position_from_spherical(
+        middle_m,
+        range_m * float(rng.uniform(*_FARTHER)),
+        azimuth_deg + float(rng.uniform(-_ASIDE_DEG, _ASIDE_DEG)),
+        elevation_deg + float(rng.uniform(-_ABOVE_DEG, _ABOVE_DEG)),
+    )
+    return replace(movement, position_m=place_m)
+
+
+def mirrored_label(label: str) -> str:
+    """Name of a movement seen in a mirror: left and right change places.
+
+    Examples
+    --------
+    >>> mirrored_label("left-to-right"), mirrored_label("Swipe up")
+    ('right-to-left', 'Swipe up')
+    """
+    return re.sub("left|right", lambda found: _OTHER_SIDE[found[0]], label)
+
+
+def _middle_m(mesh: MeshSequence) -> tuple[float, float, float]:
+    """Middle of the body over all frames."""
+    x, y, z = mesh.read(0, mesh.frame_count).mean(axis=(0, 1), dtype=np.float64).tolist()
+    return x, y, z

@@ -1,0 +1,112 @@
+"""Movements as they were not recorded: seen from elsewhere, by other bodies, in a mirror."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from swinging_recordings import recording
+
+from sd2core.body.model import Body
+from sd2core.doppler import PRESETS, Synthesizer
+from sd2core.errors import Sd2Error
+from sd2core.io.mesh import save_mesh
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.pairs.store import PairSet, read_pairs
+from sd2core.recording.recording import Recording, Span
+from sd2core.sensor import VirtualSensor
+from sd2core.simulate.variants import VariantOptions, mirrored_label, vary_recordings
+from sd2core.timebase import Timebase
+
+PAPER = PRESETS["paper"]
+
+
+def swaying(folder: Path, frames: int = 45) -> Recording:
+    """The bundled body before the camera, swaying towards a sensor at its right."""
+    folder.mkdir()
+    body, times_s = Body.load("low"), np.arange(frames) / 30.0
+    place_m = np.zeros((frames, 3))
+    place_m[:, 0] = 0.15 * np.sin(4.0 * times_s)
+    place_m[:, 1:] = 1.0, 2.5
+    vertices = (body.vertices_m + place_m[:, None]).astype(np.float32)
+    save_mesh(MeshSequence(vertices, body.faces, Timebase(times_s)), folder / "mesh.npz")
+    made = Recording.create(
+        folder, mesh=folder / "mesh.npz", spans=(Span(start_s=0.5, end_s=1.0, label="left-arm"),)
+    )
+    made.sensor = VirtualSensor(position_m=(1.5, 0.0, 0.0))
+    made.save()
+    return made
+
+
+def means(pairs: PairSet, values: np.ndarray) -> np.ndarray:
+    """Mean velocity of every frame with energy, else 0."""
+    centres = 0.5 * (pairs.axis.edges_mps[1:] + pairs.axis.edges_mps[:-1])
+    return np.asarray(values @ centres / np.maximum(values.sum(axis=1), 1e-9))
+
+
+def vary(one: Recording, out: Path, variant, seed: int = 0) -> PairSet:
+    return vary_recordings([one.folder], out, VariantOptions(variant, PAPER, seed=seed))
+
+
+def test_a_mirrored_movement_goes_the_other_way(tmp_path: Path) -> None:
+    one = swaying(tmp_path / "anna.sd2")
+    pairs = vary(one, tmp_path / "mirrored.zarr", "mirrored")
+    (take,) = pairs.takes
+    assert (pairs.kind, take.subject, take.name) == ("simulated", "anna", "anna-000")
+    assert pairs.labels == ("background", "left-arm", "right-arm")
+    assert np.flatnonzero(take.label == 2).tolist() == list(range(15, 30))
+    assert take.sensor_position_m[0] == pytest.approx(-1.5, abs=0.3)
+    # Who sways towards a sensor on one side sways away from one on the other.
+    seen = Synthesizer(one.load_mesh(), PAPER).map(one.sensor).values.T
+    own, other = means(pairs, seen), means(pairs, take.synthetic)
+    fast = np.abs(np.cos(4.0 * take.times_s)) > 0.6
+    assert (own[fast] * other[fast] < 0.0).all()
+    # The simulated radar sees the same.
+    assert np.corrcoef(means(pairs, take.radar)[fast], other[fast])[0, 1] > 0.95
+
+
+def test_places_and_shapes_are_drawn_and_drawn_alike_again(tmp_path: Path) -> None:
+    one = swaying(tmp_path / "anna.sd2", frames=40)
+    (own,) = vary(one, tmp_path / "places.zarr", "places").takes
+    (again,) = vary(one, tmp_path / "again.zarr", "places").takes
+    (other,) = vary(one, tmp_path / "other.zarr", "places", seed=1).takes
+    assert np.array_equal(own.synthetic, again.synthetic)
+    assert np.array_equal(own.radar, again.radar)
+    assert not np.allclose(own.sensor_position_m, other.sensor_position_m)
+    middle_m = np.asarray(one.load_mesh().read(0, 40), np.float64).mean(axis=(0, 1))
+    far_m = np.linalg.norm(np.array([1.5, 0.0, 0.0]) - middle_m)
+    for take in (own, other):
+        assert 0.8 <= np.linalg.norm(take.sensor_position_m - middle_m) / far_m <= 1.25
+    (shaped,) = vary(one, tmp_path / "shapes.zarr", "shapes").takes
+    assert shaped.sensor_position_m.tolist() == [1.5, 0.0, 0.0]
+    assert not np.allclose(shaped.synthetic, own.synthetic)
+
+
+def test_what_is_there_is_not_made_again(tmp_path: Path, monkeypatch) -> None:
+    one = swaying(tmp_path / "anna.sd2", frames=40)
+    vary(one, tmp_path / "made.zarr", "places")
+    monkeypatch.setattr("sd2core.simulate.variants.radar_target", None)
+    assert len(vary(one, tmp_path / "made.zarr", "places").takes) == 1
+    with pytest.raises(Sd2Error, match="seed"):
+        vary(one, tmp_path / "made.zarr", "places", seed=3)
+    assert len(read_pairs(tmp_path / "made.zarr").takes) == 1
+
+
+def test_what_cannot_be_varied_is_refused(tmp_path: Path) -> None:
+    folder = recording(tmp_path / "ball.sd2").folder
+    with pytest.raises(Sd2Error, match="another surface than the bundled body"):
+        vary_recordings([folder], tmp_path / "a.zarr", VariantOptions("shapes", PAPER))
+    bare = recording(tmp_path / "bare.sd2")
+    bare.mesh = None
+    bare.save()
+    with pytest.raises(Sd2Error, match="has no mesh"):
+        vary_recordings([bare.folder], tmp_path / "b.zarr", VariantOptions("places", PAPER))
+
+
+def test_left_and_right_change_places_in_labels() -> None:
+    assert [mirrored_label(one) for one in ("left-to-right", "up", "arm_left")] == [
+        "right-to-left",
+        "up",
+        "arm_right",
+    ]
