@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -12,6 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sd2core.batch import keys
 from sd2core.batch.keys import all_code_digest, code_digest, key_of
 from sd2core.batch.plan import STEPS
 from sd2core.files.digests import file_digest
@@ -70,6 +72,20 @@ def test_every_step_has_code_of_its_own() -> None:
     digests = {code_digest(step) for step in STEPS}
     assert len(digests) == len(STEPS)
     assert all_code_digest() not in digests
+
+
+@pytest.mark.parametrize(("step", "source"), [("fit", "body/solve.py"), ("synthesise", "maps.py")])
+def test_changed_code_makes_results_anew(step: Any, source: str, tmp_path, monkeypatch) -> None:
+    copy = tmp_path / "sd2core"
+    package = Path(keys.__file__).parent.parent
+    shutil.copytree(package, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setattr(keys, "__file__", str(copy / "batch" / "keys.py"))
+    unkept = code_digest.__wrapped__
+    assert unkept(step) == code_digest(step)
+    with (copy / source).open("a") as stream:
+        stream.write("\nX = 1\n")
+    assert unkept(step) != code_digest(step)
+    assert unkept("denoise") == code_digest("denoise") or source == "maps.py"
 
 
 @given(st.binary(max_size=50), st.binary(max_size=50))
