@@ -50,8 +50,10 @@ class DenoiseModel(ReportingModel):
         super().__init__(parent)
         self._session, self._synthesis, self._library = session, synthesis, library
         self._document, self._synthetic = session.document, session.maps.synthetic
-        self.map = DenoisedMap(session.maps.denoised, self._view, session.jobs, self)
-        self.before_map = DenoisedMap(session.maps.before, self._view, session.jobs, self)
+        self.map, self.before_map = (
+            DenoisedMap(track, self._synthetic, self._view, session.jobs, self)
+            for track in (session.maps.denoised, session.maps.before)
+        )
         self.path: Path | None = None  # of the model that is in use or being loaded
         self.problem = ""  # why the chosen model is not in use; empty where it is
         self._choice = UNSAID
@@ -317,17 +319,13 @@ class DenoiseModel(ReportingModel):
         return lambda start, stretch: [part and part(start, stretch) for part in parts]
 
     def _take(self, part: Part) -> None:
-        source = self._synthetic.map
-        if source is None:
-            return
-        known = self._synthetic.known
         piece = (part.start, part.start + part.stretch.values.shape[1])
         for number, one in enumerate((self.map, self.before_map)):
             if self._synthesis.moving:
                 made = part.more[number] if part.more is not None else None
-                one.take_sweep(source, known, part.sensor, part.start, made)
+                one.take_sweep(part.sensor, part.start, made)
             else:
-                one.take(source, known, part.sensor, piece)
+                one.take(part.sensor, piece)
 
     def _view(self) -> View:
         source = self._synthetic.map
