@@ -25,8 +25,8 @@ from sd2app.labels.recovery import LabelNotice, recover
 from sd2app.labels.span_buttons import Decision, SpanButtons
 from sd2app.labels.timeline import LabelArea, LabelTimeline, TargetLine
 from sd2app.labels.tracks import LabelTracks, TrackMenu
+from sd2app.maps.track_mouse import TimePlot
 from sd2app.session.session import Session
-from sd2app.widgets.canvas import TimePlot
 from sd2app.widgets.layouts import pane
 from sd2app.widgets.notices import Notice
 
