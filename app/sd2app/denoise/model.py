@@ -15,7 +15,7 @@ from sd2app.background.model_worker.library import DenoiserLibrary
 from sd2app.denoise.map import TEXTURE_SEED, DenoisedMap
 from sd2app.denoise.text import origin_words, track_words
 from sd2app.maps.model import SynthesisModel
-from sd2app.maps.partial_map import Part, View
+from sd2app.maps.partial_map import Part
 from sd2app.maps.quality import Companion
 from sd2app.session.denoiser_choice import NO_MODEL, UNSAID, DenoiserChoice
 from sd2app.session.session import Session
@@ -51,7 +51,7 @@ class DenoiseModel(ReportingModel):
         self._session, self._synthesis, self._library = session, synthesis, library
         self._document, self._synthetic = session.document, session.maps.synthetic
         self.map, self.before_map = (
-            DenoisedMap(track, self._synthetic, self._view, session.jobs, self)
+            DenoisedMap(track, self._synthetic, synthesis.frames_in_view, session.jobs, self)
             for track in (session.maps.denoised, session.maps.before)
         )
         self.path: Path | None = None  # of the model that is in use or being loaded
@@ -326,9 +326,3 @@ class DenoiseModel(ReportingModel):
                 one.take_sweep(part.sensor, part.start, made)
             else:
                 one.take(part.sensor, piece)
-
-    def _view(self) -> View:
-        source = self._synthetic.map
-        if source is None:
-            return (0, 0)
-        return source.timebase.frames_between(self._session.span.start_s, self._session.span.end_s)

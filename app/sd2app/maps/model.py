@@ -122,6 +122,13 @@ class SynthesisModel(QObject):
         """True while the map is of the current sensor, at any quality."""
         return self._partial.sensor == self._sensor
 
+    def frames_in_view(self) -> View:
+        """Frames of the map in the time window, half-open."""
+        mesh = self._session.document.mesh
+        if mesh is None:
+            return (0, 0)
+        return mesh.timebase.frames_between(self._session.span.start_s, self._session.span.end_s)
+
     @property
     def torso_m(self) -> Vector | None:
         """Median vertex of the frame on screen: inside the torso whatever the limbs do."""
@@ -322,7 +329,7 @@ class SynthesisModel(QObject):
             self._set_moving(False)
             self._go_on()
             return
-        view, rough, vertices = self._frames_in_view(), self._preview_quality(), self._vertices
+        view, rough, vertices = self.frames_in_view(), self._preview_quality(), self._vertices
         self._set_moving(False)
         final = self._final_quality()
         # Much of a long clip can wait until it is known how it is to be done.
@@ -371,7 +378,7 @@ class SynthesisModel(QObject):
             self._settle()
 
     def _reorder(self) -> None:
-        start, stop = self._frames_in_view()
+        start, stop = self.frames_in_view()
         if self._synthesizers is None or self.moving or stop <= start:
             return
         self._say_quality()
@@ -408,7 +415,7 @@ class SynthesisModel(QObject):
     def _say_quality(self) -> None:
         if self._synthesizers is not None:
             final = final_words(self._synthesizers, self._accuracy.in_use)
-            self._partial.say_quality(self._frames_in_view(), final, self._compiler.busy)
+            self._partial.say_quality(self.frames_in_view(), final, self._compiler.busy)
 
     def _fail(self, error: Exception) -> None:
         self._sweeping = False
@@ -442,14 +449,8 @@ class SynthesisModel(QObject):
     def _swept(self) -> View:
         """Frames that follow a drag: the whole clip when it is short, else those in view."""
         frames = self._partial.frames
-        return (0, frames) if is_swept_whole(self._vertices, frames) else self._frames_in_view()
+        return (0, frames) if is_swept_whole(self._vertices, frames) else self.frames_in_view()
 
     def _budget_ms(self) -> float:
         start, stop = self._swept()
         return budget_ms(stop - start)
-
-    def _frames_in_view(self) -> View:
-        mesh = self._session.document.mesh
-        if mesh is None:
-            return (0, 0)
-        return mesh.timebase.frames_between(self._session.span.start_s, self._session.span.end_s)
