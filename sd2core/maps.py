@@ -336,6 +336,11 @@ class DopplerMap:
         """Time of every frame, shape (frames,)."""
         return self.timebase.times_s
 
+    @property
+    def there(self) -> NDArray[np.bool_]:
+        """Frames with a person, shape (frames,)."""
+        return np.ones(len(self.timebase), bool) if self.present is None else self.present
+
     def shifted(self, offset_s: float) -> DopplerMap:
         """Map moved by ``offset_s`` to later times."""
         return replace(self, timebase=self.timebase.shifted(offset_s))

@@ -32,7 +32,7 @@ _PLAIN = (str, int, float, complex, bytes, type(None), enum.Enum, Path)
 _PASSING = (
     *("revision", "renderings", "_origin_s"),  # counted up, or of the clock
     *("_image", "_picture", "_strongest", "_dirty", "_fine"),  # painted when it is next on screen
-    *("_reader._frame", "_prefetcher"),  # looked ahead, for the next frame
+    "_prefetcher",  # looked ahead, for the next frame
     *("_lister", "_thread", "_synthesizers._made", "_kept"),  # made in the background, or kept
     *("edits._before", "_last_px"),  # of a drag that is over
     "._body",  # what places were last drawn about, and their markers

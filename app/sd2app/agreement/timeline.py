@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QSizePolicy
 
 from sd2app.agreement.model import AgreementModel
 from sd2app.labels.painting import LabelRows, paint_tracks
-from sd2app.maps.track_mouse import SessionPlot
+from sd2app.maps.track_mouse import TimePlot
 from sd2app.session.session import Session
 from sd2app.widgets.canvas import clipped
 from sd2app.widgets.time_axis import GUTTER_PX, paint_cursor
@@ -16,7 +16,7 @@ from sd2app.widgets.time_axis import GUTTER_PX, paint_cursor
 _MARKS_PX = 7.0
 
 
-class OtherTimeline(SessionPlot):
+class OtherTimeline(TimePlot):
     """Hatched rows, as they cannot be edited; a line over them marks differences.
 
     A click goes to that time.

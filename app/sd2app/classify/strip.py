@@ -13,10 +13,10 @@ from sd2app.classify.text import ago_text, delay_text, reading_text
 from sd2app.classify.track import ClassReading
 from sd2app.labels.arrays import UNKNOWN_COLOUR
 from sd2app.labels.model import LabelsModel
-from sd2app.maps.track_mouse import SeekingPlot
+from sd2app.maps.track_mouse import SeekingPlot, ZoomedPlot
 from sd2app.session.display import DisplayModel
 from sd2app.session.session import Session
-from sd2app.widgets.canvas import AT_RIGHT, Canvas, ZoomedPlot, clipped, image_of
+from sd2app.widgets.canvas import AT_RIGHT, Canvas, clipped, image_of
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.layouts import column_of, row_of
 from sd2app.widgets.model_menu import ModelButton

@@ -127,12 +127,12 @@ class ClassTrack(BackgroundModel):
         if np.isnan(shares).any():
             return None
         assert self._given is not None
-        present, times_s = self._given.present, self._given.times_s
+        times_s = self._given.times_s
         return ClassReading(
             self.card.classes,
             tuple(map(float, shares)),
             bool(self.done[frame]) and self.current,
-            present is not None and not present[frame],
+            not self._given.there[frame],
             float(times_s[asked] - times_s[frame]) if self.card.delay_frames else 0.0,
         )
 
@@ -237,10 +237,9 @@ class ClassTrack(BackgroundModel):
             # What is read meanwhile is before it, or of no interest any more.
             values[:, first:stop] = doppler.values[:, first:stop]
         self._given, self._known = replace(doppler, values=values), known.copy()
-        if doppler.present is not None:
-            nobody = known & ~doppler.present
-            self.shares[nobody] = self.card.no_person()
-            self.done[nobody] = True
+        nobody = known & ~doppler.there
+        self.shares[nobody] = self.card.no_person()
+        self.done[nobody] = True
         self.changed.emit()
 
     def _lengthen(self, before: DopplerMap, timebase: Timebase) -> DopplerMap:
@@ -250,10 +249,8 @@ class ClassTrack(BackgroundModel):
         self.done = np.append(self.done, np.zeros(more, bool))
         self.shares = np.pad(self.shares, ((0, more), (0, 0)), constant_values=np.nan)
         values = np.pad(before.values, ((0, 0), (0, more)))
-        present = None
-        if before.present is not None:
-            present = np.append(before.present, np.ones(more, bool))
-        return replace(before, values=values, timebase=timebase, present=present)
+        there = np.append(before.there, np.ones(more, bool))
+        return replace(before, values=values, timebase=timebase, present=there)
 
     def _differs(
         self, before: DopplerMap, doppler: DopplerMap, known: NDArray[np.bool_], part: slice
@@ -261,8 +258,7 @@ class ClassTrack(BackgroundModel):
         """Mask of the frames of a part that differ from before."""
         differs = (before.values[:, part] != doppler.values[:, part]).any(axis=0)
         differs |= self._known[part] != known[part]
-        if before.present is not None or doppler.present is not None:
-            differs |= _present(before)[part] != _present(doppler)[part]
+        differs |= before.there[part] != doppler.there[part]
         return np.asarray(differs)
 
     # --- classifying ----------------------------------------------------------------------
@@ -280,7 +276,7 @@ class ClassTrack(BackgroundModel):
         is_growing = self.source is not None and self.source.growing
 
         def work(emit: Emit) -> None:
-            there = replace(doppler, present=_present(doppler) & known)
+            there = replace(doppler, present=doppler.there & known)
             for start, stop in stretches(there, rate_hz):
                 if not waiting[start:stop].any():
                     continue
@@ -345,8 +341,3 @@ def _is_longer(doppler: DopplerMap, before: DopplerMap) -> bool:
     """True if frames were added at the end of a map, whatever became of the others."""
     count = len(before.timebase)
     return len(doppler.timebase) > count and np.array_equal(doppler.times_s[:count], before.times_s)
-
-
-def _present(doppler: DopplerMap) -> NDArray[np.bool_]:
-    frames = len(doppler.timebase)
-    return np.ones(frames, bool) if doppler.present is None else doppler.present

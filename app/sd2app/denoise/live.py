@@ -11,7 +11,6 @@ from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.latest import LatestRunner
 from sd2app.background.model_worker.client import RemoteDenoiser, RemoteLive
-from sd2app.denoise.map import presence
 from sd2app.denoise.model import DenoiseModel
 from sd2app.session.session import Session
 from sd2core.denoise.resample_to_model import input_of, is_regular
@@ -118,7 +117,7 @@ class LiveDenoiseModel(QObject):
         if stop <= start or (covered is not None and not covered[start:stop].all()):
             return
         energies, session = input_of(source.between(start, stop), denoiser.parts), self._session
-        present = presence(source, start, stop)
+        present = source.there[start:stop]
 
         def work(emit: object) -> _Stepped:
             live = session or denoiser.live()

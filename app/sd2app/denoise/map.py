@@ -27,7 +27,6 @@ from sd2core.doppler.synthesizer import Stretch
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap, LimbMaps
 from sd2core.pairs.segments import LENGTH, OVERLAP
-from sd2core.timebase import Timebase
 
 _TOO_SLOW_S = 0.15
 """Time limit per sweep; a slower model waits until the drag pauses."""
@@ -54,14 +53,21 @@ class Swept(NamedTuple):
     doppler: DopplerMap
 
 
+class _Order(NamedTuple):
+    """How far a clip whose map stands is gone through, with what the model remembers there."""
+
+    next: int = 0
+    session: RemoteLive | None = None
+
+
 class _Answer(NamedTuple):
     """Denoised piece of the map."""
 
     piece: View
     values: NDArray[np.float32]  # (bins, n)
     like: DopplerMap  # map with their unit and axis
-    revision: int  # of the synthetic map that they were made from
-    session: RemoteLive | None = None  # at the end of the piece, where pieces follow in order
+    order: _Order | None = None  # that it goes on with
+    session: RemoteLive | None = None  # at its end, where pieces follow in order
 
 
 class DenoisedMap(BackgroundModel):
@@ -80,10 +86,15 @@ class DenoisedMap(BackgroundModel):
     _stumbled = Signal(str)
 
     def __init__(
-        self, track: MapModel, view: Callable[[], View], jobs: TaskList, parent: QObject
+        self,
+        track: MapModel,
+        synthetic: MapModel,
+        view: Callable[[], View],
+        jobs: TaskList,
+        parent: QObject,
     ) -> None:
         super().__init__(parent)
-        self.track = track
+        self.track, self._synthetic = track, synthetic
         self._view = view
         self._jobs = jobs
         self._job: Job | None = None
@@ -100,27 +111,20 @@ class DenoisedMap(BackgroundModel):
         self._forget()
 
     def _forget(self) -> None:
-        self._source: DopplerMap | None = None
-        self._known = np.zeros(0, bool)
-        self._sensor: object = None
-        self._stands = False
+        self._sensor: object = None  # placement that the synthetic map is of
+        self._order: _Order | None = None  # once the synthetic map stands
         self._made: DopplerMap | None = None
         self._needs_reference = True
-        self._revision = 0
         self._restart()
 
     def _restart(self) -> None:
         """Mark all frames as not denoised."""
-        frames = self._known.size
-        self._shown = np.zeros(frames, bool)
-        self._changed_at = np.full(frames, self._revision)
-        self._done_at = np.full(frames, -1)
+        frames = self._synthetic.known.size
+        self._shown = np.zeros(frames, bool)  # of the current synthetic map and sensor
+        self._wanted = np.ones(frames, bool)  # not asked for since the synthetic map changed there
         self._strongest = 0.0
-        self._begin_order()
-
-    def _begin_order(self) -> None:
-        self._session: RemoteLive | None = None
-        self._in_order = 0
+        if self._order is not None:
+            self._order = _Order()
 
     # --- what is known --------------------------------------------------------------------
 
@@ -132,7 +136,7 @@ class DenoisedMap(BackgroundModel):
     @property
     def _lacks_limbs(self) -> bool:
         """True while the model takes limb maps, and the synthetic map is not split yet."""
-        source, denoiser = self._source, self.denoiser
+        source, denoiser = self._synthetic.map, self.denoiser
         if source is None or denoiser is None:
             return False
         return bool(denoiser.parts) and source.limbs is None
@@ -183,31 +187,25 @@ class DenoisedMap(BackgroundModel):
         self._forget()
         self.track.set_map(None)
 
-    def take(
-        self, source: DopplerMap, known: NDArray[np.bool_], sensor: object, piece: View
-    ) -> None:
-        """Take a changed piece of the synthetic map from its background task.
-
-        ``source`` is the synthetic map, whose values may change in place; ``known``, shape (T,),
-        is true for its computed frames; all of them are for the placement ``sensor``.
-        """
+    def take(self, sensor: object, piece: View) -> None:
+        """Follow a changed piece of the synthetic map, all of which is for a placement now."""
         self._took_s.clear()
         if not self._held:
             self.track.set_status(self.words)
-        self._follow(source, known, sensor)
-        self._changed_at[touched(piece, known.size)] = self._revision
+        self._follow(sensor)
+        self._wanted[touched(piece, self._wanted.size)] = True
         if not self._again.isActive():
             self._go_on()
 
     def finish(self) -> None:
         """Replace previews, now that the synthetic map is complete."""
-        if not self._stands:
-            self._stands = True
+        if self._order is None:
+            self._order = _Order()
             self._go_on()
 
     def companion(self) -> Companion | None:
         """Function that denoises a preview in the same background task; None without a model."""
-        denoiser, source = self.denoiser, self._source
+        denoiser, source = self.denoiser, self._synthetic.map
         if denoiser is None or source is None or self._held or not self.keeps_up:
             return None
         if self._lacks_limbs:
@@ -225,26 +223,19 @@ class DenoisedMap(BackgroundModel):
 
         return denoised
 
-    def take_sweep(
-        self,
-        source: DopplerMap,
-        known: NDArray[np.bool_],
-        sensor: object,
-        start: int,
-        swept: Swept | None,
-    ) -> None:
+    def take_sweep(self, sensor: object, start: int, swept: Swept | None) -> None:
         """Show the preview that the companion has denoised during a drag."""
         self._runner.cancel()
         self._again.stop()
-        self._follow(source, known, sensor)
-        self._changed_at[:] = self._revision
+        self._follow(sensor)
+        self._wanted[:] = True
         self._shown[:] = False
         if self.denoiser is None or self._held:
             return
         if swept is not None and swept.denoiser is self.denoiser:
             stop = start + swept.doppler.values.shape[1]
             self._paint(swept.doppler.values, (start, stop), swept.doppler)
-            self._done_at[start:stop] = self._revision
+            self._wanted[start:stop] = False
         else:
             self.track.set_status(f"{self.words} · {_WAITS}")
         self._publish()
@@ -264,11 +255,12 @@ class DenoisedMap(BackgroundModel):
 
     def put(self, start: int, values: NDArray[np.float32], fresh: bool = False) -> None:
         """Show frames (bins, n) that were denoised elsewhere; ``fresh``: no others."""
-        if self._source is None or not self._held:
+        source = self._synthetic.map
+        if source is None or not self._held:
             return
         if fresh:
             self._shown[:] = False
-        like = replace(self._source, kind="denoised", meta={}, uncertainty=None, limbs=None)
+        like = replace(source, kind="denoised", meta={}, uncertainty=None, limbs=None)
         self._paint(values, (start, start + values.shape[1]), like)
         self._publish()
 
@@ -279,24 +271,22 @@ class DenoisedMap(BackgroundModel):
 
     # --- denoising ------------------------------------------------------------------------
 
-    def _follow(self, source: DopplerMap, known: NDArray[np.bool_], sensor: object) -> None:
-        self._source, self._known = source, known
-        if self._shown.size != known.size:
+    def _follow(self, sensor: object) -> None:
+        if self._shown.size != self._synthetic.known.size:
             self._restart()
         if sensor != self._sensor:
             self._sensor = sensor
             self._shown[:] = False  # of another place; on screen until there is better
-            self._changed_at[:] = self._revision + 1
-        self._revision += 1
-        self._stands = False
-        self._begin_order()
+            self._wanted[:] = True
+        self._order = None
 
     def _go_on(self) -> None:
-        if self._source is None or self.denoiser is None or self._held or self._runner.busy:
+        source, known, denoiser = self._synthetic.map, self._synthetic.known, self.denoiser
+        if source is None or denoiser is None or self._held or self._runner.busy:
             return
         if self._lacks_limbs:
             return  # they are on their way
-        wanted = self._known & (self._done_at < self._changed_at)
+        wanted = known & self._wanted
         piece = next_piece(wanted, self._view())
         if piece is None:
             if not self._go_on_in_order():
@@ -304,8 +294,7 @@ class DenoisedMap(BackgroundModel):
             return
         self._report(int(wanted.sum()))
         first, last = piece
-        begin, end = with_context(self._known, piece)
-        source, denoiser, revision = self._source, self.denoiser, self._revision
+        begin, end = with_context(known, piece)
         # Copied: the values go on changing while the model works.
         limbs = None if source.limbs is None else deepcopy(source.limbs.between(begin, end))
         doppler = cut_out(source, begin, source.values[:, begin:end].copy(), limbs)
@@ -313,31 +302,32 @@ class DenoisedMap(BackgroundModel):
         def work(emit: object) -> _Answer:
             denoised = denoiser.denoise(doppler)
             values = denoised.values[:, first - begin : last - begin]
-            return _Answer((first, last), values, denoised, revision)
+            return _Answer(piece, values, denoised)
 
+        self._wanted[first:last] = False
         self._runner.submit(work)
 
     def _go_on_in_order(self) -> bool:
         """Denoise the next piece with what the model remembers of those before, if need be."""
-        source, denoiser, frames = self._source, self.denoiser, self._known.size
-        if not self._stands or frames <= AT_ONCE or self._in_order >= frames:
+        source, denoiser, order = self._synthetic.map, self.denoiser, self._order
+        frames = self._wanted.size
+        if order is None or frames <= AT_ONCE or order.next >= frames:
             return False
         assert source is not None
         assert denoiser is not None
         rate_hz = denoiser.frame_rate_hz
         if not (denoiser.equals_batch and is_regular(source.times_s, rate_hz)):
             return False
-        self._report(frames - self._in_order)
-        start, session = self._in_order, self._session
+        self._report(frames - order.next)
+        start = order.next
         stop = min(start + AT_ONCE, frames)
         energies = input_of(source.between(start, stop), denoiser.parts).copy()
-        present = presence(source, start, stop)
-        revision = self._revision
+        present = source.there[start:stop]
 
         def work(emit: object) -> _Answer:
-            live = session or denoiser.live()
+            live = order.session or denoiser.live()
             answers = live.advance(energies, present)
-            return _Answer((start, stop), answers.T, source, revision, live)
+            return _Answer((start, stop), answers.T, source, order, live)
 
         self._runner.submit(work)
         return True
@@ -345,7 +335,7 @@ class DenoisedMap(BackgroundModel):
     def _end(self) -> None:
         """Everything is denoised: say which frames the model passes through."""
         self._report(0)
-        source, movements = self._source, self._movements
+        source, movements = self._synthetic.map, self._movements
         if source is not None and movements is not None:
             passed = int(movements.strange(source.values.T, source.axis).sum())
             if passed:
@@ -355,24 +345,23 @@ class DenoisedMap(BackgroundModel):
         self.idle.emit()
 
     def _receive(self, answer: _Answer) -> None:
-        first, last = answer.piece
-        if answer.session is None:
+        if answer.order is None:
             self._paint(answer.values, answer.piece, answer.like)
-            self._done_at[first:last] = answer.revision
             self._publish()
             # Pieces of a long clip follow each other at once; a short one begins again.
             if self._shown.size > AT_ONCE:
                 self.track.set_status(f"{self.words} · preview")
                 self._go_on()
-            elif (self._done_at < self._changed_at)[self._known].any():
+            elif (self._wanted & self._synthetic.known).any():
                 self._again.start()
             else:
                 self._end()
             return
-        if answer.revision == self._revision:  # else the order has begun again
-            self._session, self._in_order = answer.session, last
+        if answer.order is self._order:  # else it has begun again
+            last = answer.piece[1]
+            self._order = _Order(last, answer.session)
             self._paint(answer.values, answer.piece, answer.like)
-            share = 100 * last // self._known.size
+            share = 100 * last // self._wanted.size
             done = "" if share == 100 else f" · preview, {share} % final"
             self.track.set_status(f"{self.words}{done}")
             self._publish()
@@ -381,12 +370,13 @@ class DenoisedMap(BackgroundModel):
     def _paint(self, values: NDArray[np.float32], piece: View, like: DopplerMap) -> None:
         """Take over a piece (bins, n); a map like another is begun where there is none."""
         if self._made is None:
-            assert self._source is not None
+            source = self._synthetic.map
+            assert source is not None
             self._made = replace(
                 like,
-                values=np.zeros_like(self._source.values),
-                timebase=self._source.timebase,
-                present=self._source.present,
+                values=np.zeros_like(source.values),
+                timebase=source.timebase,
+                present=source.present,
                 limbs=None,
             )
         inside = slice(*piece)
@@ -394,7 +384,7 @@ class DenoisedMap(BackgroundModel):
             values = self._texture.drawn(values.T, (TEXTURE_SEED,), piece[0]).T
         self._made.values[:, inside] = values
         self._strongest = max(self._strongest, float(values.max(initial=0.0)))
-        self._shown[inside] = self._known[inside]
+        self._shown[inside] = self._synthetic.known[inside]
 
     def _publish(self) -> None:
         if self._made is None:
@@ -409,7 +399,7 @@ class DenoisedMap(BackgroundModel):
 
     def _report(self, left: int) -> None:
         """Report a long clip as a task that can be cancelled."""
-        total = self._known.size
+        total = self._wanted.size
         if left > AT_ONCE and self._job is None:
             self._job = self._jobs.start("Denoising the map", self._give_up)
         if self._job is not None:
@@ -420,8 +410,8 @@ class DenoisedMap(BackgroundModel):
     def _give_up(self) -> None:
         """Cancel on the user's request; denoised frames stay."""
         self._stop()
-        self._stands = False
-        self._done_at[:] = self._changed_at
+        self._order = None
+        self._wanted[:] = False
         self.idle.emit()
 
     def _fail(self, words: str) -> None:
@@ -486,20 +476,5 @@ def cut_out(
     limbs: LimbMaps | None = None,
 ) -> DopplerMap:
     """Part of a map, with other values (bins, frames), and its split."""
-    stop = start + values.shape[1]
-    whole = (start, stop) == (0, len(doppler.timebase))
-    return replace(
-        doppler,
-        values=values,
-        timebase=doppler.timebase if whole else Timebase(doppler.times_s[start:stop]),
-        present=None if doppler.present is None else doppler.present[start:stop],
-        uncertainty=None,
-        limbs=limbs,
-    )
-
-
-def presence(doppler: DopplerMap, start: int, stop: int) -> NDArray[np.bool_]:
-    """Frames of a stretch with a person, (stop - start,)."""
-    if doppler.present is None:
-        return np.ones(stop - start, bool)
-    return doppler.present[start:stop]
+    inside = replace(doppler, uncertainty=None, limbs=None).between(start, start + values.shape[1])
+    return replace(inside, values=values, limbs=limbs)

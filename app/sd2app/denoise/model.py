@@ -15,7 +15,7 @@ from sd2app.background.model_worker.library import DenoiserLibrary
 from sd2app.denoise.map import TEXTURE_SEED, DenoisedMap
 from sd2app.denoise.text import origin_words, track_words
 from sd2app.maps.model import SynthesisModel
-from sd2app.maps.partial_map import Part, View
+from sd2app.maps.partial_map import Part
 from sd2app.maps.quality import Companion
 from sd2app.session.denoiser_choice import NO_MODEL, UNSAID, DenoiserChoice
 from sd2app.session.session import Session
@@ -50,8 +50,10 @@ class DenoiseModel(ReportingModel):
         super().__init__(parent)
         self._session, self._synthesis, self._library = session, synthesis, library
         self._document, self._synthetic = session.document, session.maps.synthetic
-        self.map = DenoisedMap(session.maps.denoised, self._view, session.jobs, self)
-        self.before_map = DenoisedMap(session.maps.before, self._view, session.jobs, self)
+        self.map, self.before_map = (
+            DenoisedMap(track, self._synthetic, synthesis.frames_in_view, session.jobs, self)
+            for track in (session.maps.denoised, session.maps.before)
+        )
         self.path: Path | None = None  # of the model that is in use or being loaded
         self.problem = ""  # why the chosen model is not in use; empty where it is
         self._choice = UNSAID
@@ -317,20 +319,10 @@ class DenoiseModel(ReportingModel):
         return lambda start, stretch: [part and part(start, stretch) for part in parts]
 
     def _take(self, part: Part) -> None:
-        source = self._synthetic.map
-        if source is None:
-            return
-        known = self._synthetic.known
         piece = (part.start, part.start + part.stretch.values.shape[1])
         for number, one in enumerate((self.map, self.before_map)):
             if self._synthesis.moving:
                 made = part.more[number] if part.more is not None else None
-                one.take_sweep(source, known, part.sensor, part.start, made)
+                one.take_sweep(part.sensor, part.start, made)
             else:
-                one.take(source, known, part.sensor, piece)
-
-    def _view(self) -> View:
-        source = self._synthetic.map
-        if source is None:
-            return (0, 0)
-        return source.timebase.frames_between(self._session.span.start_s, self._session.span.end_s)
+                one.take(part.sensor, piece)

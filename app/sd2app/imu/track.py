@@ -18,7 +18,6 @@ from sd2app.widgets.canvas import AT_LEFT, AT_RIGHT, Overlay, clipped
 from sd2app.widgets.time_axis import (
     HANDLE_PX,
     MARGIN_PX,
-    paint_cursor,
     paint_handle,
     paint_readout,
     paint_title,
@@ -111,11 +110,7 @@ class InertialTrack(TrackMouse):
             return
         plot, scale = self.plot_rect(), self.scale
         with clipped(painter, plot):
-            if self._pointer.time_s is not None:
-                painter.setPen(QPen(QColor(self._display.palette.muted), 1, Qt.PenStyle.DotLine))
-                x = scale.x_of(self._pointer.time_s)
-                painter.drawLine(QPointF(x, plot.top()), QPointF(x, plot.bottom()))
-            paint_cursor(painter, plot, scale.x_of(self._playback.time_s))
+            self.paint_cursors(painter, plot, QColor(self._display.palette.muted))
         if self.underMouse() and self._pointer.time_s is not None:
             time_s = self._pointer.time_s
             if lines := reading_lines(self._model, time_s):

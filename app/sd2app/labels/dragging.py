@@ -9,7 +9,7 @@ from PySide6.QtGui import QMouseEvent
 
 from sd2app.labels.edits import LabelEdits
 from sd2app.labels.loop import SpanLoop
-from sd2app.widgets.canvas import TimePlot
+from sd2app.maps.track_mouse import TimePlot
 from sd2app.widgets.time_axis import TimeScale
 from sd2core.errors import Sd2Error
 from sd2core.labels import edits

@@ -25,8 +25,8 @@ from sd2app.labels.recovery import LabelNotice, recover
 from sd2app.labels.span_buttons import Decision, SpanButtons
 from sd2app.labels.timeline import LabelArea, LabelTimeline, TargetLine
 from sd2app.labels.tracks import LabelTracks, TrackMenu
+from sd2app.maps.track_mouse import TimePlot
 from sd2app.session.session import Session
-from sd2app.widgets.canvas import TimePlot
 from sd2app.widgets.layouts import pane
 from sd2app.widgets.notices import Notice
 
@@ -46,26 +46,26 @@ class LabelsFeature(Feature):
         accept: Callable[[str], object],
         parent: QObject,
     ) -> None:
-        self._session, self._shell, self._accept = s, _, _ = session, shell, accept
+        self._session, self._shell, self._accept = session, shell, accept
         self.model = labels = LabelsModel(parent)
-        self.autosave = LabelAutosave(s.document, labels, recovery, parent)
-        self.edits = LabelEdits(s.document, labels, s.playback, self.autosave, parent)
-        self.reaction = Reaction(s.settings)
+        self.autosave = LabelAutosave(session.document, labels, recovery, parent)
+        self.edits = LabelEdits(session.document, labels, session.playback, self.autosave, parent)
+        self.reaction = Reaction(session.settings)
         self.dragging = LabelDragging(self.edits, parent)
         self.marking = LabelMarking(self.edits, self.reaction)
         self.tracks = LabelTracks(shell, self.edits)
-        self.loop = SpanLoop(labels, s.playback, parent)
+        self.loop = SpanLoop(labels, session.playback, parent)
         self.over_maps, self.over_all = map_overlay(labels), strip_overlay(labels)
-        self.cut_out = CutOutModel(s, parent)
+        self.cut_out = CutOutModel(session, parent)
         self.cut_out.asked.connect(
             lambda *others: ask_about_others(shell.dialog_parent, self.cut_out, *others)
         )
         self._keys: LabelActions | None = None
-        self.edits.done_at.connect(s.span.reveal_any)
+        self.edits.done_at.connect(session.span.reveal_any)
         self.edits.failed.connect(shell.warn)
-        self.edits.restoring.connect(s.edits.restore)
+        self.edits.restoring.connect(session.edits.restore)
         report(shell, self.autosave, self.cut_out)
-        s.document.changed.connect(self._follow_capture)
+        session.document.changed.connect(self._follow_capture)
         shown = labels.changed, labels.selection_changed, labels.marks_changed
         self.changing = self.autosave.changed, *shown, self.dragging.changed, self.loop.changed
         self.closing = (self.cut_out, self.autosave)
@@ -74,138 +74,130 @@ class LabelsFeature(Feature):
 
     def actions(self) -> Sequence[Action]:
         """Everything that can be done to labels."""
-        s, labels, edits, loop = self._session, self.model, self.edits, self.loop
-        marking, tracks, autosave = self.marking, self.tracks, self.autosave
-        shell = self._shell
+        edits = *self._edits_of_spans(), *self._edits_of_tracks(), *self._edits_from_files()
+        return *editing(self.edits, *edits), *self._other_actions()
 
-        def has_spans() -> bool:
-            return bool(labels.labels.spans)
-
-        def has_marks() -> bool:
-            return bool(labels.marks)
-
-        def some_selected() -> bool:
-            return bool(labels.selected)
-
-        def one_selected() -> bool:
-            return len(labels.selected) == 1
-
-        def has_track() -> bool:
-            return bool(labels.track)
-
-        def has_tracks() -> bool:
-            return len(labels.targets) > 1
-
-        def can_put() -> bool:
-            return some_selected() and has_tracks()
-
+    def _edits_of_spans(self) -> Sequence[Action]:
+        labels, edits, marking = self.model, self.edits, self.marking
         return (
-            *editing(
-                edits,
-                Action(
-                    "end_marks", "Labels", "End what is being marked", ("E",),
-                    "End all spans that have begun, before the frame on screen",
-                    marking.end_marks, has_marks,
-                ),
-                Action(
-                    "carve_marks", "Labels", "End what is being marked, cutting others", ("K",),
-                    "The same, taking from other spans of the track what they hold of it",
-                    lambda: marking.end_marks(cutting=True), has_marks,
-                ),
-                Action(
-                    "span_starts_here", "Labels", "Selected span starts here", ("[",),
-                    "The frame on screen is the first one of the selected span",
-                    lambda: edits.edge_here("start"), one_selected,
-                ),
-                Action(
-                    "span_ends_here", "Labels", "Selected span ends here", ("]",),
-                    "The frame on screen is the last one of the selected span",
-                    lambda: edits.edge_here("end"), one_selected,
-                ),
-                Action(
-                    "nudge_back", "Labels", "Move selected spans one frame back", ("Alt+Left",),
-                    "They stop at their neighbours", lambda: edits.nudge(-1), some_selected,
-                ),
-                Action(
-                    "nudge_on", "Labels", "Move selected spans one frame on", ("Alt+Right",),
-                    "They stop at their neighbours", lambda: edits.nudge(1), some_selected,
-                ),
-                Action(
-                    "split_span", "Labels", "Split span here", ("/",),
-                    "Cut the span under the cursor in two, before the frame on screen",
-                    edits.split, has_spans,
-                ),
-                Action(
-                    "merge_spans", "Labels", "Merge selected spans", ("G",),
-                    "One span from the first start to the last end (Ctrl+click selects several)",
-                    edits.merge, lambda: len(labels.selected) > 1,
-                ),
-                Action(
-                    "delete_spans", "Labels", "Delete selected spans", ("Backspace", "Del"),
-                    "Undo brings them back", edits.delete, some_selected,
-                ),
-                Action(
-                    "duplicate_spans", "Labels", "Duplicate selected spans here", ("C",),
-                    "The copies begin with the frame on screen, or behind the spans where that is"
-                    " within them",
-                    edits.duplicate, some_selected,
-                ),
-                Action(
-                    "meet_spans", "Labels", "Let two selected spans meet here", ("J",),
-                    "The first ends and the second begins with the frame on screen",
-                    edits.meet, lambda: len(labels.selected) == 2,
-                ),
-                Action(
-                    "fill_gaps", "Labels", "Fill gaps of the track with background", ("Shift+F",),
-                    "A span in every gap, with the label of the class background or the one last"
-                    " used",
-                    edits.fill_gaps, lambda: s.has_content() and has_track(),
-                ),
-                Action(
-                    "spans_up", "Tracks", "Put selected spans on the track above", ("Alt+Up",),
-                    "At the times that they have", lambda: tracks.put_spans(-1), can_put,
-                ),
-                Action(
-                    "spans_down", "Tracks", "Put selected spans on the track below", ("Alt+Down",),
-                    "At the times that they have", lambda: tracks.put_spans(1), can_put,
-                ),
-                Action(
-                    "add_track", "Tracks", "Add track…", (), "A row of spans below the others",
-                    tracks.ask_to_add, s.has_content,
-                ),
-                Action(
-                    "rename_track", "Tracks", "Rename track…", (),
-                    "The one on which new spans come", tracks.rename, has_track,
-                ),
-                Action(
-                    "overlap", "Tracks", "Spans of the track may overlap", (),
-                    "Several at once, drawn one below the other",
-                    tracks.toggle_overlap, has_track, lambda: tracks.free,
-                ),
-                Action(
-                    "track_up", "Tracks", "Move track up", (), "Above the one before it",
-                    lambda: tracks.move(-1), has_tracks,
-                ),
-                Action(
-                    "track_down", "Tracks", "Move track down", (), "Below the one after it",
-                    lambda: tracks.move(1), has_tracks,
-                ),
-                Action(
-                    "remove_track", "Tracks", "Remove track", (),
-                    "With its spans; undo brings them back", tracks.remove, has_track,
-                ),
-                Action(
-                    "import_labels", "Labels", "Import labels…", ("Ctrl+I",),
-                    "Take the labels of a file: SD² Studio, table, Audacity, ELAN, Praat, BORIS,"
-                    " MNE",
-                    lambda: import_labels(shell, edits), s.has_content,
-                ),
-                Action(
-                    "restore_labels", "Labels", "Restore edits that were not saved", (),
-                    "Take over what an earlier session left behind; one undo takes that back",
-                    edits.restore, lambda: autosave.offer is not None,
-                ),
+            Action(
+                "end_marks", "Labels", "End what is being marked", ("E",),
+                "End all spans that have begun, before the frame on screen",
+                marking.end_marks, self._has_marks,
             ),
+            Action(
+                "carve_marks", "Labels", "End what is being marked, cutting others", ("K",),
+                "The same, taking from other spans of the track what they hold of it",
+                lambda: marking.end_marks(cutting=True), self._has_marks,
+            ),
+            Action(
+                "span_starts_here", "Labels", "Selected span starts here", ("[",),
+                "The frame on screen is the first one of the selected span",
+                lambda: edits.edge_here("start"), self._one_selected,
+            ),
+            Action(
+                "span_ends_here", "Labels", "Selected span ends here", ("]",),
+                "The frame on screen is the last one of the selected span",
+                lambda: edits.edge_here("end"), self._one_selected,
+            ),
+            Action(
+                "nudge_back", "Labels", "Move selected spans one frame back", ("Alt+Left",),
+                "They stop at their neighbours", lambda: edits.nudge(-1), self._some_selected,
+            ),
+            Action(
+                "nudge_on", "Labels", "Move selected spans one frame on", ("Alt+Right",),
+                "They stop at their neighbours", lambda: edits.nudge(1), self._some_selected,
+            ),
+            Action(
+                "split_span", "Labels", "Split span here", ("/",),
+                "Cut the span under the cursor in two, before the frame on screen",
+                edits.split, self._has_spans,
+            ),
+            Action(
+                "merge_spans", "Labels", "Merge selected spans", ("G",),
+                "One span from the first start to the last end (Ctrl+click selects several)",
+                edits.merge, lambda: len(labels.selected) > 1,
+            ),
+            Action(
+                "delete_spans", "Labels", "Delete selected spans", ("Backspace", "Del"),
+                "Undo brings them back", edits.delete, self._some_selected,
+            ),
+            Action(
+                "duplicate_spans", "Labels", "Duplicate selected spans here", ("C",),
+                "The copies begin with the frame on screen, or behind the spans where that is"
+                " within them",
+                edits.duplicate, self._some_selected,
+            ),
+            Action(
+                "meet_spans", "Labels", "Let two selected spans meet here", ("J",),
+                "The first ends and the second begins with the frame on screen",
+                edits.meet, lambda: len(labels.selected) == 2,
+            ),
+            Action(
+                "fill_gaps", "Labels", "Fill gaps of the track with background", ("Shift+F",),
+                "A span in every gap, with the label of the class background or the one last"
+                " used",
+                edits.fill_gaps, lambda: self._session.has_content() and self._has_track(),
+            ),
+        )  # fmt: skip
+
+    def _edits_of_tracks(self) -> Sequence[Action]:
+        tracks = self.tracks
+        return (
+            Action(
+                "spans_up", "Tracks", "Put selected spans on the track above", ("Alt+Up",),
+                "At the times that they have", lambda: tracks.put_spans(-1), self._can_put,
+            ),
+            Action(
+                "spans_down", "Tracks", "Put selected spans on the track below", ("Alt+Down",),
+                "At the times that they have", lambda: tracks.put_spans(1), self._can_put,
+            ),
+            Action(
+                "add_track", "Tracks", "Add track…", (), "A row of spans below the others",
+                tracks.ask_to_add, self._session.has_content,
+            ),
+            Action(
+                "rename_track", "Tracks", "Rename track…", (),
+                "The one on which new spans come", tracks.rename, self._has_track,
+            ),
+            Action(
+                "overlap", "Tracks", "Spans of the track may overlap", (),
+                "Several at once, drawn one below the other",
+                tracks.toggle_overlap, self._has_track, lambda: tracks.free,
+            ),
+            Action(
+                "track_up", "Tracks", "Move track up", (), "Above the one before it",
+                lambda: tracks.move(-1), self._has_tracks,
+            ),
+            Action(
+                "track_down", "Tracks", "Move track down", (), "Below the one after it",
+                lambda: tracks.move(1), self._has_tracks,
+            ),
+            Action(
+                "remove_track", "Tracks", "Remove track", (),
+                "With its spans; undo brings them back", tracks.remove, self._has_track,
+            ),
+        )  # fmt: skip
+
+    def _edits_from_files(self) -> Sequence[Action]:
+        return (
+            Action(
+                "import_labels", "Labels", "Import labels…", ("Ctrl+I",),
+                "Take the labels of a file: SD² Studio, table, Audacity, ELAN, Praat, BORIS,"
+                " MNE",
+                lambda: import_labels(self._shell, self.edits), self._session.has_content,
+            ),
+            Action(
+                "restore_labels", "Labels", "Restore edits that were not saved", (),
+                "Take over what an earlier session left behind; one undo takes that back",
+                self.edits.restore, lambda: self.autosave.offer is not None,
+            ),
+        )  # fmt: skip
+
+    def _other_actions(self) -> Sequence[Action]:
+        s, shell, labels, edits = self._session, self._shell, self.model, self.edits
+        loop, tracks, autosave = self.loop, self.tracks, self.autosave
+        return (
             Action(
                 "leave", "Labels", "Cancel", ("Esc",),
                 "Let go of what is dragged; else place no sensor; else forget what is being marked;"
@@ -215,27 +207,27 @@ class LabelsFeature(Feature):
             Action(
                 "loop_span", "Labels", "Play selected span in a loop", ("O",),
                 "Again and again, also while its edges are moved, until Esc or going elsewhere",
-                lambda: loop.play(labels.selected[0]), some_selected,
+                lambda: loop.play(labels.selected[0]), self._some_selected,
             ),
             Action(
                 "select_all", "Labels", "Select all spans", ("Ctrl+A",), "On all tracks",
-                labels.select_all, has_spans,
+                labels.select_all, self._has_spans,
             ),
             Action(
                 "next_span", "Labels", "Next span", ("N",), "Select it and go to its start",
-                lambda: edits.step(1), has_spans,
+                lambda: edits.step(1), self._has_spans,
             ),
             Action(
                 "previous_span", "Labels", "Previous span", ("P",), "Select it and go to its start",
-                lambda: edits.step(-1), has_spans,
+                lambda: edits.step(-1), self._has_spans,
             ),
             Action(
                 "previous_track", "Tracks", "Previous track", ("Shift+Up",),
-                "New spans come on the track above", lambda: tracks.step(-1), has_tracks,
+                "New spans come on the track above", lambda: tracks.step(-1), self._has_tracks,
             ),
             Action(
                 "next_track", "Tracks", "Next track", ("Shift+Down",),
-                "New spans come on the track below", lambda: tracks.step(1), has_tracks,
+                "New spans come on the track below", lambda: tracks.step(1), self._has_tracks,
             ),
             Action(
                 "export_labels", "Labels", "Export labels…", ("Ctrl+Shift+I",),
@@ -245,7 +237,7 @@ class LabelsFeature(Feature):
             Action(
                 "cut_out", "Labels", "Export cut-outs…", ("Ctrl+Shift+X",),
                 "Write video, mesh and maps of each span into a folder of its own, with an index",
-                lambda: ask_for_cut_outs(shell, labels, self.cut_out), has_spans,
+                lambda: ask_for_cut_outs(shell, labels, self.cut_out), self._has_spans,
             ),
             Action(
                 "recover_labels", "File", "Recover labels…", (),
@@ -274,6 +266,27 @@ class LabelsFeature(Feature):
                 lambda: shell.bring_up("Labels", "Spans"),
             ),
         )  # fmt: skip
+
+    def _has_spans(self) -> bool:
+        return bool(self.model.labels.spans)
+
+    def _has_marks(self) -> bool:
+        return bool(self.model.marks)
+
+    def _some_selected(self) -> bool:
+        return bool(self.model.selected)
+
+    def _one_selected(self) -> bool:
+        return len(self.model.selected) == 1
+
+    def _has_track(self) -> bool:
+        return bool(self.model.track)
+
+    def _has_tracks(self) -> bool:
+        return len(self.model.targets) > 1
+
+    def _can_put(self) -> bool:
+        return self._some_selected() and self._has_tracks()
 
     def _can_cancel(self) -> bool:
         placing = self._session.placing.active

@@ -14,9 +14,9 @@ from sd2app.labels.loop import SpanLoop
 from sd2app.labels.model import LabelsModel
 from sd2app.labels.painting import ROW_PX, LabelRows, lane_box, paint_span, paint_tracks
 from sd2app.labels.span_buttons import Decision, SpanButtons
-from sd2app.maps.track_mouse import SessionPlot
+from sd2app.maps.track_mouse import ZoomedPlot
 from sd2app.session.session import Session
-from sd2app.widgets.canvas import AT_LEFT, ZoomedPlot
+from sd2app.widgets.canvas import AT_LEFT
 from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, paint_cursor
 from sd2core.labels.spans import Span
 
@@ -44,7 +44,7 @@ def _tip_of(target: HitTarget) -> str:
 _SCROLL_MS, _SCROLL_SHARE = 30, 0.03
 
 
-class LabelTimeline(ZoomedPlot, SessionPlot):
+class LabelTimeline(ZoomedPlot):
     """A row per track. Drag an empty place, a span or an edge of it; with Alt nothing snaps.
 
     With Shift a new span is drawn over others, which it cuts. A click selects a span and goes to

@@ -23,7 +23,6 @@ from sd2app.widgets.colour_maps import lookup_table
 from sd2app.widgets.time_axis import (
     HANDLE_PX,
     MARGIN_PX,
-    paint_cursor,
     paint_handle,
     paint_readout,
     paint_title,
@@ -266,19 +265,16 @@ class HeatmapView(TrackMouse, MapWidget):
         paint_velocity_labels(painter, plot, labels)
 
     def _paint_cursors(self, painter: QPainter, plot: QRectF) -> None:
+        faint = QColor(255, 255, 255, 120)
         with clipped(painter, plot):
-            scale = self.scale
-            if self._pointer.time_s is not None:
-                painter.setPen(QPen(QColor(255, 255, 255, 120), 1, Qt.PenStyle.DotLine))
-                x = scale.x_of(self._pointer.time_s)
-                painter.drawLine(QPointF(x, plot.top()), QPointF(x, plot.bottom()))
-                if self._pointer.velocity_mps is not None:
-                    y = self.y_of(self._pointer.velocity_mps)
-                    painter.drawLine(QPointF(plot.left(), y), QPointF(plot.right(), y))
-            paint_cursor(painter, plot, scale.x_of(self._playback.time_s))
+            if self._pointer.velocity_mps is not None:
+                painter.setPen(QPen(faint, 1, Qt.PenStyle.DotLine))
+                y = self.y_of(self._pointer.velocity_mps)
+                painter.drawLine(QPointF(plot.left(), y), QPointF(plot.right(), y))
+            self.paint_cursors(painter, plot, faint)
         if self.underMouse() and self._pointer.reading is not None:
             reading = self._pointer.reading
-            place = QPointF(scale.x_of(reading.time_s), self.y_of(reading.velocity_mps))
+            place = QPointF(self.scale.x_of(reading.time_s), self.y_of(reading.velocity_mps))
             paint_readout(painter, plot, place, reading_lines(reading), self._display.palette)
 
     # --- mouse ----------------------------------------------------------------------------

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +11,7 @@ from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QBrush, QColor, QImage, QPainter, QResizeEvent
 
 from sd2app.maps.difference import DifferenceModel
-from sd2app.maps.track_mouse import SessionPlot
+from sd2app.maps.track_mouse import TimePlot
 from sd2app.session.display import HeatmapLevels
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
@@ -23,24 +22,11 @@ from sd2app.widgets.time_axis import TimeScale
 _NOBODY = "no person"
 
 
-def column_frames(
-    times_s: NDArray[np.float64], end_s: float, start_s: float, stop_s: float, columns: int
-) -> NDArray[np.int64]:
-    """First frame on screen in every pixel column, and one past the last, (columns + 1,).
-
-    A column shows frames ``[edges[k], max(edges[k] + 1, edges[k + 1]))``. Minus
-    one marks columns before the first frame, ``len(times_s)`` those past the end.
-    """
-    edges_s = start_s + (stop_s - start_s) * np.arange(columns + 1) / columns
-    frames = np.searchsorted(times_s, edges_s + 1e-9, side="right") - 1
-    frames[edges_s >= end_s] = len(times_s)
-    return frames
-
-
 @dataclass(frozen=True, eq=False)
 class Columns:
     """Frames of a map that share a pixel column."""
 
+    track: MapModel
     filled: NDArray[np.bool_]  # (columns,): True with a frame
     begin: int  # frames in view, half-open
     end: int
@@ -52,7 +38,11 @@ class Columns:
         assert track.map is not None
         timebase = track.map.timebase
         from_s, to_s = start_s - track.offset_s, stop_s - track.offset_s
-        frames = column_frames(timebase.times_s, timebase.end_s, from_s, to_s, columns)
+        edges_s = from_s + (to_s - from_s) * np.arange(columns + 1) / columns
+        # First frame of every column, and one past the last: −1 before the map, the number of
+        # frames behind it.
+        frames = np.searchsorted(timebase.times_s, edges_s + 1e-9, side="right") - 1
+        frames[edges_s >= timebase.end_s] = len(timebase)
         first = frames[:-1]
         filled = (first >= 0) & (first < len(timebase))
         left_s = from_s + (stop_s - start_s) * np.arange(columns) / columns
@@ -62,49 +52,43 @@ class Columns:
             left_s[filled] - timebase.times_s[first[filled]] < track.longest_s
         )
         if not filled.any():
-            return cls(filled, 0, 0, np.zeros(0, np.int64))
+            return cls(track, filled, 0, 0, np.zeros(0, np.int64))
         begin, end = int(first[filled][0]), int(frames[1:][filled][-1])
         end = min(max(end, int(first[filled][-1]) + 1), len(timebase))
-        return cls(filled, begin, end, first[filled] - begin)
+        return cls(track, filled, begin, end, first[filled] - begin)
 
-    def strongest(self, values: NDArray[Any]) -> NDArray[Any]:
-        """The largest of every column's frames, (bins, filled columns), of (bins, end - begin)."""
+    def shown(self) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+        """Values of every column (bins, columns), and which columns have computed ones.
+
+        Where several frames share a column the strongest value is shown, so that a
+        short gesture does not vanish when zoomed out.
+        """
+        covered, filled = self.track.covered, self.filled.copy()
+        if covered is not None:
+            filled[filled] = covered[self.starts + self.begin]
+        return self._strongest(self.track.values[:, self.begin : self.end]), filled
+
+    def uncertain(self, levels: HeatmapLevels) -> NDArray[np.bool_] | None:
+        """Mask of uncertain cells, bool (bins, columns); None where that is not known.
+
+        Of several frames that share a column the one that is shown decides.
+        """
+        uncertain = self.track.uncertain(levels, self.begin, self.end)
+        if uncertain is None:
+            return None
+        values = self.track.values[:, self.begin : self.end]
+        known = self._strongest(np.where(uncertain, np.float32(-1.0), values))
+        unknown = self._strongest(np.where(uncertain, values, np.float32(-1.0)))
+        return self.filled & (unknown >= np.maximum(known, 0.0))
+
+    def _strongest(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The largest of every column's frames, (bins, columns), of (bins, end - begin)."""
+        found = np.zeros((len(values), len(self.filled)), np.float32)
         if values.shape[1] > self.starts.size:
-            return np.maximum.reduceat(values, self.starts, axis=1)
-        return values[:, self.starts]
-
-
-def shade_columns(
-    track: MapModel, levels: HeatmapLevels, start_s: float, stop_s: float, columns: int
-) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Shades of the time window, shape (bins, columns), and a mask of the filled columns.
-
-    Where several frames share a column the strongest value is shown, so that a
-    short gesture does not vanish when zoomed out.
-    """
-    values, filled = _strongest_columns(track, start_s, stop_s, columns)
-    return track.shade(values, levels), filled
-
-
-def uncertain_columns(
-    track: MapModel, levels: HeatmapLevels, start_s: float, stop_s: float, columns: int
-) -> NDArray[np.bool_] | None:
-    """Mask of uncertain cells, bool (bins, columns); None where that is not known.
-
-    Of several frames that share a column the one that is shown decides.
-    """
-    assert track.map is not None
-    view = Columns.of(track, start_s, stop_s, columns)
-    uncertain = track.uncertain(levels, view.begin, view.end)
-    if uncertain is None:
-        return None
-    found = np.zeros((track.map.axis.bins, columns), bool)
-    if view.filled.any():
-        values = track.values[:, view.begin : view.end]
-        known = view.strongest(np.where(uncertain, np.float32(-1.0), values))
-        unknown = view.strongest(np.where(uncertain, values, np.float32(-1.0)))
-        found[:, view.filled] = unknown >= np.maximum(known, 0.0)
-    return found
+            found[:, self.filled] = np.maximum.reduceat(values, self.starts, axis=1)
+        else:
+            found[:, self.filled] = values[:, self.starts]
+        return found
 
 
 def heatmap_image(
@@ -116,10 +100,11 @@ def heatmap_image(
     background: int,
 ) -> QImage:
     """One pixel per column and bin, fastest approach on top; uncertain cells without colour."""
-    shades, filled = shade_columns(track, levels, start_s, stop_s, columns)
-    numbers = (shades * 255.0).astype(np.uint8)
+    view = Columns.of(track, start_s, stop_s, columns)
+    values, filled = view.shown()
+    numbers = (track.shade(values, levels) * 255.0).astype(np.uint8)
     colours = lookup_table(levels.colour_map)[numbers]
-    uncertain = uncertain_columns(track, levels, start_s, stop_s, columns)
+    uncertain = view.uncertain(levels)
     if uncertain is not None:
         colours = np.where(uncertain, uncertain_table(levels.colour_map)[numbers], colours)
     colours[:, ~filled] = background
@@ -140,7 +125,7 @@ def difference_image(
     Where several frames share a column, of the strongest of each, as the maps show them.
     """
     (denoised, there), (real, as_well) = (
-        _strongest_columns(track, start_s, stop_s, columns)
+        Columns.of(track, start_s, stop_s, columns).shown()
         for track in (difference.denoised, difference.real)
     )
     shades = difference.shades(denoised, real, levels)
@@ -149,22 +134,7 @@ def difference_image(
     return image_of(colours[::-1], QImage.Format.Format_RGB32)
 
 
-def _strongest_columns(
-    track: MapModel, start_s: float, stop_s: float, columns: int
-) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Values of every pixel column (bins, columns), and which columns have some."""
-    assert track.map is not None
-    view = Columns.of(track, start_s, stop_s, columns)
-    values = np.zeros((track.map.axis.bins, columns), np.float32)
-    filled = view.filled.copy()
-    if filled.any():
-        values[:, filled] = view.strongest(track.values[:, view.begin : view.end])
-        if track.covered is not None:
-            filled[filled] = track.covered[view.starts + view.begin]
-    return values, filled
-
-
-class MapWidget(SessionPlot):
+class MapWidget(TimePlot):
     """Keeps the picture of a map until map, stretch, levels, theme or size change."""
 
     BOTTOM_PX = 4

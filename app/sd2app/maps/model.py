@@ -13,7 +13,7 @@ from PySide6.QtCore import QObject, Signal
 
 from sd2app.accuracy.model import AccuracyModel
 from sd2app.background.latest import Emit, delayed
-from sd2app.maps.partial_map import FINAL, Part, ShownMap, View
+from sd2app.maps.partial_map import FINAL, Part, PartialMap, View
 from sd2app.maps.quality import (
     Companion,
     QualityLevel,
@@ -66,7 +66,7 @@ class SynthesisModel(QObject):
         self._session, self._accuracy = session, accuracy
         self.moving = False  # then the time budget decides, otherwise the tolerance
         self._track = session.maps.synthetic
-        self._shown_map = ShownMap(self._track)
+        self._partial = PartialMap(self._track)
         self._companion: Callable[[], Companion | None] = lambda: None
         self._wanting_limbs: set[str] = set()
         self._reader = FrameReader(session)
@@ -110,18 +110,24 @@ class SynthesisModel(QObject):
     @property
     def complete(self) -> bool:
         """True once every frame has its final quality for the current sensor."""
-        partial = self._shown_map.partial
-        return partial.final and partial.sensor == self._sensor
+        return self._partial.final and self.shows_sensor
 
     @property
     def split(self) -> bool:
         """True if the map is split by the parts of the body."""
-        return self._shown_map.partial.limbs is not None
+        return self._partial.split
 
     @property
     def shows_sensor(self) -> bool:
         """True while the map is of the current sensor, at any quality."""
-        return self._shown_map.partial.sensor == self._sensor
+        return self._partial.sensor == self._sensor
+
+    def frames_in_view(self) -> View:
+        """Frames of the map in the time window, half-open."""
+        mesh = self._session.document.mesh
+        if mesh is None:
+            return (0, 0)
+        return mesh.timebase.frames_between(self._session.span.start_s, self._session.span.end_s)
 
     @property
     def torso_m(self) -> Vector | None:
@@ -173,7 +179,7 @@ class SynthesisModel(QObject):
         except Sd2Error as error:
             self.failed.emit(str(error))
             return
-        self._shown_map.begin(options, mesh)
+        self._partial.begin(options, mesh)
         self._compiler.start()
         self._announce()
         self._follow()
@@ -188,7 +194,7 @@ class SynthesisModel(QObject):
         self._synthesizers = SynthesizerCache(mesh, options, self._accuracy.library)
         self._synthesizers.limbs = synthesizers.limbs
         self._prefetcher.forget()
-        self._shown_map.mark_stale()
+        self._partial.mark_stale()
         self._accuracy.take_over(mesh, options)
         self._follow()
 
@@ -213,7 +219,7 @@ class SynthesisModel(QObject):
         if bool(self._wanting_limbs) != before and self._synthesizers is not None:
             self._synthesizers.limbs = not before
             if not before:
-                self._shown_map.partial.quality[:] = 0
+                self._partial.quality[:] = 0
                 self._settle()
 
     def export(self, path: Path) -> None:
@@ -249,7 +255,7 @@ class SynthesisModel(QObject):
     # --- following ------------------------------------------------------------------------
 
     def _forget(self) -> None:
-        self._shown_map.forget()
+        self._partial.forget()
         self._reader.forget()
         self._plan: AccuracyPlan | None = None
         self._dragging_plan: AccuracyPlan | None = None
@@ -272,7 +278,7 @@ class SynthesisModel(QObject):
         self._prefetcher.cancel()
         if self._session.sensor.dragging:
             self._rest.start()
-            self._set_moving(self.moving or self._sensor != self._shown_map.partial.sensor)
+            self._set_moving(self.moving or self._sensor != self._partial.sensor)
             self._follow_clock()
             if self.moving:
                 self._sweep()
@@ -318,12 +324,12 @@ class SynthesisModel(QObject):
         self._sweeping = False
         sensor = self._sensor
         self._accuracy.measured.rest_at(sensor)
-        quality = self._shown_map.partial.quality_for(sensor)
+        quality = self._partial.quality_for(sensor)
         if quality.min() >= FINAL:
             self._set_moving(False)
             self._go_on()
             return
-        view, rough, vertices = self._frames_in_view(), self._preview_quality(), self._vertices
+        view, rough, vertices = self.frames_in_view(), self._preview_quality(), self._vertices
         self._set_moving(False)
         final = self._final_quality()
         # Much of a long clip can wait until it is known how it is to be done.
@@ -367,17 +373,17 @@ class SynthesisModel(QObject):
             self._say_quality()
             return
         self._plan = plan
-        self._shown_map.mark_stale()
+        self._partial.mark_stale()
         if not self.moving:
             self._settle()
 
     def _reorder(self) -> None:
-        start, stop = self._frames_in_view()
+        start, stop = self.frames_in_view()
         if self._synthesizers is None or self.moving or stop <= start:
             return
         self._say_quality()
-        partial = self._shown_map.partial
-        if partial.quality[start:stop].min() < FINAL and partial.frames > stop - start:
+        quality = self._partial.quality
+        if quality[start:stop].min() < FINAL and len(quality) > stop - start:
             self._settle()
 
     # --- results --------------------------------------------------------------------------
@@ -399,7 +405,7 @@ class SynthesisModel(QObject):
 
     def _take(self, part: Part) -> None:
         first = self._track.map is None
-        self._shown_map.take(part)
+        self._partial.take(part)
         self._say_quality()
         self.painted.emit(part)
         if first:
@@ -409,7 +415,7 @@ class SynthesisModel(QObject):
     def _say_quality(self) -> None:
         if self._synthesizers is not None:
             final = final_words(self._synthesizers, self._accuracy.in_use)
-            self._shown_map.say_quality(self._frames_in_view(), final, self._compiler.busy)
+            self._partial.say_quality(self.frames_in_view(), final, self._compiler.busy)
 
     def _fail(self, error: Exception) -> None:
         self._sweeping = False
@@ -442,15 +448,9 @@ class SynthesisModel(QObject):
 
     def _swept(self) -> View:
         """Frames that follow a drag: the whole clip when it is short, else those in view."""
-        frames = self._shown_map.partial.frames
-        return (0, frames) if is_swept_whole(self._vertices, frames) else self._frames_in_view()
+        frames = self._partial.frames
+        return (0, frames) if is_swept_whole(self._vertices, frames) else self.frames_in_view()
 
     def _budget_ms(self) -> float:
         start, stop = self._swept()
         return budget_ms(stop - start)
-
-    def _frames_in_view(self) -> View:
-        mesh = self._session.document.mesh
-        if mesh is None:
-            return (0, 0)
-        return mesh.timebase.frames_between(self._session.span.start_s, self._session.span.end_s)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from sd2app.session.content import reference_of
 from sd2app.session.maps import MapModel
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.doppler.synthesizer import Stretch
-from sd2core.maps import DopplerMap, LimbMaps
+from sd2core.maps import DopplerMap
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.sensor import VirtualSensor
 
@@ -25,13 +25,32 @@ View = tuple[int, int]
 
 
 class PartialMap:
-    """Doppler map of which some frames are computed, none of them at first."""
+    """Map on screen that is filled part by part, each frame with its quality."""
 
-    def __init__(self, bins: int, frames: int) -> None:
-        self.values = np.zeros((bins, frames), np.float32)
-        self.limbs: LimbMaps | None = None  # where they are wanted
-        self.quality = np.zeros(frames, np.uint8)  # see FINAL
+    def __init__(self, track: MapModel) -> None:
+        self._track = track
+        self.forget()
+
+    def forget(self) -> None:
+        """Begin without a mesh; what is on the track stays."""
+        self._map: DopplerMap | None = None  # with the values so far
+        self.quality = np.zeros(0, np.uint8)  # (T,), see FINAL
         self.sensor: VirtualSensor | None = None  # placement that all of it is for
+        self._words: dict[int, str] = {}
+        self._needs_reference = True
+
+    def begin(self, options: SynthesisOptions, mesh: MeshSequence) -> None:
+        """Begin an empty map of another mesh."""
+        self.forget()
+        self.quality = np.zeros(mesh.frame_count, np.uint8)
+        self._map = DopplerMap(
+            values=np.zeros((options.axis.bins, mesh.frame_count), np.float32),
+            axis=options.axis,
+            timebase=mesh.timebase,
+            kind="synthetic",
+            null_bins=options.null_bins,
+            present=mesh.presence.measured,
+        )
 
     @property
     def frames(self) -> int:
@@ -48,28 +67,60 @@ class PartialMap:
         """True once every frame has its final quality."""
         return bool(self.frames and self.quality.min() >= FINAL)
 
-    def paint(self, sensor: VirtualSensor, start: int, stretch: Stretch, quality: int) -> None:
-        """Take computed frames over; those of another sensor are forgotten."""
-        if sensor != self.sensor:
-            self.sensor = sensor
-            self.quality[:] = 0
-        inside = slice(start, start + stretch.values.shape[1])
-        self.values[:, inside] = stretch.values
-        if stretch.limbs is None:
-            self.limbs = None
-        else:
-            if self.limbs is None:
-                self.limbs = stretch.limbs.empty(self.frames)
-            self.limbs.put(start, stretch.limbs)
-        self.quality[inside] = quality
+    @property
+    def split(self) -> bool:
+        """True if the map is split by the parts of the body."""
+        return self._map is not None and self._map.limbs is not None
 
     def mark_stale(self) -> None:
         """Lower final frames to previews; they stay on screen until they are replaced."""
         np.minimum(self.quality, PREVIEW, out=self.quality)
+        self._words[PREVIEW] = self._words.get(FINAL, self._words.get(PREVIEW, ""))
 
     def quality_for(self, sensor: VirtualSensor) -> NDArray[np.uint8]:
         """A copy of the ranks as far as they hold for a placement."""
         return self.quality.copy() if sensor == self.sensor else np.zeros_like(self.quality)
+
+    def take(self, part: Part) -> None:
+        """Paint computed frames; those of another sensor are forgotten.
+
+        The first whole map sets the 0 dB reference.
+        """
+        assert self._map is not None
+        if part.sensor != self.sensor:
+            self.sensor = part.sensor
+            self.quality[:] = 0
+        values, limbs, made = self._map.values, self._map.limbs, part.stretch
+        inside = slice(part.start, part.start + made.values.shape[1])
+        values[:, inside] = made.values
+        if made.limbs is None:
+            limbs = None
+        else:
+            limbs = made.limbs.empty(self.frames) if limbs is None else limbs
+            limbs.put(part.start, made.limbs)
+        self.quality[inside] = part.quality
+        self._words[part.quality] = part.words
+        if self._needs_reference and self.full:
+            self._needs_reference = False
+            self._track.set_reference(reference_of(values))
+        # Others tell by the object that it is another map, though its values are in the same place.
+        self._map = replace(self._map, unit=part.unit, limbs=limbs)
+        self._track.set_map(self._map, None if self.full else self.quality > 0)
+
+    def say_quality(self, view: View, final_words: str, compiling: bool) -> None:
+        """Write the lowest quality in view on the track."""
+        start, stop = view
+        quality = self.quality[start:stop]
+        if not quality.any():
+            return
+        final = float((quality >= FINAL).mean())
+        lowest = int(quality[quality > 0].min())
+        words = final_words if lowest == FINAL else self._words.get(lowest, "")
+        if 0 < final < 1 and lowest < FINAL:
+            words = f"{words}, {100 * final:.0f} % final"
+        if compiling:
+            words += " · compiling, exact follows"
+        self._track.set_status(words)
 
 
 def pieces(
@@ -87,68 +138,6 @@ def pieces(
         end = start + (len(inside) if inside.all() else int(inside.argmin()))
         yield start, end
         start = end
-
-
-class ShownMap:
-    """Map on screen that is painted part by part, with its quality on the track."""
-
-    def __init__(self, track: MapModel) -> None:
-        self._track = track
-        self.forget()
-
-    def forget(self) -> None:
-        """Remove the map."""
-        self.partial = PartialMap(2, 0)
-        self._scene: tuple[SynthesisOptions, MeshSequence] | None = None
-        self._words: dict[int, str] = {}
-        self._needs_reference = True
-
-    def begin(self, options: SynthesisOptions, mesh: MeshSequence) -> None:
-        """Begin an empty map of another mesh."""
-        self.forget()
-        self._scene = options, mesh
-        self.partial = PartialMap(options.axis.bins, mesh.frame_count)
-
-    def mark_stale(self) -> None:
-        """Lower final frames to previews; they stay on screen until they are replaced."""
-        self.partial.mark_stale()
-        self._words[PREVIEW] = self._words.get(FINAL, self._words.get(PREVIEW, ""))
-
-    def take(self, part: Part) -> None:
-        """Paint a stretch; the first whole map sets the 0 dB reference."""
-        assert self._scene is not None
-        options, mesh = self._scene
-        self.partial.paint(part.sensor, part.start, part.stretch, part.quality)
-        self._words[part.quality] = part.words
-        if self._needs_reference and self.partial.full:
-            self._needs_reference = False
-            self._track.set_reference(reference_of(self.partial.values))
-        painted = DopplerMap(
-            values=self.partial.values,
-            axis=options.axis,
-            timebase=mesh.timebase,
-            kind="synthetic",
-            unit=part.unit,
-            null_bins=options.null_bins,
-            present=mesh.presence.measured,
-            limbs=self.partial.limbs,
-        )
-        self._track.set_map(painted, None if self.partial.full else self.partial.quality > 0)
-
-    def say_quality(self, view: View, final_words: str, compiling: bool) -> None:
-        """Write the lowest quality in view on the track."""
-        start, stop = view
-        quality = self.partial.quality[start:stop]
-        if not quality.any():
-            return
-        final = float((quality >= FINAL).mean())
-        lowest = int(quality[quality > 0].min())
-        words = final_words if lowest == FINAL else self._words.get(lowest, "")
-        if 0 < final < 1 and lowest < FINAL:
-            words = f"{words}, {100 * final:.0f} % final"
-        if compiling:
-            words += " · compiling, exact follows"
-        self._track.set_status(words)
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from functools import lru_cache
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from sd2app.session.maps import Reading
 from sd2app.session.session import Session
 from sd2app.widgets.time_axis import clock_text
 from sd2core.doppler.synthesizer import FrameScattering, Synthesizer, Visibility
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.sensor import Vector
 
 
@@ -24,7 +25,7 @@ class Readout:
 
 
 class FrameReader:
-    """Reads the frame on screen; what was read last is kept."""
+    """Reads the frame on screen; what was read last is kept, as several views ask for the same."""
 
     def __init__(self, session: Session) -> None:
         self._document, self._sensor = session.document, session.sensor
@@ -33,9 +34,9 @@ class FrameReader:
 
     def forget(self) -> None:
         """Drop what was read of an earlier recording."""
-        self._frame: tuple[Any, FrameScattering] | None = None
-        self._torso: tuple[int, Vector] | None = None
-        self._readout: tuple[FrameScattering, Any, Readout] | None = None
+        newest = lru_cache(maxsize=1)
+        self._scattering_of, self._torso_of = newest(Synthesizer.frame), newest(_torso_m)
+        self._readout_of = newest(_readout)
 
     def index(self) -> int | None:
         """Frame of the mesh on screen, None where there is no person."""
@@ -45,12 +46,7 @@ class FrameReader:
     def torso_m(self) -> Vector | None:
         """Median vertex: inside the torso whatever the limbs do."""
         index, mesh = self.index(), self._document.mesh
-        if index is None or mesh is None:
-            return None
-        if self._torso is None or self._torso[0] != index:
-            x, y, z = np.median(mesh.frame(index), axis=0)
-            self._torso = (index, (float(x), float(y), float(z)))
-        return self._torso[1]
+        return None if index is None or mesh is None else self._torso_of(mesh, index)
 
     def scattering(
         self, synthesizer: Synthesizer, visibility: Visibility
@@ -59,28 +55,28 @@ class FrameReader:
         index = self.index()
         if index is None:
             return None
-        key = (index, self._sensor.sensor, id(synthesizer), visibility)
-        if self._frame is None or self._frame[0] != key:
-            self._frame = (key, synthesizer.frame(key[1], index, visibility))
-        return self._frame[1]
+        return self._scattering_of(synthesizer, self._sensor.sensor, index, visibility)
 
     def readout(self, frame: FrameScattering | None, v_max_mps: float) -> Readout | None:
         """Numbers beside the sensor, None without a mesh on screen."""
-        torso = self.torso_m()
-        if frame is None or torso is None:
+        torso_m = self.torso_m()
+        if frame is None or torso_m is None:
             return None
-        place = self._sensor.sensor.position_m
-        key, kept = (torso, place, v_max_mps), self._readout
-        # Several views ask for the same after each move.
-        if kept is None or kept[0] is not frame or kept[1] != key:
-            seen = np.abs(frame.velocity_mps[frame.visible])
-            readout = Readout(
-                torso_range_m=float(np.linalg.norm(np.subtract(place, torso))),
-                visible_share=float(frame.visible.mean()),
-                beyond_share=float((seen > v_max_mps).mean()) if seen.size else 0.0,
-            )
-            kept = self._readout = (frame, key, readout)
-        return kept[2]
+        return self._readout_of(frame, torso_m, self._sensor.sensor.position_m, v_max_mps)
+
+
+def _torso_m(mesh: MeshSequence, frame: int) -> Vector:
+    x, y, z = np.median(mesh.frame(frame), axis=0)
+    return float(x), float(y), float(z)
+
+
+def _readout(frame: FrameScattering, torso_m: Vector, place_m: Vector, v_max_mps: float) -> Readout:
+    seen_mps = np.abs(frame.velocity_mps[frame.visible])
+    return Readout(
+        torso_range_m=float(np.linalg.norm(np.subtract(place_m, torso_m))),
+        visible_share=float(frame.visible.mean()),
+        beyond_share=float((seen_mps > v_max_mps).mean()) if seen_mps.size else 0.0,
+    )
 
 
 def reading_lines(reading: Reading) -> tuple[str, ...]:
@@ -108,5 +104,6 @@ def body_range_m(session: Session, time_s: float) -> float | None:
     frame = None if mesh is None else mesh.person_at(time_s)
     if mesh is None or frame is None:
         return None
-    torso_m = np.median(mesh.frame(frame), axis=0)
-    return float(np.linalg.norm(torso_m - session.sensor.sensor.position_m))
+    return float(
+        np.linalg.norm(np.subtract(_torso_m(mesh, frame), session.sensor.sensor.position_m))
+    )

@@ -35,8 +35,7 @@ class _Curve:
     @property
     def nobody(self) -> bool:
         """True in a frame without a person."""
-        present = self.map.present
-        return self.frame is not None and present is not None and not present[self.frame]
+        return self.frame is not None and not self.map.there[self.frame]
 
 
 class SpectrumView(Canvas):

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar
 
-from PySide6.QtCore import QPointF, Qt
-from PySide6.QtGui import QMouseEvent
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPen, QWheelEvent
 
 from sd2app.maps.arrangement import HEADER_PX
 from sd2app.session.session import Session
 from sd2app.session.undo import Offset
-from sd2app.widgets.canvas import Overlay, TimePlot, ZoomedPlot
+from sd2app.widgets.canvas import Canvas, Overlay
+from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, TimeScale, paint_cursor
 
 _CURSORS = {
     "seek": Qt.CursorShape.CrossCursor,
@@ -19,13 +20,19 @@ _CURSORS = {
     "fold": Qt.CursorShape.PointingHandCursor,
     "": Qt.CursorShape.ArrowCursor,
 }
+_ZOOM_PER_NOTCH = 0.8
 
 
-class SessionPlot(TimePlot):
-    """Plot that follows the clock, the theme, and what other features draw over it."""
+class TimePlot(Canvas):
+    """Plot over the time axis that follows the clock, the theme, and what others draw over it."""
+
+    TOP_PX: ClassVar[int] = 0
+    """Room above the plot."""
+    BOTTOM_PX: ClassVar[int] = 0
+    """Room below the plot."""
 
     def __init__(self, session: Session, overlays: Sequence[Overlay] = ()) -> None:
-        super().__init__(session.span)
+        super().__init__()
         self._session, self._overlays = session, tuple(overlays)
         self._span, self._playback, self._pointer = session.span, session.playback, session.pointer
         self._display = session.display
@@ -35,8 +42,43 @@ class SessionPlot(TimePlot):
         for signal in (self._display.theme_changed, *drawn):
             signal.connect(self.redraw)
 
+    @property
+    def scale(self) -> TimeScale:
+        """Time axis of this widget."""
+        return TimeScale(self._span.start_s, self._span.end_s, self.width())
 
-class SeekingPlot(SessionPlot):
+    def plot_rect(self) -> QRectF:
+        """Rectangle of the plot, in pixels."""
+        width, height = self.width() - GUTTER_PX - MARGIN_PX, self.height() - self.TOP_PX
+        return QRectF(GUTTER_PX, self.TOP_PX, max(width, 1), max(height - self.BOTTOM_PX, 1))
+
+    def paint_cursors(self, painter: QPainter, plot: QRectF, pointer_colour: QColor) -> None:
+        """Paint the time under the pointer, dotted, and the time on screen."""
+        if self._pointer.time_s is not None:
+            painter.setPen(QPen(pointer_colour, 1, Qt.PenStyle.DotLine))
+            x = self.scale.x_of(self._pointer.time_s)
+            painter.drawLine(QPointF(x, plot.top()), QPointF(x, plot.bottom()))
+        paint_cursor(painter, plot, self.scale.x_of(self._playback.time_s))
+
+
+class ZoomedPlot(TimePlot):
+    """Plot whose time axis follows the wheel."""
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        """Zoom about the pointer, or pan with Shift or a sideways wheel."""
+        delta, span = event.angleDelta(), self._span
+        sideways = delta.x() or (
+            delta.y() if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 0
+        )
+        if sideways:
+            span.pan(-sideways / 120.0 * span.duration_s * 0.1)
+        elif delta.y():
+            anchor_s = self.scale.time_of(event.position().x())
+            span.zoom(_ZOOM_PER_NOTCH ** (delta.y() / 120.0), anchor_s)
+        event.accept()
+
+
+class SeekingPlot(TimePlot):
     """Plot on which a click or drag seeks."""
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
@@ -47,7 +89,7 @@ class SeekingPlot(SessionPlot):
     mouseMoveEvent = mousePressEvent
 
 
-class TrackMouse(ZoomedPlot, SessionPlot):
+class TrackMouse(ZoomedPlot):
     """Click or drag seeks, the middle button and the wheel move and scale the time axis.
 
     A drag from where :meth:`use_of` says ``"offset"`` moves what was measured in time.

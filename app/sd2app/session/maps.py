@@ -239,7 +239,7 @@ class MapModel(QObject):
             return None
         value = self.values[index, frame]
         note = ""
-        if self.map.present is not None and not self.map.present[frame]:
+        if not self.map.there[frame]:
             note = "no person"
         elif index in self.map.null_bins:
             note = "nulled bin"

@@ -9,10 +9,10 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, SignalInstance
-from PySide6.QtGui import QContextMenuEvent, QImage, QPainter, QPaintEvent, QPixmap, QWheelEvent
+from PySide6.QtGui import QContextMenuEvent, QImage, QPainter, QPaintEvent, QPixmap
 from PySide6.QtWidgets import QMenu, QWidget
 
-from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, ShownTime, TimeScale
+from sd2app.widgets.time_axis import TimeScale
 
 MenuPart = Callable[[QMenu, QPointF], None]
 """Adds to the context menu of a widget what concerns a place in it."""
@@ -20,8 +20,6 @@ MenuPart = Callable[[QMenu, QPointF], None]
 AT_LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 AT_RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 """Places of a line of text in its box."""
-
-_ZOOM_PER_NOTCH = 0.8
 
 
 @contextmanager
@@ -104,43 +102,3 @@ class Overlay(NamedTuple):
 
     paint: Callable[[QPainter, QRectF, TimeScale], None]
     changed: tuple[SignalInstance, ...] = ()
-
-
-class TimePlot(Canvas):
-    """Widget with a plot over the shared time axis."""
-
-    TOP_PX: ClassVar[int] = 0
-    """Room above the plot."""
-    BOTTOM_PX: ClassVar[int] = 0
-    """Room below the plot."""
-
-    def __init__(self, span: ShownTime) -> None:
-        super().__init__()
-        self._shown = span
-
-    @property
-    def scale(self) -> TimeScale:
-        """Time axis of this widget."""
-        return TimeScale(self._shown.start_s, self._shown.end_s, self.width())
-
-    def plot_rect(self) -> QRectF:
-        """Rectangle of the plot, in pixels."""
-        width, height = self.width() - GUTTER_PX - MARGIN_PX, self.height() - self.TOP_PX
-        return QRectF(GUTTER_PX, self.TOP_PX, max(width, 1), max(height - self.BOTTOM_PX, 1))
-
-
-class ZoomedPlot(TimePlot):
-    """Plot whose time axis follows the wheel."""
-
-    def wheelEvent(self, event: QWheelEvent) -> None:
-        """Zoom about the pointer, or pan with Shift or a sideways wheel."""
-        delta, span = event.angleDelta(), self._shown
-        sideways = delta.x() or (
-            delta.y() if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 0
-        )
-        if sideways:
-            span.pan(-sideways / 120.0 * span.duration_s * 0.1)
-        elif delta.y():
-            anchor_s = self.scale.time_of(event.position().x())
-            span.zoom(_ZOOM_PER_NOTCH ** (delta.y() / 120.0), anchor_s)
-        event.accept()

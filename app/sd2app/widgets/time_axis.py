@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Literal
 
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPen
@@ -144,25 +144,3 @@ def paint_readout(
     flags = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop
     painter.drawText(box.adjusted(6, 3, 0, 0), flags, "\n".join(lines))
     painter.restore()
-
-
-class ShownTime(Protocol):
-    """Part of the recording on screen, which can be moved and zoomed."""
-
-    @property
-    def start_s(self) -> float:
-        """Left edge of the part."""
-
-    @property
-    def end_s(self) -> float:
-        """Right edge of the part."""
-
-    @property
-    def duration_s(self) -> float:
-        """Length of the part."""
-
-    def pan(self, seconds: float) -> None:
-        """Move the part."""
-
-    def zoom(self, factor: float, anchor_s: float) -> None:
-        """Scale its length about a time."""

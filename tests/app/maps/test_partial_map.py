@@ -6,17 +6,34 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sd2app.maps.partial_map import FINAL, PREVIEW, ROUGH, PartialMap, pieces
+from sd2app.maps.partial_map import FINAL, PREVIEW, ROUGH, Part, PartialMap, pieces
+from sd2app.session.maps import MapModel
+from sd2core.doppler.options import SynthesisOptions
 from sd2core.doppler.synthesizer import Stretch
 from sd2core.maps import LimbMaps
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.vertex_parts import JOINTS, QUANTITIES
-from sd2core.sensor import VirtualSensor
+from sd2core.sensor import VelocityAxis, VirtualSensor
+from sd2core.timebase import Timebase
 
 
 def stretch_of(frames, value):
     ones = np.ones(frames, np.float32)
     values = np.full((2, frames), value)
     return Stretch(values.astype(np.float32), values, ones, 0 * ones, "exact")
+
+
+def partial_map(frames):
+    """An empty map of two bins, and the track that it is shown on."""
+    times, track = Timebase.regular(frames, 30.0), MapModel("Synthetic")
+    mesh = MeshSequence(np.zeros((frames, 3, 3), np.float32), None, times)
+    partial = PartialMap(track)
+    partial.begin(SynthesisOptions(axis=VelocityAxis(2, 2.0), null_bins=()), mesh)
+    return partial, track
+
+
+def paint(partial, sensor, start, stretch, quality):
+    partial.take(Part(sensor, start, stretch, quality, f"rank {quality}", "count"))
 
 
 @given(
@@ -39,40 +56,41 @@ def test_pieces_cover_what_is_below_once_and_nothing_else(ranks, below, size, da
 
 
 def test_a_new_placement_forgets_the_old_one():
-    partial = PartialMap(2, 10)
+    partial, track = partial_map(10)
     here, there = VirtualSensor(), VirtualSensor(position_m=(1, 0, 0))
-    partial.paint(here, 0, stretch_of(10, 1.0), FINAL)
+    paint(partial, here, 0, stretch_of(10, 1.0), FINAL)
     assert partial.final
-    partial.paint(there, 4, stretch_of(3, 2.0), ROUGH)
+    paint(partial, there, 4, stretch_of(3, 2.0), ROUGH)
     assert not partial.full
+    assert track.covered.tolist() == [False] * 4 + [True] * 3 + [False] * 3
     assert partial.quality.tolist() == [0] * 4 + [ROUGH] * 3 + [0] * 3
     assert not partial.quality_for(here).any()
     np.testing.assert_array_equal(partial.quality_for(there), partial.quality)
 
 
 def test_ranks_rise_to_final():
-    partial = PartialMap(2, 4)
+    partial, _ = partial_map(4)
     assert not partial.full
-    partial.paint(VirtualSensor(), 0, stretch_of(4, 1.0), ROUGH)
+    paint(partial, VirtualSensor(), 0, stretch_of(4, 1.0), ROUGH)
     assert partial.full
     assert not partial.final
-    partial.paint(VirtualSensor(), 0, stretch_of(4, 1.0), FINAL)
+    paint(partial, VirtualSensor(), 0, stretch_of(4, 1.0), FINAL)
     assert partial.quality.min() == FINAL
 
 
 def test_another_plan_leaves_the_values_until_they_are_replaced():
-    partial, here = PartialMap(2, 4), VirtualSensor()
-    partial.paint(here, 0, stretch_of(3, 1.0), FINAL)
+    (partial, track), here = partial_map(4), VirtualSensor()
+    paint(partial, here, 0, stretch_of(3, 1.0), FINAL)
     partial.mark_stale()
     assert partial.quality.tolist() == [PREVIEW] * 3 + [0]
-    assert partial.values[0].tolist() == [1.0] * 3 + [0.0]
+    assert track.map.values[0].tolist() == [1.0] * 3 + [0.0]
 
 
 @given(
     st.lists(st.tuples(st.integers(0, 9), st.integers(1, 10), st.integers(0, 10**6)), max_size=12)
 )
 def test_parts_are_painted_whole_also_where_they_become_zero(strokes):
-    partial, wanted = PartialMap(2, 10), np.zeros((3, 2, 10), np.float32)
+    (partial, track), wanted = partial_map(10), np.zeros((3, 2, 10), np.float32)
     kinematics = np.zeros((len(JOINTS), len(QUANTITIES), 10), np.float32)
     for start, frames, seed in strokes:
         stop, rng = min(start + frames, 10), np.random.default_rng(seed)
@@ -81,7 +99,7 @@ def test_parts_are_painted_whole_also_where_they_become_zero(strokes):
         moves = rng.normal(size=(*kinematics.shape[:2], stop - start)).astype(np.float32)
         split = LimbMaps(("a", "b", "c"), limbs, moves)
         painted = replace(stretch_of(stop - start, 1.0), limbs=split)
-        partial.paint(VirtualSensor(), start, painted, FINAL)
+        paint(partial, VirtualSensor(), start, painted, FINAL)
         wanted[..., start:stop], kinematics[..., start:stop] = limbs, moves
-        np.testing.assert_array_equal(partial.limbs.values, wanted)
-        np.testing.assert_array_equal(partial.limbs.kinematics, kinematics)
+        np.testing.assert_array_equal(track.map.limbs.values, wanted)
+        np.testing.assert_array_equal(track.map.limbs.kinematics, kinematics)

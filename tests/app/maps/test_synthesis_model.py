@@ -64,9 +64,7 @@ def test_rough_comes_before_exact(context, qtbot, ball):
     ranks = []
     context.synthetic.changed.connect(
         lambda: (
-            ranks.append(context.synthesis._shown_map.partial.quality.copy())
-            if context.synthetic.map
-            else 0
+            ranks.append(context.synthesis._partial.quality.copy()) if context.synthetic.map else 0
         )
     )
     open_ball(context, qtbot, ball)
@@ -89,9 +87,7 @@ def test_every_sweep_of_a_fast_hand_is_for_one_placement(context, qtbot, ball):
     open_ball(context, qtbot, ball)
     qtbot.waitUntil(lambda: context.synthesis.complete, timeout=10_000)
     shown = []
-    context.synthetic.changed.connect(
-        lambda: shown.append(context.synthesis._shown_map.partial.sensor)
-    )
+    context.synthetic.changed.connect(lambda: shown.append(context.synthesis._partial.sensor))
     context.edits.begin_sensor_drag()
     for step in range(200):
         context.edits.drag_sensor((step * 0.005, 0.0, 0.0))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sd2app.maps.heatmap_image import heatmap_image, uncertain_columns
+from sd2app.maps.heatmap_image import Columns, heatmap_image
 from sd2app.session.display import COLOUR_MAPS, HeatmapLevels
 from sd2app.session.maps import MapModel
 from sd2app.widgets.colour_maps import lookup_table, uncertain_table
@@ -69,7 +69,7 @@ def test_of_frames_that_share_a_column_the_one_that_is_shown_decides():
     values[0, 12], sd[0, 12] = 0.3, 0.3  # hidden behind it
     values[0, 30], sd[0, 30] = 1.0, 0.9  # shown, unknown
     values[0, 33], sd[0, 33] = 0.5, 0.1
-    found = uncertain_columns(track_of(values, sd), DB, 0.0, 10.0, 10)
+    found = Columns.of(track_of(values, sd), 0.0, 10.0, 10).uncertain(DB)
     assert np.flatnonzero(found[1]).tolist() == [3]
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sd2app.maps.heatmap_image import shade_columns
+from sd2app.maps.heatmap_image import Columns
 from sd2app.session.display import HeatmapLevels
 from sd2app.session.maps import MapModel
 from sd2core.maps import DopplerMap
@@ -55,6 +55,11 @@ def test_a_reading_names_bin_frame_and_sign():
     track.set_offset(0.3)
     assert track.read(1.05, 1.2).frame == 7
     assert track.read(1.05, 1.2).time_s == pytest.approx(1.0)
+
+
+def shade_columns(track, levels, start_s, stop_s, columns):
+    values, filled = Columns.of(track, start_s, stop_s, columns).shown()
+    return track.shade(values, levels), filled
 
 
 def test_every_frame_is_somewhere_when_zoomed_out():
