@@ -11,7 +11,7 @@ from sd2app.batch.questions import BatchQuestions
 from sd2app.batch.run_view import BatchRunView
 from sd2app.batch.setup_view import BatchSetupView
 from sd2app.manual.help import help_button
-from sd2app.widgets.layouts import column_of, row_of
+from sd2app.widgets.layouts import column_of
 from sd2app.widgets.panel import sentence, show_words
 from sd2app.widgets.run_panel import RunPanel
 
@@ -30,10 +30,16 @@ class BatchWindow(QDialog):
         self._warning.hide()
         tip = "The batch in view; one that lies elsewhere can be opened"
         runs = RunPanel(
-            batch, self._setup, self._run, tip, asks.open_batch, new="New batch", fills=True
+            batch,
+            self._setup,
+            self._run,
+            tip,
+            ("Open batch…", asks.open_batch),
+            new="New batch",
+            help=help_button("Batch", self),
         )
-        head = row_of((self._warning, 1), help_button("Batch", self))
-        self.setLayout(column_of(head, (runs, 1), spacing_px=4, margins_px=(8, 8, 8, 10)))
+        column = column_of(self._warning, (runs, 1), spacing_px=4, margins_px=(8, 8, 8, 10))
+        self.setLayout(column)
         # Not while the user still changes a number.
         self._patience = delayed(self._estimate, _ESTIMATE_MS, self)
         batch.changed.connect(self._patience.start)

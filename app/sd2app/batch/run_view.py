@@ -38,8 +38,9 @@ class BatchRunView(RunView[BatchMonitor]):
 
     def __init__(self, batch: BatchModel, asks: BatchQuestions) -> None:
         buttons = (
-            Button("resume", "Go on", "Do what is missing or new", asks.resume),
+            # First, so that no other button comes to where it was.
             Button("folder", "Open folder", "Show the results as files", asks.open_folder),
+            Button("resume", "Go on", "Do what is missing or new", asks.resume),
         )
         super().__init__(batch, asks.shell, _WORDS, buttons)
         self._batch, self._asks = batch, asks

@@ -56,7 +56,7 @@ class TrainingPanel(RunPanel):
             TrainingSetupView(training, document, shell),
             TrainingRunView(training, adoption, display, shell),
             "Runs: those under way, and those that have ended",
-            open_run,
+            ("Open a run…", open_run),
         )
 
 

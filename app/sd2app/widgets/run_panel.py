@@ -24,8 +24,9 @@ from sd2app.widgets.run_text import time_text
 class RunPanel(QWidget):
     """The list of runs on top; below it the run in view, or the setup of a new one.
 
-    ``tip`` describes the list, ``new`` what is set up. ``open_other`` lets the user choose a run
-    of another folder. ``fills``: what is below takes all room.
+    ``tip`` describes the list, ``new`` what is set up. ``open_other``, a text and a function, lets
+    the user choose a run of another folder. ``help``: a button beside the list, of a panel that has
+    no title of its own; it takes all room.
     """
 
     def __init__(
@@ -34,9 +35,9 @@ class RunPanel(QWidget):
         setup: QWidget,
         run: QWidget,
         tip: str,
-        open_other: Callable[[], object] | None = None,
+        open_other: tuple[str, Callable[[], object]] | None = None,
         new: str = "New training",
-        fills: bool = False,
+        help: QWidget | None = None,
     ) -> None:
         super().__init__()
         self.setObjectName("page")
@@ -47,8 +48,9 @@ class RunPanel(QWidget):
         self._list.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self._list.activated.connect(self._choose)
         self._new = outlined("New", "Set up another one", lambda: runs.select(None), self)
-        head = row_of((self._list, 1), self._new, spacing_px=6)
-        below = ((setup, 1), (run, 1)) if fills else (setup, run, STRETCH)
+        beside = () if help is None else (help,)
+        head = row_of((self._list, 1), self._new, *beside, spacing_px=6)
+        below = (setup, run, STRETCH) if help is None else ((setup, 1), (run, 1))
         self.setLayout(column_of(head, *below, spacing_px=8, margins_px=(8, 4, 8, 6)))
         runs.changed.connect(self._refresh)
         self._refresh()
@@ -65,7 +67,7 @@ class RunPanel(QWidget):
             self._paths.insert(1, here)
             self._texts.insert(1, here.name)
         if self._open is not None:
-            self._texts.append("Open a run…")
+            self._texts.append(self._open[0])
         self._list.setToolTip(str(here) if here is not None else self._tip)
         self._list.offer(self._texts, self._paths.index(here))
 
@@ -77,7 +79,7 @@ class RunPanel(QWidget):
         if at < len(self._paths):
             self._runs.select(self._paths[at])
         elif self._open is not None:
-            self._open()
+            self._open[1]()
             self._list.offer(self._texts, self._paths.index(self._here))
 
     def showEvent(self, event: QShowEvent) -> None:
