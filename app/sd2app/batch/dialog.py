@@ -36,7 +36,7 @@ class BatchWindow(QDialog):
             tip,
             ("Open batch…", asks.open_batch),
             new="New batch",
-            help=help_button("Batch", self),
+            guide=help_button("Batch", self),
         )
         column = column_of(self._warning, (runs, 1), spacing_px=4, margins_px=(8, 8, 8, 10))
         self.setLayout(column)

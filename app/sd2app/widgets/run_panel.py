@@ -25,8 +25,8 @@ class RunPanel(QWidget):
     """The list of runs on top; below it the run in view, or the setup of a new one.
 
     ``tip`` describes the list, ``new`` what is set up. ``open_other``, a text and a function, lets
-    the user choose a run of another folder. ``help``: a button beside the list, of a panel that has
-    no title of its own; it takes all room.
+    the user choose a run of another folder. ``guide`` is a help button beside the list, of a panel
+    that fills a window: what is below takes all room then.
     """
 
     def __init__(
@@ -37,7 +37,7 @@ class RunPanel(QWidget):
         tip: str,
         open_other: tuple[str, Callable[[], object]] | None = None,
         new: str = "New training",
-        help: QWidget | None = None,
+        guide: QWidget | None = None,
     ) -> None:
         super().__init__()
         self.setObjectName("page")
@@ -48,9 +48,9 @@ class RunPanel(QWidget):
         self._list.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self._list.activated.connect(self._choose)
         self._new = outlined("New", "Set up another one", lambda: runs.select(None), self)
-        beside = () if help is None else (help,)
+        beside = () if guide is None else (guide,)
         head = row_of((self._list, 1), self._new, *beside, spacing_px=6)
-        below = (setup, run, STRETCH) if help is None else ((setup, 1), (run, 1))
+        below = (setup, run, STRETCH) if guide is None else ((setup, 1), (run, 1))
         self.setLayout(column_of(head, *below, spacing_px=8, margins_px=(8, 4, 8, 6)))
         runs.changed.connect(self._refresh)
         self._refresh()
