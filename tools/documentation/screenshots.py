@@ -18,7 +18,7 @@ from pathlib import Path
 from PySide6.QtWidgets import QApplication
 
 from sd2app.fit.request import FitRequest
-from sd2app.live.request import ListenRequest
+from sd2app.live.setup import ListenRequest
 from sd2app.mesh_comparison.window import ComparisonWindow
 from sd2app.shell.app import wait_until_settled
 from sd2app.shell.window import MainWindow

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, ClassVar, Generic, Literal, NamedTuple, TypeVar
@@ -13,7 +13,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from sd2app.background.latest import LatestRunner
 from sd2core.errors import Sd2Error
 from sd2core.processes import ProcessId
-from sd2core.runs.command_folder import last_output
+from sd2core.runs.command_folder import CommandFolder, last_output
 from sd2core.runs.control import Word, read_control, write_control
 from sd2core.runs.folder import LIVE, RunFolder, State
 from sd2core.runs.progress import ProgressTail
@@ -39,25 +39,7 @@ _CLOSING_S = 10.0
 """A killed process is gone at once, unless the machine is busy."""
 _SILENT = "It ended without saying why."
 
-T = TypeVar("T")
 F = TypeVar("F", bound=RunFolder)
-Readers = Mapping[str, Callable[[T, dict[str, Any]], None]]
-"""Method that takes a line of progress, by the name of the line's event."""
-
-
-def take_lines(target: T, readers: Readers[T], events: Iterable[dict[str, Any]]) -> bool:
-    """Pass lines to their methods, leaving out damaged ones; True if any was of use."""
-    taken = False
-    for event in events:
-        reader = readers.get(str(event.get("event")))
-        if reader is None:
-            continue
-        try:
-            reader(target, event)
-        except (KeyError, TypeError, ValueError, OverflowError):
-            continue
-        taken = True
-    return taken
 
 
 class History:
@@ -66,20 +48,45 @@ class History:
     Damaged lines are left out.
     """
 
-    readers: ClassVar[Readers[Any]] = {}
+    readers: ClassVar[Mapping[str, Callable[[Any, dict[str, Any]], None]]] = {}
+    """Method that takes a line of progress, by the name of the line's event."""
     begun = True  # the process has said that it works
     paused = False  # the process has said that it pauses
     saving = False  # a result is written that a stop would lose
     error = ""  # reason of a failure as the run reported it
+    elapsed_s: float | None = None  # time at work; None while that is not known
 
     @property
     def share(self) -> float | None:
         """Share of the whole that is done; None while that is not known."""
         return None
 
+    @property
+    def left_s(self) -> float | None:
+        """Time left; None while that is not known."""
+        return None
+
     def take(self, events: Iterable[dict[str, Any]]) -> bool:
         """Take lines; True if any of them was of use."""
-        return take_lines(self, self.readers, events)
+        taken = False
+        for event in events:
+            reader = self.readers.get(str(event.get("event")))
+            if reader is None:
+                continue
+            try:
+                reader(self, event)
+            except (KeyError, TypeError, ValueError, OverflowError):
+                continue
+            taken = True
+        return taken
+
+
+def reason_in(event: Mapping[str, Any]) -> str:
+    """Reason of a failure that a line reports as a JSON object; empty without one."""
+    error = event.get("error")
+    if not isinstance(error, dict):
+        return ""
+    return str(Sd2Error(*(str(error.get(part) or "") for part in ("found", "expected", "remedy"))))
 
 
 class _Found(NamedTuple):
@@ -98,36 +105,35 @@ class _Found(NamedTuple):
 class RunMonitor(QObject, Generic[F]):
     """State and progress of one run, and orders to its process.
 
-    ``history`` reads its lines. The folder may be missing at first; ``process`` is one that was
-    just started for it.
+    The folder may be missing at first; ``process`` is one that was just started for it.
+    Subclasses say what the folder is, and who reads its lines.
     """
 
     changed = Signal()
     phase_changed = Signal()
     ended = Signal()  # the run came to its end while it was followed
 
+    folders: ClassVar[type[RunFolder]]
+    histories: ClassVar[type[History]] = History
+    poll_ms: ClassVar[int | None] = None
+    """Interval between two looks; None: :data:`POLL_MS`."""
     stop_patience_s: ClassVar[float | None] = None
     """A process that does not stop within this time is killed; None: it may take its time."""
-    history: History
-    """What it has told."""
+    folder: F
+    history: Any
+    """What it has told: a :class:`History`."""
     facts: Any = None
     """Newest result of :meth:`inspect`."""
 
     def __init__(
-        self,
-        folder: F,
-        parent: QObject | None = None,
-        *,
-        history: History | None = None,
-        process: ProcessId | None = None,
-        poll_ms: int | None = None,
+        self, path: Path, parent: QObject | None = None, *, process: ProcessId | None = None
     ) -> None:
         super().__init__(parent)
-        self.folder: F = folder
-        self.history = history or History()
+        self.folder = self.folders(path)  # type: ignore[assignment]
+        self.history = self.histories()
         self._launched = process
         self._clock_s = time.monotonic
-        self._tail = ProgressTail(folder.progress)
+        self._tail = ProgressTail(self.folder.progress)
         self._phase: Phase = "starting"
         self.loaded = False  # true once the folder has been read
         self.text = ""  # why it failed
@@ -135,27 +141,17 @@ class RunMonitor(QObject, Generic[F]):
         self._wish: Word | None = None
         self._cancelled_s: float | None = None
         self._stopped_s: float | None = None
-        self._poll_ms = poll_ms or POLL_MS
         self._looker = LatestRunner("run", self, self._take, self._fail)
         self._timer = QTimer(self)
         self._timer.timeout.connect(self.poll)
-        self._timer.start(self._poll_ms)
+        self._timer.start(self.poll_ms or POLL_MS)
         self.poll()
 
     # --- what subclasses say ----------------------------------------------------------------
 
-    def on_events(self, events: Sequence[dict[str, Any]]) -> bool:
-        """Read new lines of progress; True if any was of use."""
-        return self.history.take(events)
-
     def inspect(self) -> Any:
         """Read further :attr:`facts` from disk, in the background."""
         return None
-
-    @property
-    def error(self) -> str:
-        """Reason of a failure as the run reported it; empty without one."""
-        return self.history.error
 
     # --- what is known ----------------------------------------------------------------------
 
@@ -257,7 +253,7 @@ class RunMonitor(QObject, Generic[F]):
         )  # fmt: skip
 
     def _take(self, found: _Found) -> None:
-        told = self.on_events(found.events)
+        told = self.history.take(found.events)
         told |= found.facts != self.facts
         self.facts = found.facts
         if self._launched is None or found.live or _is_begun_by(found.process, self._launched):
@@ -334,7 +330,7 @@ class RunMonitor(QObject, Generic[F]):
         """Take over another phase."""
         under_way = self._phase in UNDER_WAY
         rests = not under_way or self._phase == "paused"
-        self._timer.setInterval(SLOW_POLL_MS if rests else self._poll_ms)
+        self._timer.setInterval(SLOW_POLL_MS if rests else self.poll_ms or POLL_MS)
         if under_way:
             return
         self._wish = None
@@ -343,7 +339,7 @@ class RunMonitor(QObject, Generic[F]):
         said = "\n".join(lines)
         self.text = ""
         if self._phase == "failed":
-            self.text = self.error or said.removeprefix("sd2: ") or _SILENT
+            self.text = self.history.error or said.removeprefix("sd2: ") or _SILENT
         elif self._phase == "died":
             self.text = lines[-1] if lines else ""
         if self._phase in ("finished", "stopped", "gone") and output.parent != self.path:
@@ -354,6 +350,18 @@ class RunMonitor(QObject, Generic[F]):
         if self.text != str(error):
             self.text = str(error)
             self.changed.emit()
+
+
+class CommandRun(RunMonitor[CommandFolder]):
+    """A command of ``sd2`` under way, or one that has ended."""
+
+    folders = CommandFolder
+
+    def __init__(
+        self, path: Path, parent: QObject | None = None, *, process: ProcessId | None = None
+    ) -> None:
+        self.about = CommandFolder(path).facts  # as noted at the start
+        super().__init__(path, parent, process=process)
 
 
 def _is_begun_by(process: ProcessId | None, launched: ProcessId) -> bool:

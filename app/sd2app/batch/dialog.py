@@ -1,9 +1,9 @@
-"""Window of a batch: a new one that is set up, or the one in view."""
+"""Window of batches: a new one that is set up, or the one in view."""
 
 from __future__ import annotations
 
-from PySide6.QtGui import QHideEvent, QShowEvent
-from PySide6.QtWidgets import QDialog, QStackedWidget, QWidget
+from PySide6.QtGui import QShowEvent
+from PySide6.QtWidgets import QDialog, QWidget
 
 from sd2app.background.latest import delayed
 from sd2app.batch.model import BatchModel
@@ -11,8 +11,9 @@ from sd2app.batch.questions import BatchQuestions
 from sd2app.batch.run_view import BatchRunView
 from sd2app.batch.setup_view import BatchSetupView
 from sd2app.manual.help import help_button
-from sd2app.widgets.layouts import column_of, row_of
-from sd2app.widgets.panel import outlined, sentence, show_words, title
+from sd2app.widgets.layouts import column_of
+from sd2app.widgets.panel import sentence, show_words
+from sd2app.widgets.run_panel import RunPanel
 
 _ESTIMATE_MS = 600
 
@@ -24,48 +25,35 @@ class BatchWindow(QDialog):
         super().__init__(parent)
         self.setWindowTitle("Batch")
         self._batch = batch
-        self._title = title("New batch")
-        another = outlined("Open batch…", "One that lies elsewhere", asks.open_batch, self)
-        self._setup = BatchSetupView(batch, asks, self)
-        self._run = BatchRunView(batch, asks, self)
-        self._pages = QStackedWidget(self)
-        self._pages.addWidget(self._setup)
-        self._pages.addWidget(self._run)
+        self._setup, self._run = BatchSetupView(batch, asks, self), BatchRunView(batch, asks)
         self._warning = sentence("", "warning")
         self._warning.hide()
-        head = row_of((self._title, 1), another, help_button("Batch", self))
-        parts = (head, self._warning, (self._pages, 1))
-        self.setLayout(column_of(*parts, spacing_px=10, margins_px=(16, 12, 16, 16)))
+        tip = "The batch in view; one that lies elsewhere can be opened"
+        runs = RunPanel(
+            batch,
+            self._setup,
+            self._run,
+            tip,
+            ("Open batch…", asks.open_batch),
+            new="New batch",
+            guide=help_button("Batch", self),
+        )
+        column = column_of(self._warning, (runs, 1), spacing_px=4, margins_px=(8, 8, 8, 10))
+        self.setLayout(column)
         # Not while the user still changes a number.
         self._patience = delayed(self._estimate, _ESTIMATE_MS, self)
-        batch.changed.connect(self._refresh)
-        batch.setup.changed.connect(self._patience.start)
+        batch.changed.connect(self._patience.start)
         self.resize(620, 640)
-        self._refresh()
 
     def warn(self, text: str) -> None:
         """Say what went wrong, or nothing any more."""
         show_words(self._warning, text)
 
     def showEvent(self, event: QShowEvent) -> None:
-        """Follow the batch and estimate the set-up."""
+        """Follow what the open recording offers, and estimate the set-up."""
         super().showEvent(event)
-        self._batch.set_watched(True)
         self._setup.refresh()
         self._patience.start()
-
-    def hideEvent(self, event: QHideEvent) -> None:
-        """Stop following while hidden."""
-        super().hideEvent(event)
-        self._batch.set_watched(False)
-
-    def _refresh(self) -> None:
-        run = self._batch.run
-        self._title.setText("New batch" if run is None else run.folder.path.name)
-        page = self._setup if run is None else self._run
-        if self._pages.currentWidget() is not page:
-            self._pages.setCurrentWidget(page)
-            self._patience.start()
 
     def _estimate(self) -> None:
         if self.isVisible() and self._batch.run is None:

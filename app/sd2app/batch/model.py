@@ -151,6 +151,7 @@ class BatchModel(Runs[BatchMonitor]):
         self.results.forget()
         super().follow(run, under_way)
         if run is not None:
+            self._last = str(run.path)  # it is listed once another is in view
             run.phase_changed.connect(self._read_results)
 
     def _read_results(self) -> None:

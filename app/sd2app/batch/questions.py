@@ -51,7 +51,7 @@ class BatchQuestions(QObject):
         denoiser: DenoiseModel,
     ) -> None:
         super().__init__(batch)
-        self._batch, self._session, self._shell = batch, session, shell
+        self._batch, self._session, self.shell = batch, session, shell
         self._placements, self._denoiser = placements, denoiser
         self._opening: tuple[Result, set[Path]] | None = None
         placements.changed.connect(self._follow_plan)
@@ -189,8 +189,8 @@ class BatchQuestions(QObject):
         """Open a recording in the window, with the sensor where a result says."""
         result = self._batch.results.rows[row]
         paths = self._attempt(lambda: paths_of(result))
-        if paths is not None and self._shell.may_discard():
-            self._shell.open_paths(paths)
+        if paths is not None and self.shell.may_discard():
+            self.shell.open_paths(paths)
             self._opening = (result, set(map(plain_path, paths)))
 
     def _place_sensor(self) -> None:
@@ -209,7 +209,7 @@ class BatchQuestions(QObject):
     @property
     def _over(self) -> QWidget:
         """Parent of the file choosers."""
-        return QApplication.activeWindow() or self._shell.dialog_parent
+        return QApplication.activeWindow() or self.shell.dialog_parent
 
     def _attempt(self, work: Callable[[], T]) -> T | None:
         """Result of ``work``; an error is said, and None returned."""

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
+from pydantic import TypeAdapter, ValidationError
+from pydantic.dataclasses import dataclass
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.latest import LatestRunner
@@ -13,7 +13,7 @@ from sd2app.widgets.record_table import Heading, RecordTableModel
 from sd2core.batch.folder import BatchFolder
 from sd2core.errors import Sd2Error
 from sd2core.files.limits import open_regular
-from sd2core.files.texts import parse_json, whole_lines
+from sd2core.files.texts import whole_lines
 from sd2core.placements.placements import Place
 from sd2core.sensor import Vector, VirtualSensor, spherical_from_position
 
@@ -24,16 +24,28 @@ _COLUMNS = ("Recording", "Subject", "Place", "Seen from the body", "Maps")
 
 @dataclass(frozen=True)
 class Result:
-    """One map of a recording from one place."""
+    """One map of a recording from one place, as a line of ``results.jsonl`` describes it."""
 
     recording: str
     subject: str
     source: str  # the processed file
     mesh: str  # the mesh that the map is of
-    placement: int  # 0 is the recording's own sensor
+    placement: int | None  # 0 or None is the recording's own sensor
     sensor: VirtualSensor
     target_m: Vector  # position of the body
-    maps: dict[str, str]  # file of each kind of map, relative to the folder of the batch
+    # Files of the maps, relative to the folder of the batch.
+    synthetic: str | None = None
+    denoised: str | None = None
+    simulated: str | None = None
+
+    @property
+    def kinds(self) -> str:
+        """Kinds of maps that there are, in words."""
+        kinds = ("synthetic", "denoised", "simulated")
+        return ", ".join(kind for kind in kinds if getattr(self, kind))
+
+
+_LINE = TypeAdapter(Result)
 
 
 class BatchResults(RecordTableModel[Result]):
@@ -74,7 +86,7 @@ class BatchResults(RecordTableModel[Result]):
             record.subject,
             f"{record.placement:,}" if record.placement else "own sensor",
             Place(*around).words.replace("-", "−"),
-            ", ".join(record.maps),
+            record.kinds,
         )[column]
 
 
@@ -82,39 +94,19 @@ def _rows(file: Path) -> list[Result]:
     rows: dict[tuple[str, int], Result] = {}
     with open_regular(file) as stream:
         for line in whole_lines(stream):
-            row = _row(line.decode(errors="replace"))
+            row = _row(line)
             if row is not None:
-                rows.setdefault((row.recording, row.placement), row)
+                rows.setdefault((row.recording, row.placement or 0), row)
             if len(rows) >= _MOST_ROWS:
                 break
     return list(rows.values())
 
 
-def _row(line: str) -> Result | None:
+def _row(line: bytes) -> Result | None:
     try:
-        content = parse_json(line, "The line", "a map")
-        maps = {
-            kind: content[kind]
-            for kind in ("synthetic", "denoised", "simulated")
-            if content.get(kind)
-        }
-        return Result(
-            str(content["recording"]),
-            str(content["subject"]),
-            str(content["source"]),
-            str(content["mesh"]),
-            int(content["placement"] or 0),
-            VirtualSensor(**content["sensor"]),
-            _vector(content["target_m"]),
-            maps,
-        )
-    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, Sd2Error):
+        return _LINE.validate_json(line)
+    except (ValidationError, Sd2Error):
         return None
-
-
-def _vector(values: Any) -> Vector:
-    x, y, z = map(float, values)
-    return (x, y, z)
 
 
 def _card(folder: BatchFolder) -> str:

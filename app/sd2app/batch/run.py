@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
-from PySide6.QtCore import QObject
-
-from sd2app.background.run_monitor import RunMonitor
+from sd2app.background.run_monitor import History, RunMonitor, reason_in
 from sd2core.batch.folder import BatchFolder, BatchStatus, status_of
 from sd2core.errors import Sd2Error
-from sd2core.processes import ProcessId
 from sd2core.runs.command_folder import last_output
 from sd2core.runs.folder import State
 from sd2core.runs.progress import Event
@@ -42,29 +38,54 @@ def plan_of(folder: Path) -> Path:
     return folder.with_name(f".{folder.name}.plan.toml")
 
 
+class BatchHistory(History):
+    """Counts and failures of a batch's last start."""
+
+    left_s: float | None = None
+
+    def __init__(self) -> None:
+        self.lines: list[Event] = []  # the first, and the newest with counts
+        self.failures: list[Failed] = []
+
+    @property
+    def share(self) -> float | None:
+        """Share of the time that has passed; None while what is left is not known."""
+        if self.elapsed_s is None or self.left_s is None:
+            return None
+        return self.elapsed_s / max(self.elapsed_s + self.left_s, 1e-9)
+
+    def _start(self, event: Event) -> None:
+        self.lines, self.failures = [event], []
+        self.elapsed_s, self.left_s, self.error = None, None, ""
+
+    def _count(self, event: Event) -> None:
+        self.lines = [*self.lines[:1], event]
+        elapsed_s, left_s = event.get("elapsed_s"), event.get("left_s")
+        self.elapsed_s = None if elapsed_s is None else float(elapsed_s)
+        self.left_s = None if left_s is None else float(left_s)
+        self.error = reason_in(event)
+
+    def _fail(self, event: Event) -> None:
+        if len(self.failures) < _KEPT_FAILURES:
+            placement = event.get("placement")
+            self.failures.append(
+                Failed(
+                    str(event.get("recording", "")),
+                    str(event.get("step", "")),
+                    placement if isinstance(placement, int) else None,
+                    reason_in(event),
+                )
+            )
+
+    readers: ClassVar = {"start": _start, "progress": _count, "end": _count, "failed": _fail}
+
+
 class BatchMonitor(RunMonitor[BatchFolder]):
     """A batch with its counts, its failures and its log; only its last start counts."""
 
+    folders, histories = BatchFolder, BatchHistory
+    history: BatchHistory
     facts = _Facts({}, "", False)
-
-    def __init__(
-        self, path: Path, parent: QObject | None = None, *, process: ProcessId | None = None
-    ) -> None:
-        self._start_and_last: list[Event] = []
-        self.failures: list[Failed] = []
-        super().__init__(BatchFolder(path), parent, process=process)
-
-    def on_events(self, events: Sequence[dict[str, Any]]) -> bool:
-        """Read counts and failures."""
-        for event in events:
-            kind = event["event"]
-            if kind == "start":
-                self._start_and_last, self.failures = [event], []
-            elif kind in ("progress", "end"):
-                self._start_and_last = [*self._start_and_last[:1], event]
-            elif kind == "failed" and len(self.failures) < _KEPT_FAILURES:
-                self.failures.append(_failed(event))
-        return bool(events)
 
     def inspect(self) -> _Facts:
         """Read the description and the end of the log."""
@@ -85,17 +106,12 @@ class BatchMonitor(RunMonitor[BatchFolder]):
             state: State = "running"
         else:
             state = "died" if about["state"] == "running" else about["state"]
-        return status_of(state, about, self._start_and_last)
-
-    @property
-    def error(self) -> str:
-        """Reason why the whole batch failed."""
-        return (self.status and self.status.error) or ""
+        return status_of(state, about, self.history.lines)
 
     @property
     def steps(self) -> tuple[str, ...]:
         """Steps of the plan, in order."""
-        start = self._start_and_last[:1]
+        start = self.history.lines[:1]
         return tuple(map(str, start[0].get("steps", ()))) if start else ()
 
     @property
@@ -112,15 +128,3 @@ class BatchMonitor(RunMonitor[BatchFolder]):
         super()._settle()
         if not self.under_way:
             plan_of(self.path).unlink(missing_ok=True)
-
-
-def _failed(event: dict[str, Any]) -> Failed:
-    error = event.get("error") or {}
-    words = (str(error.get(part, "")) for part in ("found", "expected", "remedy"))
-    placement = event.get("placement")
-    return Failed(
-        str(event.get("recording", "")),
-        str(event.get("step", "")),
-        placement if isinstance(placement, int) else None,
-        str(Sd2Error(*words)),
-    )

@@ -2,50 +2,54 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QGridLayout,
-    QHBoxLayout,
     QHeaderView,
     QLabel,
     QPlainTextEdit,
     QTextBrowser,
-    QWidget,
 )
 
 from sd2app.batch.model import BatchModel
 from sd2app.batch.questions import BatchQuestions
-from sd2app.batch.text import failure_text, headline, step_facts, time_text
-from sd2app.widgets.layouts import STRETCH, column_of, grid_of, pane, row_of
+from sd2app.batch.run import BatchMonitor
+from sd2app.batch.text import batch_time_text, failure_text, headline, step_facts
+from sd2app.widgets.layouts import STRETCH, grid_of, pane, row_of
 from sd2app.widgets.pages import InnerPage, InnerPages
-from sd2app.widgets.panel import ElidedLabel, outlined, sentence, show_words, side_by_side, title
+from sd2app.widgets.panel import ElidedLabel, outlined, sentence
 from sd2app.widgets.progress_bar import ProgressBar
+from sd2app.widgets.run_panel import Button, RunView, RunWords
 from sd2app.widgets.table import RecordTable
 
 _MOST_STEPS = 6
 _NO_DATASET = "No data set has been exported here yet."
 _FAILURES, _FAILURES_PAGE = "Failures", 2
+_WORDS = RunWords(
+    headline, lambda run: "", batch_time_text, "batch", "End it now; what is done stays"
+)
 
 
-class BatchRunView(QWidget):
-    """A view of :class:`BatchMonitor` and of its results."""
+class BatchRunView(RunView[BatchMonitor]):
+    """Steps and failures of a batch, its log, and its results."""
 
-    def __init__(self, batch: BatchModel, asks: BatchQuestions, parent: QWidget) -> None:
-        super().__init__(parent)
+    def __init__(self, batch: BatchModel, asks: BatchQuestions) -> None:
+        buttons = (
+            # First, so that no other button comes to where it was.
+            Button("folder", "Open folder", "Show the results as files", asks.open_folder),
+            Button("resume", "Go on", "Do what is missing or new", asks.resume),
+        )
+        super().__init__(batch, asks.shell, _WORDS, buttons)
         self._batch, self._asks = batch, asks
         self._shown_card: str | None = None
-        self._name = ElidedLabel(self)
-        self._headline = title("", "How the batch stands")
-        self._time = sentence("")
-        self._reason = sentence("", "warning")
-        parts = (self._name, self._headline, self._time, self._reason)
-        below = (self._bars(), self._button_row(), (self._pages(), 1))
-        self.setLayout(column_of(*parts, *below, spacing_px=8, margins_px=0))
-        batch.changed.connect(self._refresh)
-        self._refresh()
+        self._where = ElidedLabel(self, "muted")
+        self.column.addLayout(self._bars())
+        self.column.addWidget(self._where)
+        self.column.addWidget(self._pages(), 1)
+        self.refresh()
 
     # --- building -------------------------------------------------------------------------
 
@@ -56,17 +60,6 @@ class BatchRunView(QWidget):
             widgets[2].setWordWrap(False)
             self._steps.append(widgets)
         return grid_of(*self._steps, gaps_px=(12, 4))
-
-    def _button_row(self) -> QHBoxLayout:
-        asks, batch = self._asks, self._batch
-        self._stop = outlined(
-            "Stop", "End it now; what is done stays", lambda: batch.tell("stop"), self
-        )
-        self._resume = outlined("Go on", "Do what is missing or new", asks.resume, self)
-        self._folder = outlined("Open folder", "Show the results as files", asks.open_folder, self)
-        self._new = outlined("New batch", "Set up another", lambda: batch.select(None), self)
-        buttons = (self._stop, self._resume, self._folder, self._new)
-        return side_by_side(*buttons, spacing_px=6)
 
     def _pages(self) -> InnerPages:
         self._failures = _text("What could not be done")
@@ -96,23 +89,20 @@ class BatchRunView(QWidget):
 
     # --- showing --------------------------------------------------------------------------
 
-    def _refresh(self) -> None:
-        run, results = self._batch.run, self._batch.results
-        if run is None:
-            return
-        self._name.setText(str(run.folder.path))
-        self._headline.setText(headline(run))
-        show_words(self._time, time_text(run))
-        show_words(self._reason, run.text)
-        self._show_steps()
-        self._stop.setVisible(run.under_way)
-        self._stop.setEnabled(run.phase != "stopping")
-        self._resume.setVisible(run.resumable)
-        self._resume.setText("Run again" if run.phase == "finished" else "Go on")
-        self._folder.setEnabled(run.folder.path.is_dir())
-        self._new.setVisible(not run.under_way)
-        _show(self._failures, "\n\n".join(map(failure_text, run.failures)) or "None.")
-        count = len(run.failures)
+    def shown(self, run: BatchMonitor) -> Collection[str]:
+        """Names of the buttons that are of use now; results are the user's to delete."""
+        useful = {"stop": run.under_way, "resume": run.resumable, "folder": True}
+        return [name for name, is_useful in useful.items() if is_useful]
+
+    def show_made(self, run: BatchMonitor) -> None:
+        """Follow steps, failures, log and results."""
+        results, failures = self._batch.results, run.history.failures
+        self._where.setText(str(run.path))
+        self._buttons["resume"].setText("Run again" if run.phase == "finished" else "Go on")
+        self._buttons["folder"].setEnabled(run.path.is_dir())
+        self._show_steps(run)
+        _show(self._failures, "\n\n".join(map(failure_text, failures)) or "None.")
+        count = len(failures)
         self._inner.name_page(_FAILURES_PAGE, f"{_FAILURES} ({count})" if count else _FAILURES)
         _show(self._log, run.log or "Nothing was noted.")
         if results.card != self._shown_card:
@@ -122,9 +112,8 @@ class BatchRunView(QWidget):
         self._table.setVisible(bool(results.rows))
         self._open_result.setVisible(bool(results.rows))
 
-    def _show_steps(self) -> None:
-        run = self._batch.run
-        facts = step_facts(run) if run is not None else []
+    def _show_steps(self, run: BatchMonitor) -> None:
+        facts = step_facts(run)
         for row, (name, bar, words) in enumerate(self._steps):
             shown = row < len(facts)
             for widget in (name, bar, words):

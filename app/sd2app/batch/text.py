@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sd2app.background.run_monitor import Phase
 from sd2app.batch.run import BatchMonitor, Failed
 from sd2app.batch.setup import Entry
-from sd2app.widgets.text import about, bytes_text, counted, duration_text, exact_text
+from sd2app.widgets.run_text import PHASES, time_text
+from sd2app.widgets.text import about, bytes_text, counted
 
 if TYPE_CHECKING:
     from sd2core.batch.estimate import BatchEstimate, StepEstimate
@@ -20,16 +20,7 @@ STEP_WORDS = {
     "simulate": "Simulate radar",
     "export": "Export",
 }
-_PHASES: dict[Phase, str] = {
-    "starting": "Starting…",
-    "running": "At work",
-    "stopping": "Stopping, what is done stays…",
-    "finished": "Finished",
-    "stopped": "Stopped",
-    "failed": "Failed",
-    "died": "Ended unexpectedly",
-    "gone": "Nothing is there",
-}
+_PHASES = PHASES | {"stopping": "Stopping, what is done stays…"}
 
 
 def entry_text(entry: Entry) -> str:
@@ -51,18 +42,11 @@ def headline(batch: BatchMonitor) -> str:
     return words
 
 
-def time_text(batch: BatchMonitor) -> str:
-    """Elapsed time and time left."""
+def batch_time_text(batch: BatchMonitor) -> str:
+    """Time left, elapsed time, and the processes that share the work."""
     status = batch.status
-    if status is None or status.elapsed_s is None:
-        return ""
-    passed = exact_text(status.elapsed_s)
-    parts = [f"{passed} so far" if batch.under_way else f"Took {passed}"]
-    if batch.under_way and status.left_s is not None:
-        parts.append(f"about {duration_text(status.left_s)} left")
-    if batch.under_way and status.workers:
-        parts.append(counted(status.workers, "worker"))
-    return " · ".join(parts)
+    workers = status.workers if status is not None and batch.under_way else 0
+    return " · ".join(filter(None, (time_text(batch), counted(workers, "worker") * bool(workers))))
 
 
 def step_facts(batch: BatchMonitor) -> list[tuple[str, int, int, str]]:

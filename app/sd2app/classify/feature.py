@@ -10,11 +10,10 @@ from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QMenu, QWidget
 
 from sd2app.background.model_worker.library import ClassifierLibrary
-from sd2app.classify.dialogs import ClassifyDialogs
 from sd2app.classify.model import ClassifyModel
 from sd2app.classify.panel import ClassPanel
 from sd2app.classify.strip import ClassStrip
-from sd2app.classify.text import learned_text, network_text
+from sd2app.classify.text import classifier_page, learned_text, network_text
 from sd2app.classify.training import ClassTraining
 from sd2app.denoise.validity import MapValidity
 from sd2app.feature import Action, Drop, Feature, Shell, report
@@ -22,8 +21,12 @@ from sd2app.labels.actions import editing
 from sd2app.labels.edits import LabelEdits
 from sd2app.labels.model import LabelsModel
 from sd2app.session.session import Session
+from sd2app.widgets.dialogs import ask_file
+from sd2app.widgets.model_card_dialog import ModelCardDialog
 from sd2app.widgets.model_menu import ModelButton, ModelMenu, Words
+from sd2core.errors import Sd2Error
 
+_FILES = "Classifiers (*.safetensors)"
 _WORDS = Words(
     "Classify with",
     "Classifier",
@@ -55,7 +58,6 @@ class ClassifyFeature(Feature):
         self._labels, self._edits = labels, edits
         self.model = ClassifyModel(session, standing, labels, library, parent)
         self.training = ClassTraining(session.settings, self.model.use, parent)
-        self.dialogs = ClassifyDialogs(shell, self.model, self.training, session)
         self.model.failed.connect(shell.warn)
         report(shell, self.training)
         self.changing = (self.model.changed,)
@@ -79,12 +81,12 @@ class ClassifyFeature(Feature):
             Action(
                 "open_classifier", "Model", "Open classifier file…", (),
                 "Say which gesture each frame shows, with a classifier of your own (.safetensors)",
-                self.dialogs.open_classifier,
+                self._open,
             ),
             Action(
                 "classifier_card", "Model", "About this classifier…", (),
                 "What it is shown, what it learned from, and how well it did",
-                self.dialogs.show_card, lambda: model.card is not None,
+                self._show_card, lambda: model.card is not None,
             ),
             Action(
                 "show_classes", "Model", "Probabilities of gestures", ("Shift+I",),
@@ -108,7 +110,20 @@ class ClassifyFeature(Feature):
     @cached_property
     def _classifiers(self) -> ModelMenu:
         below = [self._shell.action(name) for name in ("open_classifier", "classifier_card")]
-        return ModelMenu(self.model, _WORDS, self.dialogs.use, below, self._shell.dialog_parent)
+        return ModelMenu(self.model, _WORDS, self.use, below, self._shell.dialog_parent)
+
+    def use(self, path: Path | None) -> None:
+        """Classify with a file, or not at all."""
+        self._shell.attempt(lambda: self.model.use(path))
+
+    def _open(self) -> None:
+        start = str(self.model.path or "")
+        if path := ask_file(self._shell.dialog_parent, "Open classifier file", _FILES, start):
+            self.use(path)
+
+    def _show_card(self) -> None:
+        if self.model.card is not None:
+            ModelCardDialog(classifier_page(self.model.card), self._shell.dialog_parent).exec()
 
     def panels(self) -> Mapping[str, QWidget]:
         """Probabilities below the maps."""
@@ -117,10 +132,14 @@ class ClassifyFeature(Feature):
 
     def panel(self) -> QWidget:
         """Page of the Train panel."""
-        return ClassPanel(self.training, self._session.display, self.dialogs)
+        return ClassPanel(self.training, self._session, self._shell)
 
     def drop_of(self, path: Path) -> Drop | None:
         """Use a classifier that is dropped."""
-        if path.suffix != ".safetensors" or not self.dialogs.is_classifier(path):
+        if path.suffix != ".safetensors":
             return None
-        return Drop("Classify with this model", lambda: self.dialogs.use(path))
+        try:
+            self.model.describe(path)
+        except Sd2Error:
+            return None  # another kind of model
+        return Drop("Classify with this model", lambda: self.use(path))

@@ -4,26 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from functools import partial
+from pathlib import Path
 
 from PySide6.QtWidgets import QLabel, QWidget
 
 from sd2app.background.run_monitor import UNDER_WAY
-from sd2app.classify.dialogs import ClassifyDialogs
 from sd2app.classify.run import CheckPoint, ClassHistory, ClassRun
 from sd2app.classify.setup import MAPS, DataSource
 from sd2app.classify.text import FEATURE_WORDS, MODEL_WORDS, note, run_headline
 from sd2app.classify.training import ClassTraining
+from sd2app.feature import Shell
+from sd2app.session.content import UNTITLED
 from sd2app.session.display import DisplayModel
+from sd2app.session.document import DocumentModel
+from sd2app.session.session import Session
 from sd2app.training.text import division_text
 from sd2app.widgets.chart import Chart, ChartView, Curve, Mark, Scale
+from sd2app.widgets.dialogs import ask_file, ask_folder
 from sd2app.widgets.inputs import CheckBox, TypedLine
 from sd2app.widgets.layouts import grid_of, row_of
 from sd2app.widgets.panel import FactRows, sentence, side_by_side
-from sd2app.widgets.run_panel import Button, RunPanel, RunView
+from sd2app.widgets.run_panel import Button, RunPanel, RunView, RunWords
 from sd2app.widgets.text import counted
 from sd2app.widgets.training_form import Field, TrainingForm, labelled
 from sd2core.classify.defaults import LONGEST_DELAY_S
 
+_DATA = "Data sets and labelled radar files (*.h5 *.hdf5 *.npz)"
 _MAP_TIPS = {
     "radar": "What a radar saw, simulated or real",
     "synthetic": "Counted from the mesh",
@@ -45,9 +51,9 @@ _FIELDS = (
 class ClassSetupView(TrainingForm):
     """A form over :class:`ClassSetup`."""
 
-    def __init__(self, training: ClassTraining, dialogs: ClassifyDialogs) -> None:
-        super().__init__(training.setup, dialogs.shell)
-        self._training, self._labelled, self._dialogs = training, training.setup, dialogs
+    def __init__(self, training: ClassTraining, document: DocumentModel, shell: Shell) -> None:
+        super().__init__(training.setup, shell)
+        self._training, self._labelled, self._document = training, training.setup, document
         self._add_labelled_data()
         self._add_network()
         self.add_start(training.train, lambda: training.command)
@@ -62,12 +68,31 @@ class ClassSetupView(TrainingForm):
             "A classifier learns from labelled maps: of a simulated campaign, of an exported data"
             " set, or of recordings and radar files in which gestures are labelled.",
         )
-        folder = menu.addAction("Folder…", self._dialogs.add_folder)
+        folder = menu.addAction("Folder…", self._add_folder)
         folder.setToolTip("A campaign or pairs, a data set (.zarr), a recording, or several")
-        file = menu.addAction("File…", self._dialogs.add_file)
+        file = menu.addAction("File…", self._add_file)
         file.setToolTip("A data set (.h5, .npz), or a labelled radar file (.h5)")
-        this = menu.addAction("This recording", self._dialogs.add_this)
-        menu.aboutToShow.connect(lambda: this.setEnabled(self._dialogs.has_this()))
+        this = menu.addAction("This recording", self._add_this)
+        menu.aboutToShow.connect(lambda: this.setEnabled(bool(self._this)))
+
+    def _add_folder(self) -> None:
+        title = "A campaign, a data set, a recording, or a folder of recordings"
+        if path := ask_folder(self._shell.dialog_parent, title):
+            self._labelled.add(path)
+
+    def _add_file(self) -> None:
+        if path := ask_file(self._shell.dialog_parent, "Data set or labelled radar file", _DATA):
+            self._labelled.add(path)
+
+    def _add_this(self) -> None:
+        self._labelled.add(*self._this)
+
+    @property
+    def _this(self) -> tuple[Path, ...]:
+        """The open recording, if it can be learnt from: it is on disk."""
+        recording = self._document.recording
+        on_disk = recording is not None and recording.folder != UNTITLED
+        return (recording.folder,) if recording is not None and on_disk else ()
 
     def _add_network(self) -> None:
         self._boxes: dict[str, CheckBox] = {}
@@ -126,13 +151,11 @@ class ClassSetupView(TrainingForm):
 class ClassPanel(RunPanel):
     """Panel of trainings of classifiers."""
 
-    def __init__(
-        self, training: ClassTraining, display: DisplayModel, dialogs: ClassifyDialogs
-    ) -> None:
+    def __init__(self, training: ClassTraining, session: Session, shell: Shell) -> None:
         super().__init__(
             training,
-            ClassSetupView(training, dialogs),
-            ClassRunView(training, display, dialogs),
+            ClassSetupView(training, session.document, shell),
+            ClassRunView(training, session.display, shell),
             "Trainings: under way, or ended",
         )
 
@@ -140,17 +163,14 @@ class ClassPanel(RunPanel):
 class ClassRunView(RunView[ClassRun]):
     """Recall of a training."""
 
-    def __init__(
-        self, training: ClassTraining, display: DisplayModel, dialogs: ClassifyDialogs
-    ) -> None:
-        shell = dialogs.shell
+    def __init__(self, training: ClassTraining, display: DisplayModel, shell: Shell) -> None:
         buttons = (
             Button(
                 "use", "Use this model", "Say with it which gesture each frame shows",
                 partial(shell.attempt, training.use_model), primary=True,
             ),
         )  # fmt: skip
-        super().__init__(training, shell, buttons)
+        super().__init__(training, shell, RunWords(run_headline, note), buttons)
         self._training = training
         self._curve = ChartView(display, "Recall over the steps", class_chart(ClassHistory()))
         self._facts = FactRows(1, at_the_edge=False, parent=self)
@@ -158,10 +178,6 @@ class ClassRunView(RunView[ClassRun]):
         for part in (self._curve, self._facts, self._about):
             self.column.addWidget(part)
         self.refresh()
-
-    def texts(self, run: ClassRun) -> tuple[str, str, str]:
-        """Headline, time, and advice for a run that has ended."""
-        return run_headline(run), run.time_text, note(run)
 
     def shown(self, run: ClassRun) -> Collection[str]:
         """Names of the buttons that are of use now."""

@@ -6,7 +6,8 @@ import math
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
-from sd2app.training.command_runs import CommandRun, PacedHistory
+from sd2app.background.run_monitor import CommandRun
+from sd2app.training.run import StepHistory
 
 MODEL_NAME = "classifier.safetensors"
 
@@ -26,7 +27,7 @@ class CheckPoint(NamedTuple):
     best: bool
 
 
-class ClassHistory(PacedHistory):
+class ClassHistory(StepHistory):
     """Steps and checks of a training."""
 
     def __init__(self) -> None:
@@ -67,8 +68,9 @@ class ClassHistory(PacedHistory):
 class ClassRun(CommandRun):
     """A training."""
 
-    history: ClassHistory
     histories = ClassHistory
+    history: ClassHistory
+    facts = False  # there is a model
 
     @property
     def result(self) -> Path | None:

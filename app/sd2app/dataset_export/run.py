@@ -7,11 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
-from PySide6.QtCore import QObject
-
-from sd2app.background.run_monitor import History, RunMonitor
-from sd2core.processes import ProcessId
-from sd2core.runs.command_folder import CommandFolder
+from sd2app.background.run_monitor import CommandRun, History
 
 
 @dataclass(frozen=True)
@@ -29,9 +25,10 @@ class Exported:
 class ExportHistory(History):
     """Steps of an export, and the data set at its end."""
 
+    left_s: float | None = None
+
     def __init__(self) -> None:
         self.done = self.total = 0  # steps; 0 of 0 while the preview sheet is drawn
-        self.left_s: float | None = None
         self.written: Exported | None = None
 
     def _progress(self, event: dict[str, Any]) -> None:
@@ -55,17 +52,11 @@ class ExportHistory(History):
     readers: ClassVar = {"progress": _progress, "done": _done, "error": _refuse}
 
 
-class ExportRun(RunMonitor[CommandFolder]):
+class ExportRun(CommandRun):
     """An export; its folder is that of the command, not the data set."""
 
+    histories = ExportHistory
     history: ExportHistory
-
-    def __init__(
-        self, path: Path, parent: QObject | None = None, *, process: ProcessId | None = None
-    ) -> None:
-        folder = CommandFolder(path)
-        self.about = folder.facts
-        super().__init__(folder, parent, history=ExportHistory(), process=process)
 
     @property
     def out(self) -> Path:

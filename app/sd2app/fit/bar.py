@@ -13,6 +13,15 @@ from sd2app.widgets.panel import ElidedLabel, StateBar, sentence
 from sd2app.widgets.progress_bar import ProgressBar
 from sd2app.widgets.text import about
 
+_STATES = {
+    "running": ("Fitting a body to {video}", ("follow", "cancel")),
+    "cancelling": ("Cancelling…", ("follow", "cancel")),
+    "stopped": ("The fit of {video} was stopped", ("change", "resume", "discard", "close")),
+    "failed": ("The fit of {video} failed", ("change", "resume", "close")),
+    "finished": ("{made} is ready", ("open", "close")),
+}
+"""What a fit's state is called, and the buttons that are of use then."""
+
 
 class FitOffer(Notice):
     """Offers to fit a body where there is a video and no mesh; ``begin`` asks what it needs."""
@@ -77,43 +86,23 @@ class FitBar(StateBar):
     # --- following the models -------------------------------------------------------------
 
     def _refresh(self) -> None:
-        state = self._fit.state
+        fit, state, request = self._fit, self._fit.state, self._fit.request
         self.setVisible(state != "idle")
-        if state == "idle":
+        if state == "idle" or request is None:
             return
-        shown = {
-            "running": {"follow", "cancel"},
-            "cancelling": {"follow", "cancel"},
-            "stopped": {"change", "resume", "discard", "close"},
-            "failed": {"change", "resume", "close"},
-            "finished": {"open", "close"},
-        }[state]
-        self.show_buttons(shown)
-        self._buttons["resume"].setText("Try again" if state == "failed" else "Resume")
-        self._bar.setVisible(self._fit.busy)
-        self._left.setVisible(self._fit.busy)
+        words, buttons = _STATES[state]
+        self.show_buttons(buttons)
+        self._title.setText(words.format(video=request.video.name, made=request.folder.name))
+        self._stage.setText(self._stage_text())
+        self._reason.setText(fit.text)
         self._reason.setVisible(state == "failed")
         self._stage.setVisible(state != "failed")
-        self._show_fit()
-
-    def _show_fit(self) -> None:
-        request, state = self._fit.request, self._fit.state
-        assert request is not None
-        name = request.video.name
-        self._title.setText(
-            {
-                "running": f"Fitting a body to {name}",
-                "cancelling": "Cancelling…",
-                "stopped": f"The fit of {name} was stopped",
-                "failed": f"The fit of {name} failed",
-                "finished": f"{request.folder.name} is ready",
-            }[state]
-        )
-        self._stage.setText(self._stage_text())
-        self._reason.setText(self._fit.text)
+        self._buttons["resume"].setText("Try again" if state == "failed" else "Resume")
         self._buttons["cancel"].setEnabled(state == "running")
         self._buttons["follow"].setChecked(self._on_screen.following)
         self._buttons["follow"].setEnabled(self._on_screen.visible)
+        self._bar.setVisible(fit.busy)
+        self._left.setVisible(fit.busy)
         self._show_progress()
 
     def _stage_text(self) -> str:

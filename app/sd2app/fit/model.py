@@ -145,7 +145,7 @@ class FitModel(QObject):
                 return False  # by another window
             self.request, self._landmarks = request, {}
             run.take_up()
-            self._follow(FitRun(run, self._landmarks, self))
+            self._follow(FitRun(request.run, self))
             self._set_state("running")
             return True
         self._follow(None)
@@ -171,7 +171,7 @@ class FitModel(QObject):
             self._follow(None)
             self.report_failure(str(error))
             return
-        self._follow(FitRun(folder, self._landmarks, self, process=process))
+        self._follow(FitRun(request.run, self, process=process))
         self._set_state("running")
 
     def _follow(self, run: FitRun | None) -> None:
@@ -180,6 +180,7 @@ class FitModel(QObject):
             self._run.deleteLater()
         self._run = run
         if run is not None:
+            run.history.landmarks = self._landmarks  # goes on from a stopped one's
             run.changed.connect(self._tell)
             run.ended.connect(self._end)
 

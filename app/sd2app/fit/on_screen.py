@@ -34,10 +34,9 @@ class FitOnScreen(QObject):
         self._declined: set[Path] = set()
         self.following = True
         self._moving = False
-        self._was_busy = False
         self._notes = ""
         fit.advanced.connect(self._follow)
-        fit.changed.connect(self._restart)
+        fit.state_changed.connect(self._restart)
         fit.finished.connect(self._take)
         for signal in (fit.changed, session.document.changed):
             signal.connect(self.changed)
@@ -91,9 +90,8 @@ class FitOnScreen(QObject):
             self._moving = False
 
     def _restart(self) -> None:
-        if self._fit.busy and not self._was_busy:
+        if self._fit.state == "running":
             self.set_following(True)
-        self._was_busy = self._fit.busy
 
     def _notice(self) -> None:
         if not self._moving and self._fit.busy and self._document.content is not None:

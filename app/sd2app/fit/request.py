@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+
+from pydantic import TypeAdapter
 
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
@@ -89,9 +90,9 @@ class FitRequest:
         if kept is not None and not self.asks_the_same(kept):
             remove(kept.partial)
         self.folder.mkdir(exist_ok=True)
-        content = asdict(self) | {"version": _VERSION, "video": str(self.video)}
-        del content["folder"]
-        atomic_write_text(self.folder / REQUEST_NAME, json.dumps(content, indent=2) + "\n")
+        content = _REQUEST.dump_python(self, mode="json", exclude={"folder"})
+        text = json.dumps(content | {"version": _VERSION}, indent=2)
+        atomic_write_text(self.folder / REQUEST_NAME, text + "\n")
 
     def forget(self) -> None:
         """Remove what was kept; the recording is made."""
@@ -117,27 +118,19 @@ class FitRequest:
         return (self.folder / REQUEST_NAME).exists() and self.video.exists()
 
 
+_REQUEST = TypeAdapter(FitRequest)
+
+
 def read_request(folder: Path) -> FitRequest | None:
     """The request that a folder keeps; None where there is none that can be read."""
     try:
         content = read_json(folder / REQUEST_NAME)
-        return _request(plain_path(folder), content)
+        known = content["version"] == _VERSION
+        return (
+            _REQUEST.validate_python({**content, "folder": plain_path(folder)}) if known else None
+        )
     except (Sd2Error, ValueError, KeyError, TypeError):
         return None
-
-
-def _request(folder: Path, content: dict[str, Any]) -> FitRequest | None:
-    if content["version"] != _VERSION:
-        return None
-    person = content["person"]
-    return FitRequest(
-        video=Path(content["video"]),
-        folder=folder,
-        stature_m=content["stature_m"],
-        focal_px=content["focal_px"],
-        person=None if person is None else Person(**person),
-        mesh_name=str(content["mesh_name"]),
-    )
 
 
 def settled(request: FitRequest) -> FitRequest:

@@ -12,12 +12,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QObject
 
-from sd2app.background.run_monitor import History, RunMonitor
+from sd2app.background.run_monitor import CommandRun, History
 from sd2core.body.track import LANDMARKS
-from sd2core.processes import ProcessId
-from sd2core.runs.command_folder import CommandFolder
 
 FORMAT, VERSION = "sd2-fit-progress", 1
 
@@ -40,16 +37,12 @@ _PATIENCE_S = 3.0
 class FitProgress(History):
     """What the lines of one fit tell: its stages, its landmarks, and notes for the user.
 
-    Landmarks are added to the given dict by their frame, each of shape (33, 3): x and y in pixels
-    of the upright picture, NaN where there is no person, and visibility from 0 to 1.
+    Landmarks stand by their frame, each of shape (33, 3): x and y in pixels of the upright
+    picture, NaN where there is no person, and visibility from 0 to 1.
     """
 
-    def __init__(
-        self,
-        landmarks: dict[int, NDArray[np.float32]],
-        clock_s: Callable[[], float] = time.monotonic,
-    ) -> None:
-        self.landmarks = landmarks
+    def __init__(self, clock_s: Callable[[], float] = time.monotonic) -> None:
+        self.landmarks: dict[int, NDArray[np.float32]] = {}
         self._clock_s = clock_s
         self._stages: tuple[str, ...] = ()
         self._began: list[tuple[float, float]] = []  # time and share at a stage's first report
@@ -140,19 +133,10 @@ class FitProgress(History):
     }
 
 
-class FitRun(RunMonitor[CommandFolder]):
+class FitRun(CommandRun):
     """A fit with its progress."""
 
+    histories = FitProgress
     history: FitProgress
+    poll_ms = _POLL_MS
     stop_patience_s = _PATIENCE_S
-
-    def __init__(
-        self,
-        folder: CommandFolder,
-        landmarks: dict[int, NDArray[np.float32]],
-        parent: QObject,
-        *,
-        process: ProcessId | None = None,
-    ) -> None:
-        history = FitProgress(landmarks)
-        super().__init__(folder, parent, history=history, process=process, poll_ms=_POLL_MS)

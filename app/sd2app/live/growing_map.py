@@ -2,55 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sd2core.maps import DopplerMap
 from sd2core.timebase import Timebase
 
-_SPARE_FRAMES = 1024
 
+def extended(doppler: DopplerMap, columns: Iterable[tuple[float, Sequence[float]]]) -> DopplerMap:
+    """Map with columns at its end, each a time in seconds and the values of its bins.
 
-class GrowingMap:
-    """Map that grows at its end; ``start`` is what is there before."""
-
-    def __init__(self, start: DopplerMap) -> None:
-        self._like = start
-        self._frames = len(start.timebase)
-        self._times_s = np.empty(self._frames + _SPARE_FRAMES)
-        self._values = np.empty((start.axis.bins, self._times_s.size), np.float32)
-        self._times_s[: self._frames] = start.times_s
-        self._values[:, : self._frames] = start.values
-
-    @property
-    def bins(self) -> int:
-        """Number of velocity bins."""
-        return self._like.axis.bins
-
-    @property
-    def last_s(self) -> float:
-        """Time of the last column."""
-        return float(self._times_s[self._frames - 1])
-
-    def add(self, time_s: float, values: NDArray[np.float32]) -> bool:
-        """Append a column (bins,); False if it is not later than those that are there."""
-        if not time_s > self.last_s:
-            return False
-        if self._frames == self._times_s.size:
-            self._times_s = np.concatenate([self._times_s, np.empty_like(self._times_s)])
-            self._values = np.concatenate([self._values, np.empty_like(self._values)], axis=1)
-        self._times_s[self._frames] = time_s
-        self._values[:, self._frames] = values
-        self._frames += 1
-        return True
-
-    def whole(self) -> DopplerMap:
-        """Map of all columns so far."""
-        return replace(
-            self._like,
-            values=self._values[:, : self._frames],
-            timebase=Timebase(self._times_s[: self._frames]),
-            present=None,
-        )
+    Those that are not later than the last, or of another number of bins, are left out; without any
+    it is the same map.
+    """
+    times_s, values = [float(doppler.times_s[-1])], []
+    for time_s, column in columns:
+        if time_s > times_s[-1] and len(column) == doppler.axis.bins:
+            times_s.append(time_s)
+            values.append(np.array(column, np.float32))
+    if not values:
+        return doppler
+    return replace(
+        doppler,
+        values=np.column_stack([doppler.values, *values]),
+        timebase=Timebase(np.concatenate([doppler.times_s, times_s[1:]])),
+        present=None,
+    )

@@ -14,12 +14,13 @@ import numpy as np
 from PySide6.QtCore import QObject, QProcess, QProcessEnvironment, Signal
 
 from sd2app.background.latest import delayed
-from sd2app.live.growing_map import GrowingMap
-from sd2app.live.request import ListenRequest
+from sd2app.live.growing_map import extended
+from sd2app.live.setup import ListenRequest
 from sd2app.session.content import Content
 from sd2app.session.session import Session
 from sd2core.errors import Sd2Error
 from sd2core.live.counts import Counts
+from sd2core.maps import DopplerMap
 from sd2core.processes import ONE_THREAD
 from sd2core.radar_config import CLUTTER
 from sd2core.recording.recording import FILE_NAME, open_recording
@@ -53,7 +54,7 @@ class LiveModel(QObject):
         self.counts = Counts()
         self.level_db: float | None = None  # of the newest column
         self.text = ""  # why it failed
-        self._map: GrowingMap | None = None
+        self._map: DopplerMap | None = None
         self._new: list[tuple[float, list[float]]] = []  # columns not on the map yet
         self.received_unix_s = 0.0  # of the newest column
         self._latencies_s: deque[float] = deque(maxlen=_LATENCIES)
@@ -157,7 +158,7 @@ class LiveModel(QObject):
         if there is None and self._document.capture is not None:
             return  # about to be made
         if there is not None:
-            self._map = GrowingMap(there)
+            self._map = there
         self._launch()
 
     def _fail_to_open(self, reason: str) -> None:
@@ -254,20 +255,18 @@ class LiveModel(QObject):
             if not self._document.growing:
                 self._follow()
             elif added:
-                self._document.grow(self._map.whole())
+                self._document.grow(self._map)
         if added:
             self._keep_reference()
             self._painted.start()
 
     def _add_new(self) -> bool:
         assert self._map is not None
-        bins = self._map.bins
-        columns = [(at_s, np.array(values, np.float32)) for at_s, values in self._new]
+        before, self._map = self._map, extended(self._map, self._new)
         self._new = []
-        added = [self._map.add(at_s, one) for at_s, one in columns if one.shape == (bins,)]
-        return any(added)
+        return self._map is not before
 
-    def _first_map(self) -> GrowingMap | None:
+    def _first_map(self) -> DopplerMap | None:
         """Map of what is stored by now; None before there is something."""
         assert self.request is not None
         if not (self.request.folder / FILE_NAME).is_file():
@@ -276,17 +275,16 @@ class LiveModel(QObject):
         from sd2core.sensor import VelocityAxis
 
         capture = open_recording(self.request.folder).load_capture()
-        return GrowingMap(doppler_map(capture, axis=VelocityAxis(), clutter=CLUTTER))
+        return doppler_map(capture, axis=VelocityAxis(), clutter=CLUTTER)
 
     def _follow(self) -> None:
         """Show the recording, which grows."""
         assert self.request is not None
         assert self._map is not None
         recording = open_recording(self.request.folder)
-        radar_map = self._map.whole()
-        timebase = radar_map.timebase.shifted(recording.radar_offset_s)
+        timebase = self._map.timebase.shifted(recording.radar_offset_s)
         content = Content(
-            recording, timebase, capture=recording.load_every_channel(), radar_map=radar_map
+            recording, timebase, capture=recording.load_every_channel(), radar_map=self._map
         )
         self._document.follow(content)
         # On the newest frame, the clock goes on to those that come.

@@ -1,20 +1,39 @@
-"""Set-up of listening: where frames come from, and where they go."""
+"""Set-up of listening: where frames come from and where they go; also as a command."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 from typing import Literal
 
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.live.request import ListenRequest
 from sd2app.settings import Settings, StoredChoices
 from sd2core.recording.recording import FILE_NAME, SUFFIX, folder_named
 
 Way = Literal["dca1000", "replay"]
 _DEFAULTS = {"way": "dca1000", "setup": "", "address": "", "replay": "", "beside": ""}
 _ENDINGS = (".cfg", ".json")
+
+
+@dataclass(frozen=True)
+class ListenRequest:
+    """A radar that sends by a DCA1000, or a capture that is replayed; and where frames go."""
+
+    folder: Path  # the recording
+    setup: Path | None = None  # configuration of the radar
+    address: str = ""  # of this computer, with or without a port; empty: of this computer alone
+    replay: Path | None = None
+
+    def words(self) -> list[str]:
+        """Words of the ``sd2`` command that does it."""
+        if self.replay is not None:
+            source = ["--replay", str(self.replay)]
+        else:
+            source = ["--dca1000", self.address] if self.address else ["--dca1000"]
+            source += ["--setup", str(self.setup)]
+        return ["listen", *source, "--out", str(self.folder), "--json", "--columns"]
 
 
 class ListenSetup(QObject):

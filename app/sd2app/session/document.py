@@ -26,6 +26,7 @@ from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.radar_config import CLUTTER, Clutter
+from sd2core.recording.edited import EDITED
 from sd2core.recording.recording import Recording
 from sd2core.recording.relinking import Relinked
 from sd2core.sensor import VelocityAxis
@@ -353,13 +354,10 @@ def _channel(recording: Recording) -> tuple[int | None, int | None]:
 
 def _keep_edits(before: Recording, after: Recording) -> None:
     """Apply edits made while files were read to what was read."""
-    kept = [
-        "labels", "sensor", "placements", "radar_offset_s", "denoiser", "bundled_denoiser",
-        "imu_places",
-    ]  # fmt: skip
-    if after.imu in (None, before.imu):  # not one of the files that were read
-        kept += ["imu", "imu_offset_s"]
-    if after.radar == before.radar:
-        kept += ["radar_receiver", "radar_transmitter"]
+    kept = {"labels", "denoiser", "bundled_denoiser", *EDITED}
+    if after.imu not in (None, before.imu):  # one of the files that were read
+        kept -= {"imu", "imu_offset_s"}
+    if after.radar != before.radar:
+        kept -= {"radar_receiver", "radar_transmitter"}
     for name in kept:
         setattr(after, name, getattr(before, name))

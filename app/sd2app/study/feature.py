@@ -11,9 +11,10 @@ from PySide6.QtWidgets import QWidget
 from sd2app.classify.setup import ClassSetup
 from sd2app.feature import Action, Feature, Shell, report
 from sd2app.session.session import Session
-from sd2app.study.page import study_panel
+from sd2app.study.page import StudyRunView, StudySetupView
 from sd2app.study.runs import StudyRuns
 from sd2app.widgets.dialogs import ask_file
+from sd2app.widgets.run_panel import RunPanel
 
 _RESULTS, _PLANS = "Results (*.json)", "Plans of studies (*.toml)"
 
@@ -39,8 +40,10 @@ class StudyFeature(Feature):
 
     def panel(self) -> QWidget:
         """Page of the Train panel."""
-        shell = self._shell
-        return study_panel(self.runs, shell, self.open_plan, self.open_result, self.show_result)
+        runs, shell = self.runs, self._shell
+        setup = StudySetupView(runs, shell, self.open_plan, self.open_result)
+        run = StudyRunView(runs, shell, self.show_result)
+        return RunPanel(runs, setup, run, "Studies: under way, or ended", new="New study")
 
     def open_plan(self) -> None:
         """Let the user choose a plan, and run it."""

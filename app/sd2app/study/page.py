@@ -11,12 +11,12 @@ from PySide6.QtWidgets import QApplication, QWidget
 from sd2app.background.run_monitor import UNDER_WAY
 from sd2app.feature import Shell
 from sd2app.study.runs import SWITCHES, TABLE_NAME, StudyRun, StudyRuns
-from sd2app.training.command_runs import PHASES
 from sd2app.training.model import quoted
 from sd2app.widgets.inputs import CheckBox
 from sd2app.widgets.layouts import STRETCH, column_of
 from sd2app.widgets.panel import outlined, rule, sentence, show_words, side_by_side, title
-from sd2app.widgets.run_panel import Button, RunPanel, RunView
+from sd2app.widgets.run_panel import Button, RunView, RunWords
+from sd2app.widgets.run_text import PHASES
 from sd2app.widgets.text import counted
 
 _ABOUT = (
@@ -94,22 +94,13 @@ class StudyRunView(RunView[StudyRun]):
             Button("show", "Show result", tip, show_result, primary=True),
             Button("again", "Resume", "Train what is missing", partial(shell.attempt, runs.again)),
         )
-        super().__init__(runs, shell, buttons)
+        stop_tip = "End it now; what it has trained is kept"
+        words = RunWords(_headline, _note, what="study", stop_tip=stop_tip)
+        super().__init__(runs, shell, words, buttons)
         self._found, self._about = sentence("", "plain"), sentence("")
         for part in (self._found, self._about):
             self.column.addWidget(part)
         self.refresh()
-
-    def texts(self, run: StudyRun) -> tuple[str, str, str]:
-        """Headline, time, and advice for a study that was stopped."""
-        headline = PHASES.get(run.phase, "")
-        if run.phase == "running":
-            history = run.history
-            now = min(history.steps_done + 1, history.total)
-            headline = f"Studying: training {now} of {history.total}"
-        stopped = run.phase == "stopped"
-        note = "What it has trained is kept: Resume trains what is missing." if stopped else ""
-        return headline, run.time_text, note
 
     def shown(self, run: StudyRun) -> Collection[str]:
         """Names of the buttons that are of use now."""
@@ -124,18 +115,13 @@ class StudyRunView(RunView[StudyRun]):
         self._about.setText(str(run.out))
 
 
-def study_panel(
-    runs: StudyRuns,
-    shell: Shell,
-    open_plan: Callable[[], object],
-    open_result: Callable[[], object],
-    show_result: Callable[[], object],
-) -> RunPanel:
-    """Make the page."""
-    return RunPanel(
-        runs,
-        StudySetupView(runs, shell, open_plan, open_result),
-        StudyRunView(runs, shell, show_result),
-        "Studies: under way, or ended",
-        new="New study",
-    )
+def _headline(run: StudyRun) -> str:
+    if run.phase != "running":
+        return PHASES[run.phase]
+    total = run.history.total
+    return f"Studying: training {min(run.history.steps_done + 1, total)} of {total}"
+
+
+def _note(run: StudyRun) -> str:
+    stopped = run.phase == "stopped"
+    return "What it has trained is kept: Resume trains what is missing." if stopped else ""

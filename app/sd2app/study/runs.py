@@ -9,10 +9,12 @@ from typing import Any, ClassVar
 
 from PySide6.QtCore import QObject
 
+from sd2app.background.run_monitor import CommandRun
 from sd2app.background.runs import KnownRun, Runs, free_folder
 from sd2app.classify.setup import ClassSetup
 from sd2app.settings import Settings, StoredChoices
-from sd2app.training.command_runs import SENTENCES, CommandRun, PacedHistory, known_commands
+from sd2app.training.command_runs import SENTENCES, known_commands
+from sd2app.training.run import StepHistory
 from sd2core.classify.files import user_classifiers_folder
 from sd2core.errors import Sd2Error
 from sd2core.files.texts import read_json
@@ -24,7 +26,7 @@ SWITCHES = ("quick", "radar_only", "same_people")
 """Options of ``sd2 classify table`` that are on or off."""
 
 
-class StudyHistory(PacedHistory):
+class StudyHistory(StepHistory):
     """Trainings that are done, of all."""
 
     def _done(self, event: dict[str, Any]) -> None:
@@ -38,6 +40,8 @@ class StudyRun(CommandRun):
     """A study under way, or one that has ended."""
 
     histories = StudyHistory
+    history: StudyHistory
+    facts = False  # there is a result
 
     @property
     def out(self) -> Path:

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QWidget
 from sd2app.denoise.model import DenoiseModel
 from sd2app.feature import Action, Feature, Shell, report
 from sd2app.session.session import Session
-from sd2app.training.dialogs import TrainingDialogs
+from sd2app.training.dialogs import may_leave
 from sd2app.training.model import COMMAND, TrainingModel
 from sd2app.training.panel import TrainingPanel
 from sd2app.training.result import ModelAdoption
@@ -31,7 +31,6 @@ class TrainingFeature(Feature):
         self._session, self._shell = session, shell
         self.model = TrainingModel(session.settings, parent, command or COMMAND)
         self.adoption = ModelAdoption(self.model, denoise, session.maps, user_models_folder, parent)
-        self._dialogs = TrainingDialogs(shell, self.model, session.document)
         report(shell, self.model, self.adoption)
         self.closing, self.running = (self.adoption, self.model), (self.model,)  # runs go on
 
@@ -47,8 +46,9 @@ class TrainingFeature(Feature):
 
     def panel(self) -> QWidget:
         """Page of the Train panel."""
-        return TrainingPanel(self.model, self.adoption, self._session.display, self._dialogs)
+        s = self._session
+        return TrainingPanel(self.model, self.adoption, s.display, s.document, self._shell)
 
     def may_close(self) -> bool:
         """Ask what becomes of a run under way."""
-        return self._dialogs.may_leave()
+        return may_leave(self.model, self._shell.dialog_parent)

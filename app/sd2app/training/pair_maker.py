@@ -7,14 +7,14 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.background.run_monitor import RunMonitor
+from sd2app.background.run_monitor import CommandRun
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import remove
 from sd2core.recording.recording import is_recording, open_recording
 from sd2core.runs.command_folder import COMMAND, CommandFolder
 
 
-class PairRun(RunMonitor[CommandFolder]):
+class PairRun(CommandRun):
     """Run that makes pairs."""
 
     stop_patience_s = 3.0
@@ -63,7 +63,7 @@ class PairMaker(QObject):
         except Sd2Error:
             folder.discard()
             raise
-        self._run = run = PairRun(folder, self, process=process)
+        self._run = run = PairRun(folder.path, self, process=process)
         self.out, self.cancelling = out, False
         run.ended.connect(self._end)
         self.changed.emit()

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QWidget
 from sd2app.background.run_monitor import UNDER_WAY
 from sd2app.feature import Shell
 from sd2app.session.display import DisplayModel
-from sd2app.training.dialogs import TrainingDialogs
+from sd2app.session.document import DocumentModel
 from sd2app.training.model import TrainingModel
 from sd2app.training.result import ModelAdoption, gain_rows, gain_summary
 from sd2app.training.run import TrainingHistory, TrainingMonitor
@@ -22,14 +22,14 @@ from sd2app.training.text import (
     metric_rows,
     point_text,
     remedy_text,
-    time_text,
 )
 from sd2app.widgets.chart import Chart, ChartView, Curve, Mark, Scale
+from sd2app.widgets.dialogs import ask_folder
 from sd2app.widgets.inputs import CheckBox, Choice
 from sd2app.widgets.layouts import STRETCH, column_of, pane, row_of
 from sd2app.widgets.panel import FactRows, outlined, sentence, title
 from sd2app.widgets.plot import tick_text
-from sd2app.widgets.run_panel import Button, RunPanel, RunView
+from sd2app.widgets.run_panel import Button, RunPanel, RunView, RunWords
 
 _CLOSING_TEXT = {"ask": "ask", "keep": "keep training", "stop": "stop, keep the best"}
 _PAD = 1.12
@@ -44,14 +44,19 @@ class TrainingPanel(RunPanel):
         training: TrainingModel,
         adoption: ModelAdoption,
         display: DisplayModel,
-        dialogs: TrainingDialogs,
+        document: DocumentModel,
+        shell: Shell,
     ) -> None:
+        def open_run() -> None:
+            if path := ask_folder(shell.dialog_parent, "Folder of a run"):
+                shell.attempt(lambda: training.open_run(path))
+
         super().__init__(
             training,
-            TrainingSetupView(training, dialogs),
-            TrainingRunView(training, adoption, display, dialogs.shell),
+            TrainingSetupView(training, document, shell),
+            TrainingRunView(training, adoption, display, shell),
             "Runs: those under way, and those that have ended",
-            dialogs.open_run,
+            ("Open a run…", open_run),
         )
 
 
@@ -72,7 +77,7 @@ class TrainingRunView(RunView[TrainingMonitor]):
             Button("go_on", "Continue", "Go on training", go_on),
             Button("resume", "Resume", "Go on where it ended", resume),
         )  # fmt: skip
-        super().__init__(training, shell, buttons)
+        super().__init__(training, shell, RunWords(headline, remedy_text), buttons)
         self._training, self._adoption = training, adoption
         self._gain = TrainingGainView(adoption)
         empty = training_chart(TrainingHistory())
@@ -94,10 +99,6 @@ class TrainingRunView(RunView[TrainingMonitor]):
         )
         self._closing = pane(row_of(sentence("When closing:"), (self._choice, 1), spacing_px=8))
         return self._closing
-
-    def texts(self, run: TrainingMonitor) -> tuple[str, str, str]:
-        """Headline, time, and advice for a run that has ended."""
-        return headline(run), time_text(run), remedy_text(run)
 
     def shown(self, run: TrainingMonitor) -> Collection[str]:
         """Names of the buttons that are of use now."""

@@ -5,14 +5,11 @@ from __future__ import annotations
 import math
 from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, ClassVar, Literal, NamedTuple, TypeVar, get_args
 
-from PySide6.QtCore import QObject
-
-from sd2app.background.run_monitor import History, RunMonitor
+from sd2app.background.run_monitor import History, RunMonitor, reason_in
 from sd2core.errors import Sd2Error
-from sd2core.processes import ProcessId
+from sd2core.runs.pace import Pace
 from sd2core.train.config import TrainConfig, read_config
 from sd2core.train.folder import TrainingFolder
 
@@ -23,19 +20,30 @@ _MOST_POINTS = 2000
 """Limit of kept steps; beyond it, every second one is dropped."""
 
 
-class LearningHistory(History):
-    """Steps of a training."""
+class StepHistory(History):
+    """Steps of which the number may be known, and the pace at which they are done."""
 
     def __init__(self) -> None:
         self.begun = False
-        self.steps_done = 0
-        self.elapsed_s: float | None = None
+        self.steps_done = self.total = 0  # a total of 0 is not known
+        self._pace = Pace()
         self._stride, self._skipped = 1, 0
+
+    @property
+    def share(self) -> float | None:
+        """Share of the whole that is done; None while that is not known."""
+        return min(self.steps_done / self.total, 1.0) if self.total else None
+
+    @property
+    def left_s(self) -> float | None:
+        """Time left at the pace so far; None until that can be told."""
+        return None if self.saving else self._pace.left_s(self.total - self.steps_done)
 
     def _advance(self, steps: int, elapsed_s: float) -> None:
         self.steps_done = steps
         if 0 <= elapsed_s < math.inf:
             self.elapsed_s = elapsed_s
+            self._pace.take(steps, elapsed_s)
 
     def _note(self, points: list[T], point: T) -> None:
         """Keep a point of every step, or of every so many where there are too many."""
@@ -66,8 +74,10 @@ class EpochPoint:
     best: bool  # better than all before
 
 
-class TrainingHistory(LearningHistory):
+class TrainingHistory(StepHistory):
     """Steps and epochs of the training of a denoiser."""
+
+    left_s: float | None = None  # as its process says
 
     def __init__(self) -> None:
         super().__init__()
@@ -78,7 +88,6 @@ class TrainingHistory(LearningHistory):
         self.minutes = 0.0
         self.steps_per_epoch = 0
         self.segments = 0
-        self.left_s: float | None = None
         self.step_points: list[StepPoint] = []
         self.epoch_points: list[EpochPoint] = []
         self.epoch = 0  # under way, from 1; zero before the first
@@ -92,12 +101,9 @@ class TrainingHistory(LearningHistory):
     @property
     def share(self) -> float | None:
         """Share of the whole that is done; None while that is not known."""
-        total = self.epochs * self.steps_per_epoch
-        if total:
-            return min(self.steps_done / total, 1.0)
-        if self.minutes and self.elapsed_s is not None:
+        if not self.total and self.minutes and self.elapsed_s is not None:
             return min(self.elapsed_s / (60.0 * self.minutes), 1.0)
-        return None
+        return super().share
 
     def _start(self, event: dict[str, Any]) -> None:
         steps_per_epoch, epochs = _count(event["steps_per_epoch"], 1), _count(event.get("epochs"))
@@ -106,7 +112,7 @@ class TrainingHistory(LearningHistory):
         segments = _count(event.get("train_segments"))
         self.model, self.device = str(event["model"]), str(event.get("device", ""))
         self.epochs, self.steps_per_epoch = epochs, steps_per_epoch
-        self.minutes = minutes if minutes > 0 else 0.0
+        self.total, self.minutes = epochs * steps_per_epoch, minutes if minutes > 0 else 0.0
         self.parameters, self.segments = parameters, segments
         # What was done after the checkpoint is done again.
         self.steps_done = done if event.get("resumed") else 0
@@ -152,10 +158,7 @@ class TrainingHistory(LearningHistory):
         # Lines before the next start do not say that it works.
         self.begun, self.paused, self.left_s = False, False, None
         self.outcome = outcome
-        error = event.get("error")
-        if isinstance(error, dict):
-            parts = (str(error.get(key) or "") for key in ("found", "expected", "remedy"))
-            self.error = str(Sd2Error(*parts))
+        self.error = reason_in(event)
 
     def _pause(self, event: dict[str, Any]) -> None:
         self.paused = True
@@ -182,14 +185,9 @@ class _Facts(NamedTuple):
 class TrainingMonitor(RunMonitor[TrainingFolder]):
     """A training run with its settings and its history of epochs."""
 
+    folders, histories = TrainingFolder, TrainingHistory
     history: TrainingHistory
     facts = _Facts(None, False, False)
-
-    def __init__(
-        self, path: Path, parent: QObject | None = None, *, process: ProcessId | None = None
-    ) -> None:
-        history = TrainingHistory()
-        super().__init__(TrainingFolder(path), parent, history=history, process=process)
 
     def inspect(self) -> _Facts:
         """Read the settings, and look which models are there."""

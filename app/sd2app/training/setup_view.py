@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from PySide6.QtWidgets import QGridLayout, QWidget
 
-from sd2app.training.dialogs import TrainingDialogs
+from sd2app.feature import Shell
+from sd2app.session.document import DocumentModel
 from sd2app.training.model import TrainingModel
 from sd2app.training.text import INPUT_WORDS, MODEL_WORDS, division_text
+from sd2app.widgets.dialogs import ask_folder
 from sd2app.widgets.layouts import STRETCH, grid_of, pane, row_of
 from sd2app.widgets.model_page import model_title
 from sd2app.widgets.panel import ElidedLabel, Fold, outlined, sentence, title
@@ -39,9 +41,9 @@ _MORE = (
 class TrainingSetupView(TrainingForm):
     """A form over :class:`TrainingSetupModel`."""
 
-    def __init__(self, training: TrainingModel, dialogs: TrainingDialogs) -> None:
-        super().__init__(training.setup, dialogs.shell)
-        self._training, self._pairs, self._dialogs = training, training.setup, dialogs
+    def __init__(self, training: TrainingModel, document: DocumentModel, shell: Shell) -> None:
+        super().__init__(training.setup, shell)
+        self._training, self._pairs, self._document = training, training.setup, document
         self._menu = self.add_data(
             "Pairs",
             "Add pairs",
@@ -139,10 +141,33 @@ class TrainingSetupView(TrainingForm):
             action.triggered.connect(lambda _=False, path=path: self._pairs.add(path))
         if not menu.isEmpty():
             menu.addSeparator()
-        menu.addAction("Folder of pairs…", self._dialogs.ask_store)
-        one = menu.addAction("Make of this recording", self._dialogs.make_of_this)
-        one.setToolTip(self._dialogs.why_not_this or "Its mesh and its radar, as it was saved")
-        one.setEnabled(not self._dialogs.why_not_this)
-        make = menu.addAction("Make of recordings…", self._dialogs.ask_recordings)
+        menu.addAction("Folder of pairs…", self._ask_store)
+        one = menu.addAction("Make of this recording", self._make_of_this)
+        one.setToolTip(self._why_not_this or "Its mesh and its radar, as it was saved")
+        one.setEnabled(not self._why_not_this)
+        make = menu.addAction("Make of recordings…", self._ask_recordings)
         make.setToolTip("Of one recording, or of all in a folder, that have a mesh and a radar")
         make.setEnabled(self._training.pair_maker.out is None)
+
+    def _ask_store(self) -> None:
+        if path := ask_folder(self._shell.dialog_parent, "Folder of pairs to learn from"):
+            self._pairs.add(path)
+
+    @property
+    def _why_not_this(self) -> str:
+        """Reason why no pairs can be made of the open recording; empty where they can."""
+        recording = self._document.recording
+        if self._training.pair_maker.out is not None:
+            return "Pairs are being made"
+        if recording is None or recording.mesh is None or recording.radar is None:
+            return "It takes a recording with a mesh and a radar capture"
+        return "Save the recording first" if self._document.modified else ""
+
+    def _make_of_this(self) -> None:
+        recording = self._document.recording
+        if recording is not None:
+            self._shell.attempt(lambda: self._training.make_pairs(recording.folder))
+
+    def _ask_recordings(self) -> None:
+        if path := ask_folder(self._shell.dialog_parent, "A recording, or a folder of some"):
+            self._shell.attempt(lambda: self._training.make_pairs(path))

@@ -1,13 +1,13 @@
-"""Durations, phases and kinds of model in words."""
+"""Phases and kinds of model in words."""
 
 from __future__ import annotations
 
 import math
 from typing import TYPE_CHECKING
 
-from sd2app.background.run_monitor import Phase
 from sd2app.training.run import EpochPoint, TrainingHistory, TrainingMonitor
-from sd2app.widgets.text import about, counted, error_text, exact_text
+from sd2app.widgets.run_text import AT_WORK, PHASES
+from sd2app.widgets.text import counted, error_text
 
 if TYPE_CHECKING:
     from sd2core.train.data import Split
@@ -27,21 +27,7 @@ INPUT_WORDS = {
     "kinematics": "How the joints move",
 }
 
-_PHASES: dict[Phase, str] = {
-    "starting": "Starting…",
-    "running": "Training",
-    "pausing": "Pausing…",
-    "paused": "Paused",
-    "resuming": "Going on…",
-    "stopping": "Stopping, the best model is kept…",
-    "cancelling": "Cancelling…",
-    "finished": "Finished",
-    "stopped": "Stopped",
-    "failed": "Failed",
-    "died": "Ended unexpectedly",
-    "gone": "Cancelled",
-}
-_AT_WORK: tuple[Phase, ...] = ("running", "pausing", "paused", "resuming")
+_PHASES = PHASES | {"running": "Training", "stopping": "Stopping, the best model is kept…"}
 
 
 def model_name(model: str) -> str:
@@ -90,23 +76,12 @@ def headline(run: TrainingMonitor) -> str:
     if not run.loaded:
         return "Looking…"
     text = _PHASES[phase]
-    if phase in _AT_WORK and history.epoch:
+    if phase in AT_WORK and history.epoch:
         of = f" of {history.epochs:,}" if history.epochs else ""
         return f"{text} · epoch {history.epoch:,}{of}"
     if phase in ("finished", "stopped", "failed", "died") and history.epoch_points:
         return f"{text} after {counted(history.epoch_points[-1].epoch, 'epoch')}"
     return text
-
-
-def time_text(run: TrainingMonitor) -> str:
-    """Elapsed time and time left."""
-    history, parts = run.history, []
-    if run.phase in _AT_WORK and history.left_s is not None:
-        parts.append(f"{about(history.left_s)} left")
-    if history.elapsed_s is not None:
-        passed = exact_text(history.elapsed_s)
-        parts.append(f"{passed} so far" if parts else f"trained for {passed}")
-    return " · ".join(parts)
 
 
 def remedy_text(run: TrainingMonitor) -> str:

@@ -4,83 +4,68 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-from PySide6.QtCore import QPointF, QRect, QRectF, Qt
-from PySide6.QtGui import QColor, QIcon, QPainter, QPainterPath, QPen, QPixmap
+from PySide6.QtCore import QRect, QRectF, Qt
+from PySide6.QtGui import QColor, QIcon, QPainter, QPen, QPixmap
+from PySide6.QtSvg import QSvgRenderer
 
 _SIZE = 16
 _SWATCH = 12
 _SCALES = (1, 2, 3)
-_SHAPES: dict[str, tuple[QRectF | tuple[float, float], ...]] = {
-    "play": ((4, 13),),
-    "pause": (QRectF(4, 3, 3, 10), QRectF(9, 3, 3, 10)),
-    "previous": ((10, 4), QRectF(11, 3, 2, 10)),
-    "next": ((6, 12), QRectF(3, 3, 2, 10)),
-    "first": (QRectF(2, 3, 2, 10), (9, 4), (14, 9)),
-    "last": ((2, 7), (7, 12), QRectF(12, 3, 2, 10)),
-    "slower": (QRectF(3, 7, 10, 2),),
-    "faster": (QRectF(3, 7, 10, 2), QRectF(7, 3, 2, 10)),
+_LINE = (
+    'fill="none" stroke="currentColor" stroke-width="1.6" stroke-linecap="round"'
+    ' stroke-linejoin="bevel"'
+)
+_DRAWN = {
+    "play": '<path d="M4 3v10l9-5z"/>',
+    "pause": '<path d="M4 3h3v10h-3zM9 3h3v10h-3z"/>',
+    "previous": '<path d="M10 3v10l-6-5zM11 3h2v10h-2z"/>',
+    "next": '<path d="M6 3v10l6-5zM3 3h2v10h-2z"/>',
+    "first": '<path d="M2 3h2v10h-2zM9 3v10l-5-5zM14 3v10l-5-5z"/>',
+    "last": '<path d="M2 3v10l5-5zM7 3v10l5-5zM12 3h2v10h-2z"/>',
+    "slower": '<path d="M3 7h10v2h-10z"/>',
+    "faster": '<path d="M3 7h10v2h-10zM7 3h2v10h-2z"/>',
+    "loop": '<path d="M10.5 3.67A5 5 0 1 0 13 8" fill="none" stroke="currentColor"'
+    ' stroke-width="1.8" stroke-linecap="square"/><path d="M8.5 0.5L13 3.6L8.5 6.7z"/>',
+    # waves that leave a point
+    "Sensor": f'<path d="M8.6 13.86A6 6 0 0 0 8.6 6.14M12.04 16.75A10.5 10.5 0 0 0 12.04 3.25'
+    f'M15.49 19.64A15 15 0 0 0 15.49 0.36" {_LINE}/><circle cx="4" cy="10" r="2"/>',
+    # a target
+    "Accuracy": f'<g {_LINE}><circle cx="10" cy="10" r="8"/><circle cx="10" cy="10" r="4.2"/></g>'
+    '<circle cx="10" cy="10" r="1.5"/>',
+    # an error that falls
+    "Train": f'<path d="M3 2.5V17H17.5M6 4C7 11 10 13 17 13.5" {_LINE}/>',
+    # spans on their tracks
+    "Labels": '<path d="M2 3h9v3.4h-9zM8 8.3h10v3.4h-10zM4 13.6h7v3.4h-7z"/>',
+    # what two people have in common
+    "Agree": f'<g {_LINE}><circle cx="7.2" cy="10" r="5.6"/>'
+    '<circle cx="12.8" cy="10" r="5.6"/></g>',
 }
-"""Icons of bars and triangles, each triangle from the x of its base to that of its tip."""
+"""Icons as SVG: those of the transport bar 16, those of panels 20 units large."""
+
+
+@lru_cache(maxsize=64)
+def _drawing(name: str, colour: str, size: int) -> QSvgRenderer:
+    head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {size} {size}"'
+    drawn = f'{head} color="{colour}" fill="{colour}">{_DRAWN[name]}</svg>'
+    return QSvgRenderer(drawn.encode())
 
 
 def transport_icon(name: str, colour: str) -> QIcon:
-    """Icon of the transport bar, ``loop`` or one of the shapes above, in one colour."""
+    """Icon of the transport bar in one colour."""
     icon = QIcon()
     for scale in _SCALES:
         pixmap = QPixmap(_SIZE * scale, _SIZE * scale)
         pixmap.setDevicePixelRatio(scale)
         pixmap.fill(Qt.GlobalColor.transparent)
         with QPainter(pixmap) as painter:
-            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-            if name == "loop":
-                _draw_loop(painter, QColor(colour))
-            else:
-                for shape in _SHAPES[name]:
-                    path = QPainterPath()
-                    if isinstance(shape, QRectF):
-                        path.addRect(shape)
-                    else:
-                        base, tip = shape
-                        path.addPolygon([QPointF(base, 3), QPointF(base, 13), QPointF(tip, 8)])
-                    painter.fillPath(path, QColor(colour))
+            _drawing(name, colour, _SIZE).render(painter, QRectF(0, 0, _SIZE, _SIZE))
         icon.addPixmap(pixmap)
     return icon
 
 
-def _draw_loop(painter: QPainter, colour: QColor) -> None:
-    painter.setPen(QPen(colour, 1.8))
-    painter.drawArc(QRectF(3, 3, 10, 10), 60 * 16, 300 * 16)
-    head = QPainterPath()
-    head.addPolygon([QPointF(8.5, 0.5), QPointF(13, 3.6), QPointF(8.5, 6.7)])
-    painter.fillPath(head, colour)
-
-
 def draw_panel_icon(painter: QPainter, name: str, colour: QColor) -> None:
     """Draw the icon of a panel at the side, 20 pixels in the square, in one colour."""
-    painter.setPen(QPen(colour, 1.6, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
-    painter.setBrush(Qt.BrushStyle.NoBrush)
-    if name == "Sensor":  # waves that leave a point
-        for radius in (6.0, 10.5, 15.0):
-            around = QRectF(4 - radius, 10 - radius, 2 * radius, 2 * radius)
-            painter.drawArc(around, -40 * 16, 80 * 16)
-        _draw_dot(painter, QPointF(4, 10), 2.0, colour)
-    elif name == "Accuracy":  # a target
-        painter.drawEllipse(QPointF(10, 10), 8, 8)
-        painter.drawEllipse(QPointF(10, 10), 4.2, 4.2)
-        _draw_dot(painter, QPointF(10, 10), 1.5, colour)
-    elif name == "Train":  # an error that falls
-        painter.drawPolyline([QPointF(3, 2.5), QPointF(3, 17), QPointF(17.5, 17)])
-        curve = QPainterPath(QPointF(6, 4))
-        curve.cubicTo(QPointF(7, 11), QPointF(10, 13), QPointF(17, 13.5))
-        painter.drawPath(curve)
-    elif name == "Labels":  # spans on their tracks
-        for place in (QRectF(2, 3, 9, 3.4), QRectF(8, 8.3, 10, 3.4), QRectF(4, 13.6, 7, 3.4)):
-            painter.fillRect(place, colour)
-    elif name == "Agree":  # what two people have in common
-        painter.drawEllipse(QPointF(7.2, 10), 5.6, 5.6)
-        painter.drawEllipse(QPointF(12.8, 10), 5.6, 5.6)
-    else:
-        painter.drawText(QRectF(0, 0, 20, 20), Qt.AlignmentFlag.AlignCenter, name[:1])
+    _drawing(name, colour.name(), 20).render(painter, QRectF(0, 0, 20, 20))
 
 
 def draw_ring(
@@ -93,12 +78,6 @@ def draw_ring(
     painter.setPen(QPen(colour, 2.5, Qt.PenStyle.SolidLine, Qt.PenCapStyle.FlatCap))
     part = 0.25 if share is None else min(max(share, 0.0), 1.0)
     painter.drawArc(ring, 90 * 16, -round(360 * 16 * part))
-
-
-def _draw_dot(painter: QPainter, at: QPointF, radius: float, colour: QColor) -> None:
-    path = QPainterPath()
-    path.addEllipse(at, radius, radius)
-    painter.fillPath(path, colour)
 
 
 @lru_cache(maxsize=64)

@@ -18,13 +18,15 @@ from sd2app.widgets.inputs import Choice
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import outlined, sentence, show_words, title
 from sd2app.widgets.progress_bar import ProgressBar
+from sd2app.widgets.run_text import time_text
 
 
 class RunPanel(QWidget):
     """The list of runs on top; below it the run in view, or the setup of a new one.
 
-    ``tip`` describes the list, ``new`` what is set up. ``open_other`` lets the user choose a run
-    of another folder.
+    ``tip`` describes the list, ``new`` what is set up. ``open_other``, a text and a function, lets
+    the user choose a run of another folder. ``guide`` is a help button beside the list, of a panel
+    that fills a window: what is below takes all room then.
     """
 
     def __init__(
@@ -33,8 +35,9 @@ class RunPanel(QWidget):
         setup: QWidget,
         run: QWidget,
         tip: str,
-        open_other: Callable[[], object] | None = None,
+        open_other: tuple[str, Callable[[], object]] | None = None,
         new: str = "New training",
+        guide: QWidget | None = None,
     ) -> None:
         super().__init__()
         self.setObjectName("page")
@@ -45,8 +48,10 @@ class RunPanel(QWidget):
         self._list.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self._list.activated.connect(self._choose)
         self._new = outlined("New", "Set up another one", lambda: runs.select(None), self)
-        head = row_of((self._list, 1), self._new, spacing_px=6)
-        self.setLayout(column_of(head, setup, run, STRETCH, spacing_px=8, margins_px=(8, 4, 8, 6)))
+        beside = () if guide is None else (guide,)
+        head = row_of((self._list, 1), self._new, *beside, spacing_px=6)
+        below = (setup, run, STRETCH) if guide is None else ((setup, 1), (run, 1))
+        self.setLayout(column_of(head, *below, spacing_px=8, margins_px=(8, 4, 8, 6)))
         runs.changed.connect(self._refresh)
         self._refresh()
 
@@ -62,7 +67,7 @@ class RunPanel(QWidget):
             self._paths.insert(1, here)
             self._texts.insert(1, here.name)
         if self._open is not None:
-            self._texts.append("Open a run…")
+            self._texts.append(self._open[0])
         self._list.setToolTip(str(here) if here is not None else self._tip)
         self._list.offer(self._texts, self._paths.index(here))
 
@@ -74,7 +79,7 @@ class RunPanel(QWidget):
         if at < len(self._paths):
             self._runs.select(self._paths[at])
         elif self._open is not None:
-            self._open()
+            self._open[1]()
             self._list.offer(self._texts, self._paths.index(self._here))
 
     def showEvent(self, event: QShowEvent) -> None:
@@ -98,20 +103,32 @@ class Button(NamedTuple):
     primary: bool = False
 
 
+class RunWords(NamedTuple):
+    """How runs of one kind are spoken of."""
+
+    headline: Callable[[Any], str]  # where a run stands, in a few words
+    note: Callable[[Any], str]  # advice for one that has ended; empty without any
+    time: Callable[[Any], str] = time_text
+    what: str = "training"
+    stop_tip: str = "End it now and keep the best so far"
+
+
 class RunView(QWidget, Generic[Run]):
     """Progress and actions of the run in view, and why it ended; subclasses add what it made."""
 
-    def __init__(self, runs: Runs[Run], shell: Shell, buttons: Sequence[Button]) -> None:
+    def __init__(
+        self, runs: Runs[Run], shell: Shell, words: RunWords, buttons: Sequence[Button]
+    ) -> None:
         super().__init__()
-        self._runs, self._shell = runs, shell
+        self._runs, self._shell, self._words = runs, shell, words
         stop = partial(runs.tell, "stop")
         buttons = (
             *buttons,
-            Button("stop", "Stop", "End it now and keep the best so far", stop),
+            Button("stop", "Stop", words.stop_tip, stop),
             Button("delete", "Delete…", "Delete this run with what it made", self._delete),
         )
-        self._headline = title("", "How the training stands")
-        self._bar = ProgressBar("Progress of the training")
+        self._headline = title("", f"How the {words.what} stands")
+        self._bar = ProgressBar(f"Progress of the {words.what}")
         self._time, self._reason = sentence(""), sentence("", "warning")
         self._note = sentence("")
         self._buttons = {
@@ -123,17 +140,13 @@ class RunView(QWidget, Generic[Run]):
         # never comes to where another one was.
         top = row_of(*harmless, STRETCH, spacing_px=6)
         below = row_of(delete, STRETCH, spacing_px=6)
-        words = self._headline, self._bar, self._time
-        parts = top, *words, below, self._reason, self._note
+        said = self._headline, self._bar, self._time
+        parts = top, *said, below, self._reason, self._note
         self.column = column_of(*parts, spacing_px=6, margins_px=0)
         self.setLayout(self.column)
         runs.changed.connect(self.refresh)
 
     # --- what subclasses say ----------------------------------------------------------------
-
-    def texts(self, run: Run) -> tuple[str, str, str]:
-        """Headline, time, and advice for a run that has ended."""
-        raise NotImplementedError
 
     def shown(self, run: Run) -> Collection[str]:
         """Names of the buttons that are of use now."""
@@ -150,7 +163,7 @@ class RunView(QWidget, Generic[Run]):
         if run is None:
             return
         if under_way := run.phase in UNDER_WAY:
-            reached = ", ".join(filter(None, self.texts(run)[:2]))
+            reached = ", ".join(filter(None, (self._words.headline(run), self._words.time(run))))
             what = (
                 f"{run.path.name} ends now, and all that it made is deleted ({reached})."
                 " Stop ends it too, but keeps the best so far."
@@ -174,11 +187,10 @@ class RunView(QWidget, Generic[Run]):
         run = self._runs.run
         if run is None:
             return
-        headline, time, note = self.texts(run)
-        self._headline.setText(headline)
-        show_words(self._time, time)
+        self._headline.setText(self._words.headline(run))
+        show_words(self._time, self._words.time(run))
         show_words(self._reason, run.text)
-        show_words(self._note, note)
+        show_words(self._note, self._words.note(run))
         self._bar.setVisible(run.phase in UNDER_WAY)
         self._bar.show_share(run.history.share)
         shown, ending = self.shown(run), run.phase in ("stopping", "cancelling")

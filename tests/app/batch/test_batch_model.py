@@ -18,12 +18,12 @@ from sd2app.batch.model import BatchModel
 from sd2app.batch.run import BatchMonitor, plan_of
 from sd2app.batch.setup import FORMATS, BatchSetupModel
 from sd2app.batch.text import (
+    batch_time_text,
     estimate_facts,
     estimate_headline,
     failure_text,
     headline,
     step_facts,
-    time_text,
     unusable_text,
 )
 from sd2app.settings import Settings
@@ -262,8 +262,8 @@ def test_a_batch_runs_to_its_end_and_its_results_are_listed(qtbot, made, meshes)
         ("Synthesise", 2, 3, "2 of 3"),
         ("Denoise", 2, 3, "2 of 3"),
     ]
-    assert time_text(run) == "Took 1:30"
-    assert failure_text(run.failures[0]) == (
+    assert batch_time_text(run) == "took 1:30"
+    assert failure_text(run.history.failures[0]) == (
         "ann.npz, synthesise from place 2: It is damaged. Expected: a mesh. Make it again."
     )
     # What only served to start it is gone.
@@ -314,7 +314,7 @@ def test_stop_keeps_what_is_done_and_the_same_goes_on(qtbot, made, meshes):
     assert model.run.resumable
     model.resume()
     until(qtbot, model, "finished")
-    assert not model.run.failures
+    assert not model.run.history.failures
 
 
 def test_a_stop_before_there_is_a_folder_is_heard(qtbot, made, meshes):

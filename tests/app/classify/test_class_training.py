@@ -18,6 +18,7 @@ from sd2app.classify.training import ClassTraining
 from sd2app.command_line import main
 from sd2app.settings import Settings
 from sd2app.training.text import division_text
+from sd2app.widgets.run_text import time_text
 from sd2core.classify.defaults import WIDTH, pace_kind
 from sd2core.errors import Sd2Error
 from sd2core.files.resources import resource_path
@@ -210,7 +211,7 @@ def test_a_training_is_followed_to_its_end_and_its_model_is_used(set_up, qtbot):
         (0.5, True), (0.8, True), (0.7, False),
     ]  # fmt: skip
     assert recall_text(run.history.best) == "80.0 %, at step 4"
-    assert run.time_text == "took 0:12"
+    assert time_text(run) == "took 0:12"
     assert not model.in_use
     model.use_model()
     (kept,) = set_up.used

@@ -24,7 +24,7 @@ START = {
 
 
 def said(**content: object) -> FitProgress:
-    progress = FitProgress({})
+    progress = FitProgress()
     assert progress.take([content])
     return progress
 
@@ -73,14 +73,14 @@ def test_landmarks_are_pixels_and_visibility() -> None:
 )
 def test_what_cannot_be_read_is_ignored(line: str, tmp_path) -> None:
     (tmp_path / "lines").write_text(f"{line}\n")
-    assert not FitProgress({}).take(read_events(tmp_path / "lines"))
+    assert not FitProgress().take(read_events(tmp_path / "lines"))
 
 
 @pytest.fixture
 def run():
     """Progress on a clock that is set by hand."""
     now = [0.0]
-    progress = FitProgress({}, lambda: now[0])
+    progress = FitProgress(lambda: now[0])
     progress.take([START])
     return progress, now
 

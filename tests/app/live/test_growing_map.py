@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from sd2app.live.growing_map import GrowingMap
+from sd2app.live.growing_map import extended
 from sd2core.maps import DopplerMap
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
@@ -21,31 +21,24 @@ def _map(values: np.ndarray) -> DopplerMap:
 @given(
     values=arrays(np.float32, (4, 24), elements=st.floats(0, 100, width=32)),
     there=st.integers(1, 24),
-    spare=st.integers(1, 5),
+    at_once=st.integers(1, 5),
 )
-def test_columns_added_one_by_one_make_the_whole_map(values, there, spare):
-    import sd2app.live.growing_map as module
-
-    before, module._SPARE_FRAMES = module._SPARE_FRAMES, spare
-    try:
-        whole = _map(values)
-        growing = GrowingMap(whole.between(0, there))
-        for frame in range(there, 24):
-            assert growing.add(float(whole.times_s[frame]), values[:, frame])
-            earlier = growing.whole()
-            assert len(earlier.timebase) == frame + 1
-        found = growing.whole()
-        np.testing.assert_array_equal(found.values, values)
-        np.testing.assert_array_equal(found.times_s, whole.times_s)
-        assert (found.unseen_bins, found.meta, found.kind) == ((0,), {"a": 1}, "real")
-    finally:
-        module._SPARE_FRAMES = before
+def test_columns_added_a_few_at_a_time_make_the_whole_map(values, there, at_once):
+    whole = _map(values)
+    growing = whole.between(0, there)
+    for first in range(there, 24, at_once):
+        frames = range(first, min(first + at_once, 24))
+        growing = extended(growing, [(float(whole.times_s[k]), values[:, k]) for k in frames])
+        assert len(growing.timebase) == frames.stop
+    np.testing.assert_array_equal(growing.values, values)
+    np.testing.assert_array_equal(growing.times_s, whole.times_s)
+    assert (growing.unseen_bins, growing.meta, growing.kind) == ((0,), {"a": 1}, "real")
 
 
 def test_a_column_that_is_there_is_not_added_again():
-    growing = GrowingMap(_map(np.ones((4, 3), np.float32)))
-    assert not growing.add(2 / 30, np.zeros(4, np.float32))
-    assert len(growing.whole().timebase) == 3
-    shown = growing.whole()
-    assert growing.add(0.5, np.full(4, 7, np.float32))
+    shown = _map(np.ones((4, 3), np.float32))
+    assert extended(shown, [(2 / 30, [0.0] * 4)]) is shown
+    assert extended(shown, [(0.5, [0.0] * 5)]) is shown
+    longer = extended(shown, [(2 / 30, [0.0] * 4), (0.5, [7.0] * 4)])
+    assert longer.values[:, 3:].tolist() == [[7.0]] * 4
     assert shown.values.max() == 1  # what is on screen does not change

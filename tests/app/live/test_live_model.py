@@ -12,8 +12,7 @@ import pytest
 from PySide6.QtCore import QObject
 
 from sd2app.live.model import LiveModel
-from sd2app.live.request import ListenRequest
-from sd2app.live.setup import ListenSetup
+from sd2app.live.setup import ListenRequest, ListenSetup
 from sd2app.live.text import frames_text, level_text
 from sd2app.session.session import Session, build_session
 from sd2app.settings import Settings

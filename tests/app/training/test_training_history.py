@@ -72,12 +72,11 @@ def phase_of(run: TrainingMonitor, live: bool, state: str, word: str = "run") ->
 
 def test_an_end_is_an_end_until_it_goes_on(run) -> None:
     error = {"found": "No space", "expected": "some", "remedy": "Make room"}
-    run.on_events([START, {"event": "end", "outcome": "failed", "error": error}])
+    run.history.take([START, {"event": "end", "outcome": "failed", "error": error}])
     history = run.history
-    assert run.error == history.error
     assert history.error == "No space. Expected: some. Make room."
     assert phase_of(run, False, "failed") == "failed"
-    run.on_events([{**START, "resumed": True, "steps_done": 0}])
+    run.history.take([{**START, "resumed": True, "steps_done": 0}])
     assert history.outcome is None
     assert phase_of(run, True, "running") == "running"
     assert phase_of(run, False, "died") == "died"
@@ -106,7 +105,7 @@ def test_a_process_that_takes_its_folder_meanwhile_is_not_taken_for_dead(run) ->
     ],
 )
 def test_what_a_process_was_told_and_does_makes_its_phase(run, word, paused, phase) -> None:
-    run.on_events([START, *([{"event": "paused"}] if paused else [])])
+    run.history.take([START, *([{"event": "paused"}] if paused else [])])
     assert phase_of(run, True, "running", word) == phase
 
 

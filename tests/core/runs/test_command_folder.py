@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from sd2app.background.run_monitor import RunMonitor
+from sd2app.background.run_monitor import CommandRun
 from sd2core.errors import Sd2Error
 from sd2core.processes import ProcessId
 from sd2core.runs.command_folder import CommandFolder, commands_in
@@ -33,7 +33,7 @@ def test_one_of_yesterday_is_followed(qtbot, tmp_path, code, state) -> None:
     folder = of_yesterday(tmp_path / "runs" / "one", code)
     assert [one.path for one in commands_in(tmp_path / "runs")] == [folder.path]
     assert (folder.code, folder.state(), folder.facts["what"]) == (code, state, "table")
-    run = RunMonitor(folder)
+    run = CommandRun(folder.path)
     qtbot.waitUntil(lambda: run.loaded, timeout=20_000)
     assert run.phase == state
     run.close()
@@ -41,7 +41,7 @@ def test_one_of_yesterday_is_followed(qtbot, tmp_path, code, state) -> None:
 
 def test_one_of_yesterday_starts_again_in_its_folder(qtbot, tmp_path) -> None:
     folder = of_yesterday(tmp_path / "one", 130)
-    run = RunMonitor(folder, process=folder.start(["--version"], {"what": "table"}))
+    run = CommandRun(folder.path, process=folder.start(["--version"], {"what": "table"}))
     qtbot.waitUntil(lambda: not run.under_way, timeout=60_000)
     assert run.phase == "finished"
     assert folder.code == 0
@@ -61,7 +61,7 @@ def test_a_process_that_reuses_a_number_is_not_waited_for(qtbot, tmp_path) -> No
     folder.path.mkdir()
     folder._describe("starting", started_unix_s=1.0, arguments=[])
     this = ProcessId.current()
-    run = RunMonitor(folder, process=ProcessId(this.pid, this.started_unix_s - 3600.0))
+    run = CommandRun(folder.path, process=ProcessId(this.pid, this.started_unix_s - 3600.0))
     qtbot.waitUntil(lambda: run.loaded, timeout=20_000)
     assert run.phase == "failed"
     run.close()

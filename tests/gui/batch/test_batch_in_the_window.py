@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import QCoreApplication, QEvent, Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QCheckBox, QFileDialog, QLabel, QListWidget, QTableView, QToolButton
+from PySide6.QtWidgets import QCheckBox, QFileDialog, QLabel, QListWidget, QToolButton
 from window_models import models_of
 
 from sd2app.background import run_monitor
@@ -134,7 +134,7 @@ def test_a_batch_is_set_up_started_and_its_results_opened(
     click(dialog, "Data set")
     assert "A data set" in dialog._run._card.toPlainText()
     click(dialog, "Results")
-    table = dialog.findChild(QTableView)
+    table = dialog._run._table
     table.selectRow(3)
     with qtbot.waitSignal(models_of(window).document.opened, timeout=20_000):
         click(dialog, "Open in the window")
@@ -142,7 +142,7 @@ def test_a_batch_is_set_up_started_and_its_results_opened(
     assert models_of(window).document.recording.folder == another
     assert models_of(window).sensor.sensor.position_m == (1.0, 0.0, 0.25)
     assert open_recording(another).sensor.position_m != (1.0, 0.0, 0.25)
-    click(dialog, "New batch")
+    click(dialog, "New")
     assert button(dialog, "Start")
 
 
@@ -167,7 +167,9 @@ def test_failures_and_their_reasons_are_shown_and_a_batch_is_stopped(opened, qtb
     ready(qtbot, batch)
     assert "1 recording: the first tasks tell how long it takes" in words(dialog)
     click(dialog, "Start")
-    qtbot.waitUntil(lambda: batch.run is not None and bool(batch.run.failures), timeout=20_000)
+    qtbot.waitUntil(
+        lambda: batch.run is not None and bool(batch.run.history.failures), timeout=20_000
+    )
     assert "At work" in words(dialog)
     assert "1:00 so far" in words(dialog)
     failures = dialog._run._failures.toPlainText()

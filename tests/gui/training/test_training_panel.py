@@ -31,7 +31,7 @@ from sd2app.session.maps import MapModel
 from sd2app.session.session import Maps
 from sd2app.settings import Settings
 from sd2app.shell.side_panel import SidePanel
-from sd2app.training.dialogs import TrainingDialogs
+from sd2app.training.dialogs import may_leave
 from sd2app.training.model import TrainingModel
 from sd2app.training.panel import TrainingPanel, TrainingRunView
 from sd2app.training.result import ModelAdoption
@@ -101,8 +101,8 @@ class Window:
         self.said: list[str] = []
         self.display = DisplayModel()
         self.document = SimpleNamespace(recording=None, modified=False)
-        self.dialogs = TrainingDialogs(SayingShell(self.said), self.training, self.document)
-        self.panel = TrainingPanel(self.training, self.use, self.display, self.dialogs)
+        shell = SayingShell(self.said)
+        self.panel = TrainingPanel(self.training, self.use, self.display, self.document, shell)
         self.side = SidePanel({"Train": self.panel})
         self.side.resize(300, 520)
         self.side.show()
@@ -338,7 +338,7 @@ def test_recordings_are_made_into_pairs(made, qtbot, tmp_path, small_recording, 
     qtbot.waitUntil(lambda: said == ["There is no room."], timeout=10_000)
     qtbot.waitUntil(lambda: "Making" not in texts(window))
     maker._command = (sys.executable, "-c", "import time; time.sleep(3600)")
-    window.dialogs.ask_recordings()
+    window.panel.findChild(TrainingSetupView)._ask_recordings()
     click(window, qtbot, "Cancel")
     assert "Cancelling… ball.zarr" in texts(window)
     qtbot.waitUntil(lambda: maker.out is None, timeout=10_000)
@@ -346,7 +346,7 @@ def test_recordings_are_made_into_pairs(made, qtbot, tmp_path, small_recording, 
     maker.made.emit(write_pairs(tmp_path / "made.zarr"))
     qtbot.waitUntil(lambda: "made.zarr" in texts(window))
     monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *a: str(tmp_path))
-    window.dialogs.ask_recordings()
+    window.panel.findChild(TrainingSetupView)._ask_recordings()
     assert "no recording with a mesh and a radar capture" in window.said[-1]
 
 
@@ -415,7 +415,7 @@ def test_cancelling_is_said_at_once(made, qtbot, pairs) -> None:
     assert "Cancelling…" in texts(window)
     assert not button(window, "Stop").isEnabled()
     # What becomes of it is decided.
-    assert window.dialogs.may_leave()
+    assert may_leave(window.training, None)
     qtbot.waitUntil(lambda: window.training.run is None, timeout=15_000)
     assert button(window, "Start training").isVisible()
 
@@ -519,7 +519,7 @@ def test_closing_asks_what_becomes_of_it(made, qtbot, pairs, text, closes, phase
     window = made("--rest-at", 1)
     begun(window, qtbot, pairs, "running")
     answer(qtbot, text)
-    assert window.dialogs.may_leave() is closes
+    assert may_leave(window.training, None) is closes
     run = window.training.run
     if phase is None:
         qtbot.waitUntil(lambda: window.training.run is None, timeout=15_000)
@@ -535,9 +535,9 @@ def test_what_is_always_done_is_not_asked(made, qtbot, pairs) -> None:
     choice.setFocus()
     qtbot.keyClick(choice, Qt.Key.Key_Down)
     assert window.training.closing == "keep"
-    assert window.dialogs.may_leave()
+    assert may_leave(window.training, None)
     qtbot.keyClick(choice, Qt.Key.Key_Down)
-    assert window.dialogs.may_leave()
+    assert may_leave(window.training, None)
     qtbot.waitUntil(lambda: window.training.run.phase == "stopped", timeout=15_000)
     # Nothing is under way any more.
-    assert window.dialogs.may_leave()
+    assert may_leave(window.training, None)

@@ -144,7 +144,7 @@ class RemoteDenoiser(_Remote):
     def denoise(self, doppler: DopplerMap) -> DopplerMap:
         """Denoised map: an estimate of a radar's map from a synthetic one."""
         given = replace(doppler, uncertainty=None)  # no model uses it
-        denoised: DopplerMap = self._process.ask("denoise", self._ready(), given)
+        denoised: DopplerMap = self._process.ask("call", self._ready(), "denoise", given)
         return replace(denoised, timebase=doppler.timebase)
 
     def live(self) -> RemoteLive:
@@ -164,7 +164,7 @@ class RemoteClassifier(_Remote):
     def probabilities(self, doppler: DopplerMap) -> NDArray[np.float32]:
         """Class probabilities of every frame of a map, (frames, classes)."""
         given = replace(doppler, uncertainty=None)
-        return self._process.ask("classify", self._ready(), given)
+        return self._process.ask("call", self._ready(), "probabilities", given)
 
     def live(self) -> RemoteClasses:
         """Session for live frames of one stretch, all with a person."""
@@ -188,7 +188,7 @@ class _RemoteSession:
                 "The process in which the models work was started again",
                 remedy="Choose the model again",
             )
-        return self._process.ask(do, self._clip, *arguments)
+        return self._process.ask("call", self._clip, do, *arguments)
 
 
 class RemoteClasses(_RemoteSession):

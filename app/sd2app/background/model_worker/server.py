@@ -14,11 +14,7 @@ import sys
 from pathlib import Path
 from typing import Any, BinaryIO
 
-import numpy as np
-from numpy.typing import NDArray
-
 from sd2core.errors import Sd2Error
-from sd2core.maps import DopplerMap
 
 _KEPT = 5
 """Models: the denoiser in use, the one before, the one that is about to be; the classifier
@@ -50,29 +46,13 @@ class Worker:
 
         return self._keep(self._models, load_classifier(path))
 
-    def denoise(self, model: int, doppler: DopplerMap) -> DopplerMap:
-        """Denoised map."""
-        return _newest(self._models, model).denoise(doppler)
-
-    def classify(self, model: int, doppler: DopplerMap) -> NDArray[np.float32]:
-        """Class probabilities of every frame of a map, (frames, classes)."""
-        return _newest(self._models, model).probabilities(doppler)
-
     def begin(self, model: int) -> int:
         """Number of a new clip whose frames come one after another."""
-        return self._keep(self._live, _newest(self._models, model).live())
+        return self._keep(self._live, self._newest(model).live())
 
-    def step(self, clip: int, energies: NDArray[np.float32], present: bool) -> NDArray[np.float32]:
-        """Answer to the next frame (features,) of a denoiser's clip."""
-        return _newest(self._live, clip).step(energies, present)
-
-    def advance(self, clip: int, *frames: NDArray[Any]) -> NDArray[np.float32]:
-        """Answers to the next frames (frames, features) of a clip, with a mask for a denoiser."""
-        return _newest(self._live, clip).advance(*frames)
-
-    def finish(self, clip: int) -> NDArray[np.float32]:
-        """Outstanding answers of a clip."""
-        return _newest(self._live, clip).finish()
+    def call(self, number: int, method: str, *arguments: Any) -> Any:
+        """What a method of a model, or of a clip, returns."""
+        return getattr(self._newest(number), method)(*arguments)
 
     def _keep(self, kept: dict[int, Any], one: Any) -> int:
         self._next += 1
@@ -81,13 +61,13 @@ class Worker:
             kept.pop(next(iter(kept)))
         return self._next
 
-
-def _newest(kept: dict[int, Any], number: int) -> Any:
-    """Return what has a number, and put it last: what is forgotten goes first."""
-    if number not in kept:
-        raise Sd2Error("The model is no longer loaded", remedy="Choose it again")
-    kept[number] = kept.pop(number)
-    return kept[number]
+    def _newest(self, number: int) -> Any:
+        """Return what has a number, and put it last: what is forgotten goes first."""
+        kept = self._models if number in self._models else self._live
+        if number not in kept:
+            raise Sd2Error("The model is no longer loaded", remedy="Choose it again")
+        kept[number] = kept.pop(number)
+        return kept[number]
 
 
 def serve(source: BinaryIO, sink: BinaryIO) -> None:
