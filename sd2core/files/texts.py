@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import codecs
 import json
+import os
 import re
 import tomllib
-from collections.abc import Iterator
+from collections import deque
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -101,6 +103,22 @@ def whole_lines(stream: BinaryIO) -> Iterator[bytes]:
             stream.seek(-len(line), 1)
             return
         yield line
+
+
+def append_lines(path: Path, lines: Iterable[str]) -> None:
+    """Append lines, which have ends, to a file on disk."""
+    with path.open("a", encoding="utf-8") as stream:
+        stream.writelines(lines)
+        stream.flush()
+        os.fsync(stream.fileno())
+
+
+def drop_torn_line(path: Path) -> None:
+    """Cut off an incomplete last line, where there is a file."""
+    if path.exists():
+        with path.open("r+b") as stream:
+            deque(whole_lines(stream), maxlen=0)
+            stream.truncate()
 
 
 def read_json(path: Path, expected: str = EXPECTED_JSON, remedy: str = "") -> Any:
