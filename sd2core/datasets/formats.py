@@ -18,7 +18,6 @@ from sd2core.datasets.layout import (
     Header,
     bytes_per_segment,
     check_arrays,
-    check_format,
     chunk_of,
     row_shapes,
 )
@@ -198,7 +197,6 @@ def _json(text: str, path: Path) -> Any:
 
 
 def _whole(header: Header, there: Iterable[str], path: Path) -> list[str]:
-    check_format(header.as_dict(), path)
     names = list(row_shapes(header))
     missing = sorted({*names} - {*there})
     if missing:

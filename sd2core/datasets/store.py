@@ -113,8 +113,8 @@ class SegmentStore:
         """True if nothing was appended since the header was last written."""
         return bool(self._group.attrs["complete"])
 
-    def append(self, blocks: Iterable[Arrays], entry: dict[str, Any]) -> int:
-        """Add the segments of one source and return their number.
+    def append(self, blocks: Iterable[Arrays], entry: dict[str, Any]) -> None:
+        """Add the segments of one source.
 
         Some are kept in memory and written together, which takes a fraction of the time.
         They count once their source's line is written, see :meth:`flush`.
@@ -136,14 +136,12 @@ class SegmentStore:
         except BaseException:
             self._pending = [one for one in self._pending if one[0] < self.rows]
             raise
-        added = stop - self.rows
         entry |= {"start": self.rows, "stop": stop}
         self._lines.append(_line(entry))
         self.rows = stop
         self.sources += 1
         if time.monotonic() - self._flushed_s >= FLUSH_EVERY_S:
             self.flush()
-        return added
 
     def flush(self) -> None:
         """Write appended sources to disk."""
