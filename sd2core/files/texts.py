@@ -167,6 +167,17 @@ def faults_in(place: str | Path, expected: str, remedy: str = "") -> Iterator[No
         raise Sd2Error(f"{place}: {first_fault(error)}", expected, remedy) from error
 
 
+@contextmanager
+def damage_in(place: str | Path, expected: str = "") -> Iterator[None]:
+    """Name the file in errors about its description, and refuse one of other keys or types."""
+    try:
+        yield
+    except Sd2Error as error:
+        raise error.within(place) from error
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
+        raise Sd2Error(f"{place}: its description is damaged ({error!r})", expected) from error
+
+
 def check_version(content: Any, file: Path, form: str, newest: int) -> None:
     """Refuse the content of a file of another format, or of a later version than the newest."""
     found = content.get("format") if isinstance(content, dict) else None
