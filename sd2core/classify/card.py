@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from sd2core.classify.defaults import LONGEST_DELAY_S
 from sd2core.classify.features import Features
 from sd2core.errors import Sd2Error
+from sd2core.files.texts import damage_in
 from sd2core.labels.label_set import check_name
 from sd2core.sensor import VelocityAxis
 
@@ -118,7 +119,7 @@ class ClassifierCard:
     def from_json(cls, content: dict[str, Any], path: Path | None = None) -> ClassifierCard:
         """Parse the header of a model file."""
         where = "The classifier" if path is None else str(path)
-        try:
+        with damage_in(where, "a classifier written by `sd2 classify train`"):
             if content["format"] != FORMAT or not isinstance(content["version"], int):
                 raise ValueError(f"format {content['format']!r}")
             if content["version"] > VERSION:
@@ -146,10 +147,3 @@ class ClassifierCard:
                 parameters=int(content["parameters"]),
                 path=path,
             )
-        except Sd2Error as error:
-            raise error.within(where) from error
-        except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
-            raise Sd2Error(
-                f"{where}: its description is damaged ({error!r})",
-                "a classifier written by `sd2 classify train`",
-            ) from error

@@ -7,6 +7,7 @@ import io
 import json
 import shutil
 from collections.abc import Iterable, Sequence
+from contextlib import nullcontext
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -131,8 +132,8 @@ def _write_all(
     sizes = [stop - first for first, stop in (source.frames_of(one.span) for one in wanted)]
     done, total = 0, sum(sizes)
     progress(0, total)
-    video = open_video(source.video) if source.video is not None and wanted else None
-    try:
+    shown = source.video if wanted else None
+    with nullcontext() if shown is None else open_video(shown) as video:
         for one, size in zip(wanted, sizes, strict=True):
             start = done
 
@@ -150,9 +151,6 @@ def _write_all(
                 raise
             done += size
             progress(done, total)
-    finally:
-        if video is not None:
-            video.close()
     return [one.path for one in wanted]
 
 

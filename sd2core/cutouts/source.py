@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -41,14 +41,11 @@ class CutSource:
     def only(self, parts: Iterable[Part]) -> CutSource:
         """Return the same source with some of its parts."""
         kept = {*parts}
-        return CutSource(
-            self.title,
-            self.simulated,
-            self.timebase,
-            self.video if "video" in kept else None,
-            self.mesh if "mesh" in kept else None,
-            self.maps if "maps" in kept else {},
-            self.sensor_position_m,
+        return replace(
+            self,
+            video=self.video if "video" in kept else None,
+            mesh=self.mesh if "mesh" in kept else None,
+            maps=self.maps if "maps" in kept else {},
         )
 
     def frames_of(self, span: Span) -> tuple[int, int]:

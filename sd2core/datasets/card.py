@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from sd2core.datasets.layout import SPLITS
+from sd2core.datasets.layout import SPLITS, Header
 from sd2core.datasets.reading import Dataset, open_dataset
 from sd2core.datasets.source import KINDS
 from sd2core.datasets.splitting import RULE, borrowed, named_splits, split_people
@@ -53,12 +53,6 @@ def describe_dataset(dataset: Dataset) -> dict[str, Any]:
         frames += np.bincount(part.ravel(), minlength=labels)
     of_subject = np.bincount(column["subject"], minlength=len(header.subjects))
     available = column["available"].sum(axis=0)
-    sources = _Sources()
-    for entry in dataset.sources():
-        sources.add(entry)
-    more: dict[str, Any] = {"imu_cutoff_hz": sources.imu_cutoff_hz} if header.imu else {}
-    if header.spans is not None:
-        more["spans_counted"] = dict(sources.spans)
     by_label = _named(header.labels, segments.sum(axis=1))
     return {
         "format": CARD_FORMAT,
@@ -67,9 +61,6 @@ def describe_dataset(dataset: Dataset) -> dict[str, Any]:
         **{name: value for name, value in header.as_dict().items() if name not in _NOT_ON_CARD},
         "segments": len(dataset),
         "segment_s": header.length / header.frame_rate_hz,
-        "sources": sources.count,
-        "recordings": sources.recordings,
-        "minutes": sources.minutes,
         "segments_of_split": _named(SPLITS, segments.sum(axis=0)),
         "segments_of_label": by_label,
         "frames_of_label": _named(header.labels, frames),
@@ -83,15 +74,9 @@ def describe_dataset(dataset: Dataset) -> dict[str, Any]:
             kind: int(available[KINDS.index(kind)]) for kind in header.kinds
         },
         "purity_mean": float(column["purity"].sum(dtype=np.float64)) / max(len(dataset), 1),
-        "placements": sources.placements,
         **{name: _extent(column[name]) for name in _EXTENTS},
-        "frames_without_person": sources.frames_without_person,
         "resampled_segments": int(column["resampled"].sum()),
-        "sources_without_segments": sources.empty,
-        "simulated_recordings": sources.simulated,
-        "accuracy": sources.accuracy,
-        "how": sources.how(),
-        **more,
+        **_count_sources(dataset.sources(), header),
     }  # fmt: skip
 
 
@@ -106,71 +91,58 @@ def _extent(values: np.ndarray) -> list[float] | None:
     return [round(float(one), 4) for one in (known.min(), known.max())] if len(known) else None
 
 
-class _Sources:
-    """Counts over sources."""
-
-    def __init__(self) -> None:
-        self.count = 0
-        self.empty = 0
-        self.simulated = 0
-        self.minutes = 0.0
-        self.frames_without_person = 0
-        self.spans: Counter[str] = Counter()
-        self._views: Counter[int] = Counter()
-        self._cutoffs_hz: list[float] = []
-        self._accuracies: list[MapAccuracy] = []
-        self._how: dict[str, Counter[str]] = {kind: Counter() for kind in KINDS}
-
-    def add(self, entry: dict[str, Any]) -> None:
-        self.count += 1
-        self.empty += entry["start"] == entry["stop"]
-        recording = hash((entry["subject"], entry["recording"]))
-        self._views[recording] += 1
+def _count_sources(sources: Iterable[dict[str, Any]], header: Header) -> dict[str, Any]:
+    """Return what a card says of sources, by its names there."""
+    totals: Counter[str] = Counter()
+    views: Counter[tuple[str, str]] = Counter()
+    how: dict[str, Counter[str]] = {kind: Counter() for kind in KINDS}
+    spans: Counter[str] = Counter()
+    minutes = 0.0
+    cutoffs_hz: list[float] = []
+    accuracies: list[MapAccuracy] = []
+    for entry in sources:
         provenance = entry["provenance"]
+        recording = entry["subject"], entry["recording"]
+        views[recording] += 1
+        totals["sources"] += 1
+        totals["empty"] += entry["start"] == entry["stop"]
         # Others show the same movement; its own sensor need not be among them.
-        if self._views[recording] == 1:
-            self.minutes += entry["frames"] / entry["frame_rate_hz"] / 60
-            self.frames_without_person += entry["frames"] - entry["frames_with_person"]
-            self.simulated += bool(provenance.get("simulated"))
-            self.spans.update(entry.get("spans", {}))
-        for made in provenance.get("imu", {}).values():
-            self._cutoffs_hz.append(made["cutoff_hz"])
+        if views[recording] == 1:
+            minutes += entry["frames"] / entry["frame_rate_hz"] / 60
+            totals["without person"] += entry["frames"] - entry["frames_with_person"]
+            totals["simulated"] += bool(provenance.get("simulated"))
+            spans.update(entry.get("spans", {}))
+        cutoffs_hz += [made["cutoff_hz"] for made in provenance.get("imu", {}).values()]
         for kind, made in provenance["maps"].items():
-            self._how[kind][made_text(kind, made, provenance)] += 1
+            how[kind][made_text(kind, made, provenance)] += 1
             if kind == "synthetic" and "body_error_l1" in made:
-                self._accuracies.append(MapAccuracy.of(provenance | made))
+                accuracies.append(MapAccuracy.of(provenance | made))
+    accuracies.sort(key=lambda one: one.total or 0.0)
+    found = {
+        "sources": totals["sources"],
+        "recordings": len(views),
+        "minutes": minutes,
+        "placements": max(views.values(), default=0),  # from which a recording is seen, at most
+        "frames_without_person": totals["without person"],
+        "sources_without_segments": totals["empty"],
+        "simulated_recordings": totals["simulated"],
+        # Of the median source with fitted bodies.
+        "accuracy": str(accuracies[len(accuracies) // 2]) if accuracies else "",
+        "how": {kind: _most_common(ways) for kind, ways in how.items() if ways},
+    }
+    if header.imu:
+        found["imu_cutoff_hz"] = [min(cutoffs_hz), max(cutoffs_hz)]
+    if header.spans is not None:
+        found["spans_counted"] = dict(spans)
+    return found
 
-    @property
-    def recordings(self) -> int:
-        """Number of recordings."""
-        return len(self._views)
 
-    @property
-    def placements(self) -> int:
-        """Largest number of places from which a recording is seen."""
-        return max(self._views.values(), default=0)
-
-    @property
-    def imu_cutoff_hz(self) -> list[float]:
-        """Lowest and highest cut-off of inertial sensors."""
-        return [min(self._cutoffs_hz), max(self._cutoffs_hz)]
-
-    @property
-    def accuracy(self) -> str:
-        """Accuracy of the median source with fitted bodies; empty without any."""
-        known = sorted(self._accuracies, key=lambda one: one.total or 0.0)
-        return str(known[len(known) // 2]) if known else ""
-
-    def how(self) -> dict[str, dict[str, int]]:
-        """Count the sources of each kind by how their maps were made."""
-        found = {}
-        for kind, found_counts in self._how.items():
-            if found_counts:
-                found[kind] = dict(found_counts.most_common(_MANY))
-                rest = found_counts.total() - sum(found[kind].values())
-                if rest:
-                    found[kind][f"{len(found_counts) - _MANY} other descriptions"] = rest
-        return found
+def _most_common(ways: Counter[str]) -> dict[str, int]:
+    """Count the sources of each way in which their maps were made."""
+    found = dict(ways.most_common(_MANY))
+    if len(ways) > _MANY:
+        found[f"{len(ways) - _MANY} other descriptions"] = ways.total() - sum(found.values())
+    return found
 
 
 def made_text(kind: str, made: dict[str, Any], provenance: dict[str, Any]) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +18,11 @@ from sd2core.datasets.layout import (
     Header,
     bytes_per_segment,
     check_arrays,
-    check_format,
     chunk_of,
     row_shapes,
 )
 from sd2core.errors import Sd2Error
-from sd2core.files.atomic import atomic_write, full_disk_named
+from sd2core.files.atomic import atomic_file, atomic_write
 from sd2core.files.hdf5_files import member_of, open_hdf5_file, refusing_damage
 from sd2core.files.limits import check_size
 from sd2core.files.numpy_files import open_npz_file
@@ -168,7 +167,8 @@ def _write_hdf5(
 
     rows = arrays["start_s"].shape[0]
     names = row_shapes(header)
-    with _file_in_place_of(out) as made, h5py.File(made, "w") as file:
+    # HDF5 writes to a file of its own, not to a stream.
+    with atomic_file(out) as made, h5py.File(made, "w") as file:
         file.attrs["format"], file.attrs["version"] = FORMAT, VERSION
         file[META] = json.dumps(header.as_dict(), ensure_ascii=False)
         for number, (name, (kind, row)) in enumerate(names.items()):
@@ -189,22 +189,6 @@ def _write_hdf5(
             lines[number] = json.dumps(entry, ensure_ascii=False)
 
 
-@contextmanager
-def _file_in_place_of(path: Path) -> Iterator[Path]:
-    """Path that replaces ``path`` in the end: HDF5 writes to a file of its own, not a stream."""
-    import os
-
-    made = path.with_name(f".sd2-{os.getpid()}-{path.name}")
-    try:
-        with full_disk_named(path):
-            yield made
-            with made.open("r+b") as stream:
-                os.fsync(stream.fileno())
-        made.replace(path)
-    finally:
-        made.unlink(missing_ok=True)
-
-
 def _json(text: str, path: Path) -> Any:
     try:
         return json.loads(text)
@@ -213,7 +197,6 @@ def _json(text: str, path: Path) -> Any:
 
 
 def _whole(header: Header, there: Iterable[str], path: Path) -> list[str]:
-    check_format(header.as_dict(), path)
     names = list(row_shapes(header))
     missing = sorted({*names} - {*there})
     if missing:

@@ -134,6 +134,7 @@ def entry_of(source: Source, header: Header, fingerprint: str) -> dict[str, Any]
     """Return the line of a source in the index, without its rows."""
     range_m, azimuth_deg, elevation_deg = source.spherical
     kinds = [kind for kind in header.kinds_wanted if kind in source.maps]
+    spans, grid = header.spans, (header.frame_rate_hz, header.length)
     return {
         "subject": source.subject,
         "recording": source.recording,
@@ -150,13 +151,8 @@ def entry_of(source: Source, header: Header, fingerprint: str) -> dict[str, Any]
         if source.target_m is None
         else {"range_m": range_m, "azimuth_deg": azimuth_deg, "elevation_deg": elevation_deg},
         "provenance": source.made_of(),
-        **({} if header.spans is None else {"spans": _spans(source, header)}),
+        **({} if spans is None else {"spans": count_spans(source.outline(), *grid, spans)}),
     }
-
-
-def _spans(source: Source, header: Header) -> dict[str, int]:
-    assert header.spans is not None
-    return count_spans(source.outline(), header.frame_rate_hz, header.length, header.spans)
 
 
 def refuse_other_settings(out: Path, there: Header, options: DatasetOptions) -> None:

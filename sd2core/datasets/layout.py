@@ -13,6 +13,7 @@ from pydantic import TypeAdapter
 from sd2core.datasets.options import LabelRule, SpanOptions
 from sd2core.datasets.source import KINDS
 from sd2core.errors import Sd2Error
+from sd2core.files.texts import damage_in
 from sd2core.io.kinds import DATASET_FORMAT
 from sd2core.maps import MapKind
 from sd2core.mesh.vertex_parts import QUANTITIES
@@ -106,18 +107,12 @@ class Header:
     def from_dict(cls, entry: dict[str, Any], path: Path) -> Header:
         """Parse :meth:`as_dict`; ``path`` is for messages."""
         check_format(entry, path)
-        try:
+        with damage_in(path, f"{FORMAT} {VERSION}"):
             axis = VelocityAxis(int(entry["bins"]), float(entry["v_max_mps"]))
             names = (one.name for one in fields(cls) if one.name != "axis")
             # Before there were limb maps, headers did not have parts.
             content = {name: ({"parts": (), "joints": ()} | _ADDED | entry)[name] for name in names}
             return _HEADER.validate_python({**content, "axis": axis})
-        except Sd2Error as error:
-            raise Sd2Error(f"{path}: {error.found}", error.expected) from error
-        except (KeyError, TypeError, ValueError, OverflowError) as error:
-            raise Sd2Error(
-                f"{path}: its description is damaged ({error!r})", f"{FORMAT} {VERSION}"
-            ) from error
 
 
 _ADDED: dict[str, Any] = {"imu": (), "spans": None, "min_purity": 0.0}

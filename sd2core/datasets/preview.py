@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -92,37 +93,60 @@ def draw_preview(title: str, header: Header, examples: list[Example], segments: 
 
     kinds = [kind for kind in KINDS if any(kind in one.levels for one in examples)]
     bands = _bands(examples)
-    columns = max(map(len, bands))
     wide, high = _CELL_IN
     band_in = len(kinds) * high + 0.95
-    width = max(_LEFT_IN + columns * wide + 0.8, _LEAST_IN)
+    width = max(_LEFT_IN + max(map(len, bands)) * wide + 0.8, _LEAST_IN)
     height = len(bands) * band_in + 0.95
     figure = Figure(figsize=(width, height), dpi=_PIXELS_PER_INCH)
     figure.set_facecolor("white")
+    write = partial(figure.text, transform=figure.dpi_scale_trans, va="top", parse_math=False)
+
+    def axes_at(left: float, bottom: float, wide: float, high: float) -> Axes:
+        return figure.add_axes((left / width, bottom / height, wide / width, high / height))
+
     shown: Any = None
     for number, band in enumerate(bands):
         top = height - 0.85 - number * band_in
         for column, example in enumerate(band):
             left = _LEFT_IN + column * wide
-            first_of_label = column == 0 or band[column - 1].label != example.label
-            if first_of_label:
-                _heading(figure, header, example.label, left / width, top / height)
-            _words(figure, example, (left + 0.45 * wide) / width, (top - 0.33) / height)
+            if column == 0 or band[column - 1].label != example.label:
+                name = header.labels[example.label]
+                of_class = header.classes.get(name, name)
+                write(left, top, name, fontsize=9.5, weight="bold", color=_INK)
+                write(left, top - 0.145, of_class if of_class != name else "", fontsize=7,
+                      color=_MUTED)  # fmt: skip
+            write(left + 0.45 * wide, top - 0.33, "\n".join(example.words), fontsize=6.3,
+                  color=_MUTED, ha="center", linespacing=1.15)  # fmt: skip
             for row, kind in enumerate(kinds):
                 bottom = top - 0.62 - (row + 1) * high + 0.08
-                axes = figure.add_axes(
-                    (left / width, bottom / height, 0.92 * wide / width, 0.90 * high / height)
-                )
+                axes = axes_at(left, bottom, 0.92 * wide, 0.90 * high)
                 shown = _cell(axes, header, example, kind) or shown
                 if row == 0:
                     _mark(axes, header, example)
                 axes.tick_params(labelbottom=row == len(kinds) - 1, labelleft=column == 0)
                 if column == 0:
-                    figure.text(0.32 / width, (bottom + 0.45 * high) / height, _TITLES[kind],
-                                fontsize=7.5, color=_INK, rotation=90, ha="center",
-                                va="center", weight="bold")  # fmt: skip
-    _frame(figure, title, header, segments, shown, (width, height))
+                    write(0.32, bottom + 0.45 * high, _TITLES[kind], fontsize=7.5, color=_INK,
+                          rotation=90, ha="center", va="center", weight="bold")  # fmt: skip
+    along = "across: time in the segment (s); upwards: velocity (m/s, approaching +)"
+    write(0.3, height - 0.2, title, fontsize=12, weight="bold", color=_INK)
+    write(0.3, height - 0.46, _caption(header, segments), fontsize=7.5, color=_MUTED)
+    write(_LEFT_IN, 0.1, along, fontsize=7, color=_MUTED, va="bottom")
+    if shown is not None:
+        scale = figure.colorbar(shown, cax=axes_at(width - 0.6, 0.55, 0.12, height - 1.9))
+        scale.set_label("dB", fontsize=7, color=_MUTED)
+        scale.ax.tick_params(labelsize=6.5, colors=_MUTED)
+        scale.outline.set_linewidth(0.4)
     return figure
+
+
+def _caption(header: Header, segments: int) -> str:
+    # Where both are there, each row says which of them it is.
+    radar = " The radar is simulated." if header.simulated and "real" not in header.kinds else ""
+    return (
+        f"{segments:,} segments of {header.length} frames"
+        f" ({header.length / header.frame_rate_hz:.1f} s). Coloured bars: frames with the label."
+        f" Colours: dB relative to each segment's own strongest cell.{radar}"
+    )
 
 
 def _bands(examples: list[Example]) -> list[list[Example]]:
@@ -174,7 +198,7 @@ def _example(dataset: Dataset, columns: dict[str, NDArray], label: int, row: int
         where = f"at {x:g}, {y:g}, {z:g} m"
     who = header.subjects[int(columns["subject"][row])]
     marked = np.asarray(dataset["label"][row]) == label
-    return Example(label, levels, marked, (who, where))
+    return Example(label, levels, marked, (who if len(who) <= 16 else who[:15] + "…", where))
 
 
 def _cell(axes: Axes, header: Header, example: Example, kind: MapKind) -> Any:
@@ -217,50 +241,6 @@ def _mark(axes: Axes, header: Header, example: Example) -> None:
         edges_s, limit * 1.05, limit * 1.16, where=np.append(example.marked, False), step="post",
         color=_colour(header.labels[example.label]), linewidth=0, clip_on=False,
     )  # fmt: skip
-
-
-def _heading(figure: Figure, header: Header, label: int, x: float, y: float) -> None:
-    name = header.labels[label]
-    of_class = header.classes.get(name)
-    figure.text(x, y, name, fontsize=9.5, weight="bold", color=_INK, va="top", parse_math=False)
-    if of_class and of_class != name:
-        figure.text(x, y - 0.145 / figure.get_figheight(), of_class, fontsize=7, color=_MUTED,
-                    va="top", parse_math=False)  # fmt: skip
-
-
-def _words(figure: Figure, example: Example, x: float, y: float) -> None:
-    who, where = example.words
-    short = who if len(who) <= 16 else who[:15] + "…"
-    figure.text(x, y, f"{short}\n{where}", fontsize=6.3, color=_MUTED, ha="center", va="top",
-                parse_math=False, linespacing=1.15)  # fmt: skip
-
-
-def _frame(
-    figure: Figure, title: str, header: Header, segments: int, shown: Any, size: tuple[float, float]
-) -> None:
-    """Draw the title and the colour scale."""
-    width, height = size
-    # Where both are there, each row says which of them it is.
-    radar = " The radar is simulated." if header.simulated and "real" not in header.kinds else ""
-    figure.text(0.3 / width, 1 - 0.2 / height, title, fontsize=12, weight="bold", color=_INK,
-                va="top", parse_math=False)  # fmt: skip
-    said = (
-        f"{segments:,} segments of {header.length} frames"
-        f" ({header.length / header.frame_rate_hz:.1f} s). Coloured bars: frames with the label."
-        f" Colours: dB relative to each segment's own strongest cell.{radar}"
-    )
-    figure.text(0.3 / width, 1 - 0.46 / height, said, fontsize=7.5, color=_MUTED, va="top")
-    figure.text(_LEFT_IN / width, 0.1 / height,
-                "across: time in the segment (s); upwards: velocity (m/s, approaching +)",
-                fontsize=7, color=_MUTED, va="bottom")  # fmt: skip
-    if shown is not None:
-        bar = figure.add_axes(
-            ((width - 0.6) / width, 0.55 / height, 0.12 / width, (height - 1.9) / height)
-        )
-        scale = figure.colorbar(shown, cax=bar)
-        scale.set_label("dB", fontsize=7, color=_MUTED)
-        scale.ax.tick_params(labelsize=6.5, colors=_MUTED)
-        scale.outline.set_linewidth(0.4)
 
 
 def _colour(label: str) -> str:

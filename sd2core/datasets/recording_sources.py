@@ -191,13 +191,7 @@ class _Opened:
     def __init__(self, recording: Recording, making: Making) -> None:
         self.recording = recording
         self._making = making
-        self._mesh: MeshSequence | None = None
-        if recording.mesh is not None:
-            self._mesh = recording.load_mesh()
-        self._synthesizer: Synthesizer | None = None
-        self._plan: dict[str, Any] = {}
-        self._target_m: Vector | None = None
-        self._radar: DopplerMap | None = None
+        self._mesh = None if recording.mesh is None else recording.load_mesh()
         labels = recording.effective_labels()
         self._names, self._classes = labels_and_classes(labels)
         self._spans = labels.spans
@@ -228,26 +222,34 @@ class _Opened:
     def source(self, key: SourceKey, progress: Progress) -> Source:
         wanted = self._making.kinds
         maps: dict[MapKind, DopplerMap] = {}
+        plan: dict[str, Any] = {}
         sensor = self._sensor(key.placement)
         counted_share = _COUNTED_SHARE if self._simulates else 1.0
         if self._mesh is not None and {"synthetic", "denoised"} & {*wanted}:
             model = self._model if "denoised" in wanted else None
             limbs = self._making.limbs or (model is not None and bool(describe_model(model).parts))
             counting = part_of(progress, 0.0, counted_share)
-            synthetic = self._counted(sensor, counting, limbs=limbs)
+            synthesizer, plan = self._synthesizer
+            synthetic = synthetic_map(synthesizer, sensor, limbs=limbs, progress=counting)
             maps["synthetic"] = synthetic
             if model is not None:
                 maps["denoised"] = denoised(synthetic, model, self._making.texture)
         if key.placement == 0 and self.recording.radar is not None and {
             "simulated", "real"
         } & {*wanted}:  # fmt: skip
-            if self._radar is None:
-                self._radar = radar_map(self.recording, self._making.synthesis.axis)
-            radar = self._radar
+            radar = radar_map(self.recording, self._making.synthesis.axis)
             there = self._mesh.timebase if self._mesh is not None else radar.timebase
             maps[radar.kind] = on_clock(radar, there)
         if self._simulates:
-            maps["simulated"] = self._simulated(sensor, part_of(progress, counted_share, 1.0))
+            assert self._mesh is not None
+            assert self._making.simulation is not None
+            maps["simulated"] = simulated_map(
+                self._mesh,
+                sensor,
+                self._making.simulation,
+                self._making.synthesis.axis,
+                progress=part_of(progress, counted_share, 1.0),
+            )
         maps = {kind: one for kind, one in maps.items() if kind in wanted}
         if not maps:
             raise Sd2Error(
@@ -262,13 +264,13 @@ class _Opened:
             self._label(times_s),
             self._names,
             self._classes,
-            self._target(),
+            self._target_m,
             {
                 "recording": self.recording.title,
                 "simulated": self.recording.simulated,
                 "radar_offset_s": self.recording.radar_offset_s,
                 **({"radar_channel": channel} if channel else {}),
-                **self._plan,
+                **plan,
             },
             self._imu,
             labelled_spans(self._spans, self._names),
@@ -322,32 +324,28 @@ class _Opened:
         wanted = self._making.simulation is not None and "simulated" in self._making.kinds
         return wanted and self._mesh is not None
 
-    def _simulated(self, sensor: VirtualSensor, progress: Progress) -> DopplerMap:
-        assert self._mesh is not None
-        assert self._making.simulation is not None
-        axis = self._making.synthesis.axis
-        return simulated_map(self._mesh, sensor, self._making.simulation, axis, None, progress)
-
     def _sensor(self, placement: int) -> VirtualSensor:
         if placement == 0:
             return self.recording.sensor
-        target_m = self._target()
-        assert target_m is not None
-        return places_of(self.recording, self._making)[placement - 1].sensor(target_m)
+        assert self._target_m is not None
+        return places_of(self.recording, self._making)[placement - 1].sensor(self._target_m)
 
-    def _target(self) -> Vector | None:
-        if self._target_m is None and self._mesh is not None:
-            self._target_m = BodyExtent.of(self._mesh).target_m
-        return self._target_m
+    @cached_property
+    def _target_m(self) -> Vector | None:
+        return None if self._mesh is None else BodyExtent.of(self._mesh).target_m
 
-    def _counted(self, sensor: VirtualSensor, progress: Progress, *, limbs: bool) -> DopplerMap:
-        if self._synthesizer is None:
-            assert self._mesh is not None
-            places = range(1 + len(places_of(self.recording, self._making)))
-            self._synthesizer, self._plan = _synthesizer(
-                self._mesh, [self._sensor(place) for place in places], self._making
-            )
-        return synthetic_map(self._synthesizer, sensor, limbs=limbs, progress=progress)
+    @cached_property
+    def _synthesizer(self) -> tuple[Synthesizer, dict[str, Any]]:
+        """Synthesizer of the mesh, and the accuracy plan chosen, for provenance."""
+        assert self._mesh is not None
+        mesh, making = self._mesh, self._making
+        if making.tolerance is None:
+            return Synthesizer(mesh, making.synthesis), {}
+        places = range(1 + len(places_of(self.recording, making)))
+        sensors = [self._sensor(place) for place in places]
+        frames = mesh.frame_count * len(sensors)
+        found = choose_for_places(mesh, spread(sensors), frames, making.tolerance, making.synthesis)
+        return synthesizer_for(found.plan, mesh, making.synthesis), found.provenance()
 
     def _label(self, times_s: NDArray[np.float64]) -> NDArray[np.int16]:
         return label_per_frame(self._spans, self._names, times_s)
@@ -357,17 +355,6 @@ def places_of(recording: Recording, making: Making) -> tuple[Place, ...]:
     """Return the other places from which a recording is seen."""
     plan = recording.placements if making.placements == "planned" else making.placements
     return () if plan is None or recording.mesh is None else plan.places()
-
-
-def _synthesizer(
-    mesh: MeshSequence, sensors: Sequence[VirtualSensor], making: Making
-) -> tuple[Synthesizer, dict[str, Any]]:
-    """Return the synthesizer of a mesh, and the accuracy plan chosen, for provenance."""
-    if making.tolerance is None:
-        return Synthesizer(mesh, making.synthesis), {}
-    frames = mesh.frame_count * len(sensors)
-    found = choose_for_places(mesh, spread(sensors), frames, making.tolerance, making.synthesis)
-    return synthesizer_for(found.plan, mesh, making.synthesis), found.provenance()
 
 
 def _fingerprint(recording: Recording, key: SourceKey, making: Making) -> str:

@@ -8,7 +8,6 @@ what the killed one left.
 from __future__ import annotations
 
 import json
-import os
 import shutil
 import time
 from collections.abc import Iterable, Iterator
@@ -39,6 +38,7 @@ from sd2core.files.stores import (
     open_group,
     read_attributes,
 )
+from sd2core.files.texts import append_lines, drop_torn_line, whole_lines
 from sd2core.io.kinds import is_dataset
 
 SOURCES_NAME = "sources.jsonl"
@@ -73,7 +73,7 @@ class SegmentStore:
             for name in dict.fromkeys(names)
             if (path / name / _DESCRIPTION).exists()
         }
-        _drop_torn_line(path / SOURCES_NAME)
+        drop_torn_line(path / SOURCES_NAME)
         self._pending: list[tuple[int, Arrays]] = []
         self._lines: list[str] = []
         self._flushed_s = time.monotonic()
@@ -113,8 +113,8 @@ class SegmentStore:
         """True if nothing was appended since the header was last written."""
         return bool(self._group.attrs["complete"])
 
-    def append(self, blocks: Iterable[Arrays], entry: dict[str, Any]) -> int:
-        """Add the segments of one source and return their number.
+    def append(self, blocks: Iterable[Arrays], entry: dict[str, Any]) -> None:
+        """Add the segments of one source.
 
         Some are kept in memory and written together, which takes a fraction of the time.
         They count once their source's line is written, see :meth:`flush`.
@@ -136,14 +136,12 @@ class SegmentStore:
         except BaseException:
             self._pending = [one for one in self._pending if one[0] < self.rows]
             raise
-        added = stop - self.rows
         entry |= {"start": self.rows, "stop": stop}
         self._lines.append(_line(entry))
         self.rows = stop
         self.sources += 1
         if time.monotonic() - self._flushed_s >= FLUSH_EVERY_S:
             self.flush()
-        return added
 
     def flush(self) -> None:
         """Write appended sources to disk."""
@@ -151,10 +149,7 @@ class SegmentStore:
         self._flushed_s = time.monotonic()
         if not self._lines:
             return
-        with (self.path / SOURCES_NAME).open("a", encoding="utf-8") as index:
-            index.writelines(self._lines)
-            index.flush()
-            os.fsync(index.fileno())
+        append_lines(self.path / SOURCES_NAME, self._lines)
         self._lines = []
 
     def entries(self) -> Iterator[dict[str, Any]]:
@@ -230,10 +225,9 @@ def read_sources(path: Path) -> Iterator[dict[str, Any]]:
     """Yield the lines of sources; an incomplete last line is left out."""
     if not path.exists():
         return
-    with path.open(encoding="utf-8", errors="replace") as lines:
-        for number, line in enumerate(lines, start=1):
-            if not line.endswith("\n"):
-                return
+    with path.open("rb") as stream:
+        for number, content in enumerate(whole_lines(stream), start=1):
+            line = content.decode(errors="replace")
             try:
                 entry = json.loads(line)
                 entry["subject"], entry["recording"], entry["placement"], entry["stop"]
@@ -281,16 +275,3 @@ def _create(group: Any, name: str, kind: str, row: tuple[int, ...], rows: int) -
     return create_array(
         group, name, shape=(rows, *row), dtype=kind, chunks=chunk_of(row), fill_value=fill
     )
-
-
-def _drop_torn_line(path: Path) -> None:
-    if not path.exists():
-        return
-    with path.open("r+b") as file:
-        size = file.seek(0, os.SEEK_END)
-        back = min(size, 1 << 20)
-        file.seek(size - back)
-        tail = file.read()
-        if not tail or tail.endswith(b"\n"):
-            return
-        file.truncate(size - back + tail.rfind(b"\n") + 1)

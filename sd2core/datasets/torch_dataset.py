@@ -12,8 +12,8 @@
 from __future__ import annotations
 
 import os
-from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -94,8 +94,7 @@ class SegmentDataset(TorchDataset[Item]):
         self.path = Path(path)
         self.inputs, self.target = inputs, target
         self.gain_db, self.seed, self._epoch = gain_db, seed, 0
-        self._open: tuple[int, Dataset] | None = None
-        self._kept: OrderedDict[tuple[str, int], NDArray] = OrderedDict()
+        self._reader: tuple[int, Callable[[str, int], NDArray]] | None = None  # of a process
         with open_dataset(self.path) as dataset:
             self.header = dataset.header
             there: tuple[str, ...] = self.header.kinds
@@ -139,7 +138,7 @@ class SegmentDataset(TorchDataset[Item]):
         return items
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_open": None, "_kept": OrderedDict()}
+        return self.__dict__ | {"_reader": None}
 
     def set_epoch(self, epoch: int) -> None:
         """Draw other gains; call it before the workers of that epoch start."""
@@ -183,19 +182,18 @@ class SegmentDataset(TorchDataset[Item]):
                 found[place] = values[rows[place] - chunk * CHUNK_SEGMENTS]
         return np.stack(found)
 
-    def _chunk(self, name: str, chunk: int) -> NDArray:
+    def _chunk(self, name: str, number: int) -> NDArray:
         # Opened once per process: a file is not shared with a fork.
-        if self._open is None or self._open[0] != os.getpid():
-            self._open = (os.getpid(), open_dataset(self.path))
-        dataset = self._open[1]
-        key = (name, chunk)
-        if key not in self._kept:
-            start = chunk * CHUNK_SEGMENTS
-            self._kept[key] = np.asarray(dataset[name][start : start + CHUNK_SEGMENTS])
-            while len(self._kept) > _CHUNKS_KEPT:
-                self._kept.popitem(last=False)
-        self._kept.move_to_end(key)
-        return self._kept[key]
+        if self._reader is None or self._reader[0] != os.getpid():
+            dataset = open_dataset(self.path)
+
+            @lru_cache(maxsize=_CHUNKS_KEPT)
+            def read(name: str, number: int) -> NDArray:
+                start = number * CHUNK_SEGMENTS
+                return np.asarray(dataset[name][start : start + CHUNK_SEGMENTS])
+
+            self._reader = os.getpid(), read
+        return self._reader[1](name, number)
 
 
 def _kind_of(array: str) -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import shutil
 from collections.abc import Iterable, Sized
 from dataclasses import dataclass, replace
@@ -17,7 +16,7 @@ from sd2core.datasets.formats import refuse_large_npz, write_packed
 from sd2core.datasets.index import Names, check_fits, entry_of, header_of, refuse_other_settings
 from sd2core.datasets.layout import SPLITS, FileFormat, Header, format_of
 from sd2core.datasets.options import DatasetOptions
-from sd2core.datasets.reading import open_dataset
+from sd2core.datasets.reading import Dataset, open_dataset
 from sd2core.datasets.source import KINDS, LazySource, Source, SourceKey
 from sd2core.datasets.splitting import named_splits, split_people
 from sd2core.datasets.store import LOCK_NAME, SOURCES_NAME, SegmentStore, is_begun, open_arrays
@@ -110,7 +109,7 @@ class _Writer:
     def __init__(self, out: Path, work: Path, form: FileFormat, options: DatasetOptions) -> None:
         self._out, self._work, self._form, self._options = out, work, form, options
         self._names = Names()
-        self._there: dict[bytes, str] = {}
+        self._there: dict[SourceKey, str] = {}  # fingerprints
         self._store: SegmentStore | None = None
         begun = SegmentStore(work) if is_dataset(work) else None
         if begun is not None and begun.complete and not begun.sources:
@@ -152,23 +151,22 @@ class _Writer:
     ) -> tuple[int, list[Failed], Sd2Error | None]:
         """Append all sources: number added, failures, and first error."""
         total = len(sources) if isinstance(sources, Sized) else 0
-        seen: set[bytes] = set()
+        seen: set[SourceKey] = set()
         failed: list[Failed] = []
         first_error: Sd2Error | None = None
         added = 0
         for number, one in enumerate(sources):
-            digest = _digest(one.key)
-            if digest in seen:
+            if one.key in seen:
                 raise Sd2Error(
                     f"Two sources are {one.key.title}", "subject, recording and placement once"
                 )
-            seen.add(digest)
+            seen.add(one.key)
             report = part_of(progress, number, number + 1, total)
             report(0, 1)
-            if self._is_there(one, digest):
+            if self._is_there(one):
                 continue
             try:
-                self._append(one, digest, report)
+                self._append(one, report)
                 added += 1
             except Sd2Error as error:
                 failed.append(Failed(one.key, str(error)))
@@ -183,8 +181,8 @@ class _Writer:
             header = replace(self._store.header, kinds=kinds)
             refuse_large_npz(self._out, self._store.rows, header)
 
-    def _is_there(self, one: Source | LazySource, digest: bytes) -> bool:
-        known = self._there.get(digest)
+    def _is_there(self, one: Source | LazySource) -> bool:
+        known = self._there.get(one.key)
         if known is None:
             return False
         now = one.fingerprint()
@@ -196,7 +194,7 @@ class _Writer:
             )
         return True
 
-    def _append(self, one: Source | LazySource, digest: bytes, progress: Progress) -> None:
+    def _append(self, one: Source | LazySource, progress: Progress) -> None:
         if isinstance(one, Source):
             source = one
         else:
@@ -237,19 +235,20 @@ class _Writer:
                 yield block
 
         store.append(counted(), entry)
-        self._know(entry, digest)
+        self._know(entry)
         progress(1, 1)
 
     def _open_store(self, source: Source) -> SegmentStore:
         if self._store is None:
             if self._out.exists() and self._form != "zarr":
                 with open_dataset(self._out) as there:
-                    self._store = SegmentStore.unpack(
-                        self._work, there.header, there.arrays, there.sources()
-                    )
+                    self._store = self._unpacked(there)
             else:
                 self._store = SegmentStore.begin(self._work, header_of(source, self._options))
         return self._store
+
+    def _unpacked(self, there: Dataset) -> SegmentStore:
+        return SegmentStore.unpack(self._work, there.header, there.arrays, there.sources())
 
     def _finish(self, progress: Progress) -> tuple[int, int]:
         store = self._store
@@ -258,7 +257,7 @@ class _Writer:
             with open_dataset(self._out) as there:
                 if self._final(there.header) == there.header:
                     return len(there), len(self._there)
-                store = SegmentStore.unpack(self._work, there.header, there.arrays, there.sources())
+                store = self._unpacked(there)
         if store.rows == 0:
             raise Sd2Error(
                 f"No source has {self._options.length} frames on end with a person",
@@ -291,9 +290,9 @@ class _Writer:
             units={kind: tuple(names.units[kind]) for kind in KINDS if kind in names.units},
         )
 
-    def _know(self, entry: dict[str, Any], digest: bytes | None = None) -> None:
+    def _know(self, entry: dict[str, Any]) -> None:
         key = SourceKey(entry["subject"], entry["recording"], entry["placement"])
-        self._there[digest or _digest(key)] = entry["fingerprint"]
+        self._there[key] = entry["fingerprint"]
         self._names.learn(entry)
 
 
@@ -304,7 +303,3 @@ def _refuse_other(out: Path, form: FileFormat) -> None:
             raise Sd2Error(f"{out} is there and holds no data set", "a new name")
     elif out.exists():
         open_dataset(out).close()
-
-
-def _digest(key: SourceKey) -> bytes:
-    return hashlib.blake2b("\0".join(map(str, key)).encode(), digest_size=16).digest()

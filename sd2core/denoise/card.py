@@ -13,6 +13,7 @@ from sd2core.denoise.registry import options_of_version_1
 from sd2core.denoise.scaling import Scaling, null_columns
 from sd2core.denoise.texture import Texture
 from sd2core.errors import Sd2Error
+from sd2core.files.texts import damage_in
 from sd2core.mesh.vertex_parts import JOINTS, KINEMATICS, PARTS, QUANTITIES
 from sd2core.sensor import VelocityAxis
 
@@ -151,7 +152,7 @@ class ModelCard:
         Raises Sd2Error for other content, or a newer version.
         """
         where = "The model" if path is None else str(path)
-        try:
+        with damage_in(where, "a model file written by `sd2 train`"):
             if content["format"] != FORMAT or not isinstance(content["version"], int):
                 raise ValueError(f"format {content['format']!r}")
             if content["version"] > VERSION:
@@ -182,10 +183,3 @@ class ModelCard:
                 parameters=int(content["parameters"]),
                 path=path,
             )
-        except Sd2Error as error:
-            raise error.within(where) from error
-        except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
-            raise Sd2Error(
-                f"{where}: its description is damaged ({error!r})",
-                "a model file written by `sd2 train`",
-            ) from error

@@ -23,21 +23,30 @@ _SHORT_WRITE = re.compile(r"\d+ requested and \d+ written")
 
 @contextmanager
 def atomic_write(path: Path, mode: int = 0o666) -> Iterator[IO[bytes]]:
-    """Open a binary file that replaces ``path`` when the block succeeds.
+    """Open a binary file that replaces ``path`` when the block succeeds; see :func:`atomic_file`.
 
-    The bytes go to a temporary file in the same folder, which is flushed to disk and
-    renamed; when the block raises, ``path`` is untouched. Where ``path`` is a link, the
-    file that it leads to is replaced. ``mode`` are the file's permissions, of which the process's
-    mask takes some away. Raises OSError, whose ``filename`` is ``path``, if it cannot be written.
+    ``mode`` are the file's permissions, of which the process's mask takes some away.
+    """
+    with atomic_file(path, mode) as temporary, temporary.open("wb") as stream:
+        yield stream
+
+
+@contextmanager
+def atomic_file(path: Path, mode: int = 0o666) -> Iterator[Path]:
+    """Make an empty file that replaces ``path`` when the block, which writes to it, succeeds.
+
+    It is in the same folder, and is flushed to disk and renamed; when the block raises, ``path`` is
+    untouched. Where ``path`` is a link, the file that it leads to is replaced. Raises OSError,
+    whose ``filename`` is ``path``, if it cannot be written.
     """
     path = Path(path)
     target = _target(path)
     with full_disk_named(path):
         handle, temporary = _temporary(path, target, mode)
+        os.close(handle)
         try:
-            with os.fdopen(handle, "wb") as stream:
-                yield stream
-                stream.flush()
+            yield temporary
+            with temporary.open("r+b") as stream:
                 os.fsync(stream.fileno())
             temporary.replace(target)
         except BaseException:

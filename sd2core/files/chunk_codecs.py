@@ -95,46 +95,38 @@ def check_deflated(chunk: Any, most_bytes: int) -> None:
         left = decoder.unused_data
 
 
-class _CheckedBlosc(Blosc):
-    """Blosc of arrays of Zarr's version 2."""
+class _CheckedV2:
+    """What a codec of Zarr's version 2 has in common that looks at a chunk first."""
 
+    _check: Any  # Of a chunk and the size that it may have.
+
+    def decode(self, buf: Any, out: Any = None) -> Any:
+        self._check(buf, most_bytes=read_limit_bytes(len(buf)))
+        return super().decode(buf, out)  # type: ignore[misc]
+
+
+class _CheckedBlosc(_CheckedV2, Blosc):
     codec_id = "blosc"
-
-    def decode(self, buf: Any, out: Any = None) -> Any:
-        check_blosc_frame(buf)
-        return super().decode(buf, out)
+    _check = staticmethod(check_blosc_frame)
 
 
-class _CheckedZstd(Zstd):
-    """The same of zstd."""
-
+class _CheckedZstd(_CheckedV2, Zstd):
     codec_id = "zstd"
-
-    def decode(self, buf: Any, out: Any = None) -> Any:
-        check_zstd_frame(buf, read_limit_bytes(len(buf)))
-        return super().decode(buf, out)
+    _check = staticmethod(check_zstd_frame)
 
 
-class _CheckedGZip(GZip):
-    """The same of gzip."""
-
-    def decode(self, buf: Any, out: Any = None) -> Any:
-        check_deflated(buf, read_limit_bytes(len(buf)))
-        return super().decode(buf, out)
+class _CheckedGZip(_CheckedV2, GZip):
+    _check = staticmethod(check_deflated)
 
 
-class _CheckedZlib(Zlib):
-    """The same of zlib."""
-
-    def decode(self, buf: Any, out: Any = None) -> Any:
-        check_deflated(buf, read_limit_bytes(len(buf)))
-        return super().decode(buf, out)
+class _CheckedZlib(_CheckedV2, Zlib):
+    _check = staticmethod(check_deflated)
 
 
 class _Checked:
-    """What a codec of Zarr's version 3 has in common that looks at a chunk first."""
+    """The same of version 3."""
 
-    _check: Any  # Of a chunk and the size that it may have.
+    _check: Any
 
     def _decode_sync(self, chunk_bytes: Any, chunk_spec: Any) -> Any:
         self._look_at(chunk_bytes, chunk_spec)

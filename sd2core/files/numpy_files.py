@@ -25,7 +25,7 @@ class NpzArrays(Mapping[str, NDArray[Any]]):
             for entry in archive.infolist()
             if entry.filename.endswith(".npy")
         }
-        self._archive = archive
+        self.archive = archive
 
     def __len__(self) -> int:
         return len(self._entries)
@@ -35,12 +35,12 @@ class NpzArrays(Mapping[str, NDArray[Any]]):
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         entry = self._entries[name]
-        with self._archive.open(entry) as stream:
+        with self.archive.open(entry) as stream:
             shape, _, dtype = read_array_header(stream)
             there = entry.file_size - stream.tell()
         if math.prod(shape) * dtype.itemsize > there:
             raise ValueError(f"{name} declares {dtype} of shape {shape}, in {there:,} bytes")
-        with self._archive.open(entry) as stream:
+        with self.archive.open(entry) as stream:
             return np.asarray(np.lib.format.read_array(stream, allow_pickle=False))
 
 
@@ -49,18 +49,20 @@ def open_npz_file(path: Path, what: str, expected: str, remedy: str = "") -> Ite
     """Open an ``.npz``, whose arrays are read where asked for.
 
     Raises Sd2Error, that it cannot be read as ``what``, if it is damaged or declares more than its
-    size allows, also for what goes wrong while it is open.
+    size allows, also for what goes wrong while it is open, but with another file.
     """
     try:
         with open_zip(path) as archive:
             yield NpzArrays(archive)
     except Sd2Error:
         raise
-    except PermissionError as error:
-        raise Sd2Error(
-            f"{path} may not be read ({error.strerror})", "permission to read"
-        ) from error
     except Exception as error:  # a damaged archive fails in many ways
+        of_another_file = isinstance(error, OSError) and error.filename not in (None, str(path))
+        if of_another_file:  # that is written meanwhile
+            raise
+        if isinstance(error, PermissionError):
+            found = f"{path} may not be read ({error.strerror})"
+            raise Sd2Error(found, "permission to read") from error
         raise Sd2Error(f"{path} cannot be read as {what} ({error})", expected, remedy) from error
 
 

@@ -99,12 +99,8 @@ def paths_named(names: set[str], folder: Path, progress: Progress) -> dict[str, 
 
 def common_suffix_length(a: Path, b: Path) -> int:
     """Number of trailing parts that two paths share."""
-    count = 0
-    for part_a, part_b in zip(reversed(a.parts), reversed(b.parts), strict=False):
-        if part_a != part_b:
-            break
-        count += 1
-    return count
+    pairs = zip(reversed(a.parts), reversed(b.parts), strict=False)
+    return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], pairs))
 
 
 def free_path(folder: Path, name: str, prefix: str, *, reserved: str) -> Path:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import codecs
 import json
+import os
 import re
 import tomllib
-from collections.abc import Iterator
+from collections import deque
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -103,6 +105,22 @@ def whole_lines(stream: BinaryIO) -> Iterator[bytes]:
         yield line
 
 
+def append_lines(path: Path, lines: Iterable[str]) -> None:
+    """Append lines, which have ends, to a file on disk."""
+    with path.open("a", encoding="utf-8") as stream:
+        stream.writelines(lines)
+        stream.flush()
+        os.fsync(stream.fileno())
+
+
+def drop_torn_line(path: Path) -> None:
+    """Cut off an incomplete last line, where there is a file."""
+    if path.exists():
+        with path.open("r+b") as stream:
+            deque(whole_lines(stream), maxlen=0)
+            stream.truncate()
+
+
 def read_json(path: Path, expected: str = EXPECTED_JSON, remedy: str = "") -> Any:
     """Read a JSON file; raises Sd2Error as :func:`read_text` and :func:`parse_json`."""
     return parse_json(read_text(path, expected), path, expected, remedy)
@@ -147,6 +165,17 @@ def faults_in(place: str | Path, expected: str, remedy: str = "") -> Iterator[No
         yield
     except ValidationError as error:
         raise Sd2Error(f"{place}: {first_fault(error)}", expected, remedy) from error
+
+
+@contextmanager
+def damage_in(place: str | Path, expected: str = "") -> Iterator[None]:
+    """Name the file in errors about its description, and refuse one of other keys or types."""
+    try:
+        yield
+    except Sd2Error as error:
+        raise error.within(place) from error
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
+        raise Sd2Error(f"{place}: its description is damaged ({error!r})", expected) from error
 
 
 def check_version(content: Any, file: Path, form: str, newest: int) -> None:

@@ -34,13 +34,10 @@ VERTEX_NAMES = ("vertices", "verts")
 FACE_NAMES = ("faces", "triangles")
 TIME_NAMES = ("times_s", "times")
 RATE_NAMES = ("frames_per_s", "fps")
-COUNT_NAMES = ("vertex_counts",)
-PRESENCE_NAMES = ("present",)
-LIMB_NAMES = ("limbs",)
 UNCERTAINTY_NAMES = ("vertex_limb", "limb_velocity_sigma_mps", "limb_velocity_sigma_across_mps")
 SMALL_NAMES = (
-    *(*FACE_NAMES, *TIME_NAMES, *RATE_NAMES, *COUNT_NAMES),
-    *(*PRESENCE_NAMES, *LIMB_NAMES, *UNCERTAINTY_NAMES),
+    *(*FACE_NAMES, *TIME_NAMES, *RATE_NAMES, *UNCERTAINTY_NAMES),
+    *("vertex_counts", "present", "limbs"),
 )
 
 _CHUNK_BYTES = 2 * 2**20
@@ -93,7 +90,7 @@ def named_arrays(arrays: dict[str, Any], names: list[str], source: str) -> RawMe
             f"{source} holds {' and '.join(held)}",
             f"{', '.join(UNCERTAINTY_NAMES)}: all of them, or none",
         )
-    limbs = _first(arrays, LIMB_NAMES)
+    limbs = arrays.get("limbs")
     try:
         times_s = None if times is None else np.asarray(times, dtype=np.float64)
         frames_per_s = None if rate is None else float(np.asarray(rate).reshape(-1)[0])
@@ -106,8 +103,8 @@ def named_arrays(arrays: dict[str, Any], names: list[str], source: str) -> RawMe
         faces=_first(arrays, FACE_NAMES),
         times_s=times_s,
         frames_per_s=frames_per_s,
-        vertex_counts=_first(arrays, COUNT_NAMES),
-        present=_first(arrays, PRESENCE_NAMES),
+        vertex_counts=arrays.get("vertex_counts"),
+        present=arrays.get("present"),
         limbs=() if limbs is None else tuple(map(str, np.atleast_1d(limbs))),
         uncertainty=tuple(arrays[name] for name in held) if held else None,
     )

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.files.limits import check_regular, check_size
-from sd2core.files.numpy_files import open_npz_file
+from sd2core.files.numpy_files import open_npy_file, open_npz_file
 from sd2core.files.paths import files_of_pattern
 from sd2core.io.mesh_arrays import FACE_NAMES, RawMesh
 from sd2core.progress import Progress, silent
@@ -137,11 +137,7 @@ def read_faces(path: Path) -> NDArray[Any]:
         with open_npz_file(path, "faces", expected) as archive:
             arrays = dict(archive)
     else:
-        try:
-            # Mapped, so that what its header says is compared with its size.
-            arrays = {"": np.array(np.load(path, mmap_mode="r", allow_pickle=False))}
-        except Exception as error:  # a damaged file fails in many ways
-            raise Sd2Error(f"{path} cannot be read ({error})", expected) from error
+        arrays = {"": np.array(open_npy_file(path, expected))}
     names = [name for name in (*FACE_NAMES, "f") if name in arrays]
     if names or len(arrays) == 1:
         array: NDArray[Any] = arrays[names[0]] if names else next(iter(arrays.values()))

@@ -5,14 +5,13 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
-import zipfile
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
 
 from sd2core.errors import Sd2Error
-from sd2core.files.numpy_files import open_npz_file, open_zip, read_array_header
+from sd2core.files.numpy_files import NpzArrays, open_npz_file, read_array_header
 from sd2core.files.stores import create_array, create_group
 from sd2core.io.mesh_arrays import SMALL_NAMES, VERTEX_NAMES, create_vertices, frames_per_chunk
 
@@ -22,21 +21,15 @@ Header = tuple[tuple[int, ...], bool, np.dtype[Any]]
 
 def npz_bytes(path: Path) -> int:
     """Bytes of an ``.npz``'s arrays in memory; Sd2Error if it is no ``.npz``."""
-    try:
-        with open_zip(path) as archive:
-            return sum(member.file_size for member in archive.infolist())
-    except (OSError, zipfile.BadZipFile) as error:
-        raise _unreadable(path, error) from error
+    with open_npz_file(path, ".npz", _EXPECTED) as arrays:
+        return sum(member.file_size for member in arrays.archive.infolist())
 
 
 def npz_vertices(path: Path) -> tuple[int, int]:
     """Frames and vertices of the mesh in an ``.npz``, read from a header; Sd2Error without any."""
-    try:
-        with open_zip(path) as archive, archive.open(_vertex_member(archive, path)) as stream:
-            frames, vertices, _ = _header(stream, path)[0]
-            return frames, vertices
-    except (OSError, ValueError, zipfile.BadZipFile) as error:
-        raise _unreadable(path, error) from error
+    with open_npz_file(path, ".npz", _EXPECTED) as arrays, _vertices(arrays, path) as stream:
+        frames, vertices, _ = _header(stream, path)[0]
+        return frames, vertices
 
 
 def unpack_npz(path: Path, out: Path) -> None:
@@ -47,26 +40,17 @@ def unpack_npz(path: Path, out: Path) -> None:
     """
     workspace = Path(tempfile.mkdtemp(prefix=f".{out.name}.", suffix=".tmp", dir=out.parent))
     try:
-        group = create_group(workspace / "new")
-        with open_zip(path) as archive:
-            with archive.open(_vertex_member(archive, path)) as stream:
-                _copy_vertices(stream, group, path)
-            members = {Path(name).stem for name in archive.namelist()}
         with open_npz_file(path, ".npz", _EXPECTED) as arrays:
-            for name in members.intersection(SMALL_NAMES):
+            group = create_group(workspace / "new")
+            with _vertices(arrays, path) as stream:
+                _copy_vertices(stream, group, path)
+            for name in arrays.keys() & SMALL_NAMES:
                 if name == "limbs":
                     group.attrs[name] = [str(one) for one in np.atleast_1d(arrays[name])]
                 else:
-                    create_array(group, name, data=np.asarray(arrays[name]))
+                    create_array(group, name, data=arrays[name])
         if not out.exists():
             os.rename(workspace / "new", out)
-    except Sd2Error:
-        raise
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
-        # What the disk has to say names a file; a damaged archive does not.
-        if isinstance(error, OSError) and error.filename:
-            raise
-        raise _unreadable(path, error) from error
     finally:
         shutil.rmtree(workspace, ignore_errors=True)
 
@@ -86,12 +70,13 @@ def _copy_vertices(stream: IO[bytes], group: Any, path: Path) -> None:
         vertices[start : start + count] = np.frombuffer(block, dtype).reshape(count, *shape[1:])
 
 
-def _vertex_member(archive: zipfile.ZipFile, path: Path) -> str:
+def _vertices(arrays: NpzArrays, path: Path) -> IO[bytes]:
+    """File of the vertices, with its header."""
     for name in VERTEX_NAMES:
-        if f"{name}.npy" in archive.namelist():
-            return f"{name}.npy"
+        if name in arrays:
+            return arrays.archive.open(f"{name}.npy")
     raise Sd2Error(
-        f"{path} holds {', '.join(sorted(archive.namelist())) or 'nothing'}",
+        f"{path} holds {', '.join(sorted(arrays.archive.namelist())) or 'nothing'}",
         "an array 'vertices' (or 'verts') of shape (frames, vertices, 3)",
     )
 
@@ -104,7 +89,3 @@ def _header(stream: IO[bytes], path: Path) -> Header:
             "(frames, vertices, 3) of floating-point numbers",
         )
     return shape, by_column, dtype
-
-
-def _unreadable(path: Path, error: Exception) -> Sd2Error:
-    return Sd2Error(f"{path} cannot be read as .npz ({error})", _EXPECTED)

@@ -184,19 +184,6 @@ def read_takes(path: Path, provenance: Any) -> list[dict[str, Any]]:
     return entries
 
 
-def drop_torn_line(path: Path, lines: int) -> None:
-    """Cut an incomplete last line off."""
-    index = path / INDEX_NAME
-    if not index.exists():
-        return
-    content = index.read_bytes()
-    if not content.endswith(b"\n"):
-        whole = content[: content.rfind(b"\n") + 1]
-        assert whole.count(b"\n") == lines
-        with index.open("r+b") as file:
-            file.truncate(len(whole))
-
-
 def key_of(entry: dict[str, Any]) -> TakeKey:
     """Key of the take that a line describes."""
     return TakeKey(entry["subject"], entry["name"], entry["placement"])

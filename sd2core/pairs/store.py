@@ -8,7 +8,6 @@ writer that is killed leaves whole takes.
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -28,6 +27,7 @@ from sd2core.files.stores import (
     open_group,
     read_attributes,
 )
+from sd2core.files.texts import append_lines, drop_torn_line
 from sd2core.maps import LimbMaps
 from sd2core.mesh.vertex_parts import JOINTS, PARTS
 from sd2core.pairs.rows import (
@@ -36,7 +36,6 @@ from sd2core.pairs.rows import (
     TakeKey,
     check_array,
     check_header,
-    drop_torn_line,
     key_of,
     read_rows,
     read_takes,
@@ -222,7 +221,7 @@ class PairWriter:
         names = row_kinds(header)
         self._arrays = {name: growing(self._group, self._path, name) for name in names}
         index = read_takes(self._path, provenance)
-        drop_torn_line(self._path, len(index))
+        drop_torn_line(self._path / INDEX_NAME)
         self._done = {key_of(entry) for entry in index}
         self._frames = max((entry["stop"] for entry in index), default=0)
 
@@ -281,10 +280,7 @@ class PairWriter:
             "stop": stop,
             "sensor_position_m": [float(x) for x in take.sensor_position_m],
         }
-        with (self._path / INDEX_NAME).open("a", encoding="utf-8") as index:
-            index.write(json.dumps(entry) + "\n")
-            index.flush()
-            os.fsync(index.fileno())
+        append_lines(self._path / INDEX_NAME, [json.dumps(entry) + "\n"])
         self._done.add(take.key)
         self._frames = stop
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from sd2core.errors import Sd2Error
+from sd2core.files.texts import damage_in
 from sd2core.pairs.segments import segment_starts
 from sd2core.pairs.store import PairKind, read_description
 
@@ -67,7 +67,7 @@ def pair_facts(path: Path) -> PairFacts:
         TakeFacts(entry["subject"], int(entry["placement"]), entry["stop"] - entry["start"])
         for entry in index
     )
-    try:
+    with damage_in(path):
         return PairFacts(
             path=path,
             kind=header["kind"],
@@ -77,5 +77,3 @@ def pair_facts(path: Path) -> PairFacts:
             takes=takes,
             has_limbs=bool(header.get("parts")),
         )
-    except (KeyError, TypeError, ValueError) as error:
-        raise Sd2Error(f"{path}: its description is damaged ({error!r})") from error

@@ -8,6 +8,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+from sd2core.files.tables import counted
 from sd2core.files.texts import EXPECTED_JSON, read_content
 from sd2core.labels.comparison import compare
 from sd2core.labels.merging import chosen, merge
@@ -79,9 +80,11 @@ class Divergence:
         labels = merge(self.base.labels, self.mine.labels, self.theirs.labels)
         notes = []
         if labels.both:
-            notes.append(f"Of {_spans(labels.both)} that both had changed, both are there.")
+            both = counted(labels.both, "span")
+            notes.append(f"Of {both} that both had changed, both are there.")
         if labels.aside:
-            notes.append(f"On tracks “(both)” lie {_spans(labels.aside)} that had no room.")
+            aside = counted(labels.aside, "span")
+            notes.append(f"On tracks “(both)” lie {aside} that had no room.")
         if clash := _named(name for name in self._changed() if mine[name] != base[name]):
             notes.append(f"Both had changed the {' and the '.join(clash)}: yours is kept.")
         return Merge(State(settings, labels.labels), tuple(notes))
@@ -106,7 +109,3 @@ def digests_of(paths: Iterable[Path]) -> dict[str, str]:
 
 def _named(names: Iterable[str]) -> list[str]:
     return list(dict.fromkeys(WORDS[name] for name in names))
-
-
-def _spans(count: int) -> str:
-    return f"{count:,} span{'s' * (count != 1)}"

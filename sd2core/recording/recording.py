@@ -64,6 +64,15 @@ if TYPE_CHECKING:
 SUFFIX = ".sd2"
 
 _SENSOR = ("position_m", "azimuth_deg", "elevation_deg", "field_of_view_deg")
+_OFFSETS = {
+    "radar_offset_s": "radar offset in seconds",
+    "imu_offset_s": "inertial sensor's offset in seconds",
+}
+_AS_THEY_ARE = (
+    *("title", "simulated", "camera", "mesh_reading", "bundled_denoiser"),
+    *("radar_receiver", "radar_transmitter", "imu_places"),
+)
+"""Settings that ``recording.json`` holds as a recording does."""
 
 _AIDS: set[Role] = {"faces", "denoiser", "imu"}
 """Files that are nothing to look at by themselves."""
@@ -173,41 +182,14 @@ class Recording:
 
     @classmethod
     def create(
-        cls,
-        folder: Path,
-        *,
-        video: Path | None = None,
-        mesh: Path | None = None,
-        faces: Path | None = None,
-        radar: Path | None = None,
-        mesh_reading: MeshReading | None = None,
-        radar_offset_s: float = 0.0,
-        denoiser: Path | None = None,
-        sensor: VirtualSensor | None = None,
-        spans: tuple[Span, ...] = (),
-        title: str = "",
-        simulated: bool = False,
-        camera: CameraEntry | None = None,
-        copy: bool = False,
-        progress: Progress = silent,
+        cls, folder: Path, *, copy: bool = False, progress: Progress = silent, **fields: Any
     ) -> Recording:
-        """Make ``folder`` a recording of files that exist; see :meth:`save_as`."""
-        recording = cls(
-            Path(folder),
-            video=video,
-            mesh=mesh,
-            faces=faces,
-            radar=radar,
-            mesh_reading=mesh_reading or MeshReading(),
-            radar_offset_s=radar_offset_s,
-            denoiser=denoiser,
-            sensor=sensor or VirtualSensor(),
-            spans=tuple(spans),
-            title=title,
-            simulated=simulated,
-            camera=camera,
-        )
-        return recording.save_as(Path(folder), copy=copy, progress=progress)
+        """Make ``folder`` a recording with these fields, whose files exist; see :meth:`save_as`.
+
+        A field that is None is as it is by default.
+        """
+        given = {name: value for name, value in fields.items() if value is not None}
+        return cls(Path(folder), **given).save_as(Path(folder), copy=copy, progress=progress)
 
     def save_as(
         self,
@@ -343,16 +325,13 @@ class Recording:
     def _document(self) -> Document:
         document = self._read.model_copy(deep=True)
         document.version = VERSION
-        document.title = self.title
-        document.simulated = self.simulated
-        document.mesh_reading = self.mesh_reading
-        document.camera = self.camera
-        document.radar_offset_s = _finite(self.radar_offset_s, "radar offset in seconds")
-        document.radar_receiver = self.radar_receiver
-        document.radar_transmitter = self.radar_transmitter
-        document.imu_offset_s = _finite(self.imu_offset_s, "inertial sensor's offset in seconds")
-        document.imu_places = self.imu_places
-        document.bundled_denoiser = self.bundled_denoiser
+        for name in _AS_THEY_ARE:
+            setattr(document, name, getattr(self, name))
+        for name, words in _OFFSETS.items():
+            value = float(getattr(self, name))
+            if not math.isfinite(value):
+                raise Sd2Error(f"The {words} is {value}", "a finite number")
+            setattr(document, name, value)
         document.placements = None if self.placements is None else self.placements.as_dict()
         document.spans = () if self._writes_labels else tuple(self.spans)
         for name in _SENSOR:
@@ -551,32 +530,30 @@ def open_recording(path: Path) -> Recording:
     # Taken first: what is written while it is read counts as another's.
     digests = digests_of([folder / FILE_NAME])
     document = read_document(folder / FILE_NAME)
-    planned = document.placements
     with errors_in(folder / FILE_NAME):
-        sensor = VirtualSensor(**{name: getattr(document.sensor, name) for name in _SENSOR})
-        placements = None if planned is None else placements_from_dict(planned)
+        settings = settings_of(document, folder)
+    settings["title"] = document.title or folder.stem
     recording = Recording(
-        folder,
-        **{role: located_path(getattr(document, role), folder) for role in ROLES},  # type: ignore[arg-type]
-        bundled_denoiser=document.bundled_denoiser,
-        mesh_reading=document.mesh_reading,
-        radar_offset_s=document.radar_offset_s,
-        radar_receiver=document.radar_receiver,
-        radar_transmitter=document.radar_transmitter,
-        imu_offset_s=document.imu_offset_s,
-        imu_places=tuple(dict.fromkeys(document.imu_places)),
-        sensor=sensor,
-        placements=placements,
-        spans=document.spans,
-        title=document.title or folder.stem,
-        simulated=document.simulated,
-        camera=document.camera,
-        _read=document,
-        _digests=digests,
+        folder, **settings, spans=document.spans, _read=document, _digests=digests
     )
     recording.read_labels_again()
     recording._base = recording.state()
     return recording
+
+
+def settings_of(document: Document, folder: Path) -> dict[str, Any]:
+    """Fields of a recording by their names, but for labels, as its file holds them.
+
+    Raises Sd2Error where the sensor or the placements cannot be.
+    """
+    planned = document.placements
+    return {
+        **{name: getattr(document, name) for name in (*_AS_THEY_ARE, *_OFFSETS)},
+        **{role: located_path(getattr(document, role), folder) for role in ROLES},
+        "imu_places": tuple(dict.fromkeys(document.imu_places)),
+        "sensor": VirtualSensor(**{name: getattr(document.sensor, name) for name in _SENSOR}),
+        "placements": None if planned is None else placements_from_dict(planned),
+    }
 
 
 def open_sample() -> Recording:
@@ -608,12 +585,6 @@ def _new_folder(folder: Path) -> Path:
     if not folder.parent.is_dir():
         raise Sd2Error(f"The folder {folder.parent} does not exist", "an existing folder")
     return folder
-
-
-def _finite(value: float, name: str) -> float:
-    if not math.isfinite(value):
-        raise Sd2Error(f"The {name} is {value}", "a finite number")
-    return float(value)
 
 
 def _copied(

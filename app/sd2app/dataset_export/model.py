@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
+from pydantic import TypeAdapter
 from PySide6.QtCore import QObject
 
 from sd2app.background.latest import Emit, LatestRunner
@@ -30,8 +31,6 @@ if TYPE_CHECKING:
     # Imported where it is used: it takes long to load, and the window starts without.
     from sd2core.datasets.forecast import Counting, Forecast
     from sd2core.datasets.recording_sources import Making
-
-ENDINGS = (".zarr", ".h5", ".npz")
 
 MAPS: dict[str, tuple[MapKind, ...]] = {
     "synthetic": ("synthetic",),
@@ -61,7 +60,7 @@ class ExportChoice:
     overlap: int = OVERLAP  # frames
     spans: bool = False  # one segment of each labelled span, instead of windows
     margin_s: float = 0.0  # kept before and after each span
-    ending: str = ".zarr"  # one of ENDINGS
+    ending: Literal[".zarr", ".h5", ".npz"] = ".zarr"
     imu: tuple[str, ...] = ()  # named places of inertial sensors; empty: none are exported
 
     @property
@@ -82,26 +81,9 @@ class ExportChoice:
         """Choices that decide which sources there are."""
         return self.place, self.maps, self.planned, self.subjects, self.imu
 
-    def to_json(self) -> dict[str, Any]:
-        """Choices by name."""
-        return asdict(self) | {"place": str(self.place), "maps": sorted(self.maps)}
 
-    @classmethod
-    def from_json(cls, content: Mapping[str, Any]) -> ExportChoice:
-        """Read what :meth:`to_json` gave; raises KeyError, TypeError or ValueError."""
-        ending = str(content["ending"])
-        return cls(
-            Path(content["place"]),
-            frozenset(MAPS) & frozenset(map(str, content["maps"])),
-            bool(content["planned"]),
-            tuple(map(str, content["subjects"])),
-            int(content["length"]),
-            int(content["overlap"]),
-            bool(content["spans"]),
-            float(content["margin_s"]),
-            ENDINGS[ENDINGS.index(ending)],
-            tuple(map(str, content["imu"])),
-        )
+CHOICE = TypeAdapter(ExportChoice)
+"""Reads and writes choices as JSON holds them."""
 
 
 class _Counted(NamedTuple):
@@ -201,7 +183,11 @@ class ExportModel(Runs[ExportRun]):
         words += ["--placements", "planned"] if choice.planned else []
         words += ["--imu", ",".join(choice.imu)] if choice.imu else []
         words += ["--subjects", ",".join(choice.subjects)] if choice.subjects else []
-        about = {"what": "export", "out": str(out), "choice": choice.to_json()}
+        about = {
+            "what": "export",
+            "out": str(out),
+            "choice": CHOICE.dump_python(choice, mode="json"),
+        }
         path = free_folder(self._folder, "export", [out])
         try:
             # It may use all processors: it gives way to whatever else wants them.
@@ -236,8 +222,8 @@ class ExportModel(Runs[ExportRun]):
             return
         run = ExportRun(one.path, self)
         try:
-            self.choice = ExportChoice.from_json(run.choice)
-        except (KeyError, TypeError, ValueError):
+            self.choice = CHOICE.validate_python(run.choice)
+        except ValueError:
             pass  # of another version: it is followed all the same
         else:
             self._look_into(self.choice.place)

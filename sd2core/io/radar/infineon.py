@@ -13,11 +13,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import AliasPath, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AliasPath, BaseModel, ConfigDict, Field
 
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import (
@@ -28,7 +28,7 @@ from sd2core.files.atomic import (
 )
 from sd2core.files.limits import open_regular
 from sd2core.files.numpy_files import open_npy_file
-from sd2core.files.texts import errors_in, lines_of, read_json
+from sd2core.files.texts import errors_in, faults_in, lines_of, read_json
 from sd2core.io.radar.capture import RadarCapture, Samples, by_transmitter, check_cube
 from sd2core.radar_config import RadarConfig
 from sd2core.timebase import Timebase
@@ -39,6 +39,7 @@ ADC_BITS = 12
 _DATA, _CONFIG, _TIMES, _META = "radar.npy", "config.json", "radar_timestamp.csv", "meta.json"
 INFINEON_FILES = (_CONFIG, _TIMES, _META)
 """What lies beside the samples."""
+Model = TypeVar("Model", bound=BaseModel)
 _FIRST_PLAUSIBLE_UNIX_S = 1e8
 """Smaller start times are seconds since the start, not a date."""
 _LAST_PLAUSIBLE_UNIX_S = 1e11
@@ -221,34 +222,18 @@ def _read_json(path: Path) -> Any:
     return read_json(path, "a JSON text")
 
 
-def _explain(path: Path, error: ValidationError) -> Sd2Error:
-    first = error.errors()[0]
-    key = ".".join(str(part) for part in first["loc"]) or "the top level"
-    if first["type"] == "missing":
-        found = f"{path} has no {key}"
-    else:
-        found = f"{path}: {key} is {first['input']!r:.80} ({first['msg']})"
-    return Sd2Error(
-        found,
-        "the configuration that Infineon's recorder writes (device_config.fmcw_single_shape)",
-        "Use the file that was recorded with this radar.npy",
-    )
+def _validated(model: type[Model], path: Path) -> Model:
+    expected = "the configuration that Infineon's recorder writes (device_config.fmcw_single_shape)"
+    with faults_in(path, expected, "Use the file that was recorded with this radar.npy"):
+        return model.model_validate(_read_json(path))
 
 
 def _read_meta(path: Path) -> _Meta:
-    if not path.exists():
-        return _Meta()
-    try:
-        return _Meta.model_validate(_read_json(path))
-    except ValidationError as error:
-        raise _explain(path, error) from error
+    return _validated(_Meta, path) if path.exists() else _Meta()
 
 
 def _read_config(path: Path, meta: _Meta) -> RadarConfig:
-    try:
-        shape = _Config.model_validate(_read_json(path)).shape
-    except ValidationError as error:
-        raise _explain(path, error) from error
+    shape = _validated(_Config, path).shape
     mode = (shape.mimo_mode or "off").lower()
     # Without MIMO, several transmitters send together, as one.
     transmitters = len(shape.tx_antennas) if mode == "tdm" else 1

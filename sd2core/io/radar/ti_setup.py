@@ -9,9 +9,17 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any
 
-from pydantic import AliasGenerator, AliasPath, BaseModel, ConfigDict, Field
+from pydantic import (
+    AliasGenerator,
+    AliasPath,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationInfo,
+)
 
 from sd2core.errors import Sd2Error
 from sd2core.files.texts import errors_in, faults_in, read_json, read_text
@@ -23,28 +31,6 @@ _BITS_16 = 2
 _MOST = 2**20
 _CFG = "a .cfg of the mmWave SDK"
 _JSON = "the .mmwave.json of mmWave Studio"
-
-
-class Chirp(NamedTuple):
-    """Chirps of a frame with these numbers, of one profile and a mask of transmitters."""
-
-    start: int
-    end: int
-    profile: int
-    transmitters: int
-    idle_s: float = 0.0  # beyond that of the profile
-
-
-class Profile(NamedTuple):
-    """One kind of chirp; times and frequencies in SI units."""
-
-    start_hz: float
-    idle_s: float
-    adc_start_s: float
-    ramp_end_s: float
-    slope_hz_per_s: float
-    samples: int
-    sample_rate_hz: float
 
 
 @dataclass(frozen=True)
@@ -72,6 +58,77 @@ def is_studio_json(path: Path) -> bool:
     except Sd2Error:
         return False
     return isinstance(content, dict) and "mmWaveDevices" in content
+
+
+# --- what both say, under the names and in the units of mmWave Studio -----------------------
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="ignore", allow_inf_nan=False)
+
+
+def _inside(name: str) -> ConfigDict:
+    """Configuration of a part that is alone in a table, under this name."""
+    generator = AliasGenerator(validation_alias=lambda entry: AliasPath(name, entry))
+    return ConfigDict(alias_generator=generator)
+
+
+def _at(*names: str, **how: Any) -> Any:
+    """Entry deeper within a part, in tables of these names."""
+    return Field(validation_alias=AliasPath(*names), **how)
+
+
+def _mask(text: Any, info: ValidationInfo) -> int:
+    if not isinstance(text, str) or not re.fullmatch(r"0[xX][0-9a-fA-F]{1,4}", text):
+        raise Sd2Error(f"{info.field_name} is {text!r:.40}", "a mask such as 0xF")
+    return int(text, 16)
+
+
+Mask = Annotated[int, BeforeValidator(_mask)]
+"""One bit for each antenna or lane."""
+
+
+class _Profile(_Part):
+    model_config = _inside("rlProfileCfg_t")
+
+    profileId: int
+    startFreqConst_GHz: float
+    idleTimeConst_usec: float
+    adcStartTimeConst_usec: float
+    rampEndTime_usec: float
+    freqSlopeConst_MHz_usec: float
+    numAdcSamples: int
+    digOutSampleRate: float
+
+
+class _Chirp(_Part):
+    model_config = _inside("rlChirpCfg_t")
+
+    chirpStartIdx: int
+    chirpEndIdx: int
+    profileId: int
+    idleTimeVar_usec: float = 0.0
+    txEnable: Mask
+
+
+class _Frame(_Part):
+    chirpStartIdx: int
+    chirpEndIdx: int
+    numLoops: int
+    numFrames: int
+    framePeriodicity_msec: float
+
+
+class _Device(_Part):
+    rxChannelEn: Mask = _at("rfConfig", "rlChanCfg_t", "rxChannelEn")
+    bits: int = _at("rfConfig", "rlAdcOutCfg_t", "fmt", "b2AdcBits")
+    output: int = _at("rfConfig", "rlAdcOutCfg_t", "fmt", "b2AdcOutFmt")
+    profiles: list[_Profile] = _at("rfConfig", "rlProfiles", min_length=1)
+    chirps: list[_Chirp] = _at("rfConfig", "rlChirps", min_length=1)
+    frame: _Frame = _at("rfConfig", "rlFrameCfg_t")
+    swapped: int = _at("rawDataCaptureConfig", "rlDevDataFmtCfg_t", "iqSwapSel", default=0)
+    interleaved: int = _at("rawDataCaptureConfig", "rlDevDataFmtCfg_t", "chInterleave")
+    laneEn: Mask = _at("rawDataCaptureConfig", "rlDevLaneEnable_t", "laneEn")
 
 
 # --- mmWave SDK ------------------------------------------------------------------------------
@@ -106,32 +163,46 @@ def _of_cfg(path: Path) -> TiSetup:
             " devices but xWR12xx and xWR14xx. A line '% Platform:xWR14xx' says otherwise."
         )
     lanes = 4 if platform is not None and platform[1] in ("12", "14", "22") else 2
-    profiles = {
-        int(one[0]): Profile(
-            one[1] * 1e9, one[2] * 1e-6, one[3] * 1e-6, one[4] * 1e-6, one[7] * 1e12,
-            int(one[9]), one[10] * 1e3,
+    profiles = [
+        _Profile.model_construct(
+            profileId=int(one[0]),
+            startFreqConst_GHz=one[1],
+            idleTimeConst_usec=one[2],
+            adcStartTimeConst_usec=one[3],
+            rampEndTime_usec=one[4],
+            freqSlopeConst_MHz_usec=one[7],
+            numAdcSamples=int(one[9]),
+            digOutSampleRate=one[10],
         )
         for one in _all_numbers(commands, "profileCfg", 11)
-    }  # fmt: skip
+    ]
     chirps = [
-        Chirp(int(one[0]), int(one[1]), int(one[2]), int(one[7]), one[5] * 1e-6)
+        _Chirp.model_construct(
+            chirpStartIdx=int(one[0]),
+            chirpEndIdx=int(one[1]),
+            profileId=int(one[2]),
+            idleTimeVar_usec=one[5],
+            txEnable=int(one[7]),
+        )
         for one in _all_numbers(commands, "chirpCfg", 8)
     ]
-    return _setup(
-        profiles,
-        chirps,
-        span=(int(frame[0]), int(frame[1])),
-        loops=int(frame[2]),
-        frames=int(frame[3]),
-        frame_s=frame[4] * 1e-3,
-        receivers=int(channels[0]),
-        output=int(adc[1]),
+    device = _Device.model_construct(
+        rxChannelEn=int(channels[0]),
         bits=int(adc[0]),
-        lanes=lanes,
-        q_first=int(buffer[2]) == 1,
-        interleaved=int(buffer[3]) == 0,
-        notes=notes,
+        output=int(adc[1]),
+        profiles=profiles,
+        chirps=chirps,
+        frame=_Frame.model_construct(
+            chirpStartIdx=int(frame[0]),
+            chirpEndIdx=int(frame[1]),
+            numLoops=int(frame[2]),
+            numFrames=int(frame[3]),
+            framePeriodicity_msec=frame[4],
+        ),
+        swapped=int(buffer[2]),
+        interleaved=int(buffer[3]),
     )
+    return _setup(device, lanes, notes)
 
 
 def _numbers(commands: dict[str, list[list[str]]], name: str, least: int) -> list[float]:
@@ -156,64 +227,6 @@ def _all_numbers(commands: dict[str, list[list[str]]], name: str, least: int) ->
 # --- mmWave Studio ---------------------------------------------------------------------------
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="ignore", allow_inf_nan=False)
-
-
-def _inside(name: str) -> ConfigDict:
-    """Configuration of a part that is alone in a table, under this name."""
-    generator = AliasGenerator(validation_alias=lambda entry: AliasPath(name, entry))
-    return ConfigDict(alias_generator=generator)
-
-
-def _at(*names: str, **how: Any) -> Any:
-    """Entry deeper within a part, in tables of these names."""
-    return Field(validation_alias=AliasPath(*names), **how)
-
-
-class _Profile(_Part):
-    model_config = _inside("rlProfileCfg_t")
-
-    profileId: int
-    startFreqConst_GHz: float
-    idleTimeConst_usec: float
-    adcStartTimeConst_usec: float
-    rampEndTime_usec: float
-    freqSlopeConst_MHz_usec: float
-    numAdcSamples: int
-    digOutSampleRate: float
-
-
-class _Chirp(_Part):
-    model_config = _inside("rlChirpCfg_t")
-
-    chirpStartIdx: int
-    chirpEndIdx: int
-    profileId: int
-    idleTimeVar_usec: float = 0.0
-    txEnable: str
-
-
-class _Frame(_Part):
-    chirpStartIdx: int
-    chirpEndIdx: int
-    numLoops: int
-    numFrames: int
-    framePeriodicity_msec: float
-
-
-class _Device(_Part):
-    receivers: str = _at("rfConfig", "rlChanCfg_t", "rxChannelEn")
-    bits: int = _at("rfConfig", "rlAdcOutCfg_t", "fmt", "b2AdcBits")
-    output: int = _at("rfConfig", "rlAdcOutCfg_t", "fmt", "b2AdcOutFmt")
-    profiles: list[_Profile] = _at("rfConfig", "rlProfiles", min_length=1)
-    chirps: list[_Chirp] = _at("rfConfig", "rlChirps", min_length=1)
-    frame: _Frame = _at("rfConfig", "rlFrameCfg_t")
-    swapped: int = _at("rawDataCaptureConfig", "rlDevDataFmtCfg_t", "iqSwapSel", default=0)
-    interleaved: int = _at("rawDataCaptureConfig", "rlDevDataFmtCfg_t", "chInterleave")
-    lanes: str = _at("rawDataCaptureConfig", "rlDevLaneEnable_t", "laneEn")
-
-
 class _Studio(_Part):
     mmWaveDevices: list[_Device] | _Device
 
@@ -224,93 +237,39 @@ def _of_json(path: Path) -> TiSetup:
     devices = devices if isinstance(devices, list) else [devices]
     if len(devices) != 1:
         raise Sd2Error(f"It configures {len(devices)} devices", "one")
-    device, frame = devices[0], devices[0].frame
-    lanes = _mask(device.lanes, "laneEn").bit_count()
+    lanes = devices[0].laneEn.bit_count()
     if lanes not in (2, 4):
         raise Sd2Error(f"laneEn enables {lanes} lanes of LVDS", "2 or 4")
-    profiles = {
-        one.profileId: Profile(
-            one.startFreqConst_GHz * 1e9,
-            one.idleTimeConst_usec * 1e-6,
-            one.adcStartTimeConst_usec * 1e-6,
-            one.rampEndTime_usec * 1e-6,
-            one.freqSlopeConst_MHz_usec * 1e12,
-            one.numAdcSamples,
-            one.digOutSampleRate * 1e3,
-        )
-        for one in device.profiles
-    }
-    chirps = [
-        Chirp(
-            one.chirpStartIdx,
-            one.chirpEndIdx,
-            one.profileId,
-            _mask(one.txEnable, "txEnable"),
-            one.idleTimeVar_usec * 1e-6,
-        )
-        for one in device.chirps
-    ]
-    return _setup(
-        profiles,
-        chirps,
-        span=(frame.chirpStartIdx, frame.chirpEndIdx),
-        loops=frame.numLoops,
-        frames=frame.numFrames,
-        frame_s=frame.framePeriodicity_msec * 1e-3,
-        receivers=_mask(device.receivers, "rxChannelEn"),
-        output=device.output,
-        bits=device.bits,
-        lanes=lanes,
-        q_first=device.swapped == 1,
-        interleaved=device.interleaved == 0,
-        notes=[],
-    )
-
-
-def _mask(text: str, name: str) -> int:
-    if not re.fullmatch(r"0[xX][0-9a-fA-F]{1,4}", text):
-        raise Sd2Error(f"{name} is {text!r:.40}", "a mask such as 0xF")
-    return int(text, 16)
+    return _setup(devices[0], lanes, [])
 
 
 # --- both ------------------------------------------------------------------------------------
 
 
-def _setup(
-    profiles: dict[int, Profile],
-    chirps: list[Chirp],
-    *,
-    span: tuple[int, int],
-    loops: int,
-    frames: int,
-    frame_s: float,
-    receivers: int,
-    output: int,
-    bits: int,
-    lanes: int,
-    q_first: bool,
-    interleaved: bool,
-    notes: list[str],
-) -> TiSetup:
-    if output not in _SAMPLINGS:
-        raise Sd2Error(f"The output format of the converter is {output}", "0, 1 or 2")
-    if bits != _BITS_16:
-        raise Sd2Error(f"The number of bits of the converter is {bits}", "2: 16 bits")
+def _setup(device: _Device, lanes: int, notes: list[str]) -> TiSetup:
+    if device.output not in _SAMPLINGS:
+        raise Sd2Error(f"The output format of the converter is {device.output}", "0, 1 or 2")
+    if device.bits != _BITS_16:
+        raise Sd2Error(f"The number of bits of the converter is {device.bits}", "2: 16 bits")
+    interleaved = device.interleaved == 0
     if interleaved != (lanes == 4):
         raise Sd2Error(
             f"Receivers are {'' if interleaved else 'not '}interleaved over {lanes} lanes of LVDS",
             "interleaved over four lanes (xWR12xx, xWR14xx), one after the other over two",
         )
-    antennas = (receivers & 0xF).bit_count()
+    antennas = (device.rxChannelEn & 0xF).bit_count()
     if antennas < 1:
         raise Sd2Error("No receiver is enabled", "a mask of one to four")
+    frame = device.frame
+    loops, frames = frame.numLoops, frame.numFrames
     if not (0 < loops < _MOST and 0 <= frames < 2**31):
         raise Sd2Error(f"A recording of {frames} frames of {loops} loops", "some of both")
-    turns = _turns(chirps, span)
-    profile = profiles.get(turns[0].profile)
+    turns = _turns(device.chirps, frame.chirpStartIdx, frame.chirpEndIdx)
+    number = turns[0].profileId
+    profile = next((one for one in reversed(device.profiles) if one.profileId == number), None)
     if profile is None:
-        raise Sd2Error(f"Chirps are of profile {turns[0].profile}", "a profile that is configured")
-    masks = [one.transmitters for one in turns]
+        raise Sd2Error(f"Chirps are of profile {number}", "a profile that is configured")
+    masks = [one.txEnable for one in turns]
     same = len(set(masks)) == 1
     if (
         len(turns) > 1
@@ -324,7 +283,11 @@ def _setup(
             "Record with transmitters that take turns (TDM)",
         )
     transmitters = 1 if same else len(turns)
-    chirp_s = profile.idle_s + profile.ramp_end_s + turns[0].idle_s
+    chirp_s = (
+        profile.idleTimeConst_usec * 1e-6
+        + profile.rampEndTime_usec * 1e-6
+        + turns[0].idleTimeVar_usec * 1e-6
+    )
     if transmitters > 1:
         notes.append(
             f"{transmitters} transmitters take turns: each sends every"
@@ -333,44 +296,47 @@ def _setup(
         )
     if masks[0].bit_count() > 1:
         notes.append(f"{masks[0].bit_count()} transmitters send together.")
-    if _SAMPLINGS[output] == "complex with image band":
+    if _SAMPLINGS[device.output] == "complex with image band":
         notes.append("Complex 2x samples: the half with the image band is left out.")
-    if profile.slope_hz_per_s < 0:
+    slope_hz_per_s = profile.freqSlopeConst_MHz_usec * 1e12
+    if slope_hz_per_s < 0:
         notes.append("Chirps fall in frequency; samples are turned round.")
-    if not 1 < profile.samples < _MOST or not profile.sample_rate_hz > 0:
+    samples, rate_hz = profile.numAdcSamples, profile.digOutSampleRate * 1e3
+    if not 1 < samples < _MOST or not rate_hz > 0:
         raise Sd2Error(
-            f"A chirp has {profile.samples} samples at {profile.sample_rate_hz:g} Hz",
+            f"A chirp has {samples} samples at {rate_hz:g} Hz",
             "two samples or more, at a rate",
         )
-    first_hz = profile.start_hz + profile.slope_hz_per_s * profile.adc_start_s
-    last_hz = first_hz + profile.slope_hz_per_s * profile.samples / profile.sample_rate_hz
+    adc_start_s = profile.adcStartTimeConst_usec * 1e-6
+    first_hz = profile.startFreqConst_GHz * 1e9 + slope_hz_per_s * adc_start_s
+    last_hz = first_hz + slope_hz_per_s * samples / rate_hz
     config = RadarConfig(
         start_frequency_hz=min(first_hz, last_hz),
         end_frequency_hz=max(first_hz, last_hz),
-        samples_per_chirp=profile.samples,
+        samples_per_chirp=samples,
         chirps_per_frame=loops * (len(turns) if same else 1),
         chirp_repetition_s=chirp_s * transmitters,
-        frame_repetition_s=frame_s,
-        sample_rate_hz=profile.sample_rate_hz,
+        frame_repetition_s=frame.framePeriodicity_msec * 1e-3,
+        sample_rate_hz=rate_hz,
         receivers=antennas,
         adc_bits=16,
         name=f"TI mmWave, {0.5e-9 * (first_hz + last_hz):.4g} GHz",
-        sampling=_SAMPLINGS[output],
+        sampling=_SAMPLINGS[device.output],
         transmitters=transmitters,
     )
-    return TiSetup(config, frames, lanes, q_first, profile.slope_hz_per_s < 0, tuple(notes))
+    return TiSetup(config, frames, lanes, device.swapped == 1, slope_hz_per_s < 0, tuple(notes))
 
 
-def _turns(chirps: list[Chirp], span: tuple[int, int]) -> list[Chirp]:
+def _turns(chirps: list[_Chirp], first: int, last: int) -> list[_Chirp]:
     """Chirps of one loop, each by itself; Sd2Error if one is missing, or of another profile."""
-    if not 0 <= span[0] <= span[1] < 512:
-        raise Sd2Error(f"A loop goes from chirp {span[0]} to {span[1]}", "numbers from 0 to 511")
+    if not 0 <= first <= last < 512:
+        raise Sd2Error(f"A loop goes from chirp {first} to {last}", "numbers from 0 to 511")
     found = []
-    for number in range(span[0], span[1] + 1):
-        fitting = [one for one in chirps if one.start <= number <= one.end]
+    for number in range(first, last + 1):
+        fitting = [one for one in chirps if one.chirpStartIdx <= number <= one.chirpEndIdx]
         if not fitting:
             raise Sd2Error(f"Chirp {number} of a loop is not configured", "every chirp of it")
         found.append(fitting[-1])
-    if len({(one.profile, one.idle_s) for one in found}) > 1:
+    if len({(one.profileId, one.idleTimeVar_usec) for one in found}) > 1:
         raise Sd2Error("Chirps of a loop differ in profile or idle time", "chirps of one kind")
     return found

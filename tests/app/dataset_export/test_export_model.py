@@ -14,7 +14,7 @@ from PySide6.QtCore import QObject
 from swinging_recordings import recording
 from turning_bodies import turning_body
 
-from sd2app.dataset_export.model import ExportChoice, ExportModel
+from sd2app.dataset_export.model import CHOICE, ExportModel
 from sd2app.dataset_export.run import Exported, ExportRun
 from sd2app.dataset_export.text import (
     bytes_words,
@@ -288,7 +288,7 @@ def test_inertial_sensors_of_the_recordings_are_offered(made, tmp_path: Path, qt
     assert words[words.index("--imu") + 1] == "head,chest,right-wrist"
     model.begin(tmp_path / "people" / "ben.sd2")
     assert model.choice.imu == ("chest",)
-    assert ExportChoice.from_json(model.choice.to_json()) == model.choice
+    assert CHOICE.validate_json(CHOICE.dump_json(model.choice)) == model.choice
 
 
 def test_sensors_in_words() -> None:

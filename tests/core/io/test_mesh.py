@@ -570,7 +570,7 @@ def test_unusable_faces_files_are_named(tmp_path: Path) -> None:
     (tmp_path / "points.obj").write_text("v 0 0 1\nv 1 0 1\n")
     for name, text in (
         ("gone.npy", r"gone\.npy does not exist"),
-        ("bad.npy", r"bad\.npy cannot be read"),
+        ("bad.npy", r"bad\.npy \(5 bytes\) cannot be read"),
         ("other.npz", r"other\.npz holds a, b.*'faces'"),
         ("points.obj", r"points\.obj holds no faces"),
         ("m.txt", "does not exist"),

@@ -194,11 +194,11 @@ DAMAGE: dict[str, tuple[Callable[[Path], object], str]] = {
     ),
     "other device": (
         lambda f: (f / "config.json").write_text('{"device_config": {"other": 1}}'),
-        r"config\.json has no device_config\.fmcw_single_shape",
+        r"config\.json: device_config\.fmcw_single_shape is missing",
     ),
     "missing key": (
         lambda f: edit_config(f, lambda shape: shape.pop("sample_rate_Hz")),
-        r"config\.json has no device_config\.fmcw_single_shape\.sample_rate_Hz",
+        r"config\.json: device_config\.fmcw_single_shape\.sample_rate_Hz is missing",
     ),
     "text for a number": (
         lambda f: edit_config(f, lambda shape: shape.update(sample_rate_Hz="fast")),
