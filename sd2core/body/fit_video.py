@@ -16,7 +16,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.body.camera import PinholeCamera, Source, camera_of
+from sd2core.body.camera import PinholeCamera, Source, camera_of, check_field_of_view
 from sd2core.body.fit import fit_motion
 from sd2core.body.fitted import FittedMotion
 from sd2core.body.landmark_files import save_track
@@ -25,7 +25,7 @@ from sd2core.body.landmarks import DEFAULT_MAX_GAP_S, SIGHTINGS, OnFrame, find_l
 from sd2core.body.limbs import LIMB_LANDMARKS, LIMBS
 from sd2core.body.model import Resolution
 from sd2core.body.person_selection import Rectangle
-from sd2core.body.shape import DEFAULT_STATURE_M
+from sd2core.body.shape import DEFAULT_STATURE_M, check_stature
 from sd2core.body.solve import one_thread
 from sd2core.body.track import LANDMARK, Landmarks, parts
 from sd2core.errors import Sd2Error
@@ -73,6 +73,13 @@ class FitChoices:
     max_gap_s: float = DEFAULT_MAX_GAP_S  # longest gap without the person that is bridged
     resolution: Resolution = "medium"  # mesh of 1,229, 5,000 or 13,348 vertices
     landmark_model: LandmarkModel = DEFAULT_MODEL
+
+    def __post_init__(self) -> None:
+        # Here: landmarks are looked for before a stature is used.
+        if self.stature_m is not None:
+            check_stature(self.stature_m)
+        if self.field_of_view_deg is not None:
+            check_field_of_view(self.field_of_view_deg)
 
 
 @dataclass(frozen=True)

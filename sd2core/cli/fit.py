@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.command_parser import add_command
-from sd2core.cli.options import not_negative_float, positive_float
+from sd2core.cli.options import not_negative_float, positive_float, within
 from sd2core.cli.output import (
     picked,
     print_event,
@@ -21,6 +21,7 @@ from sd2core.cli.output import (
 )
 from sd2core.cli.running import explanation
 from sd2core.errors import Sd2Error
+from sd2core.numerics.bounds import FIELD_OF_VIEW_DEG, STATURE_M
 
 if TYPE_CHECKING:
     import numpy as np
@@ -56,12 +57,12 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         "--person-frame", _frame, "N", "the frame of that rectangle, counted from 0 (default: 0)"
     )
     parser.add_value(
-        "--stature-m", positive_float, "M", "how tall the person is, in metres (default: 1.72)"
+        "--stature-m", within(STATURE_M), "M", "how tall the person is, in metres (default: 1.72)"
     )
     text = "focal length in pixels (default: as the file says, or 56° across the longer side)"
     parser.add_value("--focal-px", positive_float, "PX", text)
     text = "instead of it, the angle across the longer side of the picture"
-    parser.add_value("--field-of-view", positive_float, "DEG", text)
+    parser.add_value("--field-of-view", within(FIELD_OF_VIEW_DEG), "DEG", text)
     text = "bridge gaps without the person up to this long; longer ones stay empty (default: 0.5)"
     parser.add_value("--max-gap-s", not_negative_float, "S", text)
     parser.add_choice(

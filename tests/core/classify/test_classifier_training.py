@@ -129,6 +129,8 @@ def test_a_trained_classifier_comes_back_from_its_file(known: ClipSet, tmp_path:
     [
         ({"steps": 0}, "steps is 0"),
         ({"learning_rate": 0.0}, "learning_rate is 0"),
+        ({"learning_rate": 2.0}, "learning_rate is 2"),
+        ({"options": {"width": 2048}}, "width is 2048"),
         ({"delay_s": -1.0}, "delay is -1"),
         ({"noisy_share": 2.0}, "noisy clips is 2"),
     ],
