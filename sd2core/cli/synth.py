@@ -102,11 +102,10 @@ def _synth(options: argparse.Namespace) -> None:
       sd2 synth walk.zarr --out map.npz --limbs    (each part of the body apart, too)
     """
     from sd2core.cli.info.description import describe_map, show
-    from sd2core.cli.reading import check_map_output, mesh_and_sensor
+    from sd2core.cli.reading import mesh_and_sensor
     from sd2core.doppler import Synthesizer
     from sd2core.mesh.decimation import decimate
 
-    check_map_output(options.out)
     if options.method == "fmcw":
         _check_fmcw(options)
     elif options.radar != "paper":

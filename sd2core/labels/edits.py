@@ -29,7 +29,6 @@ from typing import Literal
 from sd2core.errors import Sd2Error
 from sd2core.labels.free_time import (
     Frames,
-    Stretch,
     clip_to_free,
     free_parts,
     limits_of,
@@ -96,7 +95,7 @@ def resize(labels: Labels, timebase: Timebase, span_id: int, side: Side, time_s:
     """Move one edge of a span to the frame edge nearest to a time, as far as it can go."""
     frames = Frames.of(timebase)
     span = labels.span(span_id)
-    low_s, high_s = limits_of(labels, span, frames)
+    ((low_s, high_s),) = limits_of(labels, [span], frames)
     wanted_s = frames.nearest(time_s)
     if side == "start":
         latest_s = float(frames.times_s[max(frames.last_before(span.end_s), 0)])
@@ -112,7 +111,8 @@ def move(labels: Labels, timebase: Timebase, span_id: int, start_s: float) -> Ed
     """Move a span to begin at a time, keeping its duration; it stops at neighbours."""
     frames = Frames.of(timebase)
     span = labels.span(span_id)
-    place = frames.placed(start_s, span.duration_s, limits_of(labels, span, frames))
+    (limits,) = limits_of(labels, [span], frames)
+    place = frames.placed(start_s, span.duration_s, limits)
     changed = _timed(span, *(place or (span.start_s, span.end_s)), frames)
     return Edit("Move span", labels.with_spans([changed]), (span_id,))
 
@@ -125,7 +125,7 @@ def nudge(labels: Labels, timebase: Timebase, span_id: int, count: int) -> Edit:
     """
     frames = Frames.of(timebase)
     span = labels.span(span_id)
-    limits = limits_of(labels, span, frames)
+    (limits,) = limits_of(labels, [span], frames)
     count = steps_free(frames, span, limits, count)
     if count == 0:
         return Edit("Nudge span", labels, (span_id,))
@@ -272,7 +272,7 @@ def move_together(
     frames = Frames.of(timebase)
     chosen = _chosen(labels, {*ids, lead_id})
     lead = labels.span(lead_id)
-    limits = _limits_of_all(labels, chosen, frames)
+    limits = limits_of(labels, chosen, frames)
     earliest_s = max(low_s - span.start_s for span, (low_s, _) in zip(chosen, limits, strict=True))
     latest_s = min(high_s - span.end_s for span, (_, high_s) in zip(chosen, limits, strict=True))
     by_s = frames.nearest(start_s) - lead.start_s
@@ -291,7 +291,7 @@ def nudge_together(labels: Labels, timebase: Timebase, ids: Collection[int], cou
     """Move spans by some frames, each keeping their number."""
     frames = Frames.of(timebase)
     chosen = _chosen(labels, ids)
-    limits = _limits_of_all(labels, chosen, frames)
+    limits = limits_of(labels, chosen, frames)
     free = [
         steps_free(frames, span, limit, count) for span, limit in zip(chosen, limits, strict=True)
     ]
@@ -326,27 +326,6 @@ def _chosen(labels: Labels, ids: Collection[int]) -> list[Span]:
     if len(chosen) < max(len(wanted), 1):
         raise Sd2Error(f"{len(chosen)} of {len(wanted)} spans are there", "spans that exist")
     return chosen
-
-
-def _limits_of_all(labels: Labels, chosen: Sequence[Span], frames: Frames) -> list[Stretch]:
-    """Limits of each span between spans that are not moved, in one pass for thousands."""
-    low_s, high_s = frames.whole
-    moving = {span.id for span in chosen}
-    exclusive = {track.name for track in labels.tracks if track.overlap == "exclusive"}
-    lows, highs = {}, {}
-    wall = dict.fromkeys(exclusive, low_s)
-    for span in labels.spans:
-        if span.id in moving:
-            lows[span.id] = wall.get(span.track, low_s)
-        elif span.track in exclusive:
-            wall[span.track] = max(wall[span.track], span.end_s)
-    wall = dict.fromkeys(exclusive, high_s)
-    for span in reversed(labels.spans):
-        if span.id in moving:
-            highs[span.id] = wall.get(span.track, high_s)
-        elif span.track in exclusive:
-            wall[span.track] = min(wall[span.track], span.start_s)
-    return [(lows[span.id], highs[span.id]) for span in chosen]
 
 
 def _put(span: Span, start_s: float, end_s: float, frames: Frames) -> Span:

@@ -26,7 +26,7 @@ def add_train(kinds: argparse._SubParsersAction) -> None:
     """Add ``train``."""
     parser = add_command(kinds, "train", handler=_train, description=DATA_HELP)
     add_data(parser)
-    parser.add_output("FILE.safetensors", "the classifier to write")
+    parser.add_output("FILE.safetensors", "the classifier to write", ".safetensors")
     add_network(parser)
     parser.add_placements_used("range synthesis: train on", "all")
     otherwise = "(default: as the data set says, or a sixth of all)"
@@ -69,9 +69,6 @@ def _train(options: argparse.Namespace) -> int:
       sd2 classify train set.zarr --maps radar,denoised --out both.safetensors
       sd2 classify train anna=a.sd2 anna=b.sd2 ben=c.sd2 --model s4 --out own.safetensors
     """
-    from sd2core.cli.reading import check_output
-
-    check_output(options.out, ".safetensors")
     maps = asked_maps(options)
     from sd2core.classify.defaults import pace_kind
     from sd2core.classify.files import save_classifier
