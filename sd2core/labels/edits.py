@@ -70,18 +70,19 @@ def create(
     return Edit("Create span", labels.with_spans([made]), (made.id,))
 
 
-def duplicate(
-    labels: Labels, timebase: Timebase, span_id: int, start_s: float, track: str | None = None
-) -> Edit:
-    """Copy a span to another start, or to another track, clipped to free time."""
+def duplicate(labels: Labels, timebase: Timebase, ids: Collection[int], start_s: float) -> Edit:
+    """Copy spans so that the first copy begins at a time; each is clipped to free time."""
     frames = Frames.of(timebase)
-    span = labels.span(span_id)
-    track = span.track if track is None else track
-    # A recording has frames, so there is room.
-    wanted = frames.placed(start_s, span.duration_s, frames.whole) or frames.whole
-    start_s, end_s = clip_to_free(labels, track, wanted, frames)
-    made = replace(span, id=labels.next_id, track=track, start_s=start_s, end_s=end_s)
-    return Edit("Duplicate span", labels.with_spans([made]), (made.id,))
+    chosen = labels.these(ids)
+    after, made = labels, []
+    for span in chosen:
+        place_s = start_s + span.start_s - chosen[0].start_s
+        # A recording has frames, so there is room.
+        wanted = frames.placed(place_s, span.duration_s, frames.whole) or frames.whole
+        first_s, last_s = clip_to_free(after, span.track, wanted, frames)
+        made.append(replace(span, id=after.next_id, start_s=first_s, end_s=last_s))
+        after = after.with_spans(made[-1:])
+    return Edit(_name("Duplicate", chosen), after, tuple(span.id for span in made))
 
 
 def delete(labels: Labels, ids: Iterable[int]) -> Edit:
@@ -117,24 +118,31 @@ def move(labels: Labels, timebase: Timebase, span_id: int, start_s: float) -> Ed
     return Edit("Move span", labels.with_spans([changed]), (span_id,))
 
 
-def nudge(labels: Labels, timebase: Timebase, span_id: int, count: int) -> Edit:
-    """Move a span by some frames, keeping their number; it stops at neighbours.
+def nudge(labels: Labels, timebase: Timebase, ids: Collection[int], count: int) -> Edit:
+    """Move spans by some frames, each keeping their number; they stop at neighbours.
 
-    Where frames are not evenly spaced its duration changes, and a step back restores it. A
-    span between frames goes to them with the first step.
+    Where frames are not evenly spaced durations change, and a step back restores them. A span
+    between frames, moved by itself, goes to them with the first step.
     """
     frames = Frames.of(timebase)
-    span = labels.span(span_id)
-    (limits,) = limits_of(labels, [span], frames)
-    count = steps_free(frames, span, limits, count)
+    chosen = labels.these(ids)
+    limits = limits_of(labels, chosen, frames)
+    free = [
+        steps_free(frames, span, limit, count) for span, limit in zip(chosen, limits, strict=True)
+    ]
+    count = min(free, key=abs)
+    ids = tuple(span.id for span in chosen)
     if count == 0:
-        return Edit("Nudge span", labels, (span_id,))
-    start_s, end_s = (frames.stepped(time_s, count) for time_s in (span.start_s, span.end_s))
-    if not frames.held(start_s, end_s):  # one that lay between two frames
-        start_s, end_s = frames.stretch(start_s, start_s)
-        end_s = min(end_s, limits[1])
-    changed = _timed(span, start_s, end_s, frames)
-    return Edit("Nudge span", labels.with_spans([changed]), (span_id,))
+        return Edit(_name("Nudge", chosen), labels, ids)
+    alone = len(chosen) == 1
+    moved = []
+    for span, (_, high_s) in zip(chosen, limits, strict=True):
+        start_s, end_s = frames.stepped(span.start_s, count), frames.stepped(span.end_s, count)
+        if alone and not frames.held(start_s, end_s):
+            start_s, end_s = frames.stretch(start_s, start_s)
+            end_s = min(end_s, high_s)
+        moved.append((_timed if alone else _put)(span, start_s, end_s, frames))
+    return Edit(_name("Nudge", chosen), labels.with_spans(moved), ids)
 
 
 def split(labels: Labels, timebase: Timebase, span_id: int, time_s: float) -> Edit:
@@ -270,7 +278,7 @@ def move_together(
 ) -> Edit:
     """Move spans so that one of them, the dragged one, begins at a time."""
     frames = Frames.of(timebase)
-    chosen = _chosen(labels, {*ids, lead_id})
+    chosen = labels.these({*ids, lead_id})
     lead = labels.span(lead_id)
     limits = limits_of(labels, chosen, frames)
     earliest_s = max(low_s - span.start_s for span, (low_s, _) in zip(chosen, limits, strict=True))
@@ -285,47 +293,6 @@ def move_together(
     if by_s == 0.0:
         moved = chosen
     return Edit(_name("Move", moved), labels.with_spans(moved), tuple(one.id for one in moved))
-
-
-def nudge_together(labels: Labels, timebase: Timebase, ids: Collection[int], count: int) -> Edit:
-    """Move spans by some frames, each keeping their number."""
-    frames = Frames.of(timebase)
-    chosen = _chosen(labels, ids)
-    limits = limits_of(labels, chosen, frames)
-    free = [
-        steps_free(frames, span, limit, count) for span, limit in zip(chosen, limits, strict=True)
-    ]
-    count = min(free, key=abs)
-    moved = chosen
-    if count:
-        moved = []
-        for span in chosen:
-            start_s, end_s = frames.stepped(span.start_s, count), frames.stepped(span.end_s, count)
-            moved.append(_put(span, start_s, end_s, frames))
-    return Edit(_name("Nudge", moved), labels.with_spans(moved), tuple(one.id for one in moved))
-
-
-def duplicate_together(
-    labels: Labels, timebase: Timebase, ids: Collection[int], start_s: float
-) -> Edit:
-    """Copy spans so that the first copy begins at a time; each is clipped to free time."""
-    chosen = _chosen(labels, ids)
-    after = labels
-    made: list[int] = []
-    for span in chosen:
-        place_s = start_s + span.start_s - chosen[0].start_s
-        edit = duplicate(after, timebase, span.id, place_s)
-        after = edit.labels
-        made += edit.ids
-    return Edit(_name("Duplicate", chosen), after, tuple(made))
-
-
-def _chosen(labels: Labels, ids: Collection[int]) -> list[Span]:
-    wanted = set(ids)
-    chosen = [span for span in labels.spans if span.id in wanted]
-    if len(chosen) < max(len(wanted), 1):
-        raise Sd2Error(f"{len(chosen)} of {len(wanted)} spans are there", "spans that exist")
-    return chosen
 
 
 def _put(span: Span, start_s: float, end_s: float, frames: Frames) -> Span:

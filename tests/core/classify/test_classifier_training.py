@@ -87,7 +87,7 @@ def test_the_best_is_kept_where_it_is_stopped(known: ClipSet) -> None:
 
 
 def test_without_a_better_one_it_ends_early(known: ClipSet) -> None:
-    still = replace(SHORT, steps=400, check_steps=2, patience=3, learning_rate=1e-9)
+    still = replace(SHORT, steps=400, check_steps=2, patience=3, learning_rate=1e-8)
     made = train(known.clips[:8], known.clips[8:], known, still)
     assert max(one.get("step", 0) for one in made.events) == 8
 
