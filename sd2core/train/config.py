@@ -11,15 +11,8 @@ from sd2core.errors import Sd2Error
 from sd2core.files.paths import located_path
 from sd2core.files.texts import errors_in, read_toml
 from sd2core.files.toml import toml_lines
-from sd2core.numerics.bounds import (
-    BATCH_SIZE,
-    EPOCHS,
-    LEARNING_RATE,
-    PATIENCE_EPOCHS,
-    RANGE_FACTOR,
-    SEED,
-    Bounds,
-)
+from sd2core.numerics import bounds
+from sd2core.numerics.bounds import Bounds
 from sd2core.pairs.segments import LENGTH, OVERLAP
 from sd2core.runs.pace import Kind
 
@@ -32,13 +25,13 @@ def refused(key: str, value: Any, allowed: str) -> Sd2Error:
     return Sd2Error(f"{key} is {value!r}", allowed)
 
 
-def number(bounds: Bounds) -> Rule:
+def number(within: Bounds) -> Rule:
     """Rule for a number within bounds."""
 
     def rule(key: str, value: Any) -> Any:
-        if not isinstance(value, int | float) or isinstance(value, bool) or value not in bounds:
-            raise refused(key, value, bounds.words)
-        return int(value) if bounds.whole else float(value)
+        if not isinstance(value, int | float) or isinstance(value, bool) or value not in within:
+            raise refused(key, value, within.words)
+        return int(value) if within.whole else float(value)
 
     return rule
 
@@ -120,7 +113,7 @@ class DataConfig:
     segments: str = _setting(choice("shifted", "fixed"), "shifted")
     # Range synthesis: scale input and target together as if the person were up to this many
     # times nearer or farther; 1 is off.
-    range_factor: float = _setting(RANGE_FACTOR, 1.0)
+    range_factor: float = _setting(bounds.RANGE_FACTOR, 1.0)
 
     def __post_init__(self) -> None:
         _check(self, "data")
@@ -153,26 +146,26 @@ class ModelConfig:
 class TrainingConfig:
     """Optimisation settings."""
 
-    batch_size: int = _setting(BATCH_SIZE, 64)  # Segments per step.
-    epochs: int = _setting(EPOCHS, 500)  # Passes over all segments.
+    batch_size: int = _setting(bounds.BATCH_SIZE, 64)  # Segments per step.
+    epochs: int = _setting(bounds.EPOCHS, 500)  # Passes over all segments.
     # Instead of a number of epochs; the learning rate follows the clock.
     minutes: float | None = _setting(Bounds(0.001, 1e5), None)
-    learning_rate: float = _setting(LEARNING_RATE, 3e-3)  # At its highest.
+    learning_rate: float = _setting(bounds.LEARNING_RATE, 3e-3)  # At its highest.
     # The same for the parameters of the state space, which never decay.
-    ssm_learning_rate: float = _setting(LEARNING_RATE, 1e-3)
+    ssm_learning_rate: float = _setting(bounds.LEARNING_RATE, 1e-3)
     weight_decay: float = _setting(Bounds(0.0, 1.0), 0.01)  # Of AdamW, on matrices only.
     warm_up: float = _setting(Bounds(0.0, 0.5), 0.03)  # Share of the run in which the rate rises.
     final_rate: float = _setting(Bounds(0.0, 1.0), 0.01)  # Share of the rate at the end.
     clip_norm: float = _setting(Bounds(0.0, 1e6), 1.0)  # Gradients are clipped to it; 0 is off.
     # End after so many epochs without a better one; 0: never.
-    early_stopping_epochs: int = _setting(PATIENCE_EPOCHS, 100)
+    early_stopping_epochs: int = _setting(bounds.PATIENCE_EPOCHS, 100)
     # Rare velocities and weak takes count more, see :func:`sd2core.train.data.frame_weights`.
     balanced: bool = _setting(flag, False)
     # Of the errors of a frame's mean and peak velocity, in 1 / (m/s), beside that of the map.
     velocity_weight: float = _setting(Bounds(0.0, 100.0), 0.0)
     # The best epoch is that of the lowest validation error of this kind.
     select_by: str = _setting(choice("rmse", "mae"), "rmse")
-    seed: int = _setting(SEED, 0)  # Of weights, order and dropout.
+    seed: int = _setting(bounds.SEED, 0)  # Of weights, order and dropout.
     checkpoint_s: float = _setting(Bounds(0.0, 86_400.0), 30.0)  # Between checkpoints, at most.
 
     def __post_init__(self) -> None:
