@@ -125,6 +125,10 @@ class Timebase:
             raise IndexError(f"frame {frame} of {len(self)}")
         return float(self.times_s[frame])
 
+    def end_of(self, frame: int) -> float:
+        """End of ``frame``, which must exist: the time of the next, or the end of all."""
+        return self.end_s if frame + 1 == len(self) else self.time_of(frame + 1)
+
     def frames_between(self, start_s: float, end_s: float) -> tuple[int, int]:
         """Half-open range of frames on screen during ``[start_s, end_s)``."""
         if end_s <= start_s or end_s <= self.start_s or start_s >= self.end_s:

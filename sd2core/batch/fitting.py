@@ -7,12 +7,16 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from pydantic import TypeAdapter
+
 from sd2core.batch.inputs import MeshInput, mesh_input_of
 from sd2core.batch.plan import Fit
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.texts import read_json
 from sd2core.progress import silent
+
+_FACTS = TypeAdapter(MeshInput)
 
 
 def fit_choices(fit: Fit, subject: str, focal_px: float | None) -> dict[str, Any]:
@@ -56,8 +60,7 @@ def facts_path(mesh: Path) -> Path:
 def fitted(mesh: Path) -> MeshInput | None:
     """Return a fitted mesh; None while it is missing or incomplete."""
     try:
-        content = read_json(facts_path(mesh))
-        facts = MeshInput(**{**content, "target_m": tuple(content["target_m"])})
-        return facts if mesh.exists() else None
-    except (Sd2Error, ValueError, KeyError, TypeError):
+        facts = _FACTS.validate_python(read_json(facts_path(mesh)))
+    except (Sd2Error, ValueError):
         return None
+    return facts if mesh.exists() else None

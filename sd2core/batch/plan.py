@@ -33,6 +33,7 @@ from sd2core.doppler.options import (
 )
 from sd2core.errors import Sd2Error
 from sd2core.maps import MapKind
+from sd2core.numerics.bounds import FIELD_OF_VIEW_DEG, STATURE_M
 from sd2core.pairs.segments import LENGTH, OVERLAP
 from sd2core.placements.placements import Placements, placements_from_dict
 from sd2core.sensor import Vector, VirtualSensor
@@ -47,6 +48,8 @@ STEPS: tuple[Step, ...] = get_args(Step)
 
 Text = Annotated[str, StringConstraints(pattern=r"\S")]
 Positive = Annotated[FiniteFloat, Field(gt=0)]
+Stature = Annotated[FiniteFloat, Field(ge=STATURE_M.low, le=STATURE_M.high)]
+Angle = Annotated[FiniteFloat, Field(ge=FIELD_OF_VIEW_DEG.low, le=FIELD_OF_VIEW_DEG.high)]
 Share = Annotated[FiniteFloat, Field(gt=0, le=1)]
 NotNegative = Annotated[FiniteFloat, Field(ge=0)]
 
@@ -75,10 +78,10 @@ class Fit(Section):
     """Section ``[fit]``: options of ``sd2 fit`` for videos without a mesh."""
 
     resolution: Resolution = "medium"
-    stature_m: Positive | None = None  # of subjects not in stature_of
-    stature_of: Mapping[Text, Positive] = Field(default_factory=dict)  # subject to metres
+    stature_m: Stature | None = None  # of subjects not in stature_of
+    stature_of: Mapping[Text, Stature] = Field(default_factory=dict)  # subject to metres
     focal_px: Positive | None = None
-    field_of_view_deg: Positive | None = None
+    field_of_view_deg: Angle | None = None
     max_gap_s: NotNegative | None = None  # longest gap that is bridged
     models: Text | None = None  # folder of the landmark models
 

@@ -14,7 +14,7 @@ from sd2core.batch.plan import STEPS, BatchPlan
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.paths import is_absolute, located_path, stored_path
-from sd2core.files.texts import parse_toml, read_text
+from sd2core.files.texts import UNKNOWN_KEY, parse_toml, read_text
 from sd2core.files.toml import toml_lines
 from sd2core.radar_profiles import RADARS
 
@@ -118,7 +118,7 @@ def _in_words(error: ValidationError, text: str, source: str) -> Sd2Error:
     name, kind = ".".join(keys), first["type"]
     if kind == "missing":
         return Sd2Error(f"{where}: {name} is missing", "it in the plan", _HINT)
-    if kind == "extra_forbidden":
+    if kind in UNKNOWN_KEY:
         return Sd2Error(f"{where}: {name} is not known", "a key that a plan may hold", _HINT)
     message = first["msg"].removeprefix("Value error, ")
     if kind == "value_error":

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.io.video import VideoReader
+from sd2core.numerics.bounds import FIELD_OF_VIEW_DEG
 
 DEFAULT_FIELD_OF_VIEW_DEG = 2.0 * math.degrees(math.atan(320.0 / 600.0))
 """Across the longer side, where neither file nor user says: 56°, a webcam's or phone's."""
@@ -88,17 +89,23 @@ def camera_of(
     if focal_px is not None:
         return PinholeCamera(*size, float(focal_px)), "user"
     if field_of_view_deg is not None:
-        if not 1.0 <= field_of_view_deg <= 170.0:
-            raise Sd2Error(
-                f"The field of view is {field_of_view_deg:g}°",
-                "1° to 170°, across the longer side of the picture",
-            )
+        check_field_of_view(field_of_view_deg)
         half = math.radians(field_of_view_deg) / 2.0
         return PinholeCamera(*size, max(size) / 2.0 / math.tan(half)), "user"
     written = written_focal_mm(video.metadata)
     if written is not None:
         return PinholeCamera(*size, written * math.hypot(*size) / _DIAGONAL_35MM), "metadata"
     return PinholeCamera.default(*size), "default"
+
+
+def check_field_of_view(angle_deg: float) -> None:
+    """Refuse an angle that no camera has; Sd2Error."""
+    if angle_deg not in FIELD_OF_VIEW_DEG:
+        raise Sd2Error(
+            f"The field of view is {angle_deg:g}°",
+            f"{FIELD_OF_VIEW_DEG.low:g}° to {FIELD_OF_VIEW_DEG.high:g}°, across the longer side of"
+            " the picture",
+        )
 
 
 def written_focal_mm(metadata: Mapping[str, str]) -> float | None:

@@ -18,7 +18,7 @@ from sd2core.body.lifter import Lifted, LiftedInParts, Lifter
 from sd2core.body.limbs import LIMBS
 from sd2core.body.rig import KeypointSpace, Rig
 from sd2core.body.rotations import Floats
-from sd2core.body.shape import DEFAULT_STATURE_M, BodyShape, ShapeSpace
+from sd2core.body.shape import DEFAULT_STATURE_M, BodyShape, ShapeSpace, check_stature
 from sd2core.body.shaping import shape_of_lengths, shape_of_outlines
 from sd2core.body.solve import ROUNDS, solve, solve_stills
 from sd2core.body.track import LANDMARKS, PART_FRAMES, Landmarks, parts
@@ -27,8 +27,6 @@ from sd2core.progress import Progress, silent
 
 Lift = Callable[[Landmarks, PinholeCamera], Lifted]
 
-
-STATURES_M = (0.5, 2.6)
 
 _SEEN = 0.5
 """Sight from which on a landmark counts as seen."""
@@ -103,11 +101,7 @@ class Fitting:
         workspace: Path | None,
     ) -> None:
         stature_m = DEFAULT_STATURE_M if stature_m is None else stature_m
-        if not STATURES_M[0] <= stature_m <= STATURES_M[1]:
-            raise Sd2Error(
-                f"a body height of {stature_m} m",
-                f"metres, from {STATURES_M[0]} to {STATURES_M[1]}",
-            )
+        check_stature(stature_m)
         if not track.present.any():
             raise Sd2Error("No frame of the video shows a person", "at least one")
         self._track, self._camera, self._stature_m = track, camera, stature_m

@@ -14,9 +14,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from sd2core.body.camera import PinholeCamera, Source, camera_of
+from sd2core.body.camera import PinholeCamera, Source, camera_of, check_field_of_view
 from sd2core.body.fit import fit_motion
 from sd2core.body.fitted import FittedMotion
 from sd2core.body.landmark_files import save_track
@@ -25,7 +24,7 @@ from sd2core.body.landmarks import DEFAULT_MAX_GAP_S, SIGHTINGS, OnFrame, find_l
 from sd2core.body.limbs import LIMB_LANDMARKS, LIMBS
 from sd2core.body.model import Resolution
 from sd2core.body.person_selection import Rectangle
-from sd2core.body.shape import DEFAULT_STATURE_M
+from sd2core.body.shape import DEFAULT_STATURE_M, check_stature
 from sd2core.body.solve import one_thread
 from sd2core.body.track import LANDMARK, Landmarks, parts
 from sd2core.errors import Sd2Error
@@ -74,6 +73,13 @@ class FitChoices:
     resolution: Resolution = "medium"  # mesh of 1,229, 5,000 or 13,348 vertices
     landmark_model: LandmarkModel = DEFAULT_MODEL
 
+    def __post_init__(self) -> None:
+        # Here: landmarks are looked for before a stature is used.
+        if self.stature_m is not None:
+            check_stature(self.stature_m)
+        if self.field_of_view_deg is not None:
+            check_field_of_view(self.field_of_view_deg)
+
 
 @dataclass(frozen=True)
 class FitReport:
@@ -82,7 +88,7 @@ class FitReport:
     progress_of: Callable[[Stage], Progress]  # gives the progress callback of a stage that begins
     started: Callable[[VideoReader, bool], None]
     """Called with the open video, and True if a stopped run is continued."""
-    on_frame: Callable[[Stage, int, NDArray[np.float32], NDArray[np.float32]], None]
+    on_frame: OnFrame
     """Called with a stage, a frame's number, landmarks in pixels (33, 2) and visibility (33,)."""
 
 
@@ -144,15 +150,13 @@ def fit_video(
         )
         with claim_folder(partial, restart), remove_without_landmarks(partial), one_thread():
             report.started(video, (partial / LANDMARKS).is_dir())
-            stages = _Stages(report)
             track = find_landmarks(
                 video,
                 found_models,
                 person=choices.person,
                 max_gap_s=choices.max_gap_s,
-                progress=stages.progress,
-                on_stage=stages.begin,
-                on_frame=stages.on_frame,
+                progress_of=report.progress_of,
+                on_frame=report.on_frame,
                 workspace=partial / LANDMARKS,
             )
             video.close()
@@ -224,27 +228,6 @@ def provenance(made: FittedVideo, path: Path, choices: FitChoices) -> dict[str, 
         "notes": list(made.notes),
         "doubts": list(made.doubts),
     }
-
-
-class _Stages:
-    """Hands the reports of the landmark search to the stage that runs."""
-
-    def __init__(self, report: FitReport) -> None:
-        self._report = report
-        self._stage: Stage = "find"
-        self._progress: Progress = report.progress_of("find")
-
-    def begin(self, stage: str) -> None:
-        if stage == "refine":
-            self._stage = "refine"
-            self._progress = self._report.progress_of("refine")
-
-    def progress(self, done: int, total: int) -> None:
-        self._progress(done, total)
-
-    @property
-    def on_frame(self) -> OnFrame:
-        return lambda frame, points, seen: self._report.on_frame(self._stage, frame, points, seen)
 
 
 def _fit_folder(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +23,9 @@ from sd2core.io.video import VideoReader
 from sd2core.numerics.compiled import worker_count
 from sd2core.progress import Progress, silent
 
-OnFrame = Callable[[int, NDArray[np.float32], NDArray[np.float32]], None]
-"""``on_frame(frame, image_px (33, 2), visibility (33,))``."""
+Pass = Literal["find", "refine"]
+OnFrame = Callable[[Pass, int, NDArray[np.float32], NDArray[np.float32]], None]
+"""``on_frame(pass, frame, image_px (33, 2), visibility (33,))``."""
 
 DEFAULT_MAX_GAP_S = 0.5
 DEFAULT_SILHOUETTES = 24
@@ -44,8 +46,7 @@ def find_landmarks(
     max_gap_s: float = DEFAULT_MAX_GAP_S,
     silhouettes: int | None = DEFAULT_SILHOUETTES,
     threads: int | None = None,
-    progress: Progress = silent,
-    on_stage: Callable[[str], None] | None = None,
+    progress_of: Callable[[Pass], Progress] = lambda _: silent,
     on_frame: OnFrame | None = None,
     workspace: Path | None = None,
 ) -> TrackInParts:
@@ -67,12 +68,10 @@ def find_landmarks(
         Number of frames, evenly spread, whose mask is kept; None for all.
     threads : int, optional
         All cores (up to 8) unless given.
-    progress : callable
-        Counts the frames of each stage; may raise ``Cancelled``.
-    on_stage : callable, optional
-        Called with ``"find"`` and ``"refine"`` when that stage begins.
+    progress_of : callable
+        Gives what counts the frames of a pass that begins; that may raise ``Cancelled``.
     on_frame : callable, optional
-        Called with the findings of each stage in a frame.
+        Called with the findings of each pass in a frame.
     workspace : Path, optional
         Folder from which a stopped search can go on. Results of another video or other options
         in it are not used. Without it the track is in memory.
@@ -91,11 +90,10 @@ def find_landmarks(
     if threads is None:
         threads = min(worker_count(), _MOST_THREADS)
     store = SearchStore(workspace, video, person, silhouettes, models.name)
-    begin = on_stage or (lambda stage: None)
-    begin("find")
-    sightings = _found(video, models, person, threads, progress, on_frame, store)
-    begin("refine")
-    refined = _refined(video, models, sightings, silhouettes, threads, progress, on_frame, store)
+    finding = progress_of("find")
+    sightings = _found(video, models, person, threads, finding, on_frame, store)
+    refining = progress_of("refine")
+    refined = _refined(video, models, sightings, silhouettes, threads, refining, on_frame, store)
     if not refined.confidence.any():
         raise Sd2Error(
             f"No person could be followed through {video.path}",
@@ -145,7 +143,7 @@ def _found(
 
     def seen(frame: int, pose: Pose | None) -> None:
         done, total = search.done
-        _show(frame, pose, on_frame)
+        _show("find", frame, pose, on_frame)
         if done % _SAVE_EVERY == 0 and done < total and search.settled:
             store.write("search.npz", search.state())
         progress(round(done * len(video) / total), len(video))
@@ -171,7 +169,7 @@ def _refined(
     kept = _spread(np.flatnonzero(np.isfinite(path[:, 0])), silhouettes)
 
     def seen(frame: int, pose: Pose | None) -> None:
-        _show(frame, pose, on_frame)
+        _show("refine", frame, pose, on_frame)
         progress(frame + 1, frames)
 
     refined = RefinedStretches(store, video, _STRETCH_FRAMES)
@@ -194,7 +192,7 @@ def _spread(frames: NDArray[np.intp], count: int | None) -> frozenset[int]:
     return frozenset(frames[rows].tolist())
 
 
-def _show(frame: int, pose: Pose | None, on_frame: OnFrame | None) -> None:
+def _show(which: Pass, frame: int, pose: Pose | None, on_frame: OnFrame | None) -> None:
     if pose is not None and on_frame is not None:
-        visibility = pose.visibility * pose.presence
-        on_frame(frame, pose.image_px[:33].astype(np.float32), visibility.astype(np.float32))
+        visibility = (pose.visibility * pose.presence).astype(np.float32)
+        on_frame(which, frame, pose.image_px[:33].astype(np.float32), visibility)

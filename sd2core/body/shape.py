@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from sd2core.body.model import Body, Resolution, Skeleton, load_skeleton, read_body_arrays
 from sd2core.errors import Sd2Error
+from sd2core.numerics.bounds import STATURE_M
 
 DEFAULT_STATURE_M = 1.72
 """Body height if none is given; distances and speeds scale with it."""
@@ -27,6 +28,15 @@ class BodyShape:
 
     coefficients: Floats  # (K,) along ShapeSpace's directions; all 0 is the bundled body
     stature_m: float  # standing height, without shoes
+
+
+def check_stature(stature_m: float) -> None:
+    """Refuse a height that no person has; Sd2Error."""
+    if stature_m not in STATURE_M:
+        raise Sd2Error(
+            f"The body height is {stature_m:g} m",
+            f"metres, {STATURE_M.low:g} to {STATURE_M.high:g}",
+        )
 
 
 class ShapeSpace:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.classify.defaults import LONGEST_DELAY_S
+from sd2core.classify.defaults import DELAYS_S
 from sd2core.classify.features import Features
 from sd2core.errors import Sd2Error
 from sd2core.files.texts import damage_in
@@ -50,9 +50,9 @@ class ClassifierCard:
             )
         for name in self.classes:
             check_name(name, "class")
-        if not 0 <= self.delay_s <= LONGEST_DELAY_S:
+        if self.delay_s not in DELAYS_S:
             raise Sd2Error(
-                f"The classifier answers {self.delay_s:g} s late", f"0 to {LONGEST_DELAY_S:g} s"
+                f"The classifier answers {self.delay_s:g} s late", f"0 to {DELAYS_S.high:g} s"
             )
 
     @property

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from sd2core.numerics.bounds import Bounds
+
 if TYPE_CHECKING:
     from sd2core.runs.pace import Kind
 
@@ -13,10 +15,13 @@ MODELS = ("lstm", "s4", "kernel")
 WIDTH = 32
 """Units or channels of every layer (the paper's: 16)."""
 
+WIDTHS = Bounds(1, 1024, whole=True)
+
 DELAY_S = 0.5
 """Frames of so many seconds after a frame are seen before its answer (the paper's: none)."""
 
 LONGEST_DELAY_S = 5.0
+DELAYS_S = Bounds(0.0, LONGEST_DELAY_S)
 
 
 def pace_kind(model: str, features: str, width: int) -> Kind:

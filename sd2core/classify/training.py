@@ -17,12 +17,13 @@ from torch.nn import functional
 
 from sd2core.classify.card import ClassifierCard
 from sd2core.classify.data import UNKNOWN, Clip, ClipSet, frame_counts, some_noisy
-from sd2core.classify.defaults import DELAY_S, LONGEST_DELAY_S
+from sd2core.classify.defaults import DELAY_S, DELAYS_S, WIDTH, WIDTHS
 from sd2core.classify.features import Features, Kind
 from sd2core.classify.live import TrainedClassifier
 from sd2core.classify.metrics import confusion_of, mean_recall
 from sd2core.classify.models import Classifier, build, options, parameter_groups
 from sd2core.errors import Sd2Error
+from sd2core.numerics.bounds import LEARNING_RATE, STEPS
 
 Watch = Callable[[dict[str, Any]], None]
 """Told every event; may raise ``KeyboardInterrupt`` to stop with the best so far."""
@@ -53,17 +54,22 @@ class TrainOptions:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for name in ("steps", "batch", "window_frames", "piece_frames", "check_steps", "patience"):
+        if self.steps not in STEPS:
+            raise Sd2Error(f"steps is {self.steps}", STEPS.words)
+        width = self.options.get("width", WIDTH)
+        if width not in WIDTHS:
+            raise Sd2Error(f"width is {width}", WIDTHS.words)
+        for name in ("batch", "window_frames", "piece_frames", "check_steps", "patience"):
             if getattr(self, name) < 1:
                 raise Sd2Error(f"{name} is {getattr(self, name)}", "at least 1")
         for name in ("learning_rate", "ssm_learning_rate"):
             value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
-                raise Sd2Error(f"{name} is {value}", "a finite number above 0")
+            if value not in LEARNING_RATE:
+                raise Sd2Error(f"{name} is {value}", LEARNING_RATE.words)
         if not 0 <= self.noisy_share <= 1:
             raise Sd2Error(f"The share of noisy clips is {self.noisy_share}", "0 to 1")
-        if not 0 <= self.delay_s <= LONGEST_DELAY_S:
-            raise Sd2Error(f"The delay is {self.delay_s} s", f"0 to {LONGEST_DELAY_S:g} s")
+        if self.delay_s not in DELAYS_S:
+            raise Sd2Error(f"The delay is {self.delay_s} s", f"0 to {DELAYS_S.high:g} s")
 
     def to_json(self) -> dict[str, Any]:
         """Return the fields by name, with all options of the model."""

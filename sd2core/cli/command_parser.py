@@ -19,6 +19,7 @@ from sd2core.cli.options import (
     positive_int,
 )
 from sd2core.errors import Sd2Error
+from sd2core.files.figure_files import SUFFIXES as FIGURES
 
 
 class UsageError(Sd2Error):
@@ -94,16 +95,33 @@ class Options(argparse._ActionsContainer):
         self.add_sensor()
 
     def add_output(
-        self, metavar: str, text: str, *, required: bool = True, goes_on: bool = False
+        self,
+        metavar: str,
+        text: str,
+        *endings: str,
+        required: bool = True,
+        goes_on: bool = False,
     ) -> None:
         """Add ``--out``, and ``--overwrite`` unless the command goes on with what is there."""
-        self.add_argument("--out", type=Path, required=required, metavar=metavar, help=text)
+        self.add_file("--out", metavar, text, *endings, required=required)
         if not goes_on:
             self.add_overwrite()
 
+    def add_file(
+        self, name: str, metavar: str, text: str, *endings: str, required: bool = False
+    ) -> None:
+        """Add a file to write.
+
+        That it can be, and that its name has one of the endings, is seen to before the command
+        begins (:func:`~sd2core.cli.output_folders.output_folders`).
+        """
+        file = self.add_argument(name, type=Path, required=required, metavar=metavar, help=text)
+        self.set_defaults(**{f"{file.dest}_endings": endings})
+
     def add_figure_output(self, drawn: str) -> None:
         """Add ``--figure``."""
-        self.add_value("--figure", Path, "FILE", f"draw {drawn}, as .png, .svg or .pdf")
+        text = f"draw {drawn}, as .png, .svg or .pdf"
+        self.add_file("--figure", "FILE", text, *FIGURES)
         self.add_overwrite()
 
     def add_overwrite(self) -> None:
@@ -114,8 +132,9 @@ class Options(argparse._ActionsContainer):
             self.add_argument("--overwrite", "--replace", action="store_true", help=text)
 
     def add_map_output(self, *, required: bool = True) -> None:
-        """Add ``--out`` for a Doppler map."""
-        self.add_output("FILE.npz", "the map to write", required=required)
+        """Add ``--out`` for a Doppler map, which replaces nothing but another one."""
+        self.add_output("FILE.npz", "the map to write", ".npz", required=required)
+        self.set_defaults(writes_map=True)
 
     def add_sensor(self) -> None:
         """Add ``--sensor``."""

@@ -52,14 +52,11 @@ def _compare(options: argparse.Namespace) -> None:
       sd2 compare-meshes fitted.zarr vibe_output.pkl --image-size 640x480
       sd2 compare-meshes ours.zarr wham.pkl --names ours,WHAM --figure both.svg
     """
-    from sd2core.cli.reading import check_output
     from sd2core.compare.figure import draw_comparison
     from sd2core.compare.meshes import compare_meshes
-    from sd2core.files.figure_files import SUFFIXES, save_figure
+    from sd2core.files.figure_files import save_figure
     from sd2core.sensor import VirtualSensor
 
-    if options.figure is not None:
-        check_output(options.figure, *SUFFIXES)
     labels = _labels(options)
     reference = 0
     if options.reference is not None:

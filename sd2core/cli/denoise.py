@@ -36,13 +36,11 @@ def _denoise(options: argparse.Namespace) -> None:
     """
     from sd2core.cli.info.description import describe_map, show
     from sd2core.cli.info.model import model_words
-    from sd2core.cli.reading import check_map_output
     from sd2core.denoise.files import default_name, describe_model, find_model, load_model
     from sd2core.denoise.resample_to_model import check_map
     from sd2core.io.kinds import kind_of
     from sd2core.maps import DopplerMap
 
-    check_map_output(options.out)
     kind = kind_of(options.map)
     if kind != "map":
         makes_one = f"Make one: `sd2 synth {options.map} --out map.npz`"

@@ -21,7 +21,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     parser.add_value("models", str, "MODEL", text, nargs="+")
     parser.add_value("--data", Path, "PAIRS", "stores of pairs", nargs="+", required=True)
     add_judging(parser, "those that the first model's run kept for the test, or all", "the errors")
-    parser.add_value("--markdown", Path, "FILE.md", "write the tables")
+    parser.add_file("--markdown", "FILE.md", "write the tables", ".md")
 
 
 def add_judging(parser: Options, usual_subjects: str, drawn: str) -> None:
@@ -54,14 +54,8 @@ def _eval(options: argparse.Namespace) -> None:
       sd2 eval denoiser --data mars.zarr --subjects subject4 --json
       sd2 eval runs/s4 runs/unet --data campaign.zarr --figure scores.png
     """
-    from sd2core.cli.reading import check_output
     from sd2core.files.atomic import atomic_write_text
-    from sd2core.files.figure_files import check_figure, save_figure
-
-    if options.figure is not None:
-        check_figure(options.figure)
-    if options.markdown is not None:
-        check_output(options.markdown, ".md")
+    from sd2core.files.figure_files import save_figure
     from sd2core.train.data import read_mixed
     from sd2core.train.evaluation import evaluate
     from sd2core.train.evaluation_text import as_markdown, as_text, draw

@@ -30,7 +30,6 @@ from sd2core.cli.output import (
     progress_bar,
     progress_events,
 )
-from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
     from sd2core.datasets.forecast import Forecast
@@ -129,16 +128,6 @@ def _export(options: argparse.Namespace) -> int:
       sd2 export campaign.zarr --kinds denoised,simulated --out campaign-set.zarr
       sd2 export recordings/ --out set.zarr --dry-run
     """
-    try:
-        return _exported(options)
-    except Sd2Error as error:
-        if not options.progress_json:
-            raise
-        print_event("error", text=str(error))
-        return 1
-
-
-def _exported(options: argparse.Namespace) -> int:
     from sd2core.datasets.layout import format_of
     from sd2core.datasets.sources import gather
 

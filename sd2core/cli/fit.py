@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.command_parser import add_command
-from sd2core.cli.options import not_negative_float, positive_float
+from sd2core.cli.options import not_negative_float, positive_float, within
 from sd2core.cli.output import (
     picked,
     print_event,
@@ -19,8 +19,8 @@ from sd2core.cli.output import (
     progress_bar,
     progress_events,
 )
-from sd2core.cli.running import explanation
 from sd2core.errors import Sd2Error
+from sd2core.numerics.bounds import FIELD_OF_VIEW_DEG, STATURE_M
 
 if TYPE_CHECKING:
     import numpy as np
@@ -56,12 +56,12 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         "--person-frame", _frame, "N", "the frame of that rectangle, counted from 0 (default: 0)"
     )
     parser.add_value(
-        "--stature-m", positive_float, "M", "how tall the person is, in metres (default: 1.72)"
+        "--stature-m", within(STATURE_M), "M", "how tall the person is, in metres (default: 1.72)"
     )
     text = "focal length in pixels (default: as the file says, or 56° across the longer side)"
     parser.add_value("--focal-px", positive_float, "PX", text)
     text = "instead of it, the angle across the longer side of the picture"
-    parser.add_value("--field-of-view", positive_float, "DEG", text)
+    parser.add_value("--field-of-view", within(FIELD_OF_VIEW_DEG), "DEG", text)
     text = "bridge gaps without the person up to this long; longer ones stay empty (default: 0.5)"
     parser.add_value("--max-gap-s", not_negative_float, "S", text)
     parser.add_choice(
@@ -74,7 +74,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
         "heavy",
     )
     parser.add_value("--models", Path, "FOLDER", "a folder with the landmark models")
-    parser.add_value("--landmarks", Path, "FILE", "keep the landmarks as well (.npz)")
+    parser.add_file("--landmarks", "FILE", "keep the landmarks as well (.npz)", ".npz")
     parser.add_flag("--restart", "start from the beginning, not where a stopped run ended")
     parser.add_json_and_progress()
 
@@ -112,23 +112,10 @@ def _fit(options: argparse.Namespace) -> None:
       sd2 fit two.mp4 --out left.zarr --person-box 40,60,180,400 --person-frame 12
       sd2 fit walk.mp4 --out walk.npz --field-of-view 68 --resolution low
     """
-    try:
-        _make(options)
-    except Exception as error:
-        if options.progress_json:
-            print_event("error", text=str(explanation(error)))
-        raise
-
-
-def _make(options: argparse.Namespace) -> None:
     if options.person_frame is not None and options.person_box is None:
         raise Sd2Error(
             "--person-frame is given without --person-box", "the rectangle in that frame"
         )
-    if options.landmarks is not None:
-        from sd2core.cli.reading import check_output
-
-        check_output(options.landmarks, ".npz")
     from sd2core.body.fit_video import PARTIAL, check_fit_output, fit_video
     from sd2core.runs.pace import fit_kind, keep_pace
 

@@ -129,7 +129,7 @@ def _errors(options: argparse.Namespace) -> SensorErrors | None:
 
 def _check_output(path: Path) -> None:
     """Refuse an output that cannot be written, or is a file of something else."""
-    from sd2core.cli.reading import check_output
+    from sd2core.cli.output_folders import check_output
     from sd2core.imu.files import SUFFIXES, read_signals
 
     check_output(path, *SUFFIXES)

@@ -52,14 +52,12 @@ def _ladder(options: argparse.Namespace) -> int:
       sd2 ladder walk.npz --figure accuracy.png --json
     """
     from sd2core.accuracy.choosing import check_options
-    from sd2core.cli.reading import check_output, mesh_and_sensor
+    from sd2core.cli.reading import mesh_and_sensor
     from sd2core.doppler import PRESETS
-    from sd2core.files.figure_files import SUFFIXES, save_figure
+    from sd2core.files.figure_files import save_figure
 
-    if options.figure is not None:
-        if options.quick:
-            raise Sd2Error("--figure is given with --quick", "one of the two: nothing is measured")
-        check_output(options.figure, *SUFFIXES)
+    if options.figure is not None and options.quick:
+        raise Sd2Error("--figure is given with --quick", "one of the two: nothing is measured")
     if options.quick and options.method == "fmcw":
         raise Sd2Error("--quick is given with --method fmcw", "it with --method histogram only")
     if options.count is not None and options.method == "fmcw":

@@ -5,8 +5,10 @@ from __future__ import annotations
 import argparse
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
+
+from sd2core.numerics.bounds import Bounds
 
 
 def add_json(parser: argparse._ActionsContainer) -> None:
@@ -100,6 +102,18 @@ def positive_float(text: str) -> float:
     if value <= 0:
         raise argparse.ArgumentTypeError(f"{text!r} is not a number above 0")
     return value
+
+
+def within(bounds: Bounds) -> Callable[[str], Any]:
+    """Make a parser of a number within bounds."""
+
+    def parse(text: str) -> float:
+        value = finite_float(text)
+        if value not in bounds:
+            raise argparse.ArgumentTypeError(f"{text!r} is not {bounds.words}")
+        return int(value) if bounds.whole else value
+
+    return parse
 
 
 def share(text: str) -> float:

@@ -46,7 +46,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     parser.add_value("--cloud", positive_int, "N", "so many random places instead of a grid")
     parser.add_value("--seed", int, "N", "seed of the random places (default: 0)")
     parser.add_value("--placements", Path, "FILE", "read the places from a file of --out")
-    parser.add_output("FILE.json", "the plan to write", required=False)
+    parser.add_output("FILE.json", "the plan to write", ".json", required=False)
     add_wish(parser, "2%%")
     parser.add_mesh_reading()
     parser.add_json()
@@ -65,17 +65,11 @@ def _placements(options: argparse.Namespace) -> int:
       sd2 placements walk.sd2 --cloud 200 --ranges 1:4 --azimuths -60:60 --elevations -10:40
       sd2 placements walk.sd2 --placements grid.json --json
     """
-    from sd2core.cli.reading import (
-        check_output,
-        load_mesh_from_options,
-        open_recording_from_options,
-    )
+    from sd2core.cli.reading import load_mesh_from_options, open_recording_from_options
     from sd2core.placements.body_extent import BodyExtent
     from sd2core.placements.placements import write_placements
     from sd2core.recording.recording import is_recording
 
-    if options.out is not None:
-        check_output(options.out, ".json")
     recording = None
     if is_recording(options.mesh):
         recording = open_recording_from_options(options.mesh, options)

@@ -96,12 +96,11 @@ def _show_limits(options: argparse.Namespace) -> None:
 
 def _write_map(options: argparse.Namespace) -> None:
     from sd2core.cli.info.description import describe_map, limit_facts, show
-    from sd2core.cli.reading import check_map_output, chosen_axis
+    from sd2core.cli.reading import chosen_axis
     from sd2core.fmcw import doppler_map, limits
     from sd2core.io.radar import holds_map, load_capture, load_recorded_map
     from sd2core.recording.recording import is_recording, open_recording
 
-    check_map_output(options.out)
     channel, offset_s = (options.receiver, options.transmitter), 0.0
     if is_recording(options.capture):
         recording = open_recording(options.capture)

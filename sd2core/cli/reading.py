@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 from sd2core.cli.options import flag, given
 from sd2core.cli.output import picked, progress_bar
 from sd2core.errors import Sd2Error
-from sd2core.files.atomic import check_writable
 from sd2core.files.paths import PICKLE_SUFFIXES
 
 if TYPE_CHECKING:
@@ -97,36 +96,3 @@ def chosen_axis(options: argparse.Namespace, usual: VelocityAxis | None = None) 
 
     usual = usual or VelocityAxis()
     return VelocityAxis(options.bins or usual.bins, options.v_max or usual.v_max_mps)
-
-
-def check_output(path: Path, *suffixes: str) -> None:
-    """Refuse an output file that cannot be written, before the work is done."""
-    endings = ", ".join(suffixes)
-    if path.suffix.lower() not in suffixes:
-        raise Sd2Error(f"The output file is {path}", f"a name that ends in {endings}")
-    if path.is_dir():
-        raise Sd2Error(f"The output file {path} is a folder", f"a file's name, ending in {endings}")
-    try:
-        check_writable(path)
-    except OSError as error:
-        raise Sd2Error(
-            f"The output file {path} cannot be written ({error.strerror})",
-            "a folder in which files may be made",
-            "Choose another place",
-        ) from error
-
-
-def check_map_output(path: Path) -> None:
-    """Refuse what :func:`check_output` does, and to replace anything but a Doppler map."""
-    from sd2core.io.kinds import kind_of
-
-    check_output(path, ".npz")
-    # `mktemp` leaves an empty file to be filled.
-    if path.exists() and path.stat().st_size:
-        kind = kind_of(path)
-        if kind != "map":
-            raise Sd2Error(
-                f"The output file {path} exists and is a {kind}",
-                "a new name, or a Doppler map to replace",
-                "Choose another name, or delete that file first",
-            )

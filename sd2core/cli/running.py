@@ -21,10 +21,10 @@ _LEARNING = ("lightning", "torch")
 def run(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> int:
     """Parse, call the handler and turn errors into a sentence on standard error.
 
-    With ``--json`` standard output has the error as well, as JSON. Returns 0, or the handler's
-    code; 1 for an error; 2 for what was typed wrong; 130 when interrupted.
+    With ``--json`` or ``--progress-json`` standard output has the error as well. Returns 0, or the
+    handler's code; 1 for an error; 2 for what was typed wrong; 130 when interrupted.
     """
-    as_json = "--json" in arguments
+    told = {"--json", "--progress-json"}.intersection(arguments)
     try:
         options = parser.parse_args(attach_negative_values(arguments))
         with output_folders(options):
@@ -43,11 +43,11 @@ def run(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> int:
             raise
         if isinstance(error, OSError) and not error.filename and error.errno and _output_fails():
             _discard_output()
-            error, as_json = Sd2Error(f"The output cannot be written ({error.strerror})"), False
+            error, told = Sd2Error(f"The output cannot be written ({error.strerror})"), set()
         explained = explanation(error)
         print(f"sd2: {explained}", file=sys.stderr)
-        if as_json:
-            _print_as_json(explained)
+        if told:
+            _tell_programs(explained, as_line="--json" not in told)
         return 2 if isinstance(error, UsageError) else 1
 
 
@@ -71,12 +71,14 @@ def explanation(error: Exception) -> Sd2Error:
     )
 
 
-def _print_as_json(error: Sd2Error) -> None:
-    from sd2core.cli.output import print_json
+def _tell_programs(error: Sd2Error, *, as_line: bool) -> None:
+    from sd2core.cli.output import picked, print_event, print_json
 
     try:
-        parts = {name: getattr(error, name) for name in ("found", "expected", "remedy")}
-        print_json({"error": parts})
+        if as_line:
+            print_event("error", text=str(error))
+        else:
+            print_json({"error": picked(error, "found", "expected", "remedy")})
         _flush_output()
     except OSError:
         _discard_output()

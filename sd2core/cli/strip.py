@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from sd2core.cli.command_parser import add_command
 from sd2core.cli.options import positive_float, positive_int
 from sd2core.cli.output import progress_bar
+from sd2core.files.figure_files import SUFFIXES as FIGURES
 
 if TYPE_CHECKING:
     from sd2core.figures.strip_source import StripSource
@@ -22,7 +23,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``strip``."""
     parser = add_command(commands, "strip", handler=_strip)
     parser.add_value("paths", Path, "PATH", "a recording, or a video, a mesh, or both", nargs="+")
-    parser.add_output("FILE", "the figure to write (.png, .svg or .pdf)")
+    parser.add_output("FILE", "the figure to write (.png, .svg or .pdf)", *FIGURES)
     chosen = parser.add_mutually_exclusive_group()
     text = "frames such as 0,15,30, or ranges FROM:TO:STEP such as 0:90:15, TO not included"
     chosen.add_value("--frames", str, "LIST", text)
@@ -58,9 +59,7 @@ def _strip(options: argparse.Namespace) -> None:
     """
     from sd2core.figures.strip import plot_strip, save_strip
     from sd2core.figures.strip_source import StripOptions, parse_frames, spread_frames
-    from sd2core.files.figure_files import check_figure
 
-    check_figure(options.out)
     with ExitStack() as stack:
         source = _source(options, stack)
         rows: Any = options.rows.replace(" ", "").split(",") if options.rows else _rows(source)

@@ -102,11 +102,10 @@ def _synth(options: argparse.Namespace) -> None:
       sd2 synth walk.zarr --out map.npz --limbs    (each part of the body apart, too)
     """
     from sd2core.cli.info.description import describe_map, show
-    from sd2core.cli.reading import check_map_output, mesh_and_sensor
+    from sd2core.cli.reading import mesh_and_sensor
     from sd2core.doppler import Synthesizer
     from sd2core.mesh.decimation import decimate
 
-    check_map_output(options.out)
     if options.method == "fmcw":
         _check_fmcw(options)
     elif options.radar != "paper":
@@ -114,6 +113,7 @@ def _synth(options: argparse.Namespace) -> None:
     wish = options.tolerance is not None or options.budget_ms is not None
     if wish:
         _check_wish(options)
+    synthesis = synthesis_options(options)
     mesh, sensor = mesh_and_sensor(options)
     if not wish:
         mesh = decimate(mesh, options.vertices_kept or 1.0)
@@ -126,9 +126,9 @@ def _synth(options: argparse.Namespace) -> None:
     if options.method == "fmcw":
         doppler = _by_fmcw(options, mesh, sensor)
     elif wish:
-        doppler = _as_chosen(options, mesh, sensor)
+        doppler = _as_chosen(options, mesh, sensor, synthesis)
     else:
-        doppler = _counted(options, Synthesizer(mesh, synthesis_options(options)), sensor)
+        doppler = _counted(options, Synthesizer(mesh, synthesis), sensor)
     doppler.save(options.out)
     description = describe_map(options.out, doppler)
     description.notes = mesh.notes + description.notes
@@ -149,12 +149,14 @@ def _check_wish(options: argparse.Namespace) -> None:
 
 
 def _as_chosen(
-    options: argparse.Namespace, mesh: MeshSequence, sensor: VirtualSensor
+    options: argparse.Namespace,
+    mesh: MeshSequence,
+    sensor: VirtualSensor,
+    base: SynthesisOptions,
 ) -> DopplerMap:
     """Map by the plan that the scene requires; plan and reasons go into its provenance."""
     from sd2core.accuracy.trial import synthesizer_for
 
-    base = synthesis_options(options)
     choice = chosen(mesh, sensor, base, options, dragging=False)
     if not choice.holds:
         raise Sd2Error(choice.summary, "a tolerance or budget that can be held", "Allow more of it")

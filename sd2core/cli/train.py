@@ -11,9 +11,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.command_parser import Options, add_command
-from sd2core.cli.options import flag, given, positive_float, positive_int
+from sd2core.cli.options import flag, given, positive_float, positive_int, within
 from sd2core.cli.output import picked, print_facts, print_json
 from sd2core.errors import Sd2Error
+from sd2core.numerics import bounds
 from sd2core.processes import INTERRUPTED
 
 if TYPE_CHECKING:
@@ -76,15 +77,18 @@ def _add_learning(parser: Options) -> None:
     group.add_value("--from", str, "FILE|NAME", text)
     text = "with --from: let the last layers learn alone, for very few pairs"
     group.add_argument("--frozen", action="store_true", default=None, help=text)
-    group.add_value("--epochs", positive_int, "N", "passes over all segments (default: 500)")
+    text = "passes over all segments (default: 500)"
+    group.add_value("--epochs", within(bounds.EPOCHS), "N", text)
     text = "train for so long instead; the learning rate follows the clock"
     group.add_value("--minutes", positive_float, "MIN", text)
-    group.add_value("--batch-size", positive_int, "N", "segments of a batch (default: 64)")
-    group.add_value("--learning-rate", positive_float, "RATE", "at its highest (default: 0.003)")
+    text = "segments of a batch (default: 64)"
+    group.add_value("--batch-size", within(bounds.BATCH_SIZE), "N", text)
+    text = "at its highest (default: 0.003)"
+    group.add_value("--learning-rate", within(bounds.LEARNING_RATE), "RATE", text)
     text = "the same for the parameters of state spaces (default: 0.001)"
-    group.add_value("--ssm-learning-rate", positive_float, "RATE", text)
+    group.add_value("--ssm-learning-rate", within(bounds.LEARNING_RATE), "RATE", text)
     text = "end after N epochs without a better one, 0: never (default: 100)"
-    group.add_value("--early-stopping", int, "N", text)
+    group.add_value("--early-stopping", within(bounds.PATIENCE_EPOCHS), "N", text)
     text = "learn the mean and the peak velocity of a frame beside the map: weight of 1 m/s"
     text += " beside the error of the map (default: 0, as in the paper)"
     group.add_value("--velocity-weight", float, "W", text)
@@ -98,7 +102,7 @@ def _add_learning(parser: Options) -> None:
     )
     text = "what makes an epoch the best: error of the map, or of the peak velocity (default: rmse)"
     group.add_choice("--select-by", ("rmse", "mae"), text)
-    group.add_value("--seed", int, "N", "seed of all random numbers (default: 0)")
+    group.add_value("--seed", within(bounds.SEED), "N", "seed of all random numbers (default: 0)")
 
 
 def _add_data(parser: Options) -> None:
@@ -117,7 +121,7 @@ def _add_data(parser: Options) -> None:
     group.add_choice("--placements", ("all", "first"), text)
     text = "range synthesis: scale input and target together, as if the person were up to F"
     text += " times nearer or farther (default: 1, off)"
-    group.add_value("--range-factor", positive_float, "FACTOR", text)
+    group.add_value("--range-factor", within(bounds.RANGE_FACTOR), "FACTOR", text)
 
 
 def _add_machine(parser: Options) -> None:

@@ -20,6 +20,8 @@ from sd2core.files.limits import VARIABLE, check_regular, read_limit_bytes
 if TYPE_CHECKING:
     from pydantic import ValidationError
 
+UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")
+"""Pydantic's words for a key that a model, or a dataclass, does not know."""
 EXPECTED_JSON = "JSON written by SD² Studio"
 _PART = 64
 """Part of the limit on memory that a text may have: parsed, it takes up to 130 times as much."""
@@ -198,7 +200,7 @@ def first_fault(error: ValidationError) -> str:
     where = ".".join(str(part) for part in first["loc"]) or "the file"
     if first["type"] == "missing":
         return f"{where} is missing"
-    if first["type"] == "extra_forbidden":
+    if first["type"] in UNKNOWN_KEY:
         return f"{where} is nothing that this version knows"
     found = repr(first["input"])
     found = found if len(found) <= _LONGEST_FOUND else f"{found[:_LONGEST_FOUND]}…"

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, NonNegativeInt
 
 from sd2core.labels.label_set import Label, LabelSet
-from sd2core.labels.spans import Labels, LabelTrack, Origin, Overlap, ShownFrames, Span
+from sd2core.labels.spans import Labels, LabelTrack, Origin, ShownFrames, Span
 from sd2core.timebase import Timebase
 
 
@@ -16,33 +16,6 @@ class Entry(BaseModel):
     """Base of the entries; unknown keys are refused, because an edit would lose them."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
-
-
-class LabelEntry(Entry):
-    """Entry of a :class:`Label`."""
-
-    name: str
-    colour: str
-    key: str = ""
-    gesture_class: str = ""
-
-
-class LabelSetEntry(Entry):
-    """Entry of a :class:`LabelSet`."""
-
-    name: str
-    labels: tuple[LabelEntry, ...]
-
-    def made(self) -> LabelSet:
-        """Make the label set."""
-        return LabelSet(self.name, tuple(Label(**dict(entry)) for entry in self.labels))
-
-
-class TrackEntry(Entry):
-    """Entry of a :class:`LabelTrack`."""
-
-    name: str
-    overlap: Overlap = "exclusive"
 
 
 class FramesEntry(Entry):
@@ -78,26 +51,24 @@ class SpanEntry(Entry):
 class LabelsEntry(Entry):
     """Entry of a whole :class:`Labels`."""
 
-    label_set: LabelSetEntry
-    tracks: tuple[TrackEntry, ...]
+    label_set: LabelSet
+    tracks: tuple[LabelTrack, ...]
     spans: tuple[SpanEntry, ...]
 
     def made(self) -> Labels:
         """Make the labels."""
-        tracks = tuple(LabelTrack(**dict(entry)) for entry in self.tracks)
-        return Labels(tracks, tuple(entry.made() for entry in self.spans), self.label_set.made())
+        return Labels(self.tracks, tuple(entry.made() for entry in self.spans), self.label_set)
 
 
-_SPAN_FIELDS = tuple(field.name for field in fields(Span))
-_SPAN_OPTIONAL = {"note": "", "author": "", "confidence": None, "origin": "person"}
+_SPAN_FIELDS = {field.name: field.default for field in fields(Span)}
 
 
 def span_entry(span: Span, frames: ShownFrames | None = None) -> dict[str, Any]:
     """Encode a span; fields at their defaults are left out."""
     entry: dict[str, Any] = {}
-    for name in _SPAN_FIELDS:
+    for name, default in _SPAN_FIELDS.items():
         value = getattr(span, name)
-        if name not in _SPAN_OPTIONAL or value != _SPAN_OPTIONAL[name]:
+        if value != default:
             entry[name] = value
         if name == "end_s" and frames is not None:
             entry["frames"] = asdict(frames)

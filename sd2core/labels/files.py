@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Literal, Protocol, TypeVar
+from typing import Any, Literal, TypeVar
 
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.paths import located_path, plain_path, stored_path
@@ -23,8 +23,8 @@ from sd2core.files.texts import (
     parse_json,
     read_text,
 )
-from sd2core.labels.entries import Entry, LabelsEntry, LabelSetEntry, label_set_entry, labels_entry
-from sd2core.labels.label_set import LONGEST_NAME, LabelSet
+from sd2core.labels.entries import Entry, LabelsEntry, label_set_entry, labels_entry
+from sd2core.labels.label_set import LONGEST_NAME, Label, LabelSet
 from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.timebase import Timebase
 
@@ -44,17 +44,14 @@ class _LabelsDocument(LabelsEntry):
     video: str | None = None
 
 
-class _LabelSetDocument(LabelSetEntry):
+class _LabelSetDocument(Entry):
     format: Literal["sd2-label-set"]
     version: int
+    name: str
+    labels: tuple[Label, ...]
 
 
 _Document = TypeVar("_Document", bound=Entry)
-_Made = TypeVar("_Made", covariant=True)
-
-
-class _Makes(Protocol[_Made]):
-    def made(self) -> _Made: ...
 
 
 @dataclass(frozen=True)
@@ -111,9 +108,11 @@ def read_labels(path: Path) -> LabelFile:
     """
     path = Path(path)
     document = _read(path, _LabelsDocument, FORMAT)
+    with errors_in(path):
+        labels = document.made()
     folder = plain_path(path).parent
     return LabelFile(
-        _made(path, document),
+        labels,
         located_path(document.recording, folder),
         located_path(document.video, folder),
     )
@@ -127,7 +126,10 @@ def write_label_set(path: Path, label_set: LabelSet) -> None:
 
 def read_label_set(path: Path) -> LabelSet:
     """Read a label set; errors are those of :func:`read_labels`."""
-    return _made(path, _read(Path(path), _LabelSetDocument, SET_FORMAT))
+    path = Path(path)
+    document = _read(path, _LabelSetDocument, SET_FORMAT)
+    with errors_in(path):
+        return LabelSet(document.name, document.labels)
 
 
 def labels_of(spans: Iterable[InlineSpan], track: str = "Gestures") -> Labels:
@@ -154,13 +156,8 @@ def _read(path: Path, document: type[_Document], expected: str) -> _Document:
     text = read_text(path, f"a file of the format {expected!r}")
     check_version(parse_json(text, path, EXPECTED_JSON), path, expected, VERSION)
     allowed = "what docs/formats.md says of labels"
-    with faults_in(path, allowed, "Correct that entry with a text editor"):
+    with faults_in(path, allowed, "Correct that entry with a text editor"), errors_in(path):
         return document.model_validate_json(text)
-
-
-def _made(path: Path, document: _Makes[_Made]) -> _Made:
-    with errors_in(path):
-        return document.made()
 
 
 def _text(content: dict[str, Any]) -> str:

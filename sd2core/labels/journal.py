@@ -32,15 +32,14 @@ from sd2core.labels.comparison import same_ends
 from sd2core.labels.entries import (
     Entry,
     LabelsEntry,
-    LabelSetEntry,
     SpanEntry,
-    TrackEntry,
     label_set_entry,
     labels_entry,
     span_entry,
     track_entries,
 )
-from sd2core.labels.spans import Labels
+from sd2core.labels.label_set import LabelSet
+from sd2core.labels.spans import Labels, LabelTrack
 
 FORMAT: Literal["sd2-labels-journal"] = "sd2-labels-journal"
 VERSION = 2
@@ -78,8 +77,8 @@ class Change(Entry):
     saved: bool = False
     gone: tuple[int, ...] = ()
     put: tuple[SpanEntry, ...] = ()
-    tracks: tuple[TrackEntry, ...] | None = None
-    label_set: LabelSetEntry | None = None
+    tracks: tuple[LabelTrack, ...] | None = None
+    label_set: LabelSet | None = None
     others: dict[str, Any] | None = None
 
 

@@ -27,6 +27,7 @@ from sd2core.body.track import LANDMARK, LANDMARKS, TORSO_CORNERS
 from sd2core.errors import Sd2Error
 from sd2core.io.radar.mars import JOINTS
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.numerics.bounds import STATURE_M
 from sd2core.timebase import Timebase
 
 _STILLS = 150
@@ -232,9 +233,10 @@ def _shape(
     length_m = float(np.median(_upright_m(points_m)))
     stature_m = space.base_stature_m * length_m / float(_upright_m(points.base_m))
     for _ in range(_ROUNDS):
-        if not 0.5 < stature_m < 2.6:
+        if stature_m not in STATURE_M:
             raise Sd2Error(
-                f"The skeleton is that of a person of {stature_m:.2g} m", "metres, 0.5 to 2.6"
+                f"The skeleton is that of a person of {stature_m:.2g} m",
+                f"metres, {STATURE_M.low:g} to {STATURE_M.high:g}",
             )
         shape, _ = shape_of_lengths(space, points, points_m, trust, stature_m)
         stature_m *= length_m / float(_upright_m(points.of(shape).rest_m))

@@ -1,1 +1,1 @@
-"""Compiled kernels, choice of precision, rasterising."""
+"""Compiled kernels, choice of precision, rasterising, bounds of settings."""

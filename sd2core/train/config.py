@@ -11,6 +11,8 @@ from sd2core.errors import Sd2Error
 from sd2core.files.paths import located_path
 from sd2core.files.texts import errors_in, read_toml
 from sd2core.files.toml import toml_lines
+from sd2core.numerics import bounds
+from sd2core.numerics.bounds import Bounds
 from sd2core.pairs.segments import LENGTH, OVERLAP
 from sd2core.runs.pace import Kind
 
@@ -23,15 +25,13 @@ def refused(key: str, value: Any, allowed: str) -> Sd2Error:
     return Sd2Error(f"{key} is {value!r}", allowed)
 
 
-def number(low: float, high: float, *, whole: bool = False) -> Rule:
-    """Rule for a number between two others, both included."""
-    allowed = f"a {'whole ' if whole else ''}number from {low:g} to {high:g}"
+def number(within: Bounds) -> Rule:
+    """Rule for a number within bounds."""
 
     def rule(key: str, value: Any) -> Any:
-        fits = isinstance(value, int | float) and not isinstance(value, bool)
-        if not fits or not low <= value <= high or (whole and int(value) != value):
-            raise refused(key, value, allowed)
-        return int(value) if whole else float(value)
+        if not isinstance(value, int | float) or isinstance(value, bool) or value not in within:
+            raise refused(key, value, within.words)
+        return int(value) if within.whole else float(value)
 
     return rule
 
@@ -91,7 +91,9 @@ def table(key: str, value: Any) -> dict[str, Any]:
     return dict(value)
 
 
-def _setting(rule: Rule, default: Any = MISSING, *, factory: Any = MISSING) -> Any:
+def _setting(rule: Rule | Bounds, default: Any = MISSING, *, factory: Any = MISSING) -> Any:
+    if isinstance(rule, Bounds):
+        rule = number(rule)
     return field(default=default, default_factory=factory, metadata={"rule": rule})
 
 
@@ -103,15 +105,15 @@ class DataConfig:
     # Kept out to choose the best epoch, and for `sd2 eval`; chosen by themselves by default.
     validation_subjects: tuple[str, ...] | None = _setting(texts, None)
     test_subjects: tuple[str, ...] | None = _setting(texts, None)
-    segment_frames: int = _setting(number(2, 10_000, whole=True), LENGTH)
-    overlap_frames: int = _setting(number(0, 9_999, whole=True), OVERLAP)  # Of neighbours.
+    segment_frames: int = _setting(Bounds(2, 10_000, whole=True), LENGTH)
+    overlap_frames: int = _setting(Bounds(0, 9_999, whole=True), OVERLAP)  # Of neighbours.
     # Range synthesis: learn from every place that the sensor was put at, or the first only.
     placements: str = _setting(choice("all", "first"), "all")
     # Cut at other places in every epoch (shifted by up to half a step), or always at the same.
     segments: str = _setting(choice("shifted", "fixed"), "shifted")
     # Range synthesis: scale input and target together as if the person were up to this many
     # times nearer or farther; 1 is off.
-    range_factor: float = _setting(number(1.0, 4.0), 1.0)
+    range_factor: float = _setting(bounds.RANGE_FACTOR, 1.0)
 
     def __post_init__(self) -> None:
         _check(self, "data")
@@ -144,27 +146,27 @@ class ModelConfig:
 class TrainingConfig:
     """Optimisation settings."""
 
-    batch_size: int = _setting(number(1, 100_000, whole=True), 64)  # Segments per step.
-    epochs: int = _setting(number(1, 1_000_000, whole=True), 500)  # Passes over all segments.
+    batch_size: int = _setting(bounds.BATCH_SIZE, 64)  # Segments per step.
+    epochs: int = _setting(bounds.EPOCHS, 500)  # Passes over all segments.
     # Instead of a number of epochs; the learning rate follows the clock.
-    minutes: float | None = _setting(number(0.001, 1e5), None)
-    learning_rate: float = _setting(number(1e-8, 1.0), 3e-3)  # At its highest.
+    minutes: float | None = _setting(Bounds(0.001, 1e5), None)
+    learning_rate: float = _setting(bounds.LEARNING_RATE, 3e-3)  # At its highest.
     # The same for the parameters of the state space, which never decay.
-    ssm_learning_rate: float = _setting(number(1e-8, 1.0), 1e-3)
-    weight_decay: float = _setting(number(0.0, 1.0), 0.01)  # Of AdamW, on matrices only.
-    warm_up: float = _setting(number(0.0, 0.5), 0.03)  # Share of the run in which the rate rises.
-    final_rate: float = _setting(number(0.0, 1.0), 0.01)  # Share of the rate at the end.
-    clip_norm: float = _setting(number(0.0, 1e6), 1.0)  # Gradients are clipped to it; 0 is off.
+    ssm_learning_rate: float = _setting(bounds.LEARNING_RATE, 1e-3)
+    weight_decay: float = _setting(Bounds(0.0, 1.0), 0.01)  # Of AdamW, on matrices only.
+    warm_up: float = _setting(Bounds(0.0, 0.5), 0.03)  # Share of the run in which the rate rises.
+    final_rate: float = _setting(Bounds(0.0, 1.0), 0.01)  # Share of the rate at the end.
+    clip_norm: float = _setting(Bounds(0.0, 1e6), 1.0)  # Gradients are clipped to it; 0 is off.
     # End after so many epochs without a better one; 0: never.
-    early_stopping_epochs: int = _setting(number(0, 1_000_000, whole=True), 100)
+    early_stopping_epochs: int = _setting(bounds.PATIENCE_EPOCHS, 100)
     # Rare velocities and weak takes count more, see :func:`sd2core.train.data.frame_weights`.
     balanced: bool = _setting(flag, False)
     # Of the errors of a frame's mean and peak velocity, in 1 / (m/s), beside that of the map.
-    velocity_weight: float = _setting(number(0.0, 100.0), 0.0)
+    velocity_weight: float = _setting(Bounds(0.0, 100.0), 0.0)
     # The best epoch is that of the lowest validation error of this kind.
     select_by: str = _setting(choice("rmse", "mae"), "rmse")
-    seed: int = _setting(number(0, 2**31 - 1, whole=True), 0)  # Of weights, order and dropout.
-    checkpoint_s: float = _setting(number(0.0, 86_400.0), 30.0)  # Between checkpoints, at most.
+    seed: int = _setting(bounds.SEED, 0)  # Of weights, order and dropout.
+    checkpoint_s: float = _setting(Bounds(0.0, 86_400.0), 30.0)  # Between checkpoints, at most.
 
     def __post_init__(self) -> None:
         _check(self, "training")
@@ -175,10 +177,10 @@ class MachineConfig:
     """Settings of the machine: device, precision, threads, priority."""
 
     device: str = _setting(choice("auto", "cpu", "cuda"), "auto")  # A GPU where there is one.
-    devices: int = _setting(number(1, 64, whole=True), 1)  # Processors of that kind.
+    devices: int = _setting(Bounds(1, 64, whole=True), 1)  # Processors of that kind.
     precision: str = _setting(choice("auto", "32", "bf16"), "auto")  # bf16 on GPUs that have it.
-    threads: int | None = _setting(number(1, 1024, whole=True), None)  # As many as torch takes.
-    nice: int = _setting(number(0, 19, whole=True), 0)  # Lower priority.
+    threads: int | None = _setting(Bounds(1, 1024, whole=True), None)  # As many as torch takes.
+    nice: int = _setting(Bounds(0, 19, whole=True), 0)  # Lower priority.
     deterministic: bool = _setting(flag, False)  # Refuse what is not reproducible.
 
     def __post_init__(self) -> None:

@@ -54,7 +54,7 @@ def test_one_edit(
         choices = [
             lambda: move(labels, FRAMES, span.id, span.start_s + rng.uniform(-0.3, 0.3)),
             lambda: resize(labels, FRAMES, span.id, "end", span.end_s + rng.uniform(-0.3, 0.3)),
-            lambda: nudge(labels, FRAMES, span.id, 1),
+            lambda: nudge(labels, FRAMES, [span.id], 1),
             lambda: delete(labels, [span.id]),
         ]
         if FRAMES.frames_between(span.start_s, span.end_s)[1] > 2 and span.duration_s > 0.2:

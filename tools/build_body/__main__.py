@@ -9,7 +9,7 @@ from pathlib import Path
 
 from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import progress_bar
-from sd2core.cli.reading import check_output
+from sd2core.cli.output_folders import check_output
 from tools.build_body.export_body import export_body
 from tools.command_line import run_tool
 

@@ -18,7 +18,7 @@ from sd2core.cli.options import (
     positive_int,
 )
 from sd2core.cli.output import print_json, progress_bar
-from sd2core.cli.reading import check_output
+from sd2core.cli.output_folders import check_output
 from sd2core.errors import Sd2Error
 from sd2core.mocap.body_motion import Role
 from tools.command_line import run_tool

@@ -27,7 +27,8 @@ from sd2app.widgets.panel import FactRows, sentence, side_by_side
 from sd2app.widgets.run_panel import Button, RunPanel, RunView, RunWords
 from sd2app.widgets.text import counted
 from sd2app.widgets.training_form import Field, TrainingForm, labelled
-from sd2core.classify.defaults import LONGEST_DELAY_S
+from sd2core.classify.defaults import DELAYS_S, WIDTHS
+from sd2core.numerics.bounds import SEED, STEPS
 
 _DATA = "Data sets and labelled radar files (*.h5 *.hdf5 *.npz)"
 _MAP_TIPS = {
@@ -37,14 +38,14 @@ _MAP_TIPS = {
 }
 _FIELDS = (
     Field(
-        "delay_s", "Answers", 0, LONGEST_DELAY_S, 0.1,
+        "delay_s", "Answers", DELAYS_S, 0.1,
         "A frame is answered so much later, when what follows it has been seen; the paper's: 0,"
         " at once",
         decimals=2, suffix=" s late",
     ),
-    Field("width", "Width", 1, 512, 8, "Units of every layer; the paper's: 16"),
-    Field("steps", "Steps", 1, 100_000, 50, "Batches that are learnt from"),
-    Field("seed", "Seed", 0, 2**31 - 1, 1, "Of weights, order and dropout"),
+    Field("width", "Width", WIDTHS, 8, "Units of every layer; the paper's: 16"),
+    Field("steps", "Steps", STEPS, 50, "Batches that are learnt from"),
+    Field("seed", "Seed", SEED, 1, "Of weights, order and dropout"),
 )  # fmt: skip
 
 

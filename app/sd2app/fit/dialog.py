@@ -6,7 +6,7 @@ from PySide6.QtCore import QPointF, QRectF, QSignalBlocker, Qt
 from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPainterPath, QPen
 from PySide6.QtWidgets import QDialog, QLabel, QSizePolicy, QSlider, QWidget
 
-from sd2app.fit.setup import ANGLES_DEG, DEFAULT_STATURE_M, STATURES_M, FitSetupModel
+from sd2app.fit.setup import DEFAULT_STATURE_M, FitSetupModel
 from sd2app.manual.help import with_help
 from sd2app.palette import Palette
 from sd2app.widgets.canvas import Canvas
@@ -16,6 +16,7 @@ from sd2app.widgets.layouts import STRETCH, column_of, form_of, row_of
 from sd2app.widgets.mesh_painting import paint_picture
 from sd2app.widgets.panel import ElidedLabel, outlined, say, sentence, side_by_side
 from sd2app.widgets.time_axis import clock_text
+from sd2core.numerics.bounds import FIELD_OF_VIEW_DEG, STATURE_M
 
 VIDEOS = "Video (*.mp4 *.mkv *.mov *.avi *.webm *.m4v *.mpg *.ts *.wmv);;All files (*)"
 _CAMERAS = {
@@ -173,7 +174,9 @@ class NewFromVideoDialog(QDialog):
         self._person.setWordWrap(True)
         tip = "Have the person chosen"
         self._clear = outlined("Clear", tip, lambda: setup.change(person=None), self, name=tip)
-        self._stature = NumberBox(*STATURES_M, " m", "Height of the person", step=0.01)
+        self._stature = NumberBox(
+            STATURE_M.low, STATURE_M.high, " m", "Height of the person", step=0.01
+        )
         self._stature.setValue(DEFAULT_STATURE_M)
         self._stature.valueChanged.connect(lambda value_m: setup.change(stature_m=value_m))
         self._known = CheckBox(
@@ -189,8 +192,9 @@ class NewFromVideoDialog(QDialog):
             lambda way: setup.change(camera=way),
         )
         self._angle = NumberBox(
-            *ANGLES_DEG, "°", "Field of view across the longer side", decimals=1, step=1.0
-        )
+            FIELD_OF_VIEW_DEG.low, FIELD_OF_VIEW_DEG.high, "°",
+            "Field of view across the longer side", decimals=1, step=1.0,
+        )  # fmt: skip
         self._angle.valueChanged.connect(lambda value_deg: setup.change(angle_deg=value_deg))
         self._focal = NumberBox(
             1.0, 100_000.0, " px", "Focal length in pixels of the video", decimals=0, step=10.0

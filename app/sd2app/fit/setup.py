@@ -17,11 +17,10 @@ from sd2app.fit.request import FitRequest, Person, read_request
 from sd2core.body.camera import DEFAULT_FIELD_OF_VIEW_DEG
 from sd2core.body.shape import DEFAULT_STATURE_M as DEFAULT_STATURE_M
 from sd2core.io.video import VideoReader, open_video
+from sd2core.numerics.bounds import FIELD_OF_VIEW_DEG, STATURE_M
 from sd2core.recording.recording import FILE_NAME, SUFFIX, Recording
 
 CameraWay = Literal["file", "angle", "focal"]
-STATURES_M = (0.8, 2.3)
-ANGLES_DEG = (10.0, 150.0)
 _SMALLEST_PERSON = 0.02
 """Smallest side of a rectangle as share of the picture; less is a click."""
 
@@ -131,9 +130,9 @@ class FitSetupModel(BackgroundModel):
     def change(self, **changes: Any) -> None:
         """Change some of the :attr:`choices`; height and field of view are held in bounds."""
         if changes.get("stature_m") is not None:
-            changes["stature_m"] = min(max(changes["stature_m"], STATURES_M[0]), STATURES_M[1])
+            changes["stature_m"] = STATURE_M.nearest(changes["stature_m"])
         if "angle_deg" in changes:
-            changes["angle_deg"] = min(max(changes["angle_deg"], ANGLES_DEG[0]), ANGLES_DEG[1])
+            changes["angle_deg"] = FIELD_OF_VIEW_DEG.nearest(changes["angle_deg"])
         choices = replace(self.choices, **changes)
         if choices != self.choices:
             self.choices = choices

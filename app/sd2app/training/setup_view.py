@@ -15,26 +15,27 @@ from sd2app.widgets.panel import ElidedLabel, Fold, outlined, sentence, title
 from sd2app.widgets.progress_bar import ProgressBar
 from sd2app.widgets.text import counted
 from sd2app.widgets.training_form import Field, TrainingForm, labelled
+from sd2core.numerics import bounds
 
 _FIELDS = (
-    Field("epochs", "Epochs", 1, 100_000, 50, "Passes over all segments; the paper's is 500"),
-    Field("batch_size", "Batch", 1, 10_000, 16, "Segments per step; the paper's is 64"),
+    Field("epochs", "Epochs", bounds.EPOCHS, 50, "Passes over all segments; the paper's is 500"),
+    Field("batch_size", "Batch", bounds.BATCH_SIZE, 16, "Segments per step; the paper's is 64"),
 )
 _MORE = (
     Field(
-        "early_stopping_epochs", "Stop early after", 0, 100_000, 10,
+        "early_stopping_epochs", "Stop early after", bounds.PATIENCE_EPOCHS, 10,
         "End when the validation has not become better for so many epochs", suffix=" epochs",
     ),
     Field(
-        "learning_rate", "Learning rate", 1e-5, 1.0, 5e-4,
-        "At its highest; it warms up and falls", decimals=5,
+        "learning_rate", "Learning rate", bounds.LEARNING_RATE, 5e-4,
+        "At its highest; it warms up and falls", decimals=8,
     ),
     Field(
-        "range_factor", "Range factor", 1.0, 4.0, 0.5,
+        "range_factor", "Range factor", bounds.RANGE_FACTOR, 0.5,
         "Learn as if the person were up to this many times nearer or farther; 1 is off",
         decimals=1,
     ),
-    Field("seed", "Seed", 0, 2**31 - 1, 1, "Of weights, order and dropout"),
+    Field("seed", "Seed", bounds.SEED, 1, "Of weights, order and dropout"),
 )  # fmt: skip
 
 

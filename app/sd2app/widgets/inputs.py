@@ -34,6 +34,7 @@ _PLAIN = (
     Qt.KeyboardModifier.ShiftModifier,
     Qt.KeyboardModifier.KeypadModifier,
 )
+_MANY_DECIMALS = 5
 
 
 class NumberBox(QDoubleSpinBox):
@@ -86,6 +87,11 @@ class NumberBox(QDoubleSpinBox):
             self.setObjectName(name)
             self.style().unpolish(self)
             self.style().polish(self)
+
+    def textFromValue(self, value: float) -> str:
+        """Digits of a number; where there may be many, without zeros at the end."""
+        text = super().textFromValue(value)
+        return text.rstrip("0").rstrip(".,") if self.decimals() > _MANY_DECIMALS else text
 
     def valueFromText(self, text: str) -> float:
         """Number that was typed, in the box's unit."""

@@ -15,6 +15,7 @@ from sd2app.widgets.inputs import Choice, NumberBox
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import ElidedLabel, outlined, sentence, show_words, side_by_side, title
 from sd2app.widgets.text import about
+from sd2core.numerics.bounds import Bounds
 
 
 class Field(NamedTuple):
@@ -22,8 +23,7 @@ class Field(NamedTuple):
 
     name: str
     text: str
-    low: float
-    high: float
+    bounds: Bounds
     step: float
     tip: str
     decimals: int = 0
@@ -60,7 +60,7 @@ class TrainingForm(QWidget):
     def number(self, field: Field) -> NumberBox:
         """Make the box of a setting."""
         box = NumberBox(
-            field.low, field.high, field.suffix, field.tip,
+            field.bounds.low, field.bounds.high, field.suffix, field.tip,
             decimals=field.decimals, step=field.step,
         )  # fmt: skip
         box.setMinimumWidth(64)

@@ -10,11 +10,12 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Literal
 
-from sd2core.classify.defaults import DELAY_S, MODELS, WIDTH
+from sd2core.classify.defaults import DELAY_S, DELAYS_S, MODELS, WIDTH, WIDTHS
 from sd2core.cli.classify.data import DATA_HELP, add_data, asked_maps, clips_of, split_of
 from sd2core.cli.command_parser import Options, add_command
-from sd2core.cli.options import given, not_negative_float, positive_float, positive_int
+from sd2core.cli.options import given, positive_int, within
 from sd2core.cli.output import finite, print_event, print_facts, print_json
+from sd2core.numerics.bounds import LEARNING_RATE, STEPS
 from sd2core.processes import INTERRUPTED
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ def add_train(kinds: argparse._SubParsersAction) -> None:
     """Add ``train``."""
     parser = add_command(kinds, "train", handler=_train, description=DATA_HELP)
     add_data(parser)
-    parser.add_output("FILE.safetensors", "the classifier to write")
+    parser.add_output("FILE.safetensors", "the classifier to write", ".safetensors")
     add_network(parser)
     parser.add_placements_used("range synthesis: train on", "all")
     otherwise = "(default: as the data set says, or a sixth of all)"
@@ -33,11 +34,11 @@ def add_train(kinds: argparse._SubParsersAction) -> None:
         f"kept out for validation, separated by commas, or none {otherwise}",
         f"kept out for a test, or none {otherwise}",
     )
-    parser.add_value("--steps", positive_int, "N", "number of training steps")
+    parser.add_value("--steps", within(STEPS), "N", "number of training steps")
     parser.add_value(
         "--patience", positive_int, "N", "end after so many validations without improvement"
     )
-    parser.add_value("--learning-rate", positive_float, "RATE", "peak learning rate")
+    parser.add_value("--learning-rate", within(LEARNING_RATE), "RATE", "peak learning rate")
     parser.add_value("--seed", int, "N", "seed of all random numbers", 0)
     parser.add_json_and_progress()
 
@@ -51,10 +52,10 @@ def add_network(parser: Options) -> None:
     text = "input per frame: whole columns (the default), or the strongest bin (the paper's)"
     group.add_choice("--features", ("columns", "peak"), text, "columns")
     text = f"units or channels of a layer (default: {WIDTH}; the paper's: 16)"
-    group.add_value("--width", positive_int, "N", text, WIDTH)
+    group.add_value("--width", within(WIDTHS), "N", text, WIDTH)
     text = "classify a frame so much later, with the frames after it known (default:"
     text += f" {DELAY_S:g}; the paper's: 0, at once)"
-    group.add_value("--delay-s", not_negative_float, "S", text, DELAY_S)
+    group.add_value("--delay-s", within(DELAYS_S), "S", text, DELAY_S)
 
 
 def _train(options: argparse.Namespace) -> int:
@@ -68,9 +69,6 @@ def _train(options: argparse.Namespace) -> int:
       sd2 classify train set.zarr --maps radar,denoised --out both.safetensors
       sd2 classify train anna=a.sd2 anna=b.sd2 ben=c.sd2 --model s4 --out own.safetensors
     """
-    from sd2core.cli.reading import check_output
-
-    check_output(options.out, ".safetensors")
     maps = asked_maps(options)
     from sd2core.classify.defaults import pace_kind
     from sd2core.classify.files import save_classifier

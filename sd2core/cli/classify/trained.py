@@ -56,10 +56,8 @@ def _eval(options: argparse.Namespace) -> None:
     """
     from sd2core.classify.files import load_classifier
     from sd2core.classify.live import judge
-    from sd2core.files.figure_files import check_figure, save_figure
+    from sd2core.files.figure_files import save_figure
 
-    if options.figure is not None:
-        check_figure(options.figure)
     classifier = load_classifier(options.model)
     maps = asked_maps(options)
     known = clips_of(options.data, maps, options.denoiser)
@@ -134,7 +132,7 @@ def add_apply(kinds: argparse._SubParsersAction) -> None:
     add_searched_map(parser, MAP_NAMES)
     _add_model(parser)
     text = "write `probabilities` (frames, classes), `times_s` and `classes`"
-    parser.add_value("--probabilities", Path, "FILE.npz", text)
+    parser.add_file("--probabilities", "FILE.npz", text, ".npz")
     parser.add_value("--min-duration-s", not_negative_float, "S", "shorter spans are left out", 0.2)
     text = "merge spans of a class with a shorter gap between them"
     parser.add_value("--merge-gap-s", not_negative_float, "S", text, 0.1)
@@ -155,13 +153,10 @@ def _apply(options: argparse.Namespace) -> None:
     """
     from sd2core.classify.files import describe_classifier, load_classifier
     from sd2core.classify.spans import SpanOptions, predicted_spans
-    from sd2core.cli.reading import check_output
     from sd2core.denoise.resample_to_model import check_bins
 
     if options.out is not None:
         check_label_output(options.out)
-    if options.probabilities is not None:
-        check_output(options.probabilities, ".npz")
     chosen = SpanOptions(options.min_duration_s, options.merge_gap_s)
     card = describe_classifier(options.model)
     doppler, clock = map_and_clock(options, card.axis)

@@ -189,7 +189,7 @@ def check_label_output(path: Path) -> str:
 
     Return the digest of what is there, for :func:`write`; empty without a file.
     """
-    from sd2core.cli.reading import check_output
+    from sd2core.cli.output_folders import check_output
 
     check_output(path, path.suffix.lower())
     return cached_digest(path)

@@ -13,6 +13,7 @@ from sd2core.cli.options import not_negative_float
 from sd2core.cli.output import counted, print_json, progress_bar
 from sd2core.cli.recording_maps import add_labelled_recording, chosen_maps, maps_of
 from sd2core.errors import Sd2Error
+from sd2core.files.figure_files import SUFFIXES as FIGURES
 
 if TYPE_CHECKING:
     from sd2core.cutouts.source import CutSource
@@ -26,7 +27,7 @@ def add_figure(kinds: argparse._SubParsersAction) -> None:
     """Add ``figure``."""
     parser = add_command(kinds, "figure", handler=_figure)
     add_labelled_recording(parser)
-    parser.add_output("FILE", "the figure to write (.png, .svg or .pdf)")
+    parser.add_output("FILE", "the figure to write (.png, .svg or .pdf)", *FIGURES)
     parser.add_value("--from-s", not_negative_float, "S", "start of the figure, in seconds")
     parser.add_value("--to-s", not_negative_float, "S", "end of the figure, in seconds")
 
@@ -42,11 +43,9 @@ def _figure(options: argparse.Namespace) -> None:
       sd2 labels figure walk.sd2 --out detail.png --maps synthetic,denoised --from-s 2 --to-s 6
     """
     from sd2core.figures.maps import Levels, MapRow, draw_maps, save_maps
-    from sd2core.files.figure_files import check_figure
     from sd2core.recording.recording import open_recording
     from sd2core.sensor import VelocityAxis
 
-    check_figure(options.out)
     recording = open_recording(options.recording)
     clock = recording_clock(recording)
     labels = labels_at(options.labels or options.recording, clock)

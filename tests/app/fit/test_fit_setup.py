@@ -75,7 +75,7 @@ def test_a_rectangle_may_be_drawn_from_any_corner_and_beyond_the_edge(setup) -> 
 
 def test_heights_stay_human(setup) -> None:
     setup.change(stature_m=17.0)
-    assert setup.choices.stature_m == 2.3
+    assert setup.choices.stature_m == 2.6
     setup.change(stature_m=None)
     assert setup.request().stature_m is None
 

@@ -87,7 +87,7 @@ def test_the_best_is_kept_where_it_is_stopped(known: ClipSet) -> None:
 
 
 def test_without_a_better_one_it_ends_early(known: ClipSet) -> None:
-    still = replace(SHORT, steps=400, check_steps=2, patience=3, learning_rate=1e-9)
+    still = replace(SHORT, steps=400, check_steps=2, patience=3, learning_rate=1e-8)
     made = train(known.clips[:8], known.clips[8:], known, still)
     assert max(one.get("step", 0) for one in made.events) == 8
 
@@ -129,6 +129,8 @@ def test_a_trained_classifier_comes_back_from_its_file(known: ClipSet, tmp_path:
     [
         ({"steps": 0}, "steps is 0"),
         ({"learning_rate": 0.0}, "learning_rate is 0"),
+        ({"learning_rate": 2.0}, "learning_rate is 2"),
+        ({"options": {"width": 2048}}, "width is 2048"),
         ({"delay_s": -1.0}, "delay is -1"),
         ({"noisy_share": 2.0}, "noisy clips is 2"),
     ],

@@ -278,6 +278,8 @@ class TestOutput:
             ("--person-frame", "-1"),
             ("--resolution", "huge"),
             ("--stature-m", "0"),
+            ("--stature-m", "178"),
+            ("--field-of-view", "500"),
             ("--json", "--progress-json"),
         ],
     )

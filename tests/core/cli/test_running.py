@@ -103,6 +103,16 @@ def test_an_error_as_json(
     assert captured.err.startswith(f"sd2: {expected[0]}")
 
 
+@pytest.mark.parametrize("command", ["fit", "export", "batch"])
+def test_an_error_is_the_last_line_of_progress(sd2: Sd2, tmp_path: Path, command: str) -> None:
+    words = () if command == "batch" else ("--out", tmp_path / "made.zarr")
+    outcome = sd2(command, tmp_path / "nothing", *words, "--progress-json")
+    assert outcome.code == 1
+    line = json.loads(outcome.out.splitlines()[-1])
+    assert line["event"] == "error"
+    assert f"sd2: {line['text']}\n" == outcome.err
+
+
 def test_what_was_typed_wrong_as_json(sd2: Sd2) -> None:
     outcome = sd2("synth", "a.npz", "--json")
     assert outcome.code == 2

@@ -148,21 +148,21 @@ class TestMove:
 
 class TestNudge:
     def test_by_frames_until_the_neighbour(self) -> None:
-        assert times(nudge(TWO, FRAMES, 1, 3))[0] == (1.3, 2.3)
-        assert times(nudge(TWO, FRAMES, 1, 30))[0] == (2.0, 3.0)
-        assert times(nudge(TWO, FRAMES, 1, -30))[0] == (0.0, 1.0)
+        assert times(nudge(TWO, FRAMES, [1], 3))[0] == (1.3, 2.3)
+        assert times(nudge(TWO, FRAMES, [1], 30))[0] == (2.0, 3.0)
+        assert times(nudge(TWO, FRAMES, [1], -30))[0] == (0.0, 1.0)
 
     @given(count=st.integers(-3, 3))
     def test_there_and_back(self, count: int) -> None:
         labels = labels_of((1.0, 3.0))  # frames 3 and 4, of different lengths
-        there = nudge(labels, JUMPY, 1, count).labels
+        there = nudge(labels, JUMPY, [1], count).labels
         assert there.span(1).start_s == JUMPY.times_s[3 + count]
-        assert nudge(there, JUMPY, 1, -count).labels == labels
+        assert nudge(there, JUMPY, [1], -count).labels == labels
 
     def test_an_import_goes_to_frames(self) -> None:
         labels = labels_of((1.04, 2.04))
-        assert times(nudge(labels, FRAMES, 1, 1)) == [(1.1, 2.1)]
-        assert times(nudge(labels, FRAMES, 1, -2)) == [(0.9, 1.9)]
+        assert times(nudge(labels, FRAMES, [1], 1)) == [(1.1, 2.1)]
+        assert times(nudge(labels, FRAMES, [1], -2)) == [(0.9, 1.9)]
 
 
 class TestSplit:
@@ -275,11 +275,10 @@ class TestFillGaps:
 def test_a_copy_keeps_what_is_said_and_fits_in() -> None:
     labels = labels_of((1.0, 2.0), (3.0, 4.0))
     labels = labels.with_spans([replace(labels.span(1), note="clear", confidence=0.5)])
-    copy = duplicate(labels, FRAMES, 1, 2.5)
+    copy = duplicate(labels, FRAMES, [1], 2.5)
     assert times(copy)[1] == (2.5, 3.0)
     assert copy.labels.span(3) == replace(labels.span(1), id=3, start_s=2.5, end_s=3.0)
-    assert times(duplicate(labels, FRAMES, 1, 1.0, "Other"), "Other") == [(1.0, 2.0)]
-    assert times(duplicate(labels, FRAMES, 1, 9.8))[-1] == (9.0, 10.0)
+    assert times(duplicate(labels, FRAMES, [1], 9.8))[-1] == (9.0, 10.0)
 
 
 def test_deleted_spans_are_gone() -> None:

@@ -12,11 +12,10 @@ from labelled import many_spans
 from sd2core.errors import Sd2Error
 from sd2core.labels.edits import (
     Edit,
-    duplicate_together,
+    duplicate,
     move,
     move_together,
     nudge,
-    nudge_together,
 )
 from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.timebase import Timebase
@@ -58,24 +57,24 @@ def test_they_do_not_leave_the_recording() -> None:
     everything = (1, 2, 3, 4)
     assert times(move_together(LABELS, FRAMES, everything, 1, 99.0))[-1] == (9, 10)
     assert times(move_together(LABELS, FRAMES, everything, 1, -99.0))[0] == (0, 1)
-    assert times(nudge_together(LABELS, FRAMES, everything, 99))[-1] == (9, 10)
-    assert times(nudge_together(LABELS, FRAMES, everything, -99))[0] == (0, 1)
+    assert times(nudge(LABELS, FRAMES, everything, 99))[-1] == (9, 10)
+    assert times(nudge(LABELS, FRAMES, everything, -99))[0] == (0, 1)
 
 
 def test_a_nudge_goes_as_far_as_the_first_that_stops() -> None:
-    assert times(nudge_together(LABELS, FRAMES, (1, 3), 3)) == times(Edit("", LABELS))
-    assert times(nudge_together(LABELS, FRAMES, (2, 3), 20))[1:3] == [(3.5, 4), (4.5, 5)]
-    refused = nudge_together(LABELS, FRAMES, (1, 3), 3)
+    assert times(nudge(LABELS, FRAMES, (1, 3), 3)) == times(Edit("", LABELS))
+    assert times(nudge(LABELS, FRAMES, (2, 3), 20))[1:3] == [(3.5, 4), (4.5, 5)]
+    refused = nudge(LABELS, FRAMES, (1, 3), 3)
     assert refused.labels is LABELS
 
 
 def test_copies_keep_their_distances_and_shorten_where_there_is_no_room() -> None:
-    edit = duplicate_together(LABELS, FRAMES, (2, 3), 7.0)
+    edit = duplicate(LABELS, FRAMES, (2, 3), 7.0)
     assert times(edit)[-2:] == [(7, 7.5), (8, 8.5)]
     assert [edit.labels.span(one).label for one in edit.ids] == ["label 2", "label 3"]
-    assert times(duplicate_together(LABELS, FRAMES, (2, 3), 3.8))[3:5] == [(3.8, 4.3), (4.8, 5)]
+    assert times(duplicate(LABELS, FRAMES, (2, 3), 3.8))[3:5] == [(3.8, 4.3), (4.8, 5)]
     with pytest.raises(Sd2Error, match="every frame has a span"):
-        duplicate_together(LABELS, FRAMES, (2, 3), 4.2)
+        duplicate(LABELS, FRAMES, (2, 3), 4.2)
 
 
 @pytest.mark.slow
@@ -107,13 +106,10 @@ def test_one_alone_goes_as_it_always_does(number: int, step: int) -> None:
     start_s = LABELS.span(number).start_s + step / 10
     together = move_together(LABELS, FRAMES, (number,), number, start_s)
     assert times(together) == times(move(LABELS, FRAMES, number, start_s))
-    assert times(nudge_together(LABELS, FRAMES, (number,), step)) == times(
-        nudge(LABELS, FRAMES, number, step)
-    )
 
 
 def test_thousands_at_once() -> None:
     base, labels = Timebase.regular(90_000, 30.0), many_spans(3000)
-    edit = nudge_together(labels, base, [span.id for span in labels.spans], 3)
+    edit = nudge(labels, base, [span.id for span in labels.spans], 3)
     assert edit.labels.spans[0].start_s == base.time_of(3)
     assert edit.name == "Nudge 3000 spans"
