@@ -10,9 +10,9 @@ from sd2core.progress import Progress
 from sd2core.sensor import VirtualSensor
 
 if TYPE_CHECKING:
-    from sd2core.accuracy.choosing import Survey
     from sd2core.accuracy.plans import AccuracyPlan, Family
     from sd2core.accuracy.results import Choice, Measurement
+    from sd2core.accuracy.survey import Survey
     from sd2core.doppler.synthesizer import Synthesizer
 
 
@@ -32,7 +32,7 @@ class AccuracyLibrary:
         like: Survey | None,
     ) -> Survey:
         """Look at a scene; ``like`` is an earlier survey of the same mesh."""
-        from sd2core.accuracy.choosing import survey_scene
+        from sd2core.accuracy.survey import survey_scene
 
         return survey_scene(mesh, sensor, options, progress, like=like)
 

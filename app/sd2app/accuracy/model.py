@@ -17,8 +17,8 @@ from sd2core.mesh.sequence import MeshSequence
 from sd2core.sensor import VirtualSensor
 
 if TYPE_CHECKING:
-    from sd2core.accuracy.choosing import Survey
     from sd2core.accuracy.results import Choice, PlanResult
+    from sd2core.accuracy.survey import Survey
 
 PRESETS = (0.005, 0.01, 0.02, 0.05, 0.1)
 """Offered tolerances."""

@@ -10,9 +10,10 @@ import pytest
 import trimesh
 from accuracy_scenes import ball, moving, plate, steady, swinging, together
 
-from sd2core.accuracy.choosing import Survey, choose, survey_scene
+from sd2core.accuracy.choosing import choose
 from sd2core.accuracy.plans import FRAME_RATE_FACTORS
 from sd2core.accuracy.sample import take_sample
+from sd2core.accuracy.survey import Survey, survey_scene
 from sd2core.accuracy.trial import synthesizer_for
 from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.errors import Sd2Error

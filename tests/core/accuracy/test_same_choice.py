@@ -11,9 +11,10 @@ from accuracy_scenes import ball, plate, swinging, together
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from sd2core.accuracy.choosing import Survey, choose, survey_scene
+from sd2core.accuracy.choosing import choose
 from sd2core.accuracy.cost_model import modelled_ns
 from sd2core.accuracy.plans import FRAME_RATE_FACTORS, AccuracyPlan, counting_plans
+from sd2core.accuracy.survey import Survey, survey_scene
 from sd2core.accuracy.trial import Trial
 from sd2core.doppler import PRESETS
 from sd2core.mesh.sequence import MeshSequence
