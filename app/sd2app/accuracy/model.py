@@ -6,7 +6,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.accuracy.measurements import Library, MeasuredModel, serves_at_rest
+from sd2app.accuracy.measurements import (
+    Library,
+    MeasuredModel,
+    cheapest_within,
+    serves_at_rest,
+)
 from sd2app.accuracy.text import InUse
 from sd2app.background.latest import Emit, ReportingModel
 from sd2app.session.tasks import ListedRunner, TaskList
@@ -123,14 +128,11 @@ class AccuracyModel(ReportingModel):
         """
         if self.measured.counting is None:
             return None
-        known = [
-            (result.errors.l1, result.cost.all_cores_ms.median)
-            for result in self.measured.counting.results
-            if serves_at_rest(result)
-        ]
-        if self.choice is not None:
-            known.append((self.choice.errors.l1, self.choice.cost_ms))
-        return min((cost_ms for error, cost_ms in known if error <= tolerance), default=None)
+        cheapest = cheapest_within(self.measured.counting, tolerance)
+        known_ms = [] if cheapest is None else [cheapest.cost.all_cores_ms.median]
+        if self.choice is not None and self.choice.errors.l1 <= tolerance:
+            known_ms.append(self.choice.cost_ms)
+        return min(known_ms, default=None)
 
     def is_decided(self, sensor: VirtualSensor, budget_ms: float) -> bool:
         """True if the plans were chosen for this sensor, budget and tolerance."""

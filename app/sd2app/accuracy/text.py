@@ -61,9 +61,11 @@ def chosen_sentence(in_use: InUse, frames: int) -> str:
 
 def legend(measurement: Measurement, tolerance: float, *, in_use: bool) -> str:
     """Signs of the plot and what they stand for, as far as they are there."""
-    signs = ["◉ in use"] if in_use else []
-    if measurement.family == "histogram":
-        signs = ["◉ chosen"] if in_use else []
+    counting = measurement.family == "histogram"
+    signs = []
+    if in_use:
+        signs.append("◉ chosen" if counting else "◉ in use")
+    if counting:
         if cheapest_within(measurement, tolerance) is not None:
             signs.append("◇ cheapest measured within the tolerance")
         if not all(map(serves_at_rest, measurement.results)):
