@@ -64,7 +64,13 @@ class FakeSurvey:
 
     def __init__(self, mesh, sensor, options):
         self.mesh, self.sensor, self.options = mesh, sensor, options
-        self.trial = self
+        self.trial, self.built_on = self, None
+
+    def at(self, sensor):
+        """That of another place, which builds on this one."""
+        other = FakeSurvey(self.mesh, sensor, self.options)
+        other.built_on = self.sensor
+        return other
 
     def forget(self):
         """Nothing was prepared."""
@@ -104,9 +110,9 @@ class FakeAccuracy:
             raise
         progress(10, 10)
 
-    def survey_scene(self, mesh, sensor, options, progress, *, like):
+    def survey_scene(self, mesh, sensor, options, progress, *, trial):
         self.surveyed.append(sensor)
-        self.alike.append(like and like.sensor)
+        self.alike.append(trial and trial.built_on)
         self._wait(progress)
         return FakeSurvey(mesh, sensor, options)
 

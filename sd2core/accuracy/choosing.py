@@ -136,13 +136,22 @@ def check_wish(tolerance: float | None, budget_ms: float | None = None) -> None:
 def _cheapest(
     survey: Survey, tolerance: float, tried: dict[AccuracyPlan, Errors], progress: Progress
 ) -> AccuracyPlan:
-    """Cheapest plan that holds, else the one of smallest error; ``tried`` gets all errors."""
+    """Cheapest plan that holds, else the one of smallest error.
+
+    ``tried`` gets all errors: on the frames to choose on where they are too large already, else on
+    those to check on.
+    """
     plans = sorted(_candidates(survey, tolerance), key=survey.dearness)
     forecast = {plan: survey.forecast_error(plan) for plan in plans}
 
+    sample = survey.trial.sample
+
     def holds(plan: AccuracyPlan) -> bool:
-        tried[plan] = _tried(survey, plan, tolerance, progress)
-        return tried[plan].l1 <= tolerance
+        for runs in (sample.chosen_on, sample.checked_on):
+            tried[plan] = survey.trial.errors(plan, runs, progress=progress)
+            if tried[plan].l1 > tolerance:
+                return False
+        return True
 
     safe = [plan for plan in plans if forecast[plan] <= tolerance]
     # What must hold if anything does.
@@ -193,15 +202,6 @@ def _reach_m(survey: Survey, progress: Progress) -> float | None:
         if survey.change[plan] < survey.change[replace(base, visibility="facing")]:
             return reach_m
     return None
-
-
-def _tried(survey: Survey, plan: AccuracyPlan, tolerance: float, progress: Progress) -> Errors:
-    """Errors on the frames to check on; if already too large on those to choose on, there."""
-    sample = survey.trial.sample
-    errors = survey.trial.errors(plan, sample.chosen_on, progress=progress)
-    if errors.l1 > tolerance:
-        return errors
-    return survey.trial.errors(plan, sample.checked_on, progress=progress)
 
 
 def _candidates(survey: Survey, tolerance: float) -> list[AccuracyPlan]:

@@ -34,10 +34,8 @@ from sd2core.fmcw.spectra import frame_spectra, signal_spectra
 from sd2core.fmcw.wave import WaveScene
 from sd2core.mesh.decimation import decimate
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.numerics.compiled import workers
 from sd2core.progress import Progress, silent
 from sd2core.radar_config import PAPER_RADAR
-from sd2core.scattering.facets import visible_facets
 from sd2core.sensor import VirtualSensor
 
 REPEATS = 5
@@ -212,9 +210,8 @@ class _Waves:
 
         ``convergence`` gets the largest change of any frame with each finer cut.
         """
-        plan = self.reference_plan
-        visible = self._visible(plan, None)
-        scene = WaveScene(self._mesh, PAPER_RADAR, self._sensor, visible, plan.wave(WaveOptions()))
+        wave = self.reference_plan.wave(WaveOptions())
+        scene = WaveScene(self._mesh, PAPER_RADAR, self._sensor, "exact", wave)
         signals = []
         for time_s in self._mesh.times_s[list(self.frames)].tolist():
             found = converged_frame(scene, time_s, most_cuts=_MOST_CUTS, go_on=go_on)
@@ -245,7 +242,9 @@ class _Waves:
         passed_s = time.perf_counter() - start
         return 1e3 * one_s / len(self.frames), 1e3 * passed_s / len(self.frames)
 
-    def _columns(self, plan: AccuracyPlan, threads: int | None = None) -> NDArray[np.float64]:
+    def _columns(
+        self, plan: AccuracyPlan, threads: Literal[1, "all"] = "all"
+    ) -> NDArray[np.float64]:
         """Columns of a plan, each adding up to 1, (bins, n)."""
         mesh = self._counted(plan)
         power = frame_spectra(
@@ -253,10 +252,10 @@ class _Waves:
             PAPER_RADAR,
             mesh.times_s[list(self.frames)],
             sensor=self._sensor,
-            visibility=self._visible(plan, threads),
+            visibility="exact" if plan.visibility == "exact" else "facing",
             wave=plan.wave(WaveOptions()),
             axis=self._axis,
-            threads=1 if threads == 1 else "all",
+            threads=threads,
         )
         return shares(power.astype(np.float64))
 
@@ -267,23 +266,6 @@ class _Waves:
             self._meshes[plan.vertices_kept] = decimate(self._mesh, plan.vertices_kept)
             self._setup_s[plan.vertices_kept] = time.perf_counter() - start
         return self._meshes[plan.vertices_kept]
-
-    def _visible(
-        self, plan: AccuracyPlan, threads: int | None
-    ) -> NDArray[np.bool_] | Literal["facing"]:
-        """Visible facets of a plan of exact visibility, else "facing"."""
-        if plan.visibility == "facing":
-            return "facing"
-        mesh = self._counted(plan)
-        faces = mesh.faces
-        assert faces is not None  # refused before
-        seen = np.zeros((mesh.frame_count, len(faces)), np.bool_)
-
-        def fill(frame: int) -> None:
-            seen[frame] = visible_facets(mesh.frame(frame), faces, self._sensor.position_m)
-
-        list((map if threads == 1 else workers().map)(fill, self.frames))
-        return seen
 
 
 def _peak_bytes(work: Callable[[], object], memory: bool) -> int | None:

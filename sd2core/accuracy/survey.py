@@ -107,20 +107,16 @@ def survey_scene(
     options: SynthesisOptions,
     progress: Progress = silent,
     *,
-    like: Survey | None = None,
     trial: Trial | None = None,
 ) -> Survey:
     """Measure error and cost of each setting alone.
 
-    ``options`` are for what a plan does not choose. ``like`` is a survey of the same mesh
-    with the same options from another place: it saves sampling and decimating again.
-    ``trial`` is one of the same scene, if there is one already. Progress counts the tries
-    and may raise Cancelled.
+    ``options`` are for what a plan does not choose. ``trial`` is one of the same scene, if there
+    is one already; that of another place, with :meth:`Trial.at` this one, saves sampling and
+    decimating again. Progress counts the tries and may raise Cancelled.
     """
     surface = mesh.faces is not None
-    if trial is None and like is not None:
-        trial = like.trial.at(sensor)
-    elif trial is None:
+    if trial is None:
         trial = Trial(mesh, sensor, options, take_sample(mesh, options))
     base = AccuracyPlan(visibility="exact" if surface else "none", weight=options.weight)
     single = [replace(sight, weight=options.weight) for sight in visibility_plans(surface=surface)]

@@ -234,7 +234,8 @@ class AccuracyModel(ReportingModel):
         if survey is not None and (survey.trial.mesh, survey.trial.options) != (mesh, options):
             survey = None
         if survey is None or survey.trial.sensor != wish.sensor:
-            survey = library.survey_scene(mesh, wish.sensor, options, progress, like=survey)
+            trial = survey.trial.at(wish.sensor) if survey is not None else None
+            survey = library.survey_scene(mesh, wish.sensor, options, progress, trial=trial)
             self._survey = survey
 
         def within(**limit: float) -> Choice:

@@ -157,7 +157,7 @@ def test_a_survey_that_builds_on_another_finds_the_same(
 ) -> None:
     aside = VirtualSensor(position_m=(0.4, 0.0, 0.0))
     anew = survey_scene(scene, aside, PAPER)
-    built_on = survey_scene(scene, aside, PAPER, like=survey)
+    built_on = survey_scene(scene, aside, PAPER, trial=survey.trial.at(aside))
     assert built_on.change == anew.change
     assert built_on.facts == anew.facts
 

@@ -68,8 +68,8 @@ def test_opened_several_times_on_a_machine_of_any_speed(
 def test_a_survey_from_elsewhere_before_changes_nothing(
     scene: MeshSequence, survey: Survey
 ) -> None:
-    there = survey_scene(scene, ELSEWHERE, PAPER, like=survey)
-    back = survey_scene(scene, CAMERA, PAPER, like=there)
+    there = survey_scene(scene, ELSEWHERE, PAPER, trial=survey.trial.at(ELSEWHERE))
+    back = survey_scene(scene, CAMERA, PAPER, trial=there.trial.at(CAMERA))
     for plan, change in survey.change.items():
         assert back.change[plan] == pytest.approx(change, rel=1e-9, abs=1e-12)
 
