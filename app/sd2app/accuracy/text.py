@@ -38,14 +38,9 @@ class InUse:
         """Accuracy and plan in few words; it is read where there is no room for all."""
         return f"{self.accuracy} · {short(self.plan)}"
 
-    @property
-    def figures(self) -> str:
-        """Accuracy and cost."""
-        figures = f"{self.accuracy} · {milliseconds(self.cost_ms)}/frame"
-        return f"{figures} (measured elsewhere)" if self.elsewhere else figures
-
     def __str__(self) -> str:
-        return f"{self.plan} · {self.figures}"
+        text = f"{self.plan} · {self.accuracy} · {milliseconds(self.cost_ms)}/frame"
+        return f"{text} (measured elsewhere)" if self.elsewhere else text
 
 
 def chosen_sentence(in_use: InUse, frames: int) -> str:
