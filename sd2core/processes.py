@@ -1,4 +1,4 @@
-"""Identity, priority, environment and memory of processes."""
+"""Identity, priority, environment and memory of processes, and their processor."""
 
 from __future__ import annotations
 
@@ -138,3 +138,15 @@ def end_with_parent() -> None:
         os._exit(1)
 
     threading.Thread(target=watch, name="sd2-parent", daemon=True).start()
+
+
+def processor_name() -> str:
+    """Name of this machine's processor."""
+    import platform
+
+    with suppress(OSError), open("/proc/cpuinfo", encoding="utf-8", errors="replace") as stream:
+        for line in stream:
+            name, _, value = line.partition(":")
+            if name.strip() == "model name":
+                return value.strip()
+    return platform.processor() or platform.machine()

@@ -6,7 +6,6 @@ import threading
 import time
 from dataclasses import replace
 
-from sd2app.accuracy.library import AccuracyLibrary
 from sd2core.accuracy.plans import AccuracyPlan, reference_plan
 from sd2core.accuracy.results import (
     Choice,
@@ -60,7 +59,24 @@ WAVES = (
 )
 
 
-class FakeAccuracy(AccuracyLibrary):
+class FakeSurvey:
+    """Survey and trial in one, of a scene that is not looked at."""
+
+    def __init__(self, mesh, sensor, options):
+        self.mesh, self.sensor, self.options = mesh, sensor, options
+        self.trial, self.built_on = self, None
+
+    def at(self, sensor):
+        """That of another place, which builds on this one."""
+        other = FakeSurvey(self.mesh, sensor, self.options)
+        other.built_on = self.sensor
+        return other
+
+    def forget(self):
+        """Nothing was prepared."""
+
+
+class FakeAccuracy:
     """What it answers, what it was asked, and a gate that keeps an answer back.
 
     Without a plan for a tolerance the one given as ``plan`` is chosen; ``gate``
@@ -78,7 +94,11 @@ class FakeAccuracy(AccuracyLibrary):
         self.known = {}
         self.remembered = []
 
-    def recall(self, mesh, sensor, options, family):
+    def library(self):
+        """Itself, in place of the functions of the library."""
+        return self
+
+    def cached_measurement(self, mesh, sensor, options, family):
         return self.known.get((family, sensor))
 
     def _wait(self, progress):
@@ -90,15 +110,15 @@ class FakeAccuracy(AccuracyLibrary):
             raise
         progress(10, 10)
 
-    def survey(self, mesh, sensor, options, progress, like):
+    def survey_scene(self, mesh, sensor, options, progress, *, trial):
         self.surveyed.append(sensor)
-        self.alike.append(like)
+        self.alike.append(trial and trial.built_on)
         self._wait(progress)
-        return sensor
+        return FakeSurvey(mesh, sensor, options)
 
     def choose(self, mesh, sensor, *, tolerance=None, budget_ms=None, progress, **parts):
         self.asked.append((tolerance, budget_ms, sensor))
-        assert parts["survey"] == sensor
+        assert parts["survey"].sensor == sensor
         self._wait(progress)
         if self.failure is not None:
             raise self.failure
@@ -107,12 +127,14 @@ class FakeAccuracy(AccuracyLibrary):
         plan = self.plans.get(tolerance, self.plan)
         return Choice(plan, self.holds, errors_of(self.error), 0.6, REASONS, tolerance, None, 0.1)
 
-    def measure(self, mesh, sensor, *, options, family, progress):
+    def measure(self, mesh, sensor, *, options, family, memory, progress):
+        # Tracing that ends while another thread's kernel allocates ends the process.
+        assert not memory
         self._wait(progress)
         results = COUNTING if family == "histogram" else WAVES
         return measurement_of(*results, family=family)
 
-    def store(self, mesh, measurement):
+    def store_measurement(self, mesh, measurement):
         self.remembered.append(measurement)
 
 

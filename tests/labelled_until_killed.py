@@ -113,7 +113,7 @@ class Editor:
 def edit_on(recording: Path, seed: int, told: int) -> None:
     """Open, restore, edit for ever."""
     application = QApplication(sys.argv[:1])
-    parts = Parts(accuracy=FakeAccuracy(), denoisers=FakeDenoisers().library)
+    parts = Parts(accuracy=FakeAccuracy().library, denoisers=FakeDenoisers().library)
     window = MainWindow(Settings.forgetful(), parts)
     window.show()
     window.populate()

@@ -1,6 +1,6 @@
 """Accuracy against speed: plans, their measured cost and error, and the plan a scene needs.
 
-``choose`` and ``measure`` are loaded when they are first used::
+Functions are loaded when they are first used::
 
     from sd2core import accuracy
 
@@ -26,8 +26,10 @@ from sd2core.accuracy.results import (
 )
 
 if TYPE_CHECKING:
+    from sd2core.accuracy.cache import cached_measurement, store_measurement
     from sd2core.accuracy.choosing import choose
     from sd2core.accuracy.measuring import measure
+    from sd2core.accuracy.survey import survey_scene
     from sd2core.accuracy.trial import synthesizer_for
 
 __all__ = [
@@ -40,13 +42,23 @@ __all__ = [
     "PlanResult",
     "Reason",
     "Spread",
+    "cached_measurement",
     "choose",
     "measure",
     "reference_plan",
+    "store_measurement",
+    "survey_scene",
     "synthesizer_for",
 ]
 
-_HOME = {"choose": "choosing", "measure": "measuring", "synthesizer_for": "trial"}
+_HOME = {
+    "cached_measurement": "cache",
+    "choose": "choosing",
+    "measure": "measuring",
+    "store_measurement": "cache",
+    "survey_scene": "survey",
+    "synthesizer_for": "trial",
+}
 
 
 def __getattr__(name: str) -> Any:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import platform
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -20,10 +19,9 @@ from sd2core.files.paths import user_cache
 from sd2core.files.texts import read_text
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics.compiled import worker_count
+from sd2core.processes import processor_name
 from sd2core.sensor import VirtualSensor
 from sd2core.version import __version__
-
-_PROCESSORS = Path("/proc/cpuinfo")
 
 
 def clip_fingerprint(mesh: MeshSequence) -> str:
@@ -59,16 +57,7 @@ def scene_fingerprint(
 
 def this_machine() -> Machine:
     """Processor, cores and program version in use."""
-    return Machine(_processor(), worker_count(), __version__)
-
-
-def _processor() -> str:
-    if _PROCESSORS.exists():
-        for line in _PROCESSORS.read_text(encoding="utf-8", errors="replace").splitlines():
-            name, _, value = line.partition(":")
-            if name.strip() == "model name":
-                return value.strip()
-    return platform.processor() or platform.machine()
+    return Machine(processor_name(), worker_count(), __version__)
 
 
 _FORMAT = 1

@@ -13,9 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from sd2core.accuracy.choosing import check_options, check_wish, choose, survey_scene
+from sd2core.accuracy.choosing import check_options, check_wish, choose
 from sd2core.accuracy.plans import AccuracyPlan, reference_plan
 from sd2core.accuracy.sample import take_sample
+from sd2core.accuracy.survey import survey_scene
 from sd2core.accuracy.trial import Trial, synthesizer_for
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.doppler.reference import reference_stretch

@@ -175,16 +175,14 @@ def _listed(
     coverage: SensorCoverage,
     radar: RadarConfig,
 ) -> list[dict[str, Any]]:
-    out_of_range, aliasing = coverage.out_of_range(radar), coverage.aliasing(radar)
+    problems = coverage.problems(radar)
     return [
         {
             **picked(place, "range_m", "azimuth_deg", "elevation_deg"),
             "position_m": sensor.position_m,
             "farthest_m": float(coverage.farthest_m[number]),
             "fastest_mps": float(coverage.fastest_mps[number]),
-            "inside": bool(coverage.inside[number]),
-            "out_of_range": bool(out_of_range[number]),
-            "aliasing": bool(aliasing[number]),
+            **{name: bool(some[number]) for name, some in problems.items()},
         }
         for number, (place, sensor) in enumerate(zip(placements.places(), sensors, strict=True))
     ]

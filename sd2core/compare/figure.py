@@ -15,7 +15,9 @@ if TYPE_CHECKING:
 COLOURS = ("#222222", "#b35806", "#2166ac", "#1b7837", "#7b3294", "#c51b7d")
 """Colours of the meshes in order; the reference is drawn in the first, whatever its number."""
 
-_CURVES = ("hands", "elbows", "torso")
+_SIDES = "left —, right - -"
+_CURVES = {"hands": _SIDES, "elbows": _SIDES, "torso": "chest —, pelvis - -"}
+"""Groups whose joints are drawn, and which line is whose."""
 
 
 def draw_comparison(comparison: Comparison) -> Figure:
@@ -26,7 +28,7 @@ def draw_comparison(comparison: Comparison) -> Figure:
     figure = Figure(figsize=(3.4 * max(count, 2), 8.4), dpi=120, layout="constrained")
     grid = figure.add_gridspec(4, count, height_ratios=(1.6, 1, 1, 1))
     top = max(float(one.values.max(initial=0.0)) for one in comparison.maps) or 1.0
-    sides = {"hands": "LR", "elbows": "LR", "torso": ""}
+    reference_first = sorted(range(count), key=lambda number: number != comparison.reference)
     first = None
     for number, (label, one) in enumerate(zip(comparison.labels, comparison.maps, strict=True)):
         axes = figure.add_subplot(grid[0, number], sharex=first, sharey=first)
@@ -55,10 +57,10 @@ def draw_comparison(comparison: Comparison) -> Figure:
             bar = figure.colorbar(shown, ax=axes, pad=0.02)
             bar.set_label("√(share / largest)", fontsize=7)
             bar.ax.tick_params(labelsize=6)
-    for row, group in enumerate(_CURVES, start=1):
+    for row, (group, lines) in enumerate(_CURVES.items(), start=1):
         axes = figure.add_subplot(grid[row, :], sharex=first)
         for number, label in enumerate(comparison.labels):
-            colour = COLOURS[_place(number, comparison.reference) % len(COLOURS)]
+            colour = COLOURS[reference_first.index(number) % len(COLOURS)]
             for joint in GROUPS[group]:
                 right = joint.endswith(".R")
                 axes.plot(
@@ -73,7 +75,6 @@ def draw_comparison(comparison: Comparison) -> Figure:
                     linestyle="--" if right or joint == "pelvis" else "-",
                     label=label if joint == GROUPS[group][0] else None,
                 )
-        lines = "left —, right - -" if sides[group] else "chest —, pelvis - -"
         axes.set_ylabel(f"{group}: {lines}\n(m/s)", fontsize=8)
         axes.axhline(0.0, color="#999999", linewidth=0.5)
         axes.grid(alpha=0.2)
@@ -87,10 +88,3 @@ def draw_comparison(comparison: Comparison) -> Figure:
         fontsize=10,
     )
     return figure
-
-
-def _place(number: int, reference: int) -> int:
-    """Number of a colour: 0 for the reference, the others from 1."""
-    if number == reference:
-        return 0
-    return number + 1 if number < reference else number

@@ -12,6 +12,7 @@ from sd2core.errors import Sd2Error
 from sd2core.fmcw.chain import FrameChain, ProcessingOptions
 from sd2core.fmcw.options import WaveOptions
 from sd2core.fmcw.processing import rebinning
+from sd2core.fmcw.scene import FacetsSeen
 from sd2core.fmcw.wave import BeatSignal, WaveScene
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics.compiled import workers
@@ -25,7 +26,7 @@ def frame_spectra(
     times_s: ArrayLike,
     *,
     sensor: VirtualSensor | None = None,
-    visibility: NDArray[np.bool_] | Literal["facing"] = "facing",
+    visibility: FacetsSeen = "facing",
     wave: WaveOptions | None = None,
     axis: VelocityAxis | None = None,
     processing: ProcessingOptions | None = None,
@@ -46,8 +47,8 @@ def frame_spectra(
         Middles of the frames.
     sensor : VirtualSensor
         At the camera by default.
-    visibility : bool array, shape (T, F), or "facing"
-        Per mesh frame; only those nearest to the times are read.
+    visibility : bool array, shape (T, F), "facing" or "exact"
+        Per mesh frame; only those nearest to the times are read. "exact" finds them.
     axis : VelocityAxis or None
         The 32 bins over ±2 m/s by default.
     processing : ProcessingOptions

@@ -28,17 +28,17 @@ class SensorCoverage:
     fastest_mps: NDArray[np.float64]
     """Radial velocity, without its sign, that 1 % of the vertices exceed in some frame."""
 
-    def out_of_range(self, radar: RadarConfig) -> NDArray[np.bool_]:
-        """Mask of sensors that see part of the body beyond the radar's range."""
-        return self.farthest_m > radar.range_max_m
-
-    def aliasing(self, radar: RadarConfig) -> NDArray[np.bool_]:
-        """Mask of sensors that see part of the body faster than the radar's v_max."""
-        return self.fastest_mps > radar.v_max_mps
+    def problems(self, radar: RadarConfig) -> dict[str, NDArray[np.bool_]]:
+        """Masks of sensors in the body, and that see part of it too far or too fast for a radar."""
+        return {
+            "inside": self.inside,
+            "out_of_range": self.farthest_m > radar.range_max_m,
+            "aliasing": self.fastest_mps > radar.v_max_mps,
+        }
 
     def beyond(self, radar: RadarConfig) -> NDArray[np.bool_]:
         """Mask of sensors that are unsuitable for any of these reasons."""
-        return self.inside | self.out_of_range(radar) | self.aliasing(radar)
+        return np.logical_or.reduce(list(self.problems(radar).values()))
 
 
 @dataclass(frozen=True, eq=False)

@@ -308,14 +308,9 @@ class PlacementCost:
     bins: int = 32  # of a map, along velocity
 
     @property
-    def map_s(self) -> float:
-        """Seconds per map."""
-        return 1e-3 * self.frame_ms * self.frames
-
-    @property
     def total_s(self) -> float:
         """Seconds for all maps, without the preparation of the clip."""
-        return self.maps * self.map_s
+        return self.maps * (1e-3 * self.frame_ms * self.frames)
 
     @property
     def total_bytes(self) -> int:

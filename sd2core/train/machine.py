@@ -12,6 +12,7 @@ from typing import Any, Literal
 import torch
 
 from sd2core.errors import Sd2Error
+from sd2core.processes import processor_name
 from sd2core.train.config import MachineConfig
 
 Device = Literal["cpu", "cuda"]
@@ -96,23 +97,11 @@ def keep_freed_memory() -> None:
 
 def machine_words(device: Device, precision: str, threads: int) -> dict[str, Any]:
     """Description of the machine that a model was trained on, for its card."""
-    name = torch.cuda.get_device_name() if device == "cuda" else _processor()
+    here = f"{processor_name()}, {os.cpu_count()} cores"
+    name = torch.cuda.get_device_name() if device == "cuda" else here
     return {
         "device": name,
         "precision": precision,
         "threads": threads,
         "torch": str(torch.__version__),
     }
-
-
-def _processor() -> str:
-    import platform
-
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8") as stream:
-            for line in stream:
-                if line.startswith("model name"):
-                    return f"{line.partition(':')[2].strip()}, {os.cpu_count()} cores"
-    except OSError:
-        pass
-    return f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores"

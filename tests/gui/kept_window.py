@@ -50,7 +50,9 @@ def new_window(qtbot: Any, fake: Any, fake_models: Any, fake_classes: Any) -> Ma
     """Window without a recording, all views in place."""
     window = MainWindow(
         Settings.forgetful(),
-        Parts(accuracy=fake, denoisers=fake_models.library, classifiers=fake_classes.library),
+        Parts(
+            accuracy=fake.library, denoisers=fake_models.library, classifiers=fake_classes.library
+        ),
     )
     window.resize(1280, 800)
     window.show()

@@ -12,10 +12,11 @@ from collections.abc import Iterator
 from matplotlib.figure import Figure
 
 from sd2core.accuracy.cache import this_machine
-from sd2core.accuracy.choosing import choose, survey_scene
+from sd2core.accuracy.choosing import choose
 from sd2core.accuracy.measuring import measure
 from sd2core.accuracy.plans import AccuracyPlan, reference_plan
 from sd2core.accuracy.results import Measurement, plot_cost_and_error
+from sd2core.accuracy.survey import survey_scene
 from sd2core.doppler import PRESETS
 from sd2core.files.figure_files import save_figure
 from sd2core.files.resources import resource_path

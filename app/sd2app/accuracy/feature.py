@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QWidget
 
-from sd2app.accuracy.library import AccuracyLibrary
+from sd2app.accuracy.measurements import Library, core_accuracy
 from sd2app.accuracy.model import AccuracyModel
 from sd2app.accuracy.panel import AccuracyPanel
 from sd2app.feature import Action, Feature, Shell, report
@@ -18,12 +18,10 @@ class AccuracyFeature(Feature):
     """Choice and measurement of accuracy plans."""
 
     def __init__(
-        self, session: Session, shell: Shell, library: AccuracyLibrary | None, parent: QObject
+        self, session: Session, shell: Shell, library: Library | None, parent: QObject
     ) -> None:
         self._session, self._shell = session, shell
-        self.model = AccuracyModel(
-            session.jobs, session.settings, library or AccuracyLibrary(), parent
-        )
+        self.model = AccuracyModel(session.jobs, session.settings, library or core_accuracy, parent)
         report(shell, self.model)
         self.changing = (self.model.plan_changed, self.model.measured.changed)
         self.closing = (self.model,)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.accuracy.library import AccuracyLibrary
 from sd2app.background.latest import Emit, LatestRunner, ReportingModel
 from sd2app.session.tasks import Job, ListedRunner, TaskList
 from sd2core.doppler.options import SynthesisOptions
@@ -17,6 +17,17 @@ from sd2core.sensor import VirtualSensor
 if TYPE_CHECKING:
     from sd2core.accuracy.plans import Family
     from sd2core.accuracy.results import Measurement, PlanResult
+
+Library = Callable[[], Any]
+"""Gives the functions of :mod:`sd2core.accuracy`, which tests replace."""
+
+
+def core_accuracy() -> Any:
+    """Functions of the library; called in the background, as they take a second to load."""
+    from sd2core import accuracy
+
+    return accuracy
+
 
 FAMILIES: tuple[Family, ...] = ("histogram", "fmcw")
 
@@ -30,7 +41,7 @@ class MeasuredModel(ReportingModel):
 
     changed = Signal()
 
-    def __init__(self, jobs: TaskList, library: AccuracyLibrary, parent: QObject) -> None:
+    def __init__(self, jobs: TaskList, library: Library, parent: QObject) -> None:
         super().__init__(parent)
         self._library = library
         self.family: Family = "histogram"  # of the plans that are shown
@@ -84,9 +95,11 @@ class MeasuredModel(ReportingModel):
         self._known = {
             family: replace(measurement, stale=True) for family, measurement in self._known.items()
         }
-        recall = self._library.recall
+        library = self._library
         self._memory.submit(
-            lambda emit: [recall(mesh, sensor, options, family) for family in FAMILIES]
+            lambda emit: [
+                library().cached_measurement(mesh, sensor, options, family) for family in FAMILIES
+            ]
         )
         self.changed.emit()
 
@@ -104,14 +117,15 @@ class MeasuredModel(ReportingModel):
         sensor, family, library = self._place, self.family, self._library
 
         def work(emit: Emit) -> tuple[Measurement, VirtualSensor]:
-            measurement = library.measure(
+            measurement = library().measure(
                 mesh,
                 sensor,
                 options=options,
                 family=family,
+                memory=False,  # the window's other threads work
                 progress=lambda done, total: emit((done, total)),
             )
-            library.store(mesh, measurement)
+            library().store_measurement(mesh, measurement)
             return measurement, sensor
 
         self._meter.submit(work, "Measuring this scene")

@@ -6,8 +6,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.accuracy.library import AccuracyLibrary
-from sd2app.accuracy.measurements import MeasuredModel, serves_at_rest
+from sd2app.accuracy.measurements import (
+    Library,
+    MeasuredModel,
+    cheapest_within,
+    serves_at_rest,
+)
 from sd2app.accuracy.text import InUse
 from sd2app.background.latest import Emit, ReportingModel
 from sd2app.session.tasks import ListedRunner, TaskList
@@ -17,8 +21,8 @@ from sd2core.mesh.sequence import MeshSequence
 from sd2core.sensor import VirtualSensor
 
 if TYPE_CHECKING:
-    from sd2core.accuracy.choosing import Survey
     from sd2core.accuracy.results import Choice, PlanResult
+    from sd2core.accuracy.survey import Survey
 
 PRESETS = (0.005, 0.01, 0.02, 0.05, 0.1)
 """Offered tolerances."""
@@ -30,14 +34,6 @@ class _Wish(NamedTuple):
     tolerance: float | None
     budget_ms: float
     sensor: VirtualSensor
-
-
-class _Surveyed(NamedTuple):
-    """Survey of a sensor position, reused by later choices there."""
-
-    mesh: MeshSequence
-    sensor: VirtualSensor
-    survey: Survey
 
 
 class AccuracyModel(ReportingModel):
@@ -55,11 +51,11 @@ class AccuracyModel(ReportingModel):
     noted = Signal(str)
 
     def __init__(
-        self, jobs: TaskList, settings: Settings, library: AccuracyLibrary, parent: QObject
+        self, jobs: TaskList, settings: Settings, library: Library, parent: QObject
     ) -> None:
         super().__init__(parent)
         self._settings = settings
-        self.library = library
+        self._library = library
         self.measured = MeasuredModel(jobs, library, self)
         self.measured.changed.connect(self._follow_measured)
         self.measured.failed.connect(self.failed)
@@ -76,7 +72,7 @@ class AccuracyModel(ReportingModel):
         self._dragging: Choice | None = None
         self._decided_for: _Wish | None = None
         self._asking: _Wish | None = None
-        self._surveyed: _Surveyed | None = None
+        self._survey: Survey | None = None  # the last, which later ones of this clip build on
         self._clicked: PlanResult | None = None
         self._clicked_elsewhere = False
         self._body: tuple[float | None, bool] = (None, False)  # its share, and if it is pending
@@ -132,14 +128,11 @@ class AccuracyModel(ReportingModel):
         """
         if self.measured.counting is None:
             return None
-        known = [
-            (result.errors.l1, result.cost.all_cores_ms.median)
-            for result in self.measured.counting.results
-            if serves_at_rest(result)
-        ]
-        if self.choice is not None:
-            known.append((self.choice.errors.l1, self.choice.cost_ms))
-        return min((cost_ms for error, cost_ms in known if error <= tolerance), default=None)
+        cheapest = cheapest_within(self.measured.counting, tolerance)
+        known_ms = [] if cheapest is None else [cheapest.cost.all_cores_ms.median]
+        if self.choice is not None and self.choice.errors.l1 <= tolerance:
+            known_ms.append(self.choice.cost_ms)
+        return min(known_ms, default=None)
 
     def is_decided(self, sensor: VirtualSensor, budget_ms: float) -> bool:
         """True if the plans were chosen for this sensor, budget and tolerance."""
@@ -232,20 +225,25 @@ class AccuracyModel(ReportingModel):
 
         The last is the result.
         """
+        library = self._library()
 
         def progress(done: int, total: int) -> None:
             emit((done, total))
 
-        known = self._surveyed
-        if known is None or known.mesh is not mesh or known.sensor != wish.sensor:
-            like = known.survey if known is not None and known.mesh is mesh else None
-            survey = self.library.survey(mesh, wish.sensor, options, progress, like)
-            self._surveyed = known = _Surveyed(mesh, wish.sensor, survey)
+        survey = self._survey
+        if survey is not None and (survey.trial.mesh, survey.trial.options) != (mesh, options):
+            survey = None
+        if survey is None or survey.trial.sensor != wish.sensor:
+            trial = survey.trial.at(wish.sensor) if survey is not None else None
+            survey = library.survey_scene(mesh, wish.sensor, options, progress, trial=trial)
+            self._survey = survey
 
         def within(**limit: float) -> Choice:
-            return self.library.choose(
-                mesh, wish.sensor, options=options, survey=known.survey, progress=progress, **limit
+            choice: Choice = library.choose(
+                mesh, wish.sensor, options=options, survey=survey, progress=progress, **limit
             )
+            survey.trial.forget()  # frames that were prepared for it
+            return choice
 
         if wish.tolerance is not None:
             emit(within(tolerance=wish.tolerance))

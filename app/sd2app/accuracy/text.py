@@ -38,14 +38,9 @@ class InUse:
         """Accuracy and plan in few words; it is read where there is no room for all."""
         return f"{self.accuracy} · {short(self.plan)}"
 
-    @property
-    def figures(self) -> str:
-        """Accuracy and cost."""
-        figures = f"{self.accuracy} · {milliseconds(self.cost_ms)}/frame"
-        return f"{figures} (measured elsewhere)" if self.elsewhere else figures
-
     def __str__(self) -> str:
-        return f"{self.plan} · {self.figures}"
+        text = f"{self.plan} · {self.accuracy} · {milliseconds(self.cost_ms)}/frame"
+        return f"{text} (measured elsewhere)" if self.elsewhere else text
 
 
 def chosen_sentence(in_use: InUse, frames: int) -> str:
@@ -61,9 +56,11 @@ def chosen_sentence(in_use: InUse, frames: int) -> str:
 
 def legend(measurement: Measurement, tolerance: float, *, in_use: bool) -> str:
     """Signs of the plot and what they stand for, as far as they are there."""
-    signs = ["◉ in use"] if in_use else []
-    if measurement.family == "histogram":
-        signs = ["◉ chosen"] if in_use else []
+    counting = measurement.family == "histogram"
+    signs = []
+    if in_use:
+        signs.append("◉ chosen" if counting else "◉ in use")
+    if counting:
         if cheapest_within(measurement, tolerance) is not None:
             signs.append("◇ cheapest measured within the tolerance")
         if not all(map(serves_at_rest, measurement.results)):

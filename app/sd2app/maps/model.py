@@ -174,7 +174,7 @@ class SynthesisModel(QObject):
             self._announce()
             return
         try:
-            self._synthesizers = SynthesizerCache(mesh, options, self._accuracy.library)
+            self._synthesizers = SynthesizerCache(mesh, options)
             self._synthesizers.limbs = bool(self._wanting_limbs)
         except Sd2Error as error:
             self.failed.emit(str(error))
@@ -191,7 +191,7 @@ class SynthesisModel(QObject):
             return
         self._stop()
         mesh, options = synthesizers.mesh, replace(synthesizers.options, count=count)
-        self._synthesizers = SynthesizerCache(mesh, options, self._accuracy.library)
+        self._synthesizers = SynthesizerCache(mesh, options)
         self._synthesizers.limbs = synthesizers.limbs
         self._prefetcher.forget()
         self._partial.mark_stale()

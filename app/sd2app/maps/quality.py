@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2app.accuracy.library import AccuracyLibrary
 from sd2app.accuracy.text import InUse
 from sd2app.background.latest import Emit
 from sd2app.maps.partial_map import FINAL, PREVIEW, ROUGH, Part, View, pieces
@@ -49,19 +48,15 @@ class SynthesizerCache:
     """Makes a synthesizer per plan on demand, and keeps the newest.
 
     Those that count as many vertices share what is prepared, as far as they can.
-    ``options`` are those that no plan chooses; ``library`` makes synthesizers, where decimating
-    the mesh takes long. ``full`` is the synthesizer on the full mesh with these options, for
-    readouts of single vertices and for use without a plan.
+    ``options`` are those that no plan chooses. ``full`` is the synthesizer on the full mesh with
+    these options, for readouts of single vertices and for use without a plan.
     """
 
-    def __init__(
-        self, mesh: MeshSequence, options: SynthesisOptions, library: AccuracyLibrary
-    ) -> None:
+    def __init__(self, mesh: MeshSequence, options: SynthesisOptions) -> None:
         self.mesh = mesh
         self.options = options
         self.full = Synthesizer(mesh, options, memory_budget_bytes=_BUDGET_BYTES)
         self.limbs = False  # True: maps are also split by the parts of the body
-        self._library = library
         self._made: OrderedDict[AccuracyPlan, Synthesizer] = OrderedDict()
         self._lock = threading.Lock()
 
@@ -73,9 +68,10 @@ class SynthesizerCache:
         with self._lock:
             synthesizer = self._made.get(key)
             if synthesizer is None:
-                synthesizer = self._library.synthesizer_for(
-                    key, self.mesh, self.options, self._like(key)
-                )
+                from sd2core.accuracy.trial import synthesizer_for
+
+                like = self._like(key)
+                synthesizer = synthesizer_for(key, self.mesh, self.options, like=like)
                 self._made[key] = synthesizer
             self._made.move_to_end(key)
             while len(self._made) > _KEPT:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,27 +18,10 @@ from sd2core.mesh.sequence import MeshSequence
 from sd2core.recording.recording import MeshReading, Recording, is_recording, open_recording
 
 if TYPE_CHECKING:
-    from sd2core.compare.meshes import Comparison
+    from sd2core.compare.meshes import Comparison, Difference
 
 JOINT = "hand.R"
 """Joint whose curves are shown at first."""
-
-
-@dataclass(frozen=True)
-class JointRow:
-    """One line of the table."""
-
-    name: str
-    distance_m: float
-    velocity_rms_mps: float
-    correlation: float
-    jitter_mps3: tuple[float, float]
-
-
-@dataclass(frozen=True, eq=False)
-class _Result:
-    meshes: tuple[MeshSequence, MeshSequence]
-    comparison: Comparison
 
 
 class ComparisonModel(BackgroundModel):
@@ -56,7 +38,8 @@ class ComparisonModel(BackgroundModel):
         self.reference = 0  # number of the mesh that the other is measured against
         self.joint = JOINT  # the one whose velocity is shown
         self.problem = ""  # why the meshes cannot be compared
-        self._result: _Result | None = None
+        self.comparison: Comparison | None = None
+        self._meshes: tuple[MeshSequence, MeshSequence] | None = None  # that it is of
         self.tracks = (MapModel("", self), MapModel("", self))
         self._runner = ListedRunner("compare", session.jobs, self, self._receive, self._refuse)
         self._runner.cancelled.connect(self.changed)
@@ -75,49 +58,30 @@ class ComparisonModel(BackgroundModel):
         return (own, other) if own != other else (f"{own} (open)", f"{other} (other)")
 
     @property
-    def comparison(self) -> Comparison | None:
-        """Result of the comparison."""
-        return self._result.comparison if self._result else None
-
-    def mesh(self, number: int) -> MeshSequence | None:
-        """One of the two, all of its frames."""
-        return self._result.meshes[number] if self._result else None
-
-    @property
-    def rows(self) -> tuple[JointRow, ...]:
-        """The table, joint by joint."""
-        comparison = self.comparison
-        if comparison is None:
+    def joints(self) -> tuple[str, ...]:
+        """Names of the joints that were compared."""
+        if self.comparison is None:
             return ()
         from sd2core.compare.joints import JOINTS
 
-        found = comparison.differences[1 - self.reference]
-        jitters = [one.jitter_mps3 for one in comparison.differences]
-        return tuple(
-            JointRow(
-                name,
-                float(found.distance_m[k]),
-                float(found.velocity_rms_mps[k]),
-                float(found.correlation[k]),
-                (float(jitters[0][k]), float(jitters[1][k])),
-            )
-            for k, name in enumerate(JOINTS)
-        )
+        return JOINTS
 
     @property
-    def map_l1(self) -> float | None:
-        """Relative difference of the two Doppler maps."""
+    def difference(self) -> Difference | None:
+        """Difference of the mesh that is not the reference."""
         comparison = self.comparison
-        return comparison.differences[1 - self.reference].map_l1 if comparison else None
+        return comparison.differences[1 - comparison.reference] if comparison else None
+
+    def mesh(self, number: int) -> MeshSequence | None:
+        """One of the two, all of its frames."""
+        return self._meshes[number] if self._meshes else None
 
     def curve(self, number: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Times, and velocities of the joint towards the sensor; NaN without a person."""
         comparison = self.comparison
         if comparison is None:
             return np.zeros(0), np.zeros(0)
-        from sd2core.compare.joints import JOINTS
-
-        velocity = comparison.velocity_mps[number][:, JOINTS.index(self.joint)]
+        velocity = comparison.velocity_mps[number][:, self.joints.index(self.joint)]
         return comparison.times_s, np.where(comparison.measured, velocity, np.nan)
 
     # --- what one can do ------------------------------------------------------------------
@@ -140,11 +104,11 @@ class ComparisonModel(BackgroundModel):
         recording, own = document.recording, document.mesh
         if recording is None or own is None:
             return
-        known = self._result.meshes[1] if self._result else None
+        known = self.mesh(1)
         other, sensor, reference = self._other, self._session.sensor.sensor, self.reference
         labels, focal_px = self.labels, document.camera.focal_px
 
-        def compare(emit: Emit) -> _Result:
+        def compare(emit: Emit) -> tuple[tuple[MeshSequence, MeshSequence], Comparison]:
             from sd2core.compare.meshes import compare_meshes
 
             mesh = known or load_other(other, recording, focal_px)
@@ -155,7 +119,7 @@ class ComparisonModel(BackgroundModel):
                 sensor=sensor,
                 progress=lambda done, total: emit((done, total)),
             )
-            return _Result((own, mesh), comparison)
+            return (own, mesh), comparison
 
         self.problem = ""
         self._runner.submit(compare, f"Comparing with {other.name}")
@@ -176,9 +140,9 @@ class ComparisonModel(BackgroundModel):
         if not sensor.dragging and (comparison is None or comparison.sensor != sensor.sensor):
             self.work_out()
 
-    def _receive(self, result: _Result) -> None:
-        self._result = result
-        comparison = result.comparison
+    def _receive(self, result: tuple[tuple[MeshSequence, MeshSequence], Comparison]) -> None:
+        self._meshes, comparison = result
+        self.comparison = comparison
         top = max(reference_of(one.values, one.null_bins) for one in comparison.maps)
         for number, (track, label) in enumerate(zip(self.tracks, self.labels, strict=True)):
             track.title = label

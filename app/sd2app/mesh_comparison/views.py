@@ -10,7 +10,7 @@ from PySide6.QtGui import QBrush, QColor, QPainter, QPen
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableWidget, QTableWidgetItem
 
 from sd2app.maps.track_mouse import SeekingPlot
-from sd2app.mesh_comparison.model import ComparisonModel, JointRow, joint_words
+from sd2app.mesh_comparison.model import ComparisonModel, joint_words
 from sd2app.session.display import DisplayModel
 from sd2app.session.session import Session
 from sd2app.video.overlay_settings import OverlayModel
@@ -163,14 +163,28 @@ class JointTable(QTableWidget):
         self._refresh()
 
     def _refresh(self) -> None:
-        rows = self._comparison.rows
+        joints = self._comparison.joints
         with QSignalBlocker(self):
-            self.setRowCount(len(rows))
-            for number, row in enumerate(rows):
-                for column, text in enumerate(_cells(row)):
+            self.setRowCount(len(joints))
+            for number, name in enumerate(joints):
+                for column, text in enumerate(self._cells(number, name)):
                     self.setItem(number, column, self._item(column, text))
-                if row.name == self._comparison.joint:
+                if name == self._comparison.joint:
                     self.setCurrentCell(number, 0)
+
+    def _cells(self, joint: int, name: str) -> tuple[str, ...]:
+        """Name of a joint, its differences, and how much it trembles in either mesh."""
+        comparison, found = self._comparison.comparison, self._comparison.difference
+        assert comparison is not None  # it has joints
+        assert found is not None
+        same = found.correlation[joint]
+        return (
+            joint_words(name),
+            f"{100 * found.distance_m[joint]:.1f}",
+            f"{found.velocity_rms_mps[joint]:.2f}",
+            "–" if math.isnan(same) else f"{same:.2f}".replace("-", "−"),
+            *(f"{one.jitter_mps3[joint]:.0f}" for one in comparison.differences),
+        )
 
     def _item(self, column: int, text: str) -> QTableWidgetItem:
         item = QTableWidgetItem(text)
@@ -182,17 +196,6 @@ class JointTable(QTableWidget):
         return item
 
     def _choose(self, row: int) -> None:
-        rows = self._comparison.rows
-        if 0 <= row < len(rows):
-            self._comparison.set_joint(rows[row].name)
-
-
-def _cells(row: JointRow) -> tuple[str, ...]:
-    same = "–" if math.isnan(row.correlation) else f"{row.correlation:.2f}".replace("-", "−")
-    return (
-        joint_words(row.name),
-        f"{100 * row.distance_m:.1f}",
-        f"{row.velocity_rms_mps:.2f}",
-        same,
-        *(f"{value:.0f}" for value in row.jitter_mps3),
-    )
+        joints = self._comparison.joints
+        if 0 <= row < len(joints):
+            self._comparison.set_joint(joints[row])

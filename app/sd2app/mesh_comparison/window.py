@@ -93,15 +93,14 @@ class ComparisonWindow(QWidget):
             return "Comparing…"
         if model.problem:
             return "These cannot be compared"
-        rows = model.rows
-        if not rows:
+        found = model.difference
+        if found is None:
             return ""
-        hands = [row for row in rows if row.name.startswith("hand.")]
-        distance_cm = 100 * sum(row.distance_m for row in rows) / len(rows)
-        error = (sum(row.velocity_rms_mps**2 for row in hands) / len(hands)) ** 0.5
+        distance_cm = 100 * found.distance_m.mean()
+        error = found.group(found.velocity_rms_mps, "hands")
         return (
             f"Joints {distance_cm:.1f} cm apart · hands' velocity off by {error:.2f} m/s ·"
-            f" Doppler maps differ by {model.map_l1:.2f} (relative L1)"
+            f" Doppler maps differ by {found.map_l1:.2f} (relative L1)"
         )
 
     def _ask(self) -> None:

@@ -175,12 +175,13 @@ def limit_facts(model: PlacementsModel) -> list[tuple[str, str]]:
     coverage, radar = model.planned.coverage, model.radar
     if coverage is None:
         return []
-    facts = (
-        ("In the body", coverage.inside),
-        (f"Beyond R max {radar.range_max_m:.1f} m", coverage.out_of_range(radar)),
-        (f"Faster than ±{radar.v_max_mps:.2f} m/s", coverage.aliasing(radar)),
-    )
-    return [(name, f"{int(some.sum()):,}") for name, some in facts if some.any()]
+    words = {
+        "inside": "In the body",
+        "out_of_range": f"Beyond R max {radar.range_max_m:.1f} m",
+        "aliasing": f"Faster than ±{radar.v_max_mps:.2f} m/s",
+    }
+    problems = coverage.problems(radar).items()
+    return [(words[name], f"{int(some.sum()):,}") for name, some in problems if some.any()]
 
 
 def limits_text(model: PlacementsModel) -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from sd2app.accuracy.library import AccuracyLibrary
+    from sd2app.accuracy.measurements import Library
     from sd2app.background.model_worker.library import ClassifierLibrary, DenoiserLibrary
 
 
@@ -22,7 +22,7 @@ class Parts:
     default. The manual has the commands of ``parser``, those of the library by default.
     """
 
-    accuracy: AccuracyLibrary | None = None
+    accuracy: Library | None = None
     fit_command: Sequence[str] | None = None
     denoisers: DenoiserLibrary | None = None
     train_command: Sequence[str] | None = None

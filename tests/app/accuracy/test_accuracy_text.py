@@ -32,7 +32,7 @@ def test_the_accuracy_holds_the_body_where_it_is_known():
     assert InUse(FACING, 0.031, 0.6).brief == "±3.1 % · visibility facing"
     known = InUse(FACING, 0.031, 0.6, body=0.37)
     assert known.accuracy == "±37 %: body 37, arithmetic 3.1"
-    assert known.figures == "±37 %: body 37, arithmetic 3.1 · 0.6 ms/frame"
+    assert str(known) == f"{FACING} · ±37 %: body 37, arithmetic 3.1 · 0.6 ms/frame"
     assert replace(known, pending=True).brief.startswith("±37 %: body 37, arithmetic 3.1… · ")
     words = chosen_sentence(known, 100)
     assert "3.1 % off the reference (with the body ±37 %: body 37, arithmetic 3.1) and" in words

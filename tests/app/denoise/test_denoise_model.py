@@ -75,7 +75,7 @@ def make(qapp, compiled_kernels):
                 build_models(
                     parent,
                     Settings.forgetful(),
-                    Parts(accuracy=FakeAccuracy(), denoisers=models.library),
+                    Parts(accuracy=FakeAccuracy().library, denoisers=models.library),
                 ),
             )
         )
@@ -493,7 +493,7 @@ def test_a_real_model_gives_the_map_that_the_library_gives(
     card = replace(card_of(tmp_path), options={"channels": 8}, path=None)
     save_model(tmp_path / "own.safetensors", TrainedDenoiser(network, card))
     parent = QObject()
-    context = build_models(parent, Settings.forgetful(), Parts(accuracy=FakeAccuracy()))
+    context = build_models(parent, Settings.forgetful(), Parts(accuracy=FakeAccuracy().library))
     open_it(context, qtbot, ball)
     context.denoise.use(tmp_path / "own.safetensors")
     qtbot.waitUntil(lambda: not context.denoise.busy, timeout=120_000)

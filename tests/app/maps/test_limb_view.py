@@ -58,7 +58,9 @@ def denoisers(tmp_path: Path) -> FakeDenoisers:
 def context(qapp, compiled_kernels, denoisers):
     parent = QObject()
     context = build_models(
-        parent, Settings.forgetful(), Parts(accuracy=FakeAccuracy(), denoisers=denoisers.library)
+        parent,
+        Settings.forgetful(),
+        Parts(accuracy=FakeAccuracy().library, denoisers=denoisers.library),
     )
     yield context
     context.close()

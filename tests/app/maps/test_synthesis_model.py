@@ -47,7 +47,7 @@ def context(qapp, compiled_kernels, fake):
     context = build_models(
         parent,
         Settings.forgetful(),
-        Parts(accuracy=fake, denoisers=FakeDenoisers().library),
+        Parts(accuracy=fake.library, denoisers=FakeDenoisers().library),
     )
     yield context
     fake.gate.set()

@@ -10,9 +10,10 @@ import pytest
 import trimesh
 from accuracy_scenes import ball, moving, plate, steady, swinging, together
 
-from sd2core.accuracy.choosing import Survey, choose, survey_scene
+from sd2core.accuracy.choosing import choose
 from sd2core.accuracy.plans import FRAME_RATE_FACTORS
 from sd2core.accuracy.sample import take_sample
+from sd2core.accuracy.survey import Survey, survey_scene
 from sd2core.accuracy.trial import synthesizer_for
 from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.errors import Sd2Error
@@ -156,7 +157,7 @@ def test_a_survey_that_builds_on_another_finds_the_same(
 ) -> None:
     aside = VirtualSensor(position_m=(0.4, 0.0, 0.0))
     anew = survey_scene(scene, aside, PAPER)
-    built_on = survey_scene(scene, aside, PAPER, like=survey)
+    built_on = survey_scene(scene, aside, PAPER, trial=survey.trial.at(aside))
     assert built_on.change == anew.change
     assert built_on.facts == anew.facts
 

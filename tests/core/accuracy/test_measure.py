@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -20,6 +21,7 @@ from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
 from sd2core.progress import Cancelled
 from sd2core.sensor import VirtualSensor
+from sd2core.timebase import Timebase
 
 CAMERA = VirtualSensor()
 
@@ -119,6 +121,16 @@ def test_a_point_cloud_has_a_table(scene: MeshSequence) -> None:
     assert {result.plan.visibility for result in table.results} == {"none"}
     with pytest.raises(Sd2Error, match="cloud has no faces"):
         measure(cloud, CAMERA, repeats=1, family="fmcw")
+
+
+def test_without_memory_no_allocation_is_traced(
+    scene: MeshSequence, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Tracing that ends while another thread's kernel allocates ends the process."""
+    monkeypatch.setattr(tracemalloc, "start", None)
+    cloud = MeshSequence(scene.read(0, 5), None, Timebase(scene.times_s[:5]))
+    table = measure(cloud, CAMERA, repeats=1, memory=False)
+    assert {result.cost.peak_bytes for result in table.results} == {None}
 
 
 def test_measuring_can_be_stopped(scene: MeshSequence) -> None:

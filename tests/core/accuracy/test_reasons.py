@@ -9,8 +9,9 @@ import pytest
 import trimesh
 from accuracy_scenes import FPS, FRAMES, ball, moving, plate, steady, swinging, together
 
-from sd2core.accuracy.choosing import choose, survey_scene
+from sd2core.accuracy.choosing import choose
 from sd2core.accuracy.results import Choice, Reason
+from sd2core.accuracy.survey import survey_scene
 from sd2core.doppler import PRESETS
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.sensor import VirtualSensor

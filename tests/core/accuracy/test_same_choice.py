@@ -11,9 +11,10 @@ from accuracy_scenes import ball, plate, swinging, together
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from sd2core.accuracy.choosing import Survey, choose, survey_scene
+from sd2core.accuracy.choosing import choose
 from sd2core.accuracy.cost_model import modelled_ns
 from sd2core.accuracy.plans import FRAME_RATE_FACTORS, AccuracyPlan, counting_plans
+from sd2core.accuracy.survey import Survey, survey_scene
 from sd2core.accuracy.trial import Trial
 from sd2core.doppler import PRESETS
 from sd2core.mesh.sequence import MeshSequence
@@ -67,8 +68,8 @@ def test_opened_several_times_on_a_machine_of_any_speed(
 def test_a_survey_from_elsewhere_before_changes_nothing(
     scene: MeshSequence, survey: Survey
 ) -> None:
-    there = survey_scene(scene, ELSEWHERE, PAPER, like=survey)
-    back = survey_scene(scene, CAMERA, PAPER, like=there)
+    there = survey_scene(scene, ELSEWHERE, PAPER, trial=survey.trial.at(ELSEWHERE))
+    back = survey_scene(scene, CAMERA, PAPER, trial=there.trial.at(CAMERA))
     for plan, change in survey.change.items():
         assert back.change[plan] == pytest.approx(change, rel=1e-9, abs=1e-12)
 

@@ -67,9 +67,9 @@ def test_what_folds_in_range_or_velocity_is_beyond_a_radar():
     beside, in_line, far = PlacementGrid((4.8, 30.0), (0.0, 90.0)).sensors(body.target_m)[:3]
     slow = BodyExtent.of(cube_walking_right(interval_s=10.0)).coverage([beside, in_line, far])
     assert PAPER_RADAR.range_max_m == pytest.approx(9.6, abs=0.01)
-    assert slow.out_of_range(PAPER_RADAR).tolist() == [False, True, True]
-    assert not slow.aliasing(PAPER_RADAR).any()
-    assert body.coverage([in_line]).aliasing(PAPER_RADAR).all()
+    assert slow.problems(PAPER_RADAR)["out_of_range"].tolist() == [False, True, True]
+    assert not slow.problems(PAPER_RADAR)["aliasing"].any()
+    assert body.coverage([in_line]).problems(PAPER_RADAR)["aliasing"].all()
 
 
 def test_a_clip_without_anybody_is_refused():

@@ -46,7 +46,7 @@ def opened(qtbot, compiled_kernels, fake, fake_models, recording_copy):
         command = [sys.executable, "-u", str(FAKE), *map(str, options)]
         window = MainWindow(
             Settings.forgetful(),
-            Parts(accuracy=fake, denoisers=fake_models.library, batch_command=command),
+            Parts(accuracy=fake.library, denoisers=fake_models.library, batch_command=command),
         )
         windows.append(window)
         window.show()

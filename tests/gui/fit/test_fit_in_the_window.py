@@ -51,7 +51,7 @@ def made(qtbot, compiled_kernels, fake):
         command = [sys.executable, "-u", str(FAKE), *map(str, options)]
         window = MainWindow(
             settings or Settings.forgetful(),
-            Parts(accuracy=fake, fit_command=command, denoisers=FakeDenoisers().library),
+            Parts(accuracy=fake.library, fit_command=command, denoisers=FakeDenoisers().library),
         )
         windows.append(window)
         window.resize(1280, 800)

@@ -36,7 +36,7 @@ def made(qtbot, compiled_kernels, fake, fake_models, monkeypatch):
         command = [sys.executable, "-u", str(FAKE), *map(str, options)]
         window = MainWindow(
             settings,
-            Parts(accuracy=fake, denoisers=fake_models.library, train_command=command),
+            Parts(accuracy=fake.library, denoisers=fake_models.library, train_command=command),
         )
         windows.append(window)
         window.resize(1280, 800)
