@@ -153,9 +153,9 @@ def parameter_groups(network: Classifier, rate: float, ssm_rate: float) -> list[
     slow = list(network.ssm_parameters())
     ids = {id(one) for one in slow}
     rest = [one for one in network.parameters() if id(one) not in ids]
-    groups: list[dict[str, Any]] = [{"params": rest, "lr": rate}]
+    groups: list[dict[str, Any]] = [{"params": rest, "peak_lr": rate}]
     if slow:
-        groups.append({"params": slow, "lr": ssm_rate, "weight_decay": 0.0})
+        groups.append({"params": slow, "peak_lr": ssm_rate, "weight_decay": 0.0})
     return groups
 
 
