@@ -27,12 +27,10 @@ from tests.environments import (
 )
 
 WINDOW = {"PySide6-Essentials", "pyvista", "pyvistaqt", "vtk"}
-LEARNING = {"lightning", "torch"}
+LEARNING = {"torch"}
 ABSENT = (
     "PySide6",
     "anny",
-    "lightning",
-    "pytorch_lightning",
     "pyvista",
     "shiboken6",
     "torch",
@@ -171,8 +169,8 @@ def test_what_needs_torch_says_how_to_get_it(tmp_path: Path) -> None:
     done = sd2_alone("denoise", map_file, "--out", tmp_path / "denoised.npz")
     assert done.returncode == 1
     assert done.stderr == (
-        "sd2: torch and lightning are needed for this, which denoises, classifies or trains."
-        ' Install them: pip install "sd2-core[learn]".\n'
+        "sd2: torch is needed for this, which denoises, classifies or trains."
+        ' Install it: pip install "sd2-core[learn]".\n'
     )
 
 

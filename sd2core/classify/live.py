@@ -13,7 +13,7 @@ from sd2core.classify.card import ClassifierCard
 from sd2core.classify.data import UNKNOWN, Clip, ClipSet
 from sd2core.classify.features import SILENCE, Heard
 from sd2core.classify.metrics import Score, score
-from sd2core.classify.models import Classifier, State, probabilities_of
+from sd2core.classify.models import Classifier, State
 from sd2core.denoise import resample_to_model as matching
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
@@ -150,7 +150,7 @@ class TrainedClassifier:
         """Run the network; answers before the first frame of a clip are dropped."""
         with torch.no_grad():
             answer, state = self.network.chunk(torch.from_numpy(shown)[None], memory.network)
-            found: Probabilities = probabilities_of(answer[0]).numpy()
+            found: Probabilities = torch.softmax(answer[0], dim=-1).numpy()
         return found[max(self.card.delay_frames - memory.owed, 0) :], state
 
 

@@ -22,7 +22,7 @@ class Classifier(nn.Module):
     """Base of the classifiers: layers along time, then a common head.
 
     The head is the paper's: layer norm, dense, dropout, dense (softmax is left to the loss
-    and to :func:`probabilities_of`). ``width`` is the number of channels before it.
+    and to whoever asks for probabilities). ``width`` is the number of channels before it.
     """
 
     whole: bool = False
@@ -153,12 +153,7 @@ def parameter_groups(network: Classifier, rate: float, ssm_rate: float) -> list[
     slow = list(network.ssm_parameters())
     ids = {id(one) for one in slow}
     rest = [one for one in network.parameters() if id(one) not in ids]
-    groups: list[dict[str, Any]] = [{"params": rest, "lr": rate}]
+    groups: list[dict[str, Any]] = [{"params": rest, "peak_lr": rate}]
     if slow:
-        groups.append({"params": slow, "lr": ssm_rate, "weight_decay": 0.0})
+        groups.append({"params": slow, "peak_lr": ssm_rate, "weight_decay": 0.0})
     return groups
-
-
-def probabilities_of(logits: Tensor) -> Tensor:
-    """Softmax over classes."""
-    return torch.softmax(logits, dim=-1)

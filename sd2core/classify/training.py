@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import math
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
@@ -24,6 +23,9 @@ from sd2core.classify.metrics import confusion_of, mean_recall
 from sd2core.classify.models import Classifier, build, options, parameter_groups
 from sd2core.errors import Sd2Error
 from sd2core.numerics.bounds import LEARNING_RATE, STEPS
+from sd2core.train.checkpoint import Position
+from sd2core.train.loop import Loop
+from sd2core.train.steps import set_rate
 
 Watch = Callable[[dict[str, Any]], None]
 """Told every event; may raise ``KeyboardInterrupt`` to stop with the best so far."""
@@ -157,37 +159,26 @@ def train(
             say("end", best_step=1, interrupted=False)
             card = _card(chosen, own, features, known, training, delay_frames, about, 1, True)
             return Trained(TrainedClassifier(network, card), events, False)
-        drawn = None if weights is None else own_weights * [len(clip) for clip in training]
-        learning = _Learning(network, material, of_classes, chosen, drawn)
-        chosen_by = Material.of(validation, features, delay_frames)
+        loop = _ClassifierLoop(
+            network,
+            material,
+            Material.of(validation, features, delay_frames),
+            of_classes,
+            chosen,
+            None if weights is None else own_weights * [len(clip) for clip in training],
+            say,
+        )
         say("start", steps=chosen.steps, clips=len(training), frames=sum(map(len, training)))
         interrupted = False
-        best, best_at, looks = -1.0, 0, 0
-        kept = copy.deepcopy(network.state_dict())
-        begun_s = time.monotonic()
         try:
-            for step, loss in enumerate(learning.run(), start=1):
-                say("step", step=step, loss=loss, elapsed_s=time.monotonic() - begun_s)
-                if step % chosen.check_steps and step < chosen.steps:
-                    continue
-                if not validation:
-                    kept, best_at = copy.deepcopy(network.state_dict()), step
-                    continue
-                score = _score(network, chosen_by, len(known.classes))
-                say("check", step=step, validation_mean_recall=score)
-                looks += 1
-                if score > best:
-                    best, best_at, looks = score, step, 0
-                    kept = copy.deepcopy(network.state_dict())
-                elif looks >= chosen.patience:
-                    break
+            loop.run()
         except KeyboardInterrupt:
             interrupted = True
-        say("end", best_step=best_at, interrupted=interrupted)
-        # Stopped before the first look, it is as far as it came.
-        if best_at > 0:
-            network.load_state_dict(kept)
-    card = _card(chosen, own, features, known, training, delay_frames, about, best_at, False)
+        say("end", best_step=loop.best_step, interrupted=interrupted)
+        # Stopped before the first check, it is as far as it came.
+        if loop.best is not None:
+            network.load_state_dict(loop.best)
+    card = _card(chosen, own, features, known, training, delay_frames, about, loop.best_step, False)
     return Trained(TrainedClassifier(network, card), events, interrupted)
 
 
@@ -225,42 +216,71 @@ def _card(
     )
 
 
-class _Learning:
-    """Loop over batches with the optimiser."""
+class _ClassifierLoop(Loop):
+    """Training of a network by steps; ``chances`` say how often each clip is to be drawn."""
 
     def __init__(
         self,
         network: Classifier,
         material: Material,
+        validation: Material,
         weights: torch.Tensor,
         chosen: TrainOptions,
         chances: NDArray[np.float64] | None,
+        say: Callable[..., None],
     ) -> None:
-        self._network, self._material, self._weights = network, material, weights
-        self._chosen = chosen
-        # Of each clip to be drawn; without any all are shown in turn.
+        super().__init__(
+            # Worse than any recall.
+            Position(best={"score": 1.0, "step": 0}),
+            epoch_steps=chosen.check_steps,
+            steps=chosen.steps,
+            patience=chosen.patience,
+        )
+        self._network, self._material, self._validation = network, material, validation
+        self._weights, self._chosen, self._say = weights, chosen, say
+        # Without chances all clips are shown in turn.
         self._chances = None if chances is None else chances / chances.sum()
+        self._waiting: list[int] = []
         self._rng = np.random.default_rng([chosen.seed, 1])
         groups = parameter_groups(network, chosen.learning_rate, chosen.ssm_learning_rate)
         self._optimiser = torch.optim.AdamW(groups, weight_decay=chosen.weight_decay)
-        self._highest = [group["lr"] for group in self._optimiser.param_groups]
+        self.best: dict[str, torch.Tensor] | None = None
 
-    def run(self) -> Iterator[float]:
-        """Yield the loss of every step."""
-        waiting: list[int] = []
-        for step in range(self._chosen.steps):
-            share = _schedule(step / self._chosen.steps)
-            for group, rate in zip(self._optimiser.param_groups, self._highest, strict=True):
-                group["lr"] = share * rate
-            drawn: list[int] = []
-            if self._chances is not None:
-                batch = self._chosen.batch
-                drawn = self._rng.choice(len(self._chances), batch, p=self._chances).tolist()
-            while len(drawn) < self._chosen.batch:
-                if not waiting:
-                    waiting = self._rng.permutation(len(self._material.labels)).tolist()
-                drawn.append(waiting.pop())
-            yield self._learn(*self._windows(drawn))
+    @property
+    def best_step(self) -> int:
+        """Step of the best check; 0 before one."""
+        assert self.position.best is not None
+        return int(self.position.best["step"])
+
+    def step(self) -> None:
+        """Learn from one batch of windows."""
+        set_rate(self._optimiser, _schedule(self.share_done))
+        loss = self._learn(*self._windows(self._drawn()))
+        self._say("step", step=self.position.steps_done + 1, loss=loss, elapsed_s=self.elapsed_s)
+
+    def check(self) -> dict[str, Any]:
+        """Mean recall of the validation; without one the last step is the best."""
+        step = self.position.steps_done
+        if not self._validation.labels:
+            return {"score": -step, "step": step}
+        recall = _score(self._network, self._validation, len(self._weights))
+        self._say("check", step=step, validation_mean_recall=recall)
+        return {"score": -recall, "step": step}
+
+    def keep_best(self) -> None:
+        """Copy the weights."""
+        self.best = copy.deepcopy(self._network.state_dict())
+
+    def _drawn(self) -> list[int]:
+        """Numbers of the clips of a batch."""
+        batch = self._chosen.batch
+        if self._chances is not None:
+            clips: list[int] = self._rng.choice(len(self._chances), batch, p=self._chances).tolist()
+            return clips
+        while len(self._waiting) < batch:
+            # The last are taken first.
+            self._waiting[:0] = self._rng.permutation(len(self._material.labels)).tolist()
+        return [self._waiting.pop() for _ in range(batch)]
 
     def _windows(self, clips: Sequence[int]) -> tuple[torch.Tensor, torch.Tensor]:
         """Cut a window from each clip: (batch, frames, size) and (batch, frames)."""

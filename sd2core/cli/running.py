@@ -14,8 +14,6 @@ from sd2core.errors import Sd2Error
 from sd2core.processes import INTERRUPTED
 
 _STARTS_WITH_NEGATIVE_NUMBER = re.compile(r"-\.?\d")
-_LEARNING = ("lightning", "torch")
-"""Packages that the library alone does not bring (extra `learn`)."""
 
 
 def run(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> int:
@@ -59,10 +57,10 @@ def explanation(error: Exception) -> Sd2Error:
         return Sd2Error(f"{error.filename}: {error.strerror}" if error.filename else error.strerror)
     if isinstance(error, MemoryError):
         return Sd2Error(f"There is not enough memory for this ({error})")
-    if isinstance(error, ModuleNotFoundError) and error.name in _LEARNING:
+    if isinstance(error, ModuleNotFoundError) and error.name == "torch":
         return Sd2Error(
-            "torch and lightning are needed for this, which denoises, classifies or trains",
-            remedy='Install them: pip install "sd2-core[learn]"',
+            "torch is needed for this, which denoises, classifies or trains",
+            remedy='Install it: pip install "sd2-core[learn]"',
         )
     return Sd2Error(
         f"This should not happen ({type(error).__name__}: {error})",

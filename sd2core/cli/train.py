@@ -289,8 +289,6 @@ def _bar(what: str) -> Iterator[Watch]:
 
 
 def _say_ending(options: argparse.Namespace, run: Path, ending: Ending) -> int:
-    if not ending.first:
-        return 0
     if options.json:
         print_json(
             {

@@ -166,11 +166,12 @@ class TrainedDenoiser:
         step = _ROUND if frames <= CHUNK else CHUNK
         padded = np.zeros((-(-frames // step) * step, values.shape[1]), np.float32)
         padded[:frames] = values
-        done = np.empty((len(padded), self.card.axis.bins), np.float32)
         with torch.no_grad():
             if len(padded) <= max(self.network.longest, CHUNK):
-                done[:] = self._answer(self.network, padded)
-                return done[:frames]
+                whole = torch.from_numpy(padded)[None].to(self.device)
+                answers: NDArray[np.float32] = self.network(whole)[0].cpu().numpy()
+                return answers[:frames]
+            done = np.empty((len(padded), self.card.axis.bins), np.float32)
             state = self.network.initial_state(1)
             for start in range(0, frames, CHUNK):
                 progress(start, frames)
@@ -199,14 +200,6 @@ class TrainedDenoiser:
                 batch = torch.from_numpy(windows[first : first + _BATCH]).to(self.device)
                 done[first : first + _BATCH] = self.network(batch).cpu().numpy()
         return join(done, starts, len(known))[:frames]
-
-    def _answer(
-        self, network: Callable[[torch.Tensor], torch.Tensor], values: NDArray[np.float32]
-    ) -> NDArray[np.float32]:
-        answer: NDArray[np.float32] = (
-            network(torch.from_numpy(values)[None].to(self.device))[0].cpu().numpy()
-        )
-        return answer
 
     def _provenance(self, doppler: DopplerMap, resampled: bool) -> dict[str, Any]:
         card, notes = self.card, []

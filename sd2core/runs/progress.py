@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import math
-import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, Self
@@ -47,25 +46,6 @@ class ProgressWriter:
 
     def __exit__(self, *_: object) -> None:
         self._stream.close()
-
-
-class StepLines:
-    """Lines of single steps, at most two a second."""
-
-    def __init__(self, writer: ProgressWriter, every_s: float = 0.5) -> None:
-        self._writer = writer
-        self._every_s = every_s
-        self._last_s = -math.inf
-
-    @property
-    def due(self) -> bool:
-        """True when it is time for a line."""
-        return time.monotonic() - self._last_s >= self._every_s
-
-    def say(self, **content: Any) -> None:
-        """Write a line of a step."""
-        self._last_s = time.monotonic()
-        self._writer.say("step", **content)
 
 
 class ProgressTail:

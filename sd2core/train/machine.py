@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import logging
 import os
-import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, Literal
@@ -16,14 +14,6 @@ from sd2core.processes import processor_name
 from sd2core.train.config import MachineConfig
 
 Device = Literal["cpu", "cuda"]
-
-# Nothing that a user could act on; whatever else is warned of is passed on.
-_BESIDE_THE_POINT = (
-    # Lightning 2.6 builds a class that torch 2.13 has deprecated.
-    r"`isinstance\(treespec, LeafSpec\)` is deprecated",
-    # A GPU that was declined on purpose.
-    r"GPU available but not used",
-)
 
 
 def device_of(machine: MachineConfig) -> Device:
@@ -57,29 +47,20 @@ def precision_of(machine: MachineConfig, device: Device) -> Literal["32-true", "
 
 @contextmanager
 def settled(machine: MachineConfig, threads: int) -> Iterator[None]:
-    """Threads and determinism for the time of a run, and Lightning's chatter off."""
+    """Threads and determinism for the time of a run."""
     before_threads = torch.get_num_threads()
     before_strict = torch.are_deterministic_algorithms_enabled()
     before_warn = torch.is_deterministic_algorithms_warn_only_enabled()
     before_rng = torch.get_rng_state()
     keep_freed_memory()
-    loggers = [logging.getLogger(name) for name in ("lightning.pytorch", "lightning.fabric")]
-    levels = [logger.level for logger in loggers]
     try:
         torch.set_num_threads(threads)
         if machine.deterministic:
             # Read by cuBLAS when it starts; it has no other switch.
             os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")
             torch.use_deterministic_algorithms(True)
-        for logger in loggers:
-            logger.setLevel(logging.ERROR)
-        with warnings.catch_warnings():
-            for message in _BESIDE_THE_POINT:
-                warnings.filterwarnings("ignore", message=message)
-            yield
+        yield
     finally:
-        for logger, level in zip(loggers, levels, strict=True):
-            logger.setLevel(level)
         torch.use_deterministic_algorithms(before_strict, warn_only=before_warn)
         torch.set_num_threads(before_threads)
         torch.set_rng_state(before_rng)

@@ -6,13 +6,12 @@ import math
 import os
 import time
 from collections.abc import Iterable, Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import torch
-from lightning.pytorch import Trainer
-from lightning.pytorch.strategies import DDPStrategy
 
 from sd2core.denoise.card import PARTS_OF, ModelCard, maps_in
 from sd2core.denoise.files import load_model, save_model
@@ -23,18 +22,20 @@ from sd2core.denoise.registry import build, options
 from sd2core.denoise.scaling import Scaling, whole_map
 from sd2core.denoise.texture import Texture
 from sd2core.errors import Sd2Error
-from sd2core.processes import lower_priority
-from sd2core.runs.control import Control, signals_kept
+from sd2core.processes import end_with_parent, lower_priority
+from sd2core.runs.control import Control
 from sd2core.runs.progress import ProgressWriter
-from sd2core.train.callbacks import Outcome, TrainingCallbacks
 from sd2core.train.checkpoint import Checkpoint, Position, read_checkpoint
 from sd2core.train.config import TrainConfig
 from sd2core.train.data import Order, TrainingData, prepare, read_mixed
-from sd2core.train.denoiser_module import DenoiserModule
+from sd2core.train.denoiser_loop import DenoiserLoop
 from sd2core.train.evaluation import check_fits
 from sd2core.train.folder import TrainingFolder
+from sd2core.train.learner import Learner
+from sd2core.train.loop import Outcome
 from sd2core.train.machine import device_of, machine_words, precision_of, settled
-from sd2core.train.steps import Steps
+from sd2core.train.ranks import Ranks, joined, others
+from sd2core.train.steps import Batches
 from sd2core.train.validate import Exam, Validation
 
 _SHOWS = 0.4
@@ -51,87 +52,91 @@ def carry_out(
     *,
     resume: bool,
     command: str,
+    rank: int = 0,
+    meeting: Path | None = None,
 ) -> tuple[Outcome, Position]:
     """Train a model in a folder that is made, and locked by this process.
 
-    ``resume`` goes on from the last checkpoint; ``command`` goes onto the model's card.
-    Raises Sd2Error for what the user can mend.
+    ``resume`` goes on from the last checkpoint; ``command`` goes onto the model's card. Where
+    several processes compute, the first starts the others, which get their ``rank`` and the file
+    at which all meet. Raises Sd2Error for what the user can mend.
     """
     lower_priority(config.machine.nice)
-    device = device_of(config.machine)
-    checkpoint = read_checkpoint(folder.last) if resume else None
-    threads = config.machine.threads or torch.get_num_threads()
-    if checkpoint is not None:
+    ranks = Ranks(rank, config.machine.devices)
+    kind = device_of(config.machine)
+    device = torch.device(kind, rank) if kind == "cuda" else torch.device(kind)
+    if kind == "cuda":
+        torch.cuda.set_device(device)
+    start = read_checkpoint(folder.last) if resume else None
+    threads = config.machine.threads or max(1, torch.get_num_threads() // ranks.count)
+    if start is not None:
         # Sums over other numbers of threads differ in their last digits.
-        threads = config.machine.threads or int(checkpoint.about["threads"])
+        threads = config.machine.threads or int(start.about["threads"])
     parts = PARTS_OF[config.model.inputs]
     data = prepare(read_mixed(config.data.pairs), config.data, parts)
     digest = data.digest
-    if checkpoint is not None and checkpoint.about["data_digest"] != digest:
+    if start is not None and start.about["data_digest"] != digest:
         raise Sd2Error(
             "The segments are not those that the run began with: its pairs have changed, or it"
             " was begun by a version that cut them otherwise",
             "the same pairs, split and cut in the same way",
             "Start a new run, or go on with the version that began this one",
         )
-    precision = precision_of(config.machine, device)
-    start = None if config.model.start is None else _start(config.model.start, data)
-    with settled(config.machine, threads), signals_kept():
+    precision = precision_of(config.machine, kind)
+    model = None if config.model.start is None else _start(config.model.start, data)
+    with settled(config.machine, threads), ExitStack() as stack:
         scaling = Scaling.fitted(
             (take.inputs(parts) for take in data.learnt_takes),
             (take.radar for take in data.learnt_takes),
             data.pairs.null_bins,
             parts=maps_in(parts),
         )
-        if start is not None:
+        if model is not None:
             # Its first layers know the input as it was; the radar may be another.
-            scaling = replace(scaling, input=start.card.scaling.input)
-        network = _network(config, data, scaling, start, checkpoint)
-        machine = machine_words(device, precision, threads)
+            scaling = replace(scaling, input=model.card.scaling.input)
+        network = _network(config, data, scaling, model, start)
+        machine = machine_words(kind, precision, threads)
         learnt_pairs = [(take.synthetic, take.radar) for take in data.learnt_takes]
         known = KnownMovements.of(learnt_pairs, data.pairs.axis)
-        if start is not None and known is not None:
-            known = known.together(start.card.known)
-        about = _About(config, data, scaling, command, machine, known)
+        if model is not None and known is not None:
+            known = known.together(model.card.known)
+        facts = _Facts(config, data, scaling, command, machine, known)
+        exam = Exam.of(data.validation, scaling, data.pairs.axis, data.pairs.null_bins).on(device)
+        if ranks.count > 1:
+            if meeting is None:
+                beside = others(ranks.count, _beside, folder.path, config, resume)
+                meeting = stack.enter_context(beside)
+            stack.enter_context(joined(ranks, meeting, device))
         learnt = config.training
-        callbacks = TrainingCallbacks(
+        order = Order(len(data.training), learnt.batch_size, learnt.seed, config.data.range_factor)
+        loop = DenoiserLoop(
             config,
             folder,
             writer,
             control,
-            Order(len(data.training), learnt.batch_size, learnt.seed, config.data.range_factor),
-            Exam.of(data.validation, scaling, data.pairs.axis, data.pairs.null_bins),
-            checkpoint.position if checkpoint is not None else Position(),
-            {"data_digest": digest, "threads": threads},
-            lambda found, live, epoch: about.save(folder.best, network, found, live, epoch),
+            Learner(network, data.training, exam, config),
+            Batches(order, data.training, rank, ranks.count),
+            exam,
+            start or Checkpoint({}, {}, Position(), {"data_digest": digest, "threads": threads}),
+            lambda found, live, epoch: facts.save(folder.best, network, found, live, epoch),
+            ranks,
+            mixed=precision == "bf16-mixed",
         )
-        module = DenoiserModule(network, data.training, callbacks, checkpoint)
-        _say_start(writer, callbacks, data, network, device, resumed=checkpoint is not None)
-        if callbacks.over:
-            # Killed between its last checkpoint and its last line.
-            return "finished", callbacks.position
-        ranks = config.machine.devices
-        trainer = Trainer(
-            accelerator="gpu" if device == "cuda" else "cpu",
-            devices=ranks,
-            strategy=DDPStrategy(forward_sync_buffers=False) if ranks > 1 else "auto",
-            precision=precision,
-            max_epochs=1,
-            # The callbacks do all of this, between steps.
-            logger=False,
-            enable_checkpointing=False,
-            enable_progress_bar=False,
-            enable_model_summary=False,
-            num_sanity_val_steps=0,
-            limit_val_batches=0,
-            use_distributed_sampler=False,
+        _say_start(writer, loop, config, data, network, kind, resumed=start is not None)
+        # It may have been killed between its last checkpoint and its last line.
+        return loop.run(), loop.position
+
+
+def _beside(path: Path, config: TrainConfig, resume: bool, rank: int, meeting: Path) -> None:
+    """Compute as another of several processes; the first one writes."""
+    end_with_parent()
+    folder = TrainingFolder(path)
+    control = Control(folder.control)
+    control.take_signals()
+    with ProgressWriter(Path(os.devnull)) as writer:
+        carry_out(
+            folder, config, writer, control, resume=resume, command="", rank=rank, meeting=meeting
         )
-        position = callbacks.position
-        # Lightning starts the other processes with a number.
-        rank = int(os.environ.get("LOCAL_RANK", "0"))
-        steps = Steps(callbacks.order, data.training, position.epoch, position.step, rank, ranks)
-        trainer.fit(module, steps)
-    return callbacks.outcome, callbacks.position
 
 
 def _start(path: Path, data: TrainingData) -> TrainedDenoiser:
@@ -185,23 +190,23 @@ def _network(
 
 def _say_start(
     writer: ProgressWriter,
-    callbacks: TrainingCallbacks,
+    loop: DenoiserLoop,
+    config: TrainConfig,
     data: TrainingData,
     network: Denoiser,
     device: str,
     *,
     resumed: bool,
 ) -> None:
-    config, position, split = callbacks.config, callbacks.position, data.split
-    timed = config.training.minutes is not None
+    split, position, minutes = data.split, loop.position, config.training.minutes
     writer.say(
         "start",
         model=config.model.name,
         parameters=parameter_count(network),
         device=device,
-        epochs=None if timed else config.training.epochs,
-        minutes=config.training.minutes,
-        steps_per_epoch=callbacks.order.steps,
+        epochs=None if minutes is not None else config.training.epochs,
+        minutes=minutes,
+        steps_per_epoch=loop.epoch_steps,
         train_segments=len(data.training),
         validation_segments=len(data.validation),
         training_subjects=list(split.training),
@@ -217,7 +222,7 @@ def _say_start(
 
 
 @dataclass(frozen=True, eq=False)
-class _About:
+class _Facts:
     """Facts of the run that the model file keeps."""
 
     config: TrainConfig

@@ -10,7 +10,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 import traceback
 from collections.abc import Callable, Mapping
@@ -27,7 +26,7 @@ from sd2core.train.config import ModelConfig, TrainConfig, config_text, read_con
 from sd2core.train.folder import TrainingFolder
 
 if TYPE_CHECKING:
-    from sd2core.train.callbacks import Outcome
+    from sd2core.train.loop import Outcome
 
 Watch = Callable[[Event], None]
 """Told every line of progress as it is written."""
@@ -43,8 +42,6 @@ class Ending:
     validation_mae_mps: float | None
     model: Path | None  # the best one, where there is one
     interrupted: bool = False  # by Ctrl-C
-    first: bool = True
-    """False in the processes that Lightning starts besides the user's own: these print nothing."""
 
 
 def begin(
@@ -59,8 +56,6 @@ def begin(
     config = with_start(config)
     check(config)
     folder = TrainingFolder(out)
-    if _is_other_rank():
-        return _beside(folder, config, command, resume=False)
     # A run that failed before it had learnt anything makes way for the next attempt.
     learnt = folder.last.exists() or folder.best.exists()
     if folder.exists and folder.state() == "failed" and not learnt:
@@ -93,8 +88,6 @@ def go_on(out: Path, *, command: str = "", watch: Watch | None = None) -> Ending
             "Start a new one in another folder",
         )
     config, resume = read_config(folder.config), folder.last.exists()
-    if _is_other_rank():
-        return _beside(folder, config, command, resume)
     lock = folder.lock()
     try:
         write_control(folder.control, "run")
@@ -193,18 +186,6 @@ def _trained(
     )
 
 
-def _beside(folder: TrainingFolder, config: TrainConfig, command: str, resume: bool) -> Ending:
-    """Compute as another of several processes; the first one writes."""
-    from sd2core.train.run import carry_out
-
-    with ProgressWriter(Path(os.devnull)) as writer:
-        outcome, _ = carry_out(
-            folder, config, writer, Control(folder.control), resume=resume, command=command
-        )
-    assert outcome != "failed"
-    return Ending(outcome, None, None, None, None, first=False)
-
-
 def _say_end(
     folder: TrainingFolder,
     writer: ProgressWriter,
@@ -242,8 +223,3 @@ def _note_failure(folder: TrainingFolder, writer: ProgressWriter, error: BaseExc
         remedy = f"Please report it, with {folder.log.name}"
         said = {"found": found, "expected": "", "remedy": remedy}
     _say_end(folder, writer, "failed", {}, said)
-
-
-def _is_other_rank() -> bool:
-    """True if Lightning started this process besides the one that the user started."""
-    return os.environ.get("LOCAL_RANK", "0") != "0"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,51 +13,38 @@ from sd2core.train.config import TrainingConfig
 from sd2core.train.data import Order, Windows
 
 
-class Step(NamedTuple):
-    """One batch: which segments, where each is cut, and how much nearer it is."""
+class Batch(NamedTuple):
+    """Where the segments of one batch are cut, and how much nearer each is."""
 
-    index: torch.Tensor  # (segments,) int64
     start: torch.Tensor  # (segments,) int64
     gain: torch.Tensor  # (segments,) float32, of power
-    epoch: int
-    number: int
+
+    def on(self, device: torch.device) -> Batch:
+        """Copy on a device."""
+        return Batch(*(each.to(device, non_blocking=True) for each in self))
 
 
-class Steps:
-    """Endless batches from a position on, given by ``epoch`` and ``step``.
+class Batches:
+    """Batches of every epoch; with several processes (``ranks``) each takes its share of them."""
 
-    With several processes (``ranks``) each takes its share of every batch.
-    """
-
-    def __init__(
-        self,
-        order: Order,
-        windows: Windows,
-        epoch: int = 0,
-        step: int = 0,
-        rank: int = 0,
-        ranks: int = 1,
-    ) -> None:
-        self._order, self._windows = order, windows
-        self._epoch, self._step = epoch, step
+    def __init__(self, order: Order, windows: Windows, rank: int = 0, ranks: int = 1) -> None:
+        self.order = order
+        self._windows = windows
         self._rank, self._ranks = rank, ranks
+        self._epoch, self._whole = -1, (np.zeros(0, np.int64), np.zeros(0, np.float32))
 
-    def __iter__(self) -> Iterator[Step]:
-        epoch, first = self._epoch, self._step
-        while True:
-            indices, gains, shares = self._order.epoch(epoch)
-            starts = self._windows.places(indices, shares)
-            for step in range(first, self._order.steps):
-                rows = np.arange(self._order.segments)[self._order.part(step)]
-                if self._ranks > 1:
-                    # All have as many, as a mean over processes wants it.
-                    each = -(-len(rows) // self._ranks)
-                    rows = rows[(np.arange(each) * self._ranks + self._rank) % len(rows)]
-                index, start, gain = (
-                    torch.from_numpy(part[rows]) for part in (indices, starts, gains)
-                )
-                yield Step(index, start, gain, epoch, step)
-            epoch, first = epoch + 1, 0
+    def at(self, epoch: int, step: int) -> Batch:
+        """Batch of a step of an epoch, both from 0."""
+        if epoch != self._epoch:
+            indices, gains, shares = self.order.epoch(epoch)
+            self._epoch, self._whole = epoch, (self._windows.places(indices, shares), gains)
+        parts = [each[self.order.part(step)] for each in self._whole]
+        if self._ranks > 1:
+            # All have as many, as a mean over processes wants it.
+            count = len(parts[0])
+            own = np.arange(-(-count // self._ranks)) * self._ranks + self._rank
+            parts = [part[own % count] for part in parts]
+        return Batch(*map(torch.from_numpy, parts))
 
 
 def optimiser_of(model: Denoiser, config: TrainingConfig) -> torch.optim.AdamW:
@@ -92,3 +79,15 @@ def set_rate(optimiser: torch.optim.Optimizer, factor: float) -> float:
     for group in optimiser.param_groups:
         group["lr"] = factor * group["peak_lr"]
     return float(optimiser.param_groups[0]["lr"])
+
+
+def rate_factor(done: float, warm_up: float, final: float) -> float:
+    """Share of the highest learning rate when the share ``done`` (0 to 1) of the run is done.
+
+    It rises linearly from zero during the share ``warm_up`` and falls to ``final`` at the
+    end, with half a cosine.
+    """
+    if done < warm_up:
+        return done / warm_up
+    angle = math.pi * min(1.0, (done - warm_up) / max(1.0 - warm_up, 1e-9))
+    return final + (1.0 - final) * 0.5 * (1.0 + math.cos(angle))

@@ -20,7 +20,7 @@ from torch import Tensor
 
 from sd2core.denoise.causal_models import S4Denoiser
 from sd2core.denoise.s4_functions import by_product, by_transform
-from sd2core.denoise.s4_layer import StateSpace
+from sd2core.denoise.s4_space import StateSpace
 
 CHANNELS, STATE_SIZE = 128, 64
 PUBLISHED = {"legs": PublishedLegs, "diagonal": PublishedDiagonal}

@@ -21,6 +21,7 @@ from sd2core.train.config import (
     TrainConfig,
     TrainingConfig,
 )
+from sd2core.train.denoiser_loop import DenoiserLoop
 from sd2core.train.start import begin
 from sd2core.train.steps import optimiser_of
 
@@ -50,9 +51,7 @@ def test_the_loop_costs_little(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Between two steps: gathering a batch, chance, rate, control file, Lightning's hooks."""
-    from sd2core.train.denoiser_module import DenoiserModule
-
+    """Between two steps: gathering a batch, chance, rate, control file, epochs."""
     pairs = write_pairs(tmp_path / "p.zarr", takes=40, frames=450, axis=VelocityAxis(BINS, 2.0))
     config = TrainConfig(
         DataConfig((pairs,)),
@@ -61,13 +60,13 @@ def test_the_loop_costs_little(
         MachineConfig(device="cpu", threads=1),
     )
     starts_s: list[float] = []
-    before = DenoiserModule.on_train_batch_start
+    before = DenoiserLoop.step
 
-    def noted(self: DenoiserModule, *arguments: Any) -> None:
+    def noted(self: DenoiserLoop) -> None:
         starts_s.append(time.thread_time())
-        before(self, *arguments)
+        before(self)
 
-    monkeypatch.setattr(DenoiserModule, "on_train_batch_start", noted)
+    monkeypatch.setattr(DenoiserLoop, "step", noted)
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:

@@ -218,7 +218,6 @@ HEAVY = (
     "trimesh",
     "pydantic",
     "torch",
-    "lightning",
     "anny",
 )
 WINDOW = ("PySide6", "shiboken6", "vtk", "vtkmodules", "pyvista", "pyvistaqt", "pyqtgraph")

@@ -12,13 +12,8 @@ from torch import Tensor
 from sd2core.denoise.causal_models import S4Denoiser
 from sd2core.denoise.s4_functions import causal_convolution
 from sd2core.denoise.s4_kernel import legs_kernel
-from sd2core.denoise.s4_layer import (
-    SLOWEST_DECAY,
-    Kernel,
-    S4Layer,
-    StateSpace,
-    joint_kernels,
-)
+from sd2core.denoise.s4_layer import S4Layer
+from sd2core.denoise.s4_space import SLOWEST_DECAY, Kernel, StateSpace, joint_kernels
 from sd2core.errors import Sd2Error
 
 KERNELS = ("legs", "diagonal")

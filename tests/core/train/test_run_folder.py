@@ -16,7 +16,6 @@ from sd2core.runs.control import Control, read_control, write_control
 from sd2core.runs.progress import (
     ProgressTail,
     ProgressWriter,
-    StepLines,
     read_events,
     standing,
 )
@@ -75,14 +74,6 @@ class TestProgress:
         assert [one["step"] for one in kept if one["event"] == "step"] == [1, 2, 3, 4, 5, 6]
         assert [one["first"] for one in kept if one["event"] == "step"] == [True] * 3 + [False] * 3
         assert not [one for one in kept if one["event"] in ("epoch", "end")]
-
-    def test_single_steps_are_few(self, tmp_path: Path) -> None:
-        with ProgressWriter(tmp_path / "p") as writer:
-            lines = StepLines(writer, every_s=1000.0)
-            for step in range(50):
-                if lines.due:
-                    lines.say(step=step)
-        assert [event["step"] for event in read_events(tmp_path / "p")] == [0]
 
 
 class TestControl:

@@ -16,7 +16,6 @@ from sd2core.denoise.registry import MODELS, build
 from sd2core.errors import Sd2Error
 from sd2core.pairs.store import read_pairs
 from sd2core.sensor import VelocityAxis
-from sd2core.train.callbacks import rate_factor
 from sd2core.train.config import DataConfig, TrainingConfig
 from sd2core.train.data import (
     Order,
@@ -28,7 +27,7 @@ from sd2core.train.data import (
     split_subjects,
     windows_of,
 )
-from sd2core.train.steps import Steps, optimiser_of, set_rate
+from sd2core.train.steps import Batches, optimiser_of, rate_factor, set_rate
 
 
 class TestSplit:
@@ -268,32 +267,30 @@ class TestOrder:
         assert 0.98 * 1.5**4 < gains.max() <= 1.5**4 * (1 + 1e-6)
         assert abs(np.log(gains).mean()) < 0.05
 
-    def test_steps_from_a_position_on(self) -> None:
-        order = Order(10, 4, 1)
-        whole = iter(Steps(order, windows(10)))
-        taken = [next(whole) for _ in range(7)]
-        later = iter(Steps(order, windows(10), 1, 2))
-        for expected in taken[5:]:
-            found = next(later)
-            assert (found.epoch, found.number) == (expected.epoch, expected.number)
-            assert torch.equal(found.index, expected.index)
-            assert torch.equal(found.start, expected.start)
-        assert [(step.epoch, step.number, len(step.index)) for step in taken[:4]] == [
-            (0, 0, 4),
-            (0, 1, 4),
-            (0, 2, 2),
-            (1, 0, 4),
-        ]
+    def test_a_batch_depends_on_its_place_alone(self) -> None:
+        order = Order(10, 4, 1, range_factor=2.0)
+        batches = Batches(order, windows(10))
+        places = [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2)]
+        taken = {place: batches.at(*place) for place in places}
+        assert [len(batch.start) for batch in taken.values()] == [4, 4, 2, 4, 4, 2]
+        for place in reversed(places):
+            found = Batches(order, windows(10)).at(*place)
+            assert torch.equal(found.start, taken[place].start)
+            assert torch.equal(found.gain, taken[place].gain)
+        indices, gains, _ = order.epoch(1)
+        assert (taken[1, 2].start // 6).tolist() == indices[8:].tolist()
+        assert taken[1, 2].gain.tolist() == gains[8:].tolist()
 
     @pytest.mark.parametrize("ranks", [2, 3])
     def test_processes_share_a_batch(self, ranks: int) -> None:
         order = Order(11, 6, 1)
-        parts = [iter(Steps(order, windows(11), rank=rank, ranks=ranks)) for rank in range(ranks)]
-        for _ in range(order.steps):
-            steps = [next(part) for part in parts]
-            assert len({len(step.index) for step in steps}) == 1
-            indices = order.epoch(0)[0][order.part(steps[0].number)]
-            assert set(torch.cat([step.index for step in steps]).tolist()) == set(indices)
+        parts = [Batches(order, windows(11), rank, ranks) for rank in range(ranks)]
+        for step in range(order.steps):
+            batches = [part.at(0, step) for part in parts]
+            assert len({len(batch.start) for batch in batches}) == 1
+            indices = order.epoch(0)[0][order.part(step)]
+            found = torch.cat([batch.start for batch in batches]) // 6
+            assert set(found.tolist()) == set(indices)
 
 
 class TestOptimiser:

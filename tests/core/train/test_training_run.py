@@ -170,12 +170,16 @@ class TestLearning:
         assert ending.validation_rmse == pytest.approx(best, rel=1e-6)
         assert best < 0.5 * epochs[0][2]
         # What a step took is what the next estimate is made of.
-        last = last_of(read_events(tmp_path / "run" / "progress.jsonl"), "epoch")
+        events = read_events(tmp_path / "run" / "progress.jsonl")
+        last = last_of(events, "epoch")
         step_s = pace.known_pace_s(config.pace_kind)
         assert last is not None
         assert step_s is not None
         assert 0 < step_s < 2 * last["elapsed_s"] / last["step"]
         assert last["left_s"] == 0.0
+        # Lines of single steps are few: of the ends of epochs, and two a second.
+        steps = [event for event in events if event["event"] == "step"]
+        assert len(steps) <= 30 + 1 + last["elapsed_s"] / 0.5
         assert ending.model is not None
         card = describe_model(ending.model)
         assert (card.model, card.trained_on, card.null_bins) == ("gru", "simulated", (3,))
@@ -252,7 +256,7 @@ class TestLearning:
         def told(model: object, exam: Exam, *_: object) -> Validation:
             return Validation(next(errors), 1.0, np.zeros(tuple(exam.targets.shape), np.float32))
 
-        monkeypatch.setattr("sd2core.train.callbacks.validate", told)
+        monkeypatch.setattr("sd2core.train.denoiser_loop.validate", told)
         ending = begin(settings(pairs, early_stopping_epochs=3, epochs=6), tmp_path / "run")
         assert (ending.outcome, ending.best_epoch) == ("finished", 2)
         assert [one[3] for one in curve(tmp_path / "run")] == [True, True, False, False, False]
