@@ -26,7 +26,6 @@ def draw_comparison(comparison: Comparison) -> Figure:
     figure = Figure(figsize=(3.4 * max(count, 2), 8.4), dpi=120, layout="constrained")
     grid = figure.add_gridspec(4, count, height_ratios=(1.6, 1, 1, 1))
     top = max(float(one.values.max(initial=0.0)) for one in comparison.maps) or 1.0
-    sides = {"hands": "LR", "elbows": "LR", "torso": ""}
     first = None
     for number, (label, one) in enumerate(zip(comparison.labels, comparison.maps, strict=True)):
         axes = figure.add_subplot(grid[0, number], sharex=first, sharey=first)
@@ -73,7 +72,7 @@ def draw_comparison(comparison: Comparison) -> Figure:
                     linestyle="--" if right or joint == "pelvis" else "-",
                     label=label if joint == GROUPS[group][0] else None,
                 )
-        lines = "left —, right - -" if sides[group] else "chest —, pelvis - -"
+        lines = "chest —, pelvis - -" if group == "torso" else "left —, right - -"
         axes.set_ylabel(f"{group}: {lines}\n(m/s)", fontsize=8)
         axes.axhline(0.0, color="#999999", linewidth=0.5)
         axes.grid(alpha=0.2)
