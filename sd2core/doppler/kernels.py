@@ -216,7 +216,9 @@ def weigh_run(  # type: ignore[no-untyped-def]
     p, q, own, middle, away, numbers, heads, normals, marks, areas, vectors, which, weighting,
     sensor, distance, exponent, reference, seen, weight, spare,
 ):  # fmt: skip
-    """Set visibility and weights of vertices ``p`` to ``q`` of a frame; weights of 1 are left.
+    """Return the visibility of vertices ``p`` to ``q`` of a frame and set their weights.
+
+    Weights of 1 are left.
 
     ``middle`` (3, n) and ``away`` (n,) are the frame's places and ranges, ``marks`` its row of the
     mask, ``own`` is the place of its values among those of all frames. ``heads`` (n,) is the
@@ -230,7 +232,7 @@ def weigh_run(  # type: ignore[no-untyped-def]
         nx, ny, nz = normal[0][p:q], normal[1][p:q], normal[2][p:q]
         facing_kernel(x, y, z, nx, ny, nz, sx, sy, sz, seen)
     elif which == MASK and count == marks.shape[0]:
-        seen[:] = marks[p:q]
+        seen = marks[p:q]
     elif which == MASK:
         for i in range(q - p):
             seen[i] = marks[np.uint32(numbers[p + i])]
@@ -238,7 +240,7 @@ def weigh_run(  # type: ignore[no-untyped-def]
         squared_ratios(away[p:q], distance, reference, weight)
         raise_to(weight, exponent, spare)
     if weighting == ONE:
-        return
+        return seen
     if weighting == AREA:
         spare[:] = areas[own + p : own + q]
     elif weighting == PROJECTED:
@@ -252,6 +254,7 @@ def weigh_run(  # type: ignore[no-untyped-def]
             weight[i] *= spare[i]
     else:
         weight[:] = spare
+    return seen
 
 
 @compiled
@@ -339,16 +342,16 @@ def count_kernel(  # type: ignore[no-untyped-def]
             q = run_end(numbers, p)
             n = q - p
             away = ranges_at(here, knot, sensor, distance, ranges, held)
-            weigh_run(
+            sight = weigh_run(
                 p, q, own, here[3 * knot : 3 * knot + 3], away, numbers, heads, normals, marks,
                 areas, vectors, which, weighting, sensor, distance, exponent, reference,
                 seen[:n], weight[:n], spare[:n],
             )  # fmt: skip
             if grouped:
-                seen_count += heads_seen(seen[:n], heads[p:q])
+                seen_count += heads_seen(sight, heads[p:q])
             else:
                 for i in range(n):
-                    seen_count += np.int64(seen[i])
+                    seen_count += np.int64(sight[i])
             for sample in range(samples):
                 if scale[t, sample] <= 0:
                     continue
@@ -356,10 +359,10 @@ def count_kernel(  # type: ignore[no-untyped-def]
                 b = ranges_at(here, after[frame, sample], sensor, distance, ranges, held)
                 axis_positions(a[p:q], b[p:q], scale[t, sample], offset, f[:n])
                 if grouped:
-                    outside_count += heads_beyond(f[:n], seen[:n], heads[p:q], bins)
-                    slots_of(f[:n], seen[:n], bins, beyond, slot[:n])
+                    outside_count += heads_beyond(f[:n], sight, heads[p:q], bins)
+                    slots_of(f[:n], sight, bins, beyond, slot[:n])
                 else:
-                    outside_count += slots_of(f[:n], seen[:n], bins, beyond, slot[:n])
+                    outside_count += slots_of(f[:n], sight, bins, beyond, slot[:n])
                 _add(slot[:n], weight[:n], row[p:q], place[:n], sums)
             p = q
         _total(sums, total)

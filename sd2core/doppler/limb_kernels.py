@@ -75,13 +75,13 @@ def fine_kernel(  # type: ignore[no-untyped-def]
             q = min(p + RUN, most)
             n = q - p
             away = ranges_at(here, knot, sensor, distance, ranges, held)
-            weigh_run(
+            sight = weigh_run(
                 p, q, most * t, here[3 * knot : 3 * knot + 3], away, numbers, heads, normals,
                 marks, areas, vectors, which, weighting, sensor, distance, exponent, reference,
                 seen[:n], weight[:n], spare[:n],
             )  # fmt: skip
             for i in range(n):
-                if seen[i] != 0:
+                if sight[i] != 0:
                     visible[t] += heads[p + i] if heads.shape[0] > 0 else 1.0
             for sample in range(samples):
                 if scale[t, sample] <= 0:
@@ -90,7 +90,7 @@ def fine_kernel(  # type: ignore[no-untyped-def]
                 b = ranges_at(here, after[t, sample], sensor, distance, ranges, held)
                 axis_positions(a[p:q], b[p:q], scale[t, sample], offset, f[:n])
                 outside[t] += share * _tally(
-                    f[:n], seen[:n], weight[:n], share, limb[p:q], heads[p:q], bins, room, beyond,
+                    f[:n], sight, weight[:n], share, limb[p:q], heads[p:q], bins, room, beyond,
                     sigma[t], part, fine[t], histogram[t],
                 )  # fmt: skip
 
