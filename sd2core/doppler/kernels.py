@@ -271,6 +271,17 @@ def _add(slot, weight, row, place, sums):  # type: ignore[no-untyped-def]
 
 
 @compiled
+def _add_in_turn(slot, weight, tables):  # type: ignore[no-untyped-def]
+    """Add the weights of a run of all vertices as :func:`_add` does, without a row for each."""
+    whole = slot.shape[0] // TABLES * TABLES
+    for first in range(0, whole, TABLES):
+        for table in range(TABLES):
+            tables[table, slot[first + table]] += np.float64(weight[first + table])
+    for i in range(whole, slot.shape[0]):
+        tables[0, slot[i]] += np.float64(weight[i])
+
+
+@compiled
 def _total(sums, total):  # type: ignore[no-untyped-def]
     """Sum of the tables, each place in the order of the tables."""
     total[:] = 0
@@ -305,7 +316,7 @@ def count_kernel(  # type: ignore[no-untyped-def]
     heads = np.ones(most, np.float32)
     parts, width = histogram.shape[1], bins + 2
     sums, total = np.zeros(TABLES * parts * width), np.empty(parts * width)
-    slots = np.int32(parts * width)
+    tables, slots = sums.reshape((TABLES, parts * width)), np.int32(parts * width)
     split, grouped = part.shape[0] > 0, every.shape[0] > 0
     whole = np.int32(vertices // TABLES * TABLES)
     group = start // group_frames - 1
@@ -363,7 +374,10 @@ def count_kernel(  # type: ignore[no-untyped-def]
                     slots_of(f[:n], sight, bins, beyond, slot[:n])
                 else:
                     outside_count += slots_of(f[:n], sight, bins, beyond, slot[:n])
-                _add(slot[:n], weight[:n], row[p:q], place[:n], sums)
+                if count == vertices and not split:
+                    _add_in_turn(slot[:n], weight[:n], tables)
+                else:
+                    _add(slot[:n], weight[:n], row[p:q], place[:n], sums)
             p = q
         _total(sums, total)
         for number in range(parts):
