@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,12 +22,12 @@ from numpy.typing import NDArray
 from sd2core.doppler.frame_counts import FrameCounts
 from sd2core.doppler.limb_histograms import FineAxis, fine_histograms
 from sd2core.doppler.masks import Visibility
-from sd2core.doppler.parallel import Ticket, run_jobs
 from sd2core.doppler.prepared import Block
 from sd2core.doppler.smoothing import frames_within_reach, smooth_time, velocity_kernel
 from sd2core.errors import Sd2Error
 from sd2core.maps import CellUncertainty
 from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
+from sd2core.numerics.parallel import Ticket, run_jobs
 from sd2core.progress import Progress
 from sd2core.sensor import VirtualSensor
 
@@ -176,8 +175,8 @@ class _Piece:
         counts, known = self._counts, self._known
         position_m = self._sensor.position_m
         place = counts.prepared.sensor(position_m)
-        scatterers, _ = counts.scatterers(block, rows, position_m, self._visibility)
-        scatterers = replace(scatterers, parts=known.vertex_limb)
+        visibility, limb = self._visibility, known.vertex_limb
+        scatterers, _ = counts.scatterers(block, rows, position_m, visibility, limb)
         frames, velocity = block.frames.rows(rows), None
         if counts.options.velocity == "vid2doppler":
             velocity = counts.prepared.velocities_vid2doppler(block, rows, place)

@@ -21,7 +21,6 @@ from sd2core.doppler.histogram import (
     Counts,
     Frames,
     Scatterers,
-    kernel_arrays,
     place_in_bins,
     places_plain,
 )
@@ -80,15 +79,15 @@ def count_expected(
     if not kernels_ready():
         _count_plain(frames, sensor, counting, scatterers, sigma_bins[:, vertex_limb], into)
         return
+    place = sensor.astype(frames.positions.dtype)
     for first in range(0, len(frames), _FRAMES):
         rows = slice(first, min(first + _FRAMES, len(frames)))
         some, counts, sigma = frames.rows(rows), into.rows(rows), sigma_bins[rows, limb]
         room = 0 if counting.beyond == WRAP else math.ceil(REACH * sigma.max()) + 1
         fine = np.zeros((len(some), len(pairs), FineAxis(counting, room).parts, 2))
         fine_kernel(
-            *kernel_arrays(some, counting, scatterers.rows(rows)), group,
-            sensor.astype(frames.positions.dtype), *scatterers.kinds, counting.bins, room,
-            counting.beyond, counting.range_exponent, np.float32(counting.reference_range_m),
+            tuple(some.paths()), counting.scale(some.duration_s, place.dtype),
+            scatterers.rows(rows).arguments(), place, counting.arguments(), group, room,
             sigma, part, fine, counts.histogram, counts.visible, counts.beyond,
         )  # fmt: skip
         spread_kernel(fine, sigma, part, counting.bins, room, counting.beyond, counts.histogram)

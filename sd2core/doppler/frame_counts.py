@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,7 +9,7 @@ from sd2core.doppler import histogram, vid2doppler
 from sd2core.doppler.expected import SIGMA_FACTOR, count_expected, sigma_bins
 from sd2core.doppler.histogram import Counts, Scatterers, counting_of
 from sd2core.doppler.masks import Position, Quality, Visibility, VisibilityMasks
-from sd2core.doppler.moving import MovingVertices, count_moving, visible_counts
+from sd2core.doppler.moving import MovingVertices, visible_counts
 from sd2core.doppler.prepared import Block, PreparedMesh
 from sd2core.numerics.compiled import kernels_ready
 from sd2core.scattering.amplitude import range_weight
@@ -52,21 +50,39 @@ class FrameCounts:
         Vertices of different ``parts`` (V,) are counted apart. Without ``shares`` the number of
         visible vertices may be left out.
         """
-        place = self.prepared.sensor(position_m)
+        prepared, place = self.prepared, self.prepared.sensor(position_m)
         totals[:] = self.totals(block, rows)
-        moving = self.prepared.moving(block, self.counting)
-        if moving is not None and moving.hold_from(place):
-            quality = self._count_moving(
-                moving, block, rows, position_m, visibility, into, parts, shares
-            )
-            if self.options.range_law == "frame":
-                into.histogram[:] *= self.frame_law(block, rows, position_m)[:, None, None]
-            return quality
-        block = self.prepared.whole(block)
-        scatterers, quality = self.scatterers(block, rows, position_m, visibility)
-        scatterers = replace(scatterers, parts=parts)
+        moving = prepared.moving(block, self.counting)
+        if moving is not None and not moving.hold_from(place):
+            moving = None
+        if moving is None:
+            block = prepared.whole(block)
+        scatterers, quality = self.scatterers(block, rows, position_m, visibility, parts, moving)
+        if moving is None:
+            self._count_all(block, rows, position_m, scatterers, into)
+        else:
+            # The other vertices lie in emptied bins.
+            duration_s = block.frames.duration_s[rows]
+            histogram.count(moving, rows.start, duration_s, place, self.counting, scatterers, into)
+            if shares:
+                points, mask = prepared.points(block)[rows], scatterers.mask
+                normals = None if scatterers.normals is None else prepared.normals(block)[rows]
+                into.visible[:] = visible_counts(points, place, mask, normals, prepared.heads)
+        if self.options.range_law == "frame":
+            into.histogram[:] *= self.frame_law(block, rows, position_m)[:, None, None]
+        return quality
+
+    def _count_all(
+        self,
+        block: Block,
+        rows: slice,
+        position_m: Position,
+        scatterers: Scatterers,
+        into: Counts,
+    ) -> None:
+        """Count all vertices of some of a block's frames."""
+        place, known = self.prepared.sensor(position_m), self.mesh.uncertainty
         frames = block.frames.rows(rows)
-        known = self.mesh.uncertainty
         if self.prepared.spreads and known is not None:
             sigma = SIGMA_FACTOR * self.sigma_bins(block, rows, position_m)
             limb = known.vertex_limb
@@ -75,12 +91,11 @@ class FrameCounts:
             velocity = self.prepared.velocities_vid2doppler(block, rows, place)
             edges_mps = self.options.axis.edges_mps
             vid2doppler.count(frames, velocity, edges_mps, place, self.counting, scatterers, into)
+        elif kernels_ready():
+            paths, duration_s = frames.paths(), frames.duration_s
+            histogram.count(paths, 0, duration_s, place, self.counting, scatterers, into)
         else:
-            count = histogram.count if kernels_ready() else histogram.count_plain
-            count(frames, place, self.counting, scatterers, into)
-        if self.options.range_law == "frame":
-            into.histogram[:] *= self.frame_law(block, rows, position_m)[:, None, None]
-        return quality
+            histogram.count_plain(frames, place, self.counting, scatterers, into)
 
     def prepare(self, index: int, occluded: bool) -> None:
         """Make all that counting a block takes and that no sensor changes."""
@@ -88,41 +103,16 @@ class FrameCounts:
         block = prepared.counted(index, self.counting, points=occluded)
         moving = prepared.moving(block, self.counting)
         facing = self.mesh.faces is not None
-        if moving is None:
-            self._of_all(block, slice(None), None, facing)
-        else:
-            self._of_moving(block, moving, None, facing and not occluded)
-            if occluded:
-                prepared.normals(block)
+        # What is occluded is found among all vertices.
+        whole = moving is not None and occluded
+        self._scatterers(block, slice(None), None, facing and not whole, None, moving)
+        if whole:
+            prepared.normals(block)
         if prepared.spreads:
             prepared.limb_places(block)
         self.totals(block, slice(0, 0))
         if self.options.range_law == "frame":
             prepared.middles(block)
-
-    def _count_moving(
-        self,
-        moving: MovingVertices,
-        block: Block,
-        rows: slice,
-        position_m: Position,
-        visibility: Visibility,
-        into: Counts,
-        parts: NDArray[np.uint8] | None,
-        shares: bool,
-    ) -> Quality:
-        """Count what moves only; the other vertices lie in emptied bins."""
-        prepared, place = self.prepared, self.prepared.sensor(position_m)
-        mask, quality = self.masks.for_rows(block, rows, position_m, visibility)
-        facing = mask is None and quality == "facing"
-        scatterers = replace(self._of_moving(block, moving, mask, facing), parts=parts)
-        duration_s = block.frames.duration_s[rows]
-        count_moving(moving, rows, duration_s, place, self.counting, scatterers, into)
-        if shares:
-            points = prepared.points(block)[rows]
-            normals = prepared.normals(block)[rows] if facing else None
-            into.visible[:] = visible_counts(points, place, mask, normals, prepared.heads)
-        return quality
 
     def sigma_bins(self, block: Block, rows: slice, position_m: Position) -> NDArray[np.float64]:
         """Deviation of each limb's velocity towards a sensor in bins, (n, limbs)."""
@@ -148,34 +138,39 @@ class FrameCounts:
         )
 
     def scatterers(
-        self, block: Block, rows: slice, position_m: Position, visibility: Visibility
+        self,
+        block: Block,
+        rows: slice,
+        position_m: Position,
+        visibility: Visibility,
+        parts: NDArray[np.uint8] | None,
+        moving: MovingVertices | None = None,
     ) -> tuple[Scatterers, Quality]:
-        """Scatterers of some of a block's frames, and the visibility that was used."""
+        """Scatterers of some of a block's frames, and the visibility that was used.
+
+        With ``moving``, normals and areas are those of what moves in all of the block's frames.
+        """
         mask, quality = self.masks.for_rows(block, rows, position_m, visibility)
         facing = mask is None and quality == "facing"
-        return self._of_all(block, rows, mask, facing), quality
+        return self._scatterers(block, rows, mask, facing, parts, moving), quality
 
-    def _of_all(
-        self, block: Block, rows: slice, mask: NDArray[np.uint8] | None, facing: bool
+    def _scatterers(
+        self,
+        block: Block,
+        rows: slice,
+        mask: NDArray[np.uint8] | None,
+        facing: bool,
+        parts: NDArray[np.uint8] | None,
+        moving: MovingVertices | None,
     ) -> Scatterers:
         prepared, weight = self.prepared, self.options.weight
+        rows = rows if moving is None else slice(None)
+        vectors = prepared.area_vectors
         return Scatterers(
-            normals=prepared.normals(block)[rows] if facing else None,
+            normals=prepared.normals(block, moving)[rows] if facing else None,
             mask=mask,
-            areas=prepared.areas(block)[rows] if weight == "area" else None,
-            area_vectors=prepared.area_vectors(block)[rows] if weight == "projected" else None,
+            areas=prepared.areas(block, moving)[rows] if weight == "area" else None,
+            area_vectors=vectors(block, moving)[rows] if weight == "projected" else None,
             vertex_counts=prepared.heads,
-        )
-
-    def _of_moving(
-        self, block: Block, moving: MovingVertices, mask: NDArray[np.uint8] | None, facing: bool
-    ) -> Scatterers:
-        prepared, weight = self.prepared, self.options.weight
-        vectors = prepared.moving_area_vectors
-        return Scatterers(
-            normals=prepared.moving_normals(block, moving) if facing else None,
-            mask=mask,
-            areas=prepared.moving_areas(block, moving) if weight == "area" else None,
-            area_vectors=vectors(block, moving) if weight == "projected" else None,
-            vertex_counts=prepared.heads,
+            parts=parts,
         )

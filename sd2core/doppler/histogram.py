@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +18,7 @@ from sd2core.doppler.kernels import (
     FACING,
     HEADS,
     MASK,
+    ONE,
     PROJECTED,
     WRAP,
     count_kernel,
@@ -47,7 +50,26 @@ class Scatterers:
         which = MASK if self.mask is not None else FACING if self.normals is not None else ALL
         if self.area_vectors is not None:
             return which, PROJECTED
-        return which, AREA if self.areas is not None else HEADS
+        if self.areas is not None:
+            return which, AREA
+        return which, ONE if self.vertex_counts is None else HEADS
+
+    def arguments(self) -> tuple[Any, ...]:
+        """What kernels take: values as :class:`Paths` has places, empty where there are none."""
+        normals, mask, parts = self.normals, self.mask, self.parts
+        areas, vectors, heads = (
+            _NO_AREAS if values is None else values.reshape(-1)
+            for values in (self.areas, self.area_vectors, self.vertex_counts)
+        )
+        return (
+            _NO_NORMALS if normals is None else normals.reshape(-1),
+            _NO_MASK if mask is None else mask,
+            areas,
+            vectors,
+            heads,
+            _NO_PARTS if parts is None else parts,
+            *self.kinds,
+        )
 
     def rows(self, rows: slice) -> Scatterers:
         """Those of some of the frames; nothing is copied."""
@@ -92,9 +114,34 @@ class Scatterers:
         return self.vertex_counts.astype(np.float64)
 
 
+_NO_NORMALS = np.empty(0, np.int8)
+_NO_MASK = np.empty((0, 0), np.uint8)
+_NO_AREAS = np.empty(0, np.float32)
+_NO_PARTS = np.empty(0, np.uint8)
+
+
+class Paths(NamedTuple):
+    """Vertices by groups of consecutive frames, and their places, as the kernels take them.
+
+    Of a surface of which little moves each group has vertices of its own
+    (:mod:`sd2core.doppler.moving`); otherwise all frames are one group, with all vertices.
+    """
+
+    vertex: NDArray[np.int32]  # (N,), ascending within a group
+    first: NDArray[np.int64]  # (groups + 1,): number of the first of every group
+    places: NDArray[Any]
+    """Group after group, so that memory is read from front to back: the positions of its n
+    vertices at the group's knots, (knots, 3, n)."""
+    centre: NDArray[np.int64]  # (frames,): knot of every frame, counted within its group
+    before: NDArray[np.int64]  # (frames, samples), like that
+    after: NDArray[np.int64]
+    group_frames: int
+    vertices: int  # V
+
+
 @dataclass(frozen=True, eq=False)
 class Frames:
-    """Consecutive prepared frames, as the kernels take them."""
+    """Consecutive prepared frames."""
 
     positions: NDArray[Any]
     """Shape (knots, 3, V), float32 or float64, relative to the clip's origin; velocities have
@@ -119,6 +166,25 @@ class Frames:
             self.duration_s[rows],
         )
 
+    def paths(self) -> Paths:
+        """All vertices of these frames."""
+        vertices = self.positions.shape[2]
+        return Paths(
+            *_every(vertices),
+            self.positions.reshape(-1),
+            self.centre,
+            self.before,
+            self.after,
+            max(len(self), 1),
+            vertices,
+        )
+
+
+@lru_cache(maxsize=8)
+def _every(vertices: int) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+    """All vertices as one group."""
+    return np.arange(vertices, dtype=np.int32), np.array([0, vertices], np.int64)
+
 
 @dataclass(frozen=True)
 class Counting:
@@ -135,6 +201,11 @@ class Counting:
         rate = np.divide(1.0, duration_s, out=np.zeros_like(duration_s), where=duration_s > 0)
         scale: NDArray[Any] = (rate * (0.5 * self.bins / self.v_max_mps)).astype(precision)
         return scale
+
+    def arguments(self) -> tuple[int, int, float, np.float32]:
+        """What kernels take."""
+        reference_m = np.float32(self.reference_range_m)
+        return self.bins, self.beyond, float(self.range_exponent), reference_m
 
 
 def counting_of(options: SynthesisOptions) -> Counting:
@@ -167,24 +238,6 @@ class Counts:
     def rows(self, rows: slice) -> Counts:
         """Some of the frames; writing to them writes to the whole."""
         return Counts(self.histogram[rows], self.visible[rows], self.beyond[rows])
-
-    def add(
-        self,
-        row: int,
-        number: NDArray[np.intp],
-        weight: NDArray[np.float64],
-        seen: NDArray[np.bool_],
-        part: NDArray[np.uint8] | None,
-        samples: int,
-    ) -> None:
-        """Add one of ``samples`` samples of a frame: bin, weight, visibility and part, (V,) each.
-
-        The bin is ``bins`` where a vertex is dropped.
-        """
-        _, parts, bins = self.histogram.shape
-        slot = number if part is None else number + (bins + 1) * part.astype(np.intp)
-        total = np.bincount(slot[seen], weight[seen], parts * (bins + 1))
-        self.histogram[row] += total.reshape(parts, bins + 1)[:, :bins] / samples
 
 
 def relative_range(positions: NDArray[Any], sensor: NDArray[np.float64]) -> NDArray[Any]:
@@ -250,9 +303,21 @@ def count_plain(
     counting: Counting,
     scatterers: Scatterers,
     into: Counts,
+    bins_of: Callable[[int, int], tuple[NDArray[np.intp], NDArray[np.bool_]]] | None = None,
 ) -> None:
-    """Count some frames as :func:`count` does, in NumPy."""
+    """Count some frames as :func:`count` does, in NumPy.
+
+    ``bins_of`` a frame and a sample replaces what :func:`bins_plain` finds.
+    """
+    if bins_of is None:
+
+        def bins_of(t: int, sample: int) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+            return bins_plain(frames, t, sample, sensor, counting)
+
+    _, parts, bins = into.histogram.shape
     heads = scatterers.heads(frames.positions.shape[2])
+    # Bins of a part, and one for what is dropped.
+    base = 0 if scatterers.parts is None else (bins + 1) * scatterers.parts.astype(np.intp)
     for t, knot in enumerate(frames.centre):
         points = frames.positions[knot]
         seen = scatterers.seen(t, points, sensor)
@@ -260,85 +325,69 @@ def count_plain(
         into.visible[t] = heads[seen].sum()
         measured = max(1, int((frames.duration_s[t] > 0).sum()))
         for sample in np.flatnonzero(frames.duration_s[t] > 0).tolist():
-            number, beyond = bins_plain(frames, t, sample, sensor, counting)
-            into.add(t, number, weight, seen, scatterers.parts, measured)
+            number, beyond = bins_of(t, sample)
+            total = np.bincount((number + base)[seen], weight[seen], parts * (bins + 1))
+            into.histogram[t] += total.reshape(parts, bins + 1)[:, :bins] / measured
             into.beyond[t] += heads[beyond & seen].sum() / measured
 
 
 def count(
-    frames: Frames,
+    paths: Paths,
+    start: int,
+    duration_s: NDArray[np.float64],
     sensor: NDArray[np.float64],
     counting: Counting,
     scatterers: Scatterers,
     into: Counts,
 ) -> None:
-    """Count some frames, compiled; ``into`` has as many frames and is zero at first.
+    """Count frames from ``start`` on, compiled; ``into`` is zero at first.
 
-    The sensor is in the frame of the positions.
+    Parameters
+    ----------
+    paths : Paths
+        Those that are counted: of what moves, bins that are not kept get less than their share.
+    duration_s : float64 array, shape (n, samples)
+        Of the n frames that are counted; so are mask and ``into``.
+    sensor : float64 array, shape (3,)
+        In the frame of the positions.
+    scatterers : Scatterers
+        Normals, areas and area vectors are those of all frames of the paths, in their order.
     """
+    precision = paths.places.dtype
     count_kernel(
-        *kernel_arrays(frames, counting, scatterers),
-        scatterers.parts if scatterers.parts is not None else _NO_PARTS,
-        sensor.astype(frames.positions.dtype),
-        *scatterers.kinds,
-        counting.bins,
-        counting.beyond,
-        counting.range_exponent,
-        np.float32(counting.reference_range_m),
+        tuple(paths),
+        start,
+        counting.scale(duration_s, precision),
+        scatterers.arguments(),
+        sensor.astype(precision),
+        counting.arguments(),
         into.histogram,
         into.visible,
         into.beyond,
     )
 
 
-_A = NDArray[Any]
-
-
-def kernel_arrays(
-    frames: Frames, counting: Counting, scatterers: Scatterers
-) -> tuple[_A, _A, _A, _A, _A, _A, _A, _A, _A, _A]:
-    """Arrays that counting kernels take first, empty where there is none."""
-    normals, mask, areas = scatterers.normals, scatterers.mask, scatterers.areas
-    vectors, heads = scatterers.area_vectors, scatterers.vertex_counts
-    return (
-        frames.positions,
-        frames.centre,
-        frames.before,
-        frames.after,
-        counting.scale(frames.duration_s, frames.positions.dtype),
-        normals if normals is not None else _NO_NORMALS,
-        mask if mask is not None else _NO_MASK,
-        areas if areas is not None else _NO_AREAS,
-        vectors if vectors is not None else _NO_VECTORS,
-        heads if heads is not None else _NO_HEADS,
-    )
-
-
-_NO_NORMALS = np.empty((0, 3, 0), np.int8)
-_NO_MASK = np.empty((0, 0), np.uint8)
-_NO_AREAS = np.empty((0, 0), np.float32)
-_NO_VECTORS = np.empty((0, 3, 0), np.float32)
-_NO_HEADS = np.empty(0, np.float32)
-_NO_PARTS = np.empty(0, np.uint8)
-
-
 def mark_needed(
-    frames: Frames, sensor: NDArray[np.float64], counting: Counting, live: NDArray[np.uint8]
+    paths: Paths,
+    start: int,
+    duration_s: NDArray[np.float64],
+    sensor: NDArray[np.float64],
+    counting: Counting,
+    live: NDArray[np.uint8],
 ) -> NDArray[np.uint8]:
     """Mark the vertices (n, V) whose visibility can change the histogram, compiled.
 
     ``live`` (bins + 1,) is 1 for bins that are kept; its last entry is for velocities
-    beyond the axis.
+    beyond the axis. The other parameters are those of :func:`count`.
     """
-    needed = np.zeros((len(frames), frames.positions.shape[2]), np.uint8)
+    needed = np.zeros((len(duration_s), paths.vertices), np.uint8)
+    precision = paths.places.dtype
     needed_kernel(
-        frames.positions,
-        frames.before,
-        frames.after,
-        counting.scale(frames.duration_s, frames.positions.dtype),
-        sensor.astype(frames.positions.dtype),
-        counting.bins,
-        counting.beyond,
+        tuple(paths),
+        start,
+        counting.scale(duration_s, precision),
+        sensor.astype(precision),
+        counting.arguments(),
         live,
         needed,
     )
@@ -348,7 +397,7 @@ def mark_needed(
 def mark_needed_plain(
     frames: Frames, sensor: NDArray[np.float64], counting: Counting, live: NDArray[np.uint8]
 ) -> NDArray[np.uint8]:
-    """Mark vertices as :func:`mark_needed` does, in NumPy."""
+    """Mark vertices of all frames as :func:`mark_needed` does, in NumPy."""
     needed = np.zeros((len(frames.centre), frames.positions.shape[2]), np.uint8)
     for t in range(len(frames.centre)):
         for sample in range(frames.before.shape[1]):

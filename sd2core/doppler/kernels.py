@@ -1,11 +1,14 @@
 """Compiled inner loops of counting.
 
+They go over the vertices of :class:`sd2core.doppler.histogram.Paths`: all, or those that move.
 Each frame is processed in runs of vertices that stay in the second-level
 cache. Each step of a run is a loop of its own with few streams, which the compiler
 turns into vector instructions. :mod:`sd2core.doppler.histogram` explains the
 numbers. Positions, sensor and scale are all in single precision, or all in
 double: the compiler makes two forms of each loop, and constants are in single
 precision, so that they do not widen the first (docs/decisions/0013).
+
+Tuples are ``Paths`` there, and the ``arguments`` of ``Scatterers`` and ``Counting``.
 """
 
 from __future__ import annotations
@@ -23,8 +26,8 @@ _NEAREST = np.float32(NEAREST_RANGE_M)
 ALL, FACING, MASK = 0, 1, 2
 """Which vertices count: all, those facing the sensor, those marked in a mask."""
 
-HEADS, AREA, PROJECTED = 0, 1, 2
-"""What a vertex counts: the vertices it stands for, its area, that towards the sensor."""
+ONE, HEADS, AREA, PROJECTED = 0, 1, 2, 3
+"""What a vertex counts: 1, the vertices it stands for, its area, that towards the sensor."""
 
 DROP, WRAP, CLIP = 0, 1, 2
 """What happens beyond the axis."""
@@ -52,15 +55,49 @@ def distance_of(sensor):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def extend(positions, sensor, distance, known, upto, ring):  # type: ignore[no-untyped-def]
-    """Compute the knots from ``known`` to ``upto``; the ring keeps the newest few."""
-    for knot in range(known, upto + 1):
-        points = positions[knot]
+def ranges_at(here, knot, sensor, distance, ranges, held):  # type: ignore[no-untyped-def]
+    """Ranges of a group's vertices at one of its knots, computed when they are first asked for.
+
+    ``ranges`` keeps those of the newest knots, whose numbers are ``held``.
+    """
+    row = knot % ranges.shape[0]
+    # Cut like this the compiler knows that they lie side by side.
+    found = ranges[row][: here.shape[1]]
+    if held[row] != knot:
         relative_ranges(
-            points[0], points[1], points[2],
-            sensor[0], sensor[1], sensor[2], distance, ring[knot % ring.shape[0]],
+            here[3 * knot], here[3 * knot + 1], here[3 * knot + 2],
+            sensor[0], sensor[1], sensor[2], distance, found,
         )  # fmt: skip
-    return max(known, upto + 1)
+        held[row] = knot
+    return found
+
+
+@compiled
+def group_of(vertex, first, places, group):  # type: ignore[no-untyped-def]
+    """Vertices (n,) of a group and their coordinates at its knots (3 knots, n)."""
+    knots = places.shape[0] // (3 * max(vertex.shape[0], 1))
+    begin, end = first[group], first[group + 1]
+    here = places[3 * knots * begin : 3 * knots * end].reshape((3 * knots, end - begin))
+    return vertex[begin:end], here
+
+
+@compiled
+def most_in_a_group(first):  # type: ignore[no-untyped-def]
+    """Largest number of vertices in a group."""
+    most = 0
+    for group in range(first.shape[0] - 1):
+        most = max(most, first[group + 1] - first[group])
+    return most
+
+
+@compiled
+def run_end(numbers, p):  # type: ignore[no-untyped-def]
+    """End of the vertices from ``p`` that lie in the same run of all as the first of them."""
+    end = (numbers[p] // RUN + 1) * RUN
+    q = min(p + RUN, numbers.shape[0])
+    while numbers[q - 1] >= end:
+        q -= 1
+    return q
 
 
 @compiled
@@ -175,217 +212,223 @@ def heads_seen(seen, heads):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _tally(slot, counts):  # type: ignore[no-untyped-def]
-    """Add 1 per vertex; several tables in turn, so that equal slots do not wait."""
-    whole = slot.shape[0] // TABLES * TABLES
-    for v in range(0, whole, TABLES):
-        for table in range(TABLES):
-            counts[table, slot[v + table]] += np.int32(1)
-    for v in range(whole, slot.shape[0]):
-        counts[0, slot[v]] += np.int32(1)
-
-
-@compiled
-def _tally_weights(slot, weight, sums):  # type: ignore[no-untyped-def]
-    whole = slot.shape[0] // TABLES * TABLES
-    for v in range(0, whole, TABLES):
-        for table in range(TABLES):
-            sums[table, slot[v + table]] += np.float64(weight[v + table])
-    for v in range(whole, slot.shape[0]):
-        sums[0, slot[v]] += np.float64(weight[v])
-
-
-@compiled
-def _tally_parts(slot, base, counts):  # type: ignore[no-untyped-def]
-    """Add 1 per vertex; the slots of its part of the body begin at ``base``."""
-    whole = slot.shape[0] // TABLES * TABLES
-    for v in range(0, whole, TABLES):
-        for table in range(TABLES):
-            counts[table, base[v + table] + slot[v + table]] += np.int32(1)
-    for v in range(whole, slot.shape[0]):
-        counts[0, base[v] + slot[v]] += np.int32(1)
-
-
-@compiled
-def _tally_weights_of_parts(slot, weight, base, sums):  # type: ignore[no-untyped-def]
-    whole = slot.shape[0] // TABLES * TABLES
-    for v in range(0, whole, TABLES):
-        for table in range(TABLES):
-            sums[table, base[v + table] + slot[v + table]] += np.float64(weight[v + table])
-    for v in range(whole, slot.shape[0]):
-        sums[0, base[v] + slot[v]] += np.float64(weight[v])
-
-
-@compiled
 def weigh_run(  # type: ignore[no-untyped-def]
-    t, v0, v1, middle, ranges, normals, mask, areas, vectors, heads, sensor, distance,
-    which, weighting, exponent, reference, seen, weight, spare, turned,
+    p, q, own, middle, away, numbers, heads, normals, marks, areas, vectors, which, weighting,
+    sensor, distance, exponent, reference, seen, weight, spare,
 ):  # fmt: skip
-    """Visibility of vertices ``v0`` to ``v1`` of a frame; their weights are written unless all 1.
+    """Return the visibility of vertices ``p`` to ``q`` of a frame and set their weights.
 
-    ``middle`` (3, V) and ``ranges`` (V,) are those of the frame; the last four are work space.
+    Weights of 1 are left.
+
+    ``middle`` (3, n) and ``away`` (n,) are the frame's places and ranges, ``marks`` its row of the
+    mask, ``own`` is the place of its values among those of all frames. ``heads`` (n,) is the
+    number of vertices that each stands for. The last three are of length q - p.
     """
-    n = v1 - v0
-    x, y, z = middle[0], middle[1], middle[2]
+    count = numbers.shape[0]
+    x, y, z = middle[0][p:q], middle[1][p:q], middle[2][p:q]
     sx, sy, sz = sensor[0], sensor[1], sensor[2]
-    sight = seen[:n]
     if which == FACING:
-        nx, ny, nz = normals[t, 0], normals[t, 1], normals[t, 2]
-        facing_kernel(
-            x[v0:v1], y[v0:v1], z[v0:v1], nx[v0:v1], ny[v0:v1], nz[v0:v1], sx, sy, sz, sight
-        )
+        normal = normals[3 * own : 3 * (own + count)].reshape((3, count))
+        nx, ny, nz = normal[0][p:q], normal[1][p:q], normal[2][p:q]
+        facing_kernel(x, y, z, nx, ny, nz, sx, sy, sz, seen)
+    elif which == MASK and count == marks.shape[0]:
+        seen = marks[p:q]
     elif which == MASK:
-        marks = mask[t]
-        sight = marks[v0:v1]
+        for i in range(q - p):
+            seen[i] = marks[np.uint32(numbers[p + i])]
     if exponent != 0:
-        squared_ratios(ranges[v0:v1], distance, reference, weight[:n])
-        raise_to(weight[:n], exponent, spare[:n])
-    if weighting != HEADS or heads.shape[0] > 0:
-        own = heads[v0:v1]
-        if weighting == AREA:
-            own = areas[t, v0:v1]
-        elif weighting == PROJECTED:
-            own = turned[:n]
-            ax, ay, az = vectors[t, 0], vectors[t, 1], vectors[t, 2]
-            projected(
-                x[v0:v1], y[v0:v1], z[v0:v1], ax[v0:v1], ay[v0:v1], az[v0:v1], sx, sy, sz, own
-            )
-        if exponent != 0:
-            for v in range(n):
-                weight[v] *= own[v]
-        else:
-            weight[:n] = own
-    return sight
+        squared_ratios(away[p:q], distance, reference, weight)
+        raise_to(weight, exponent, spare)
+    if weighting == ONE:
+        return seen
+    if weighting == AREA:
+        spare[:] = areas[own + p : own + q]
+    elif weighting == PROJECTED:
+        vector = vectors[3 * own : 3 * (own + count)].reshape((3, count))
+        ax, ay, az = vector[0][p:q], vector[1][p:q], vector[2][p:q]
+        projected(x, y, z, ax, ay, az, sx, sy, sz, spare)
+    else:
+        spare[:] = heads[p:q]
+    if exponent != 0:
+        for i in range(q - p):
+            weight[i] *= spare[i]
+    else:
+        weight[:] = spare
+    return seen
+
+
+@compiled
+def _add(slot, weight, row, place, sums):  # type: ignore[no-untyped-def]
+    """Add the weights to their slots of the tables' rows; ``place`` is work space."""
+    for i in range(slot.shape[0]):
+        place[i] = row[i] + np.uint32(slot[i])
+    whole = slot.shape[0] // TABLES * TABLES
+    for first in range(0, whole, TABLES):
+        for i in range(first, first + TABLES):
+            sums[place[i]] += np.float64(weight[i])
+    for i in range(whole, slot.shape[0]):
+        sums[place[i]] += np.float64(weight[i])
+
+
+@compiled
+def _add_in_turn(slot, weight, tables):  # type: ignore[no-untyped-def]
+    """Add the weights of a run of all vertices as :func:`_add` does, without a row for each."""
+    whole = slot.shape[0] // TABLES * TABLES
+    for first in range(0, whole, TABLES):
+        for table in range(TABLES):
+            tables[table, slot[first + table]] += np.float64(weight[first + table])
+    for i in range(whole, slot.shape[0]):
+        tables[0, slot[i]] += np.float64(weight[i])
+
+
+@compiled
+def _total(sums, total):  # type: ignore[no-untyped-def]
+    """Sum of the tables, each place in the order of the tables."""
+    total[:] = 0
+    for table in range(TABLES):
+        first = table * total.shape[0]
+        for place in range(total.shape[0]):
+            total[place] += sums[first + place]
 
 
 @compiled
 def count_kernel(  # type: ignore[no-untyped-def]
-    positions, centre, before, after, scale, normals, mask, areas, vectors, heads, part, sensor,
-    which, weighting, bins, beyond, exponent, reference, histogram, visible, outside,
-):  # fmt: skip
+    paths, start, scale, scatterers, sensor, law, histogram, visible, outside
+):
     """Compiled form of :func:`sd2core.doppler.histogram.count`; the last three are written.
 
-    ``heads`` (V,) is the number of vertices that each stands for, and is empty if each
-    stands for itself; ``part`` (V,) is empty if the body is not split. The histogram is of
-    shape (n, parts, bins).
+    ``scale`` (n, samples), the mask and what is written are of the frames from ``start`` on. The
+    histogram is of shape (n, parts, bins). Vertices go to several tables in turn, so that equal
+    slots do not wait for one another: by their numbers, so that all vertices and those that move
+    are added up in the same order.
     """
-    vertices = positions.shape[2]
-    samples = before.shape[1]
-    offset = np.float32(0.5 * bins)
-    f = np.empty(RUN, positions.dtype)
-    weight = np.empty(RUN, np.float32)
-    spare = np.empty(RUN, np.float32)
-    turned = np.empty(RUN, np.float32)
-    seen = np.ones(RUN, np.uint8)
-    slot = np.empty(RUN, np.uint8)
-    parts, slots = histogram.shape[1], bins + 2
-    split = part.shape[0] > 0
-    base = part.astype(np.int32) * np.int32(slots)
-    counts = np.zeros((TABLES, parts * slots), np.int32)
-    sums = np.zeros((TABLES, parts * slots), np.float64)
-    grouped = heads.shape[0] > 0
-    weights = weighting != HEADS or grouped or exponent != 0
-    distance = distance_of(sensor)
-    ring = np.empty((samples + 2, vertices), positions.dtype)
-    known = before[0, 0]
-    for t in range(centre.shape[0]):
-        known = extend(positions, sensor, distance, known, after[t, samples - 1], ring)
-        if weights:
-            sums[:] = 0
-        else:
-            counts[:] = 0
-        seen_count = np.int64(0)
-        outside_count = np.int64(0)
+    vertex, first, places, centre, before, after, group_frames, vertices = paths
+    normals, mask, areas, vectors, every, part, which, weighting = scatterers
+    bins, beyond, exponent, reference = law
+    samples, most = scale.shape[1], most_in_a_group(first)
+    offset, distance = np.float32(0.5 * bins), distance_of(sensor)
+    ranges, held = np.empty((samples + 2, most), places.dtype), np.empty(samples + 2, np.int64)
+    f, slot = np.empty(min(most, RUN), places.dtype), np.empty(min(most, RUN), np.uint8)
+    weight, spare = np.ones(min(most, RUN), np.float32), np.empty(min(most, RUN), np.float32)
+    seen = np.ones(min(most, RUN), np.uint8)
+    # Places without a sign are not looked at for being negative.
+    row, place = np.empty(most, np.uint32), np.empty(min(most, RUN), np.uint32)
+    heads = np.ones(most, np.float32)
+    parts, width = histogram.shape[1], bins + 2
+    sums, total = np.zeros(TABLES * parts * width), np.empty(parts * width)
+    tables, slots = sums.reshape((TABLES, parts * width)), np.int32(parts * width)
+    split, grouped = part.shape[0] > 0, every.shape[0] > 0
+    whole = np.int32(vertices // TABLES * TABLES)
+    group = start // group_frames - 1
+    numbers, here, count = vertex, places[:0].reshape((0, 0)), 0
+    marks = np.empty(0, np.uint8)
+    for t in range(scale.shape[0]):
+        frame = start + t
+        if frame // group_frames != group:
+            group = frame // group_frames
+            numbers, here = group_of(vertex, first, places, group)
+            count = numbers.shape[0]
+            held[:] = -1
+            for i in range(count):
+                v = numbers[i]
+                row[i] = (v & np.int32(TABLES - 1)) * slots if v < whole else np.int32(0)
+            if split:
+                for i in range(count):
+                    row[i] += np.uint32(part[numbers[i]]) * np.uint32(width)
+            if grouped:
+                for i in range(count):
+                    heads[i] = every[numbers[i]]
+        own = group_frames * first[group] + (frame - group * group_frames) * count
+        if which == MASK:
+            marks = mask[t]
+        sums[:] = 0
+        seen_count = outside_count = np.int64(0)
         measured = 0
         for sample in range(samples):
             if scale[t, sample] > 0:
                 measured += 1
         measured = max(measured, 1)
-        middle = positions[centre[t]]
-        for v0 in range(0, vertices, RUN):
-            v1 = min(v0 + RUN, vertices)
-            n = v1 - v0
+        knot, p = centre[frame], 0
+        while p < count:
+            q = run_end(numbers, p)
+            n = q - p
+            away = ranges_at(here, knot, sensor, distance, ranges, held)
             sight = weigh_run(
-                t, v0, v1, middle, ring[centre[t] % ring.shape[0]], normals, mask, areas, vectors,
-                heads, sensor, distance, which, weighting, exponent, reference,
-                seen, weight, spare, turned,
+                p, q, own, here[3 * knot : 3 * knot + 3], away, numbers, heads, normals, marks,
+                areas, vectors, which, weighting, sensor, distance, exponent, reference,
+                seen[:n], weight[:n], spare[:n],
             )  # fmt: skip
             if grouped:
-                seen_count += heads_seen(sight, heads[v0:v1])
+                seen_count += heads_seen(sight, heads[p:q])
             else:
-                for v in range(n):
-                    seen_count += np.int64(sight[v])
+                for i in range(n):
+                    seen_count += np.int64(sight[i])
             for sample in range(samples):
                 if scale[t, sample] <= 0:
                     continue
-                a = ring[before[t, sample] % ring.shape[0]]
-                b = ring[after[t, sample] % ring.shape[0]]
-                axis_positions(a[v0:v1], b[v0:v1], scale[t, sample], offset, f[:n])
+                a = ranges_at(here, before[frame, sample], sensor, distance, ranges, held)
+                b = ranges_at(here, after[frame, sample], sensor, distance, ranges, held)
+                axis_positions(a[p:q], b[p:q], scale[t, sample], offset, f[:n])
                 if grouped:
-                    outside_count += heads_beyond(f[:n], sight, heads[v0:v1], bins)
+                    outside_count += heads_beyond(f[:n], sight, heads[p:q], bins)
                     slots_of(f[:n], sight, bins, beyond, slot[:n])
                 else:
                     outside_count += slots_of(f[:n], sight, bins, beyond, slot[:n])
-                if split and weights:
-                    _tally_weights_of_parts(slot[:n], weight[:n], base[v0:v1], sums)
-                elif split:
-                    _tally_parts(slot[:n], base[v0:v1], counts)
-                elif weights:
-                    _tally_weights(slot[:n], weight[:n], sums)
+                if count == vertices and not split:
+                    _add_in_turn(slot[:n], weight[:n], tables)
                 else:
-                    _tally(slot[:n], counts)
+                    _add(slot[:n], weight[:n], row[p:q], place[:n], sums)
+            p = q
+        _total(sums, total)
         for number in range(parts):
             for bin_number in range(bins):
-                total, place = 0.0, number * slots + bin_number
-                for table in range(TABLES):
-                    total += sums[table, place] if weights else counts[table, place]
-                histogram[t, number, bin_number] = total / measured
+                histogram[t, number, bin_number] = total[number * width + bin_number] / measured
         visible[t] = seen_count
         outside[t] = outside_count / measured
 
 
 @compiled
 def needed_kernel(  # type: ignore[no-untyped-def]
-    positions, before, after, scale, sensor, bins, beyond, live, needed
+    paths, start, scale, sensor, law, live, needed
 ) -> None:
     """Compiled :func:`sd2core.doppler.histogram.mark_needed`; ``needed`` starts as zeros."""
-    vertices = positions.shape[2]
-    offset = np.float32(0.5 * bins)
-    f = np.empty(RUN, positions.dtype)
-    seen = np.ones(RUN, np.uint8)
-    slot = np.empty(RUN, np.uint8)
-    distance = distance_of(sensor)
-    ring = np.empty((before.shape[1] + 2, vertices), positions.dtype)
-    known = before[0, 0]
-    for t in range(needed.shape[0]):
-        known = extend(positions, sensor, distance, known, after[t, -1], ring)
-        for sample in range(before.shape[1]):
+    vertex, first, places, _, before, after, group_frames, _ = paths
+    bins, beyond, _, _ = law
+    samples, most = scale.shape[1], most_in_a_group(first)
+    offset, distance = np.float32(0.5 * bins), distance_of(sensor)
+    ranges, held = np.empty((samples + 2, most), places.dtype), np.empty(samples + 2, np.int64)
+    f, seen, slot = np.empty(most, places.dtype), np.ones(most, np.uint8), np.empty(most, np.uint8)
+    group = start // group_frames - 1
+    numbers, here = vertex, places[:0].reshape((0, 0))
+    for t in range(scale.shape[0]):
+        frame = start + t
+        if frame // group_frames != group:
+            group = frame // group_frames
+            numbers, here = group_of(vertex, first, places, group)
+            held[:] = -1
+        n = numbers.shape[0]
+        for sample in range(samples):
             if scale[t, sample] <= 0:
                 continue
-            a = ring[before[t, sample] % ring.shape[0]]
-            b = ring[after[t, sample] % ring.shape[0]]
-            for v0 in range(0, vertices, RUN):
-                v1 = min(v0 + RUN, vertices)
-                n = v1 - v0
-                axis_positions(a[v0:v1], b[v0:v1], scale[t, sample], offset, f[:n])
-                slots_of(f[:n], seen[:n], bins, beyond, slot[:n])
-                for v in range(n):
-                    needed[t, v0 + v] |= live[slot[v]]
+            a = ranges_at(here, before[frame, sample], sensor, distance, ranges, held)
+            b = ranges_at(here, after[frame, sample], sensor, distance, ranges, held)
+            axis_positions(a, b, scale[t, sample], offset, f[:n])
+            slots_of(f[:n], seen[:n], bins, beyond, slot[:n])
+            for i in range(n):
+                needed[t, numbers[i]] |= live[slot[i]]
 
 
 def compile_kernels() -> None:
     """Call every kernel of this module once in single and once in double precision."""
-    knots = np.zeros((1, 1), np.int64)
-    normals, marks = np.zeros((1, 3, 4), np.int8), np.zeros((1, 4), np.uint8)
-    vectors, heads = np.ones((1, 3, 4), np.float32), np.ones(4, np.float32)
+    knots, first, numbers = np.zeros((1, 1), np.int64), np.array([0, 4]), np.arange(4, dtype="i4")
+    marks, areas = np.zeros((1, 4), np.uint8), np.ones(12, np.float32)
+    scatterers = (np.zeros(12, np.int8), marks, areas, areas, areas[:4], marks[0], ALL, ONE)
     for precision in (np.float32, np.float64):
-        positions, sensor = np.ones((1, 3, 4), precision), np.zeros(3, precision)
-        scale = np.ones((1, 1), precision)
+        paths = (numbers, first, np.ones(12, precision), knots[0], knots, knots, 1, 4)
+        scale, sensor = np.ones((1, 1), precision), np.zeros(3, precision)
+        law = (32, DROP, 4.0, np.float32(2.2))
         count_kernel(
-            positions, knots[0], knots, knots, scale, normals, marks, heads[None],
-            vectors, heads, marks[0], sensor, ALL, HEADS, 32, DROP, 4.0, np.float32(2.2),
+            paths, 0, scale, scatterers, sensor, law,
             np.zeros((1, 1, 32)), np.zeros(1), np.zeros(1),
         )  # fmt: skip
-        needed_kernel(
-            positions, knots, knots, scale, sensor, 32, DROP, np.ones(33, np.uint8), marks.copy()
-        )
+        needed_kernel(paths, 0, scale, sensor, law, np.ones(33, np.uint8), marks.copy())

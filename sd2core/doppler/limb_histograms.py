@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.doppler.histogram import Counting, Frames, Scatterers, kernel_arrays, places_plain
+from sd2core.doppler.histogram import Counting, Frames, Scatterers, places_plain
 from sd2core.doppler.kernels import CLIP, WRAP
 from sd2core.doppler.limb_kernels import PARTS, fine_kernel
 from sd2core.numerics.compiled import kernels_ready
@@ -100,13 +100,12 @@ def fine_histograms(
     assert limb is not None
     if kernels_ready() and velocity_mps is None:
         both = np.zeros((len(frames), limbs, axis.parts, 2))
+        place = sensor.astype(frames.positions.dtype)
         fine_kernel(
-            *kernel_arrays(frames, counting, scatterers), limb.astype(np.intp),
-            sensor.astype(frames.positions.dtype), *scatterers.kinds, counting.bins,
-            axis.room_bins, counting.beyond, counting.range_exponent,
-            np.float32(counting.reference_range_m), np.full((len(frames), limbs), np.inf),
-            np.zeros(limbs, np.intp), both, np.empty((len(frames), 1, 0)),
-            np.zeros(len(frames)), np.zeros(len(frames)),
+            tuple(frames.paths()), counting.scale(frames.duration_s, place.dtype),
+            scatterers.arguments(), place, counting.arguments(), limb.astype(np.intp),
+            axis.room_bins, np.full((len(frames), limbs), np.inf), np.zeros(limbs, np.intp), both,
+            np.empty((len(frames), 1, 0)), np.zeros(len(frames)), np.zeros(len(frames)),
         )  # fmt: skip
         return both[..., 0]
     fine = np.zeros((len(frames), limbs, axis.parts))

@@ -11,12 +11,14 @@ from scipy.special import ndtr
 from sd2core.doppler.kernels import (
     ALL,
     DROP,
-    HEADS,
+    MASK,
+    ONE,
     RUN,
     WRAP,
     axis_positions,
     distance_of,
-    extend,
+    group_of,
+    ranges_at,
     weigh_run,
 )
 from sd2core.numerics.compiled import compiled
@@ -39,52 +41,56 @@ _TABLE = (_TABLE - _TABLE[0]) / (_TABLE[-1] - _TABLE[0])
 
 @compiled
 def fine_kernel(  # type: ignore[no-untyped-def]
-    positions, centre, before, after, scale, normals, mask, areas, vectors, heads, limb, sensor,
-    which, weighting, bins, room, beyond, exponent, reference, sigma, part, fine, histogram,
-    visible, outside,
+    paths, scale, scatterers, sensor, law, limb, room, sigma, part, fine, histogram, visible,
+    outside,
 ) -> None:  # fmt: skip
     """Count every limb on a fine axis, (n, limbs, parts, 2), or spread its vertices at once.
 
+    The paths are those of all vertices. ``limb`` (V,) is the limb of each, which takes the place
+    of the scatterers' part, and ``room`` the number of bins beyond each end of the axis.
     A part holds the sum of its weights, and that of weights times the place within the part. The
     last four are written, and zero at first. ``sigma`` (n, limbs) is that of each limb in bins: of
     those below ``SPREAD_AT_ONCE`` the vertices go to ``histogram`` (n, body parts, bins), spread;
     ``part`` (limbs,) is a limb's part of the body.
     """
-    vertices, samples = positions.shape[2], before.shape[1]
-    offset = np.float32(0.5 * bins)
-    f = np.empty(RUN, positions.dtype)
-    weight = np.ones(RUN, np.float32)
-    spare = np.empty(RUN, np.float32)
-    turned = np.empty(RUN, np.float32)
-    seen = np.ones(RUN, np.uint8)
-    distance = distance_of(sensor)
-    ring = np.empty((samples + 2, vertices), positions.dtype)
-    known = before[0, 0]
-    for t in range(centre.shape[0]):
-        known = extend(positions, sensor, distance, known, after[t, samples - 1], ring)
+    vertex, first, places, centre, before, after, _, _ = paths
+    normals, mask, areas, vectors, heads, _, which, weighting = scatterers
+    bins, beyond, exponent, reference = law
+    numbers, here = group_of(vertex, first, places, 0)
+    marks = np.empty(0, np.uint8)
+    samples, most = scale.shape[1], numbers.shape[0]
+    offset, distance = np.float32(0.5 * bins), distance_of(sensor)
+    ranges, held = np.empty((samples + 2, most), places.dtype), np.full(samples + 2, -1)
+    f, seen = np.empty(min(most, RUN), places.dtype), np.ones(min(most, RUN), np.uint8)
+    weight, spare = np.ones(min(most, RUN), np.float32), np.empty(min(most, RUN), np.float32)
+    for t in range(scale.shape[0]):
+        if which == MASK:
+            marks = mask[t]
         measured = 0
         for sample in range(samples):
             measured += scale[t, sample] > 0
         share = 1.0 / max(measured, 1)
-        for v0 in range(0, vertices, RUN):
-            v1 = min(v0 + RUN, vertices)
-            n = v1 - v0
+        knot = centre[t]
+        for p in range(0, most, RUN):
+            q = min(p + RUN, most)
+            n = q - p
+            away = ranges_at(here, knot, sensor, distance, ranges, held)
             sight = weigh_run(
-                t, v0, v1, positions[centre[t]], ring[centre[t] % ring.shape[0]], normals, mask,
-                areas, vectors, heads, sensor, distance, which, weighting, exponent, reference,
-                seen, weight, spare, turned,
+                p, q, most * t, here[3 * knot : 3 * knot + 3], away, numbers, heads, normals,
+                marks, areas, vectors, which, weighting, sensor, distance, exponent, reference,
+                seen[:n], weight[:n], spare[:n],
             )  # fmt: skip
-            for v in range(n):
-                if sight[v] != 0:
-                    visible[t] += heads[v0 + v] if heads.shape[0] > 0 else 1.0
+            for i in range(n):
+                if sight[i] != 0:
+                    visible[t] += heads[p + i] if heads.shape[0] > 0 else 1.0
             for sample in range(samples):
                 if scale[t, sample] <= 0:
                     continue
-                a = ring[before[t, sample] % ring.shape[0]]
-                b = ring[after[t, sample] % ring.shape[0]]
-                axis_positions(a[v0:v1], b[v0:v1], scale[t, sample], offset, f[:n])
+                a = ranges_at(here, before[t, sample], sensor, distance, ranges, held)
+                b = ranges_at(here, after[t, sample], sensor, distance, ranges, held)
+                axis_positions(a[p:q], b[p:q], scale[t, sample], offset, f[:n])
                 outside[t] += share * _tally(
-                    f[:n], sight, weight, share, limb[v0:v1], heads[v0:v1], bins, room, beyond,
+                    f[:n], sight, weight[:n], share, limb[p:q], heads[p:q], bins, room, beyond,
                     sigma[t], part, fine[t], histogram[t],
                 )  # fmt: skip
 
@@ -171,15 +177,16 @@ def _share_below(steps):  # type: ignore[no-untyped-def]
 
 def compile_kernels() -> None:
     """Call every kernel of this module once in single and once in double precision."""
-    knots, marks = np.zeros((1, 1), np.int64), np.zeros((1, 4), np.uint8)
-    normals, heads = np.zeros((1, 3, 4), np.int8), np.ones(4, np.float32)
-    vectors, sigma, part = np.ones((1, 3, 4), np.float32), np.ones((1, 1)), np.zeros(1, np.intp)
+    knots, first, numbers = np.zeros((1, 1), np.int64), np.array([0, 4]), np.arange(4, dtype="i4")
+    marks, areas = np.zeros((1, 4), np.uint8), np.ones(12, np.float32)
+    scatterers = (np.zeros(12, np.int8), marks, areas, areas, areas[:4], marks[0], ALL, ONE)
+    sigma, part = np.ones((1, 1)), np.zeros(1, np.intp)
     fine, coarse = np.zeros((1, 1, 256, 2)), np.zeros((1, 1, 32))
     for precision in (np.float32, np.float64):
+        paths = (numbers, first, np.ones(12, precision), knots[0], knots, knots, 1, 4)
         fine_kernel(
-            np.ones((1, 3, 4), precision), knots[0], knots, knots, np.ones((1, 1), precision),
-            normals, marks, heads[None], vectors, heads, part[[0, 0, 0, 0]], np.zeros(3, precision),
-            ALL, HEADS, 32, 0, DROP, 4.0, np.float32(2.2), sigma, part, fine, coarse,
+            paths, np.ones((1, 1), precision), scatterers, np.zeros(3, precision),
+            (32, DROP, 4.0, np.float32(2.2)), part[[0, 0, 0, 0]], 0, sigma, part, fine, coarse,
             np.zeros(1), np.zeros(1),
         )  # fmt: skip
     spread_kernel(fine, sigma, part, 32, 0, DROP, coarse)

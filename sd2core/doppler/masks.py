@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.doppler import histogram, vid2doppler
-from sd2core.doppler.histogram import Counting
-from sd2core.doppler.moving import mark_needed_moving
+from sd2core.doppler.histogram import Counting, Paths
 from sd2core.doppler.prepared import Block, PreparedMesh
 from sd2core.numerics.compiled import kernels_ready
 from sd2core.scattering import depth_plain, exact_plain
@@ -249,11 +248,14 @@ class VisibilityMasks:
             return self._live[vid2doppler.place_in_bins(velocity, edges_mps, self._counting)[0]]
         moving = self._prepared.moving(block, self._counting)
         if moving is not None and moving.hold_from(place):
-            duration_s = block.frames.duration_s[rows]
-            return mark_needed_moving(moving, rows, duration_s, place, self._counting, self._live)
-        mark = histogram.mark_needed if kernels_ready() else histogram.mark_needed_plain
-        frames = self._prepared.whole(block).frames
-        return mark(frames.rows(rows), place, self._counting, self._live)
+            paths: Paths = moving
+            start, duration_s = rows.start, block.frames.duration_s[rows]
+        else:
+            frames = self._prepared.whole(block).frames.rows(rows)
+            if not kernels_ready():
+                return histogram.mark_needed_plain(frames, place, self._counting, self._live)
+            paths, start, duration_s = frames.paths(), 0, frames.duration_s
+        return histogram.mark_needed(paths, start, duration_s, place, self._counting, self._live)
 
     def _test(
         self,

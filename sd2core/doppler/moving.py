@@ -11,22 +11,18 @@ same values are added up in the same order (docs/decisions/0057).
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.doppler.histogram import Counting, Counts, Frames, Scatterers
+from sd2core.doppler.histogram import Counting, Frames, Paths
 from sd2core.doppler.moving_kernels import (
     GROUP,
-    add_moving_kernel,
     facing_counts_kernel,
     gather_kernel,
     moving_kernel,
     moving_normals_kernel,
-    needed_moving_kernel,
-    places_kernel,
 )
 
 _LARGEST_SHARE = 0.6
@@ -49,24 +45,13 @@ def still_bins(bins: int, null_bins: Collection[int]) -> float:
     return max(min(middle - below, above - middle), 0.0)
 
 
-@dataclass(frozen=True, eq=False)
-class MovingVertices:
-    """Vertices of a block that can enter a kept bin, by groups of consecutive frames.
+class MovingVertices(Paths):
+    """Vertices of a block that can enter a kept bin.
 
     A vertex that moves in one frame mostly moves in the next, and the frames of a group share the
     knots between which their velocities are measured. Where it does not move it is in an emptied
     bin, and does no harm.
     """
-
-    vertex: NDArray[np.int32]  # (N,), ascending within a group
-    first: NDArray[np.int64]  # (groups + 1,): number of the first of every group
-    places: NDArray[Any]
-    """Group after group, so that memory is read from front to back: the positions of its n
-    vertices at the group's knots, (knots, 3, n)."""
-    centre: NDArray[np.int64]  # (frames,): knot of every frame, counted within its group
-    before: NDArray[np.int64]  # (frames, samples), like that
-    after: NDArray[np.int64]
-    vertices: int  # V
 
     @property
     def nbytes(self) -> int:
@@ -88,9 +73,11 @@ class MovingVertices:
         Group after group, frame after frame, (..., n).
         """
         columns = values.reshape(len(values), -1, self.vertices)
-        width = columns.shape[1]
-        found = np.empty(GROUP * width * len(self.vertex), values.dtype)
-        gather_kernel(columns, self.vertex, self.first, found)
+        frames = np.arange(GROUP * (len(self.first) - 1)).reshape(-1, GROUP)
+        # Of a last group with fewer frames the last stands for those that are missing.
+        rows = np.minimum(frames, len(values) - 1)
+        found = np.empty(GROUP * columns.shape[1] * len(self.vertex), values.dtype)
+        gather_kernel(columns, rows, self.vertex, self.first, found)
         return found
 
     def normals(self, points: NDArray[np.float32], faces: NDArray[np.int32]) -> NDArray[np.int8]:
@@ -135,7 +122,7 @@ def find_moving(
     knots = low[:, None] + np.arange(int((high - low).max()) + 1)  # (groups, knots)
     knots = np.minimum(knots, high[:, None])
     places = np.empty(3 * knots.shape[1] * len(number), precision)
-    places_kernel(frames.positions, knots, number, first, places)
+    gather_kernel(frames.positions, knots, number, first, places)
     base = np.repeat(low, GROUP)[: len(frames)]
     return MovingVertices(
         number,
@@ -144,81 +131,9 @@ def find_moving(
         frames.centre - base,
         frames.before - base[:, None],
         frames.after - base[:, None],
+        GROUP,
         vertices,
     )
-
-
-def count_moving(
-    moving: MovingVertices,
-    rows: slice,
-    duration_s: NDArray[np.float64],
-    sensor: NDArray[np.float64],
-    counting: Counting,
-    scatterers: Scatterers,
-    into: Counts,
-) -> None:
-    """Count what moves in some frames, as :func:`sd2core.doppler.histogram.count` does.
-
-    Of ``scatterers`` normals, areas and area vectors are those of what moves, as
-    :meth:`MovingVertices.of` gives them. Bins that are not kept get less than their share, and
-    ``into.visible`` nothing.
-    """
-    normals, mask, areas = scatterers.normals, scatterers.mask, scatterers.areas
-    vectors, heads, parts = scatterers.area_vectors, scatterers.vertex_counts, scatterers.parts
-    precision = moving.places.dtype
-    add_moving_kernel(
-        moving.vertex,
-        moving.first,
-        moving.places,
-        moving.centre,
-        moving.before,
-        moving.after,
-        rows.start,
-        counting.scale(duration_s, precision),
-        _NO_NORMALS if normals is None else normals,
-        _NO_MASK if mask is None else mask,
-        _NO_AREAS if areas is None else areas,
-        _NO_AREAS if vectors is None else vectors,
-        _NO_AREAS if heads is None else heads,
-        _NO_PARTS if parts is None else parts,
-        moving.vertices,
-        sensor.astype(precision),
-        *scatterers.kinds,
-        counting.bins,
-        counting.beyond,
-        counting.range_exponent,
-        np.float32(counting.reference_range_m),
-        into.histogram,
-        into.beyond,
-    )
-
-
-def mark_needed_moving(
-    moving: MovingVertices,
-    rows: slice,
-    duration_s: NDArray[np.float64],
-    sensor: NDArray[np.float64],
-    counting: Counting,
-    live: NDArray[np.uint8],
-) -> NDArray[np.uint8]:
-    """Mark vertices (n, V) of some frames as :func:`sd2core.doppler.histogram.mark_needed` does."""
-    needed = np.zeros((rows.stop - rows.start, moving.vertices), np.uint8)
-    precision = moving.places.dtype
-    needed_moving_kernel(
-        moving.vertex,
-        moving.first,
-        moving.places,
-        moving.before,
-        moving.after,
-        rows.start,
-        counting.scale(duration_s, precision),
-        sensor.astype(precision),
-        counting.bins,
-        counting.beyond,
-        live,
-        needed,
-    )
-    return needed
 
 
 def visible_counts(
@@ -238,12 +153,6 @@ def visible_counts(
         return (mask > 0) @ stands_for
     visible = np.full(len(points), stands_for.sum())
     if normals is not None:
-        own = _NO_AREAS if heads is None else heads
+        own = np.empty(0, np.float32) if heads is None else heads
         facing_counts_kernel(points, normals, own, sensor.astype(points.dtype), visible)
     return visible
-
-
-_NO_NORMALS = np.empty(0, np.int8)
-_NO_MASK = np.empty((0, 0), np.uint8)
-_NO_AREAS = np.empty(0, np.float32)
-_NO_PARTS = np.empty(0, np.uint8)

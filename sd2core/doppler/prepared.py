@@ -207,7 +207,7 @@ class PreparedMesh:
             if points and self.options.oversampling > 1:
                 self._kept("points", whole, self._points)
             elif not points and self.faces is not None:
-                self.moving_normals(whole, moving)
+                self.normals(whole, moving)
             frames = replace(whole.frames, positions=whole.frames.positions[:0].copy())
             return (replace(whole, frames=frames),), 0
 
@@ -239,13 +239,26 @@ class PreparedMesh:
             points = points - place_m[:, :, None]
         return np.ascontiguousarray(points, np.float32), place_m
 
-    def normals(self, block: Block) -> NDArray[np.int8]:
-        """Vertex normals of a block's frames, int8 (n, 3, V)."""
-        return self._kept("normals", block, self._normals)
+    def normals(self, block: Block, moving: MovingVertices | None = None) -> NDArray[np.int8]:
+        """Vertex normals of a block's frames, int8 (n, 3, V).
 
-    def areas(self, block: Block) -> NDArray[np.float32]:
-        """Vertex areas of a block's frames in m², float32 (n, V)."""
-        return self._kept("areas", block, self._areas)
+        With ``moving`` those of what moves, as :meth:`MovingVertices.of` orders them.
+        """
+
+        def few(block: Block, moving: MovingVertices) -> NDArray[np.int8]:
+            return moving.normals(self._at_frames(block), self._faces())
+
+        return self._kept("normals", block, self._normals, moving, few)
+
+    def areas(self, block: Block, moving: MovingVertices | None = None) -> NDArray[np.float32]:
+        """Vertex areas of a block's frames in m², float32 (n, V), or of what moves."""
+        return self._kept("areas", block, self._areas, moving)
+
+    def area_vectors(
+        self, block: Block, moving: MovingVertices | None = None
+    ) -> NDArray[np.float32]:
+        """Vertex area vectors of a block's frames in m², float32 (n, 3, V), or of what moves."""
+        return self._kept("area vectors", block, self._area_vectors, moving)
 
     def surface(self, block: Block) -> NDArray[np.float64]:
         """Area of the whole surface in each of a block's frames in m², float64 (n,)."""
@@ -262,10 +275,6 @@ class PreparedMesh:
     def limb_places(self, block: Block) -> NDArray[np.float64]:
         """Mean vertex of every limb with an uncertainty, in the camera's frame, (n, L, 3)."""
         return self._kept("limb places", block, self._limb_places)
-
-    def area_vectors(self, block: Block) -> NDArray[np.float32]:
-        """Vertex area vectors of a block's frames in m², float32 (n, 3, V)."""
-        return self._kept("area vectors", block, self._area_vectors)
 
     def moving(self, block: Block, counting: Counting) -> MovingVertices | None:
         """Vertices of a block that can enter a kept bin; None where counting all is as fast."""
@@ -294,44 +303,6 @@ class PreparedMesh:
         # Blocks are shared by options with the same bin width.
         return what, "moving", self.options.axis.bins, self.options.null_bins, self.spreads, index
 
-    def moving_normals(self, block: Block, moving: MovingVertices) -> NDArray[np.int8]:
-        """Normals of what moves in a block, as :meth:`MovingVertices.of` orders them."""
-
-        def make() -> tuple[NDArray[np.int8], int]:
-            every = self.budget.get(("normals", block.index))
-            if every is not None:
-                made = moving.of(every)
-            else:
-                made = moving.normals(self._at_frames(block), self._faces())
-            return made, made.nbytes
-
-        key = self._moving_key("normals", block.index)
-        normals: NDArray[np.int8] = self.budget.get_or_make(key, make)
-        return normals
-
-    def moving_areas(self, block: Block, moving: MovingVertices) -> NDArray[np.float32]:
-        """Areas of what moves in a block in m², like that."""
-        return self._of_moving("areas", block, moving, self._areas)
-
-    def moving_area_vectors(self, block: Block, moving: MovingVertices) -> NDArray[np.float32]:
-        """Area vectors of what moves in a block in m², like that."""
-        return self._of_moving("area vectors", block, moving, self._area_vectors)
-
-    def _of_moving(
-        self,
-        what: str,
-        block: Block,
-        moving: MovingVertices,
-        every: Callable[[Block], NDArray[Any]],
-    ) -> NDArray[Any]:
-        def make() -> tuple[NDArray[Any], int]:
-            known = self.budget.get((what, block.index))
-            made = moving.of(every(block) if known is None else known)
-            return made, made.nbytes
-
-        kept: NDArray[Any] = self.budget.get_or_make(self._moving_key(what, block.index), make)
-        return kept
-
     def velocities_vid2doppler(
         self, block: Block, rows: slice, sensor: NDArray[np.float64]
     ) -> NDArray[np.float64]:
@@ -347,14 +318,30 @@ class PreparedMesh:
             self.mesh.presence,
         )
 
-    def _kept(self, what: str, block: Block, make: Callable[[Block], NDArray[Any]]) -> NDArray[Any]:
-        """Derived array of a block, from memory or computed now."""
+    def _kept(
+        self,
+        what: str,
+        block: Block,
+        make: Callable[[Block], NDArray[Any]],
+        moving: MovingVertices | None = None,
+        few: Callable[[Block, MovingVertices], NDArray[Any]] | None = None,
+    ) -> NDArray[Any]:
+        """Derived array of a block, or its part of what moves, from memory or computed now.
+
+        That part is taken from the whole, unless ``few`` makes it where the whole is not known.
+        """
 
         def sized() -> tuple[NDArray[Any], int]:
-            made = make(block)
+            if moving is None:
+                made = make(block)
+            elif (every := self.budget.get((what, block.index))) is not None:
+                made = moving.of(every)
+            else:
+                made = moving.of(make(block)) if few is None else few(block, moving)
             return made, made.nbytes
 
-        kept: NDArray[Any] = self.budget.get_or_make((what, block.index), sized)
+        key = (what, block.index) if moving is None else self._moving_key(what, block.index)
+        kept: NDArray[Any] = self.budget.get_or_make(key, sized)
         return kept
 
     def _normals(self, block: Block) -> NDArray[np.int8]:

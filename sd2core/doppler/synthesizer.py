@@ -14,9 +14,8 @@ from sd2core.doppler.cell_uncertainty import cell_uncertainty
 from sd2core.doppler.frame_counts import FrameCounts
 from sd2core.doppler.histogram import Counts
 from sd2core.doppler.kinematics import kinematics
-from sd2core.doppler.masks import Occlusion, Quality, Visibility
+from sd2core.doppler.masks import Quality, Visibility
 from sd2core.doppler.options import PRESETS, SynthesisOptions
-from sd2core.doppler.parallel import Ticket, run_jobs, run_light_jobs
 from sd2core.doppler.prepared import Block, ByteBudget, PreparedMesh
 from sd2core.doppler.smoothing import frames_within_reach, smooth
 from sd2core.errors import Sd2Error, wanted
@@ -25,6 +24,7 @@ from sd2core.mesh.presence import gaps_in_words, runs
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.vertex_parts import VertexParts
 from sd2core.numerics.compiled import compile_in_background, kernels_ready
+from sd2core.numerics.parallel import Ticket, run_jobs, run_light_jobs
 from sd2core.numerics.precision import SHARE_OF_A_BIN, stored_velocity_error_mps
 from sd2core.progress import Progress, silent
 from sd2core.scattering.amplitude import NEAREST_RANGE_M
@@ -441,28 +441,6 @@ class Synthesizer:
             raise IndexError(f"frames {start} to {stop} of {self.mesh.frame_count}")
         chosen = self._choose(visibility)
         return cell_uncertainty(self._frames, sensor, start, stop, chosen, progress, self._threads)
-
-    def cached_mask(
-        self,
-        sensor: VirtualSensor,
-        start: int = 0,
-        stop: int | None = None,
-        visibility: Occlusion = "exact",
-    ) -> NDArray[np.uint8] | None:
-        """Exact or depth visibility (n, V) of frames ``start`` to ``stop``, if kept for this place.
-
-        Vertices that cannot change the map hold the facing test.
-        """
-        stop = self.mesh.frame_count if stop is None else stop
-        parts = []
-        for index, low, high in self._frames.blocks_between(start, stop):
-            base = index * self.prepared.block_frames
-            rows = slice(low - base, high - base)
-            mask = self._frames.masks.kept(index, rows, sensor.position_m, visibility)
-            if mask is None:
-                return None
-            parts.append(mask)
-        return np.concatenate(parts)
 
     def _choose(self, visibility: Visibility | None) -> Visibility:
         chosen: Visibility = self.options.visibility if visibility is None else visibility

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.doppler.histogram import Counting, Counts, Frames, Scatterers
+from sd2core.doppler.histogram import Counting, Counts, Frames, Scatterers, count_plain
 from sd2core.doppler.kernels import CLIP, DROP, WRAP
 from sd2core.mesh.presence import Presence
 
@@ -98,14 +98,7 @@ def count(
 
     The edges of the bins are of shape (bins + 1,).
     """
-    heads = scatterers.heads(frames.positions.shape[2])
     numbers, beyond = place_in_bins(velocity_mps, edges_mps, counting)
-    for row, knot in enumerate(frames.centre):
-        points = frames.positions[knot]
-        seen = scatterers.seen(row, points, sensor)
-        weight = scatterers.weights(row, points, sensor, counting)
-        into.visible[row] = heads[seen].sum()
-        # With one frame there is no velocity, not a velocity of zero.
-        if frames.duration_s[row].any():
-            into.add(row, numbers[row], weight, seen, scatterers.parts, 1)
-            into.beyond[row] = heads[beyond[row] & seen].sum()
+    count_plain(
+        frames, sensor, counting, scatterers, into, lambda row, _: (numbers[row], beyond[row])
+    )

@@ -6,10 +6,8 @@ formula: :class:`WaveOptions`.
 
 from __future__ import annotations
 
-import itertools
-import threading
-from concurrent.futures import FIRST_COMPLETED, wait
 from dataclasses import asdict
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,14 +19,10 @@ from sd2core.fmcw.wave import BeatSignal, WaveScene
 from sd2core.io.radar.capture import RadarCapture, Signal
 from sd2core.mesh.presence import runs
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.numerics.compiled import worker_count, workers
-from sd2core.progress import Cancelled, Progress, silent
+from sd2core.numerics.parallel import Ticket, run_jobs
+from sd2core.progress import Progress, silent
 from sd2core.radar_config import RadarConfig
 from sd2core.sensor import VirtualSensor
-
-_POLL_S = 0.03
-_QUEUED = 8
-"""Frames that wait for every thread."""
 
 
 def simulate_radar(
@@ -126,39 +120,15 @@ def _fill(
     """Fill in beat signals on worker threads; mean squares of what moves, and the peak."""
     frames = len(times_s)
     power, peak = np.empty(frames), np.empty(frames)
-    stopped = threading.Event()
 
-    def go_on() -> None:
-        if stopped.is_set():
-            raise Cancelled
-
-    def fill(frame: int) -> None:
-        go_on()
-        found = scene.frame(float(times_s[frame]), go_on)
+    def fill(frame: int, ticket: Ticket) -> None:
+        ticket.advance(0)
+        found = scene.frame(float(times_s[frame]), lambda: ticket.advance(0))
         power[frame] = np.mean(np.square(np.abs(found)))
         found += static
         peak[frame] = np.abs(found).max()
         signal[frame] = found
+        ticket.advance(1)
 
-    progress(0, frames)
-    waiting = iter(range(frames))
-    # No more than keep the threads busy: an hour of frames would be a lot of futures.
-    running = {
-        workers().submit(fill, k) for k in itertools.islice(waiting, _QUEUED * worker_count())
-    }
-    done = 0
-    try:
-        while running:
-            ended, running = wait(running, _POLL_S, FIRST_COMPLETED)
-            for future in ended:
-                future.result()
-            done += len(ended)
-            running |= {workers().submit(fill, k) for k in itertools.islice(waiting, len(ended))}
-            progress(done, frames)
-    except BaseException:
-        stopped.set()
-        for future in running:
-            future.cancel()
-        wait(running)
-        raise
+    run_jobs([partial(fill, frame) for frame in range(frames)], frames, progress)
     return power, float(peak.max())

@@ -20,11 +20,10 @@ from sd2core.numerics.compiled import compiled
 from sd2core.scattering.exact import (
     CONTACT,
     EDGE,
-    LANES,
-    MOST_CELLS,
     WIDEST,
     axes_along,
     exact_visibility_kernel,
+    search_scratch,
     search_view,
 )
 
@@ -235,16 +234,10 @@ def depth_visibility_kernel(
     doubtful = np.empty(vertices, np.uint8)
     axes = np.empty((3, 3), np.float64)
     centre = np.empty(3, np.float64)
-    # Scratch of the search.
+    # Of the search.
     towards = np.empty((3, vertices), np.float64)
-    image = np.empty((2, vertices), np.float32)
-    depth = np.empty(vertices, np.float32)
-    cell = np.empty(vertices, np.int32)
-    start = np.empty(MOST_CELLS + 2, np.int32)
-    order = np.empty(vertices + LANES, np.int32)
-    sorted_image = np.empty((2, vertices + LANES), np.float32)
-    sorted_depth = np.empty(vertices + LANES, np.float32)
-    hidden = np.empty(vertices, np.uint8)
+    image, depth = np.empty((2, vertices), np.float32), np.empty(vertices, np.float32)
+    scratch = search_scratch(vertices)
     for t in range(first, last):
         wanted = False
         for v in range(vertices):
@@ -279,12 +272,9 @@ def depth_visibility_kernel(
                 towards[axis, v] = sensor[axis] - positions[t, axis, v]
         search_view(
             positions[t, 0], positions[t, 1], positions[t, 2], drawn[:triangles], towards, axes,
-            np.float32(-np.inf), CONTACT * size, doubtful, count, image, depth, cell, start,
-            order, sorted_image, sorted_depth, hidden,
+            np.float32(-np.inf), CONTACT * size, doubtful, count, image, depth, scratch,
+            visible[t],
         )  # fmt: skip
-        for at in range(count):
-            if hidden[at]:
-                visible[t, order[at]] = 0
 
 
 def compile_kernels() -> None:

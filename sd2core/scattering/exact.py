@@ -156,17 +156,28 @@ def _outcodes(image, depth, near, xmin, xmax, ymin, ymax, dmax, code):  # type: 
 
 
 @compiled
+def search_scratch(vertices):  # type: ignore[no-untyped-def]
+    """Work space of :func:`search_view` for so many vertices."""
+    cell, start = np.empty(vertices, np.int32), np.empty(MOST_CELLS + 2, np.int32)
+    order = np.empty(vertices + LANES, np.int32)
+    sorted_image = np.empty((2, vertices + LANES), np.float32)
+    sorted_depth = np.empty(vertices + LANES, np.float32)
+    return cell, start, order, sorted_image, sorted_depth, np.empty(vertices, np.uint8)
+
+
+@compiled
 def search_view(  # type: ignore[no-untyped-def]
-    x, y, z, faces, g, axes, near, contact, owned, owned_count, image, depth, cell, start,
-    order, sorted_image, sorted_depth, hidden,
+    x, y, z, faces, g, axes, near, contact, owned, owned_count, image, depth, scratch, visible,
 ) -> None:  # fmt: skip
-    """Set the ``hidden`` flag of the owned vertices that a triangle hides in one view.
+    """Set ``visible`` to 0 for the owned vertices that a triangle hides in one view.
 
     ``g`` (3, V) float64 is sensor − vertex, ``axes`` (3, 3) the view's right, up
     and forward; ``image`` (2, V) and ``depth`` (V,) float32 hold each vertex's
     image coordinates and depth. In a view that looks in one direction only,
-    ``near`` cuts off triangles behind it. Sorted arrays have room for :data:`LANES` more.
+    ``near`` cuts off triangles behind it.
     """
+    # Sorted arrays have room for some lanes more.
+    cell, start, order, sorted_image, sorted_depth, hidden = scratch
     vertices = depth.shape[0]
     xmin = ymin = np.float32(np.inf)
     xmax = ymax = dmax = np.float32(-np.inf)
@@ -272,6 +283,9 @@ def search_view(  # type: ignore[no-untyped-def]
                         # Nothing more can be behind a triangle here.
                         sorted_depth[at] = -np.inf
                         hidden[at] = 1
+    for at in range(owned_count):
+        if hidden[at]:
+            visible[order[at]] = 0
 
 
 @compiled
@@ -290,12 +304,7 @@ def exact_visibility_kernel(
     image = np.empty((2, vertices), np.float32)
     depth = np.empty(vertices, np.float32)
     owned = np.empty(vertices, np.uint8)
-    cell = np.empty(vertices, np.int32)
-    start = np.empty(MOST_CELLS + 2, np.int32)
-    order = np.empty(vertices + LANES, np.int32)
-    sorted_image = np.empty((2, vertices + LANES), np.float32)
-    sorted_depth = np.empty(vertices + LANES, np.float32)
-    hidden = np.empty(vertices, np.uint8)
+    scratch = search_scratch(vertices)
     axes = np.empty((3, 3), np.float64)
     for t in range(first, last):
         count = 0
@@ -339,11 +348,8 @@ def exact_visibility_kernel(
         if narrow:
             search_view(
                 x, y, z, faces, g, axes, np.float32(-np.inf), contact, needed[t], count, image,
-                depth, cell, start, order, sorted_image, sorted_depth, hidden,
+                depth, scratch, visible[t],
             )  # fmt: skip
-            for at in range(count):
-                if hidden[at]:
-                    visible[t, order[at]] = 0
             continue
 
         for side in range(6):
@@ -369,11 +375,8 @@ def exact_visibility_kernel(
                 continue
             search_view(
                 x, y, z, faces, g, axes, np.float32(contact), contact, owned, mine, image,
-                depth, cell, start, order, sorted_image, sorted_depth, hidden,
+                depth, scratch, visible[t],
             )  # fmt: skip
-            for at in range(mine):
-                if hidden[at]:
-                    visible[t, order[at]] = 0
 
 
 @compiled

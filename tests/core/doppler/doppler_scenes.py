@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sd2core.doppler import PRESETS, SynthesisOptions
+from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
+from sd2core.doppler.masks import Occlusion
 from sd2core.doppler.reference import at_frames
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.sensor import VirtualSensor
@@ -82,3 +83,24 @@ def reference_velocities(
     """Velocity of every vertex at each of a frame's moments, (moments, V), in double precision."""
     place = np.asarray(sensor.position_m, np.float64)
     return next(at_frames(mesh, place, options, frame, frame + 1))[0]
+
+
+def cached_mask(
+    maker: Synthesizer,
+    sensor: VirtualSensor,
+    frames: tuple[int, int] | None = None,
+    visibility: Occlusion = "exact",
+) -> NDArray[np.uint8] | None:
+    """Exact or depth visibility (n, V) of some frames, or all, if it is kept for this place.
+
+    Vertices that cannot change the map hold the facing test.
+    """
+    counts, parts = maker._frames, []
+    for index, low, high in counts.blocks_between(*(frames or (0, maker.mesh.frame_count))):
+        start, _ = counts.prepared.span(index)
+        rows = slice(low - start, high - start)
+        mask = counts.masks.kept(index, rows, sensor.position_m, visibility)
+        if mask is None:
+            return None
+        parts.append(mask)
+    return np.concatenate(parts)

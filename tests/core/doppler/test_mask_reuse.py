@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from doppler_scenes import RAW, options, sensor_at, wobbling
+from doppler_scenes import RAW, cached_mask, options, sensor_at, wobbling
 
 from sd2core.doppler import PRESETS, Synthesizer, masks
 
@@ -35,7 +35,7 @@ def test_the_nearest_frame_serves(visibility: Any, stride: int) -> None:
     wide = options(mask_stride=stride, beyond="clip")
     maker = Synthesizer(mesh, wide)
     made = maker.map(NEAR, visibility=visibility)
-    mask = maker.cached_mask(NEAR, visibility=visibility)
+    mask = cached_mask(maker, NEAR, visibility=visibility)
     assert mask is not None
     every = Synthesizer(mesh, replace(wide, mask_stride=1))
     serving = range(0, frames, stride)

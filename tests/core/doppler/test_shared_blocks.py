@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from doppler_scenes import cached_mask
 
 from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.doppler.options import SynthesisOptions
@@ -66,7 +67,7 @@ def test_masks_are_shared_by_what_they_depend_on(other: SynthesisOptions, shared
     first, sensor = Synthesizer(mesh, BASE), VirtualSensor()
     first.stretch(sensor, 60, 70)
     second = Synthesizer(mesh, other, blocks_of=first)
-    assert (second.cached_mask(sensor, 60, 70) is not None) == shared
+    assert (cached_mask(second, sensor, (60, 70)) is not None) == shared
     again = second.stretch(sensor, 60, 70)
     np.testing.assert_array_equal(
         again.values, Synthesizer(mesh, other).stretch(sensor, 60, 70).values
@@ -78,5 +79,5 @@ def test_depth_masks_of_another_resolution_are_not_shared() -> None:
     coarse = Synthesizer(mesh, OTHERS["depth 128"])
     coarse.stretch(VirtualSensor(), 60, 70)
     fine = Synthesizer(mesh, OTHERS["depth 256"], blocks_of=coarse)
-    assert coarse.cached_mask(VirtualSensor(), 60, 70, "depth") is not None
-    assert fine.cached_mask(VirtualSensor(), 60, 70, "depth") is None
+    assert cached_mask(coarse, VirtualSensor(), (60, 70), "depth") is not None
+    assert cached_mask(fine, VirtualSensor(), (60, 70), "depth") is None

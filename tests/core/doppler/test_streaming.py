@@ -12,14 +12,15 @@ from typing import Any
 import numpy as np
 import pytest
 import zarr
-from doppler_scenes import CAMERA, options, sensor_at, wobbling
+from doppler_scenes import CAMERA, cached_mask, options, sensor_at, wobbling
 
-from sd2core.doppler import PRESETS, Synthesizer, parallel
+from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.doppler.masks import VisibilityMasks
-from sd2core.doppler.parallel import run_jobs, run_light_jobs
 from sd2core.doppler.prepared import ByteBudget
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.numerics import parallel
+from sd2core.numerics.parallel import run_jobs, run_light_jobs
 from sd2core.progress import Cancelled, silent
 
 NEAR = sensor_at(0.3, -0.2, 0.1)
@@ -140,14 +141,14 @@ def test_frozen_is_the_last_exact_visibility() -> None:
     before = maker.stretch(NEXT, 0, 20, "frozen")
     assert before.quality == "facing"  # nothing exact has been worked out yet
     np.testing.assert_array_equal(before.values, maker.stretch(NEXT, 0, 20, "facing").values)
-    assert maker.cached_mask(NEAR) is None
+    assert cached_mask(maker, NEAR) is None
 
     exact = maker.stretch(NEAR, 0, 20)
     assert exact.quality == "exact"
     same = maker.stretch(NEAR, 0, 20, "frozen")
     assert same.quality == "frozen"
     np.testing.assert_array_equal(same.values, exact.values)
-    mask = maker.cached_mask(NEAR)
+    mask = cached_mask(maker, NEAR)
     assert mask is not None
     assert mask.shape == (20, mesh.vertex_count)
 

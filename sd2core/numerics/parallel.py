@@ -13,6 +13,8 @@ from sd2core.numerics.compiled import worker_count, workers
 from sd2core.progress import Cancelled, Progress
 
 _POLL_S = 0.03
+_QUEUED = 8
+"""Jobs that wait for every thread: those of an hour of frames would be a lot of futures."""
 
 
 class Ticket:
@@ -108,9 +110,10 @@ def run_jobs(
         return own.processor_s
     ticket, waiting = Ticket(), iter(jobs)
     running: set[Future[None]] = set()
+    most = _QUEUED * worker_count() if threads is None else threads
 
     def start() -> None:
-        free = len(jobs) if threads is None else threads - len(running)
+        free = most - len(running)
         running.update(workers().submit(ticket.run, job) for job in islice(waiting, free))
 
     try:
