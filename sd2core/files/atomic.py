@@ -6,7 +6,6 @@ import errno
 import json
 import os
 import re
-import secrets
 import shutil
 import tempfile
 from collections.abc import Iterator
@@ -162,7 +161,7 @@ def _target(path: Path) -> Path:
 
 def _temporary(path: Path, target: Path, mode: int = 0o666) -> tuple[int, Path]:
     # Not named after the file, whose name may be as long as a name can be.
-    temporary = target.with_name(f"{_PREFIX}{secrets.token_hex(8)}{_SUFFIX}")
+    temporary = target.with_name(f"{_PREFIX}{os.urandom(8).hex()}{_SUFFIX}")
     new = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
     try:
         # Made with its permissions: the mask cannot be read without setting it, for all threads.

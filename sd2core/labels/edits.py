@@ -130,7 +130,7 @@ def nudge(labels: Labels, timebase: Timebase, ids: Collection[int], count: int) 
     free = [
         steps_free(frames, span, limit, count) for span, limit in zip(chosen, limits, strict=True)
     ]
-    count = min(free, key=abs)
+    count = min(free, key=abs, default=0)
     ids = tuple(span.id for span in chosen)
     if count == 0:
         return Edit(_name("Nudge", chosen), labels, ids)

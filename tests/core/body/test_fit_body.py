@@ -287,7 +287,7 @@ def test_stature_sets_the_scale(scene: Scene, fitted: BodyFit) -> None:
 
 
 def test_impossible_stature_and_nobody_are_refused(scene: Scene) -> None:
-    with pytest.raises(Sd2Error, match="body height of 172"):
+    with pytest.raises(Sd2Error, match="body height is 172"):
         fit_body(scene.track, CAMERA, stature_m=172.0, lift=scene.lift)
     empty = Scene(3)
     empty.track.present[:] = False

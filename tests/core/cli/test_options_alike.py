@@ -15,7 +15,7 @@ WITHOUT_FACTS = {"labels figure", "strip", "warm-up", "fetch-models", "open", "d
 
 GO_ON = {
     *("classify table", "export", "labels cut", "pairs mars", "pairs recordings"),
-    *("simulate campaign", "train", "listen"),
+    *("pairs vary", "simulate campaign", "train", "listen"),
     *("import",),  # and `demo`: recordings are never overwritten
 }
 """Commands that go on with what is there. All others refuse it, unless told to overwrite."""
