@@ -13,7 +13,6 @@ from sd2app.plain_imports import plain_imports
 from sd2app.system_libraries import explain_missing, missing_libraries
 from sd2core.cli import build_parser, run
 from sd2core.cli.command_parser import add_command
-from sd2core.cli.importing import copy_sample
 from sd2core.cli.options import (
     add_json,
 )
@@ -27,12 +26,13 @@ _EXAMPLES = """\
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one ``sd2`` command and return its exit code."""
-    return run(full_parser(), sys.argv[1:] if arguments is None else arguments)
+    typed = sys.argv[1:] if arguments is None else arguments
+    return run(full_parser(typed), typed)
 
 
-def full_parser() -> argparse.ArgumentParser:
-    """The library's commands and those that open the window."""
-    parser, commands = build_parser(_EXAMPLES)
+def full_parser(typed: Sequence[str] = ()) -> argparse.ArgumentParser:
+    """The library's commands, or the one that is typed, and those that open the window."""
+    parser, commands = build_parser(_EXAMPLES, typed)
     _add_window_commands(commands)
     return parser
 
@@ -136,6 +136,7 @@ def _open(options: argparse.Namespace) -> int:
 
 
 def _demo(options: argparse.Namespace) -> int:
+    from sd2core.cli.importing import copy_sample
     from sd2core.files.resources import resource_path
 
     if options.out is None:

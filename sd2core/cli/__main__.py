@@ -18,7 +18,7 @@ _EXAMPLES = "  sd2 demo --out sample.sd2                   a copy of the bundled
 
 def main() -> int:
     """Run one of the library's commands and return its exit code."""
-    parser, commands = build_parser(_EXAMPLES)
+    parser, commands = build_parser(_EXAMPLES, sys.argv[1:])
     demo = add_command(commands, "demo", handler=_demo)
     demo.add_output("NAME.sd2", "the copy to write; new", required=False, goes_on=True)
     demo.add_argument("--screenshot", type=Path, help=argparse.SUPPRESS)

@@ -33,7 +33,7 @@ def main() -> int:
 
     def command() -> int:
         # The library's commands: none of those that open the window is run in the background.
-        return run(build_parser()[0], words)
+        return run(build_parser(typed=words)[0], words)
 
     return command() if folder is None else run_in_folder(folder, command)
 

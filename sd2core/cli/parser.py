@@ -3,33 +3,9 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
+from importlib import import_module
 
-from sd2core.cli import (
-    align,
-    batch,
-    classify,
-    compare_meshes,
-    denoise,
-    eval,
-    export,
-    fit,
-    importing,
-    imu,
-    info,
-    labels,
-    ladder,
-    listen,
-    pairs,
-    placements,
-    preparing,
-    radar,
-    runs,
-    simulate,
-    strip,
-    study,
-    synth,
-    train,
-)
 from sd2core.cli.command_parser import CommandParser
 from sd2core.version import __version__
 
@@ -65,8 +41,27 @@ well, {{"error": {{"found": …, "expected": …, "remedy": …}}}}, and the exi
 """
 
 
-def build_parser(examples: str = "") -> tuple[argparse.ArgumentParser, argparse._SubParsersAction]:
-    """Parser of the library's commands, and where others are added, with their examples."""
+_MODULES = (
+    *("info", "importing", "align", "fit", "synth", "radar", "listen", "imu", "denoise"),
+    *("classify", "labels", "pairs", "export", "ladder", "placements", "compare_meshes"),
+    *("strip", "simulate", "train", "runs", "eval", "study", "batch", "preparing"),
+)
+"""Modules with commands, in the order of the help. A command is called as its module, but for:"""
+
+_MODULE_OF = {
+    **dict.fromkeys(("import", "set", "relink"), "importing"),
+    **dict.fromkeys(("warm-up", "fetch-models"), "preparing"),
+}
+
+
+def build_parser(
+    examples: str = "", typed: Sequence[str] = ()
+) -> tuple[argparse.ArgumentParser, argparse._SubParsersAction]:
+    """Parser of the library's commands, and where others are added, with their examples.
+
+    Where the first of the ``typed`` words is a command, the others are left out: they take longer
+    to load than most commands work.
+    """
     parser = CommandParser(
         prog="sd2",
         description=_DESCRIPTION,
@@ -75,32 +70,8 @@ def build_parser(examples: str = "") -> tuple[argparse.ArgumentParser, argparse.
     )
     parser.add_argument("--version", action="version", version=f"SD² Studio {__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    groups = (
-        info,
-        importing,
-        align,
-        fit,
-        synth,
-        radar,
-        listen,
-        imu,
-        denoise,
-        classify,
-        labels,
-        pairs,
-        export,
-        ladder,
-        placements,
-        compare_meshes,
-        strip,
-        simulate,
-        train,
-        runs,
-        eval,
-        study,
-        batch,
-        preparing,
-    )
-    for group in groups:
-        group.add_commands(commands)
+    name = typed[0] if typed else ""
+    named = _MODULE_OF.get(name, name.replace("-", "_"))
+    for module in (named,) if named in _MODULES else _MODULES:
+        import_module(f"sd2core.cli.{module}").add_commands(commands)
     return parser, commands

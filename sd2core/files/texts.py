@@ -6,7 +6,6 @@ import codecs
 import json
 import os
 import re
-import tomllib
 from collections import deque
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -208,6 +207,8 @@ def first_fault(error: ValidationError) -> str:
 
 
 def _parsed(form: str, text: str, place: str | Path, expected: str, remedy: str) -> Any:
+    import tomllib  # for few files, and slow to load
+
     try:
         if long := _LONG_NUMBER.search(text):
             line = text.count("\n", 0, long.start()) + 1

@@ -8,6 +8,7 @@ import sys
 import pytest
 from cli_outcome import Sd2
 
+from sd2core.cli.parser import build_parser
 from sd2core.progress import Progress
 
 
@@ -26,3 +27,13 @@ def test_warm_up(sd2: Sd2, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sd2core.numerics.compiled.warm_up", calls.append)
     assert sd2("warm-up").code == 0
     assert len(calls) == 1
+
+
+def test_a_command_that_is_typed_is_loaded_alone() -> None:
+    _, commands = build_parser()
+    for name in commands.choices:
+        _, alone = build_parser(typed=[name, "--help"])
+        assert name in alone.choices
+        assert len(alone.choices) < 4
+    for words in ([], ["--help"], ["synht"]):
+        assert build_parser(typed=words)[1].choices.keys() == commands.choices.keys()
