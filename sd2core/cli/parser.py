@@ -46,12 +46,13 @@ _MODULES = (
     *("classify", "labels", "pairs", "export", "ladder", "placements", "compare_meshes"),
     *("strip", "simulate", "train", "runs", "eval", "study", "batch", "preparing"),
 )
-"""Modules with commands, in the order of the help. A command is called as its module, but for:"""
+"""Modules with commands, in the order of the help."""
 
 _MODULE_OF = {
     **dict.fromkeys(("import", "set", "relink"), "importing"),
     **dict.fromkeys(("warm-up", "fetch-models"), "preparing"),
 }
+"""Modules of commands that are called otherwise."""
 
 
 def build_parser(
