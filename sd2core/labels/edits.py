@@ -72,17 +72,29 @@ def create(
 
 
 def duplicate(
-    labels: Labels, timebase: Timebase, span_id: int, start_s: float, track: str | None = None
+    labels: Labels,
+    timebase: Timebase,
+    ids: Collection[int],
+    start_s: float,
+    track: str | None = None,
 ) -> Edit:
-    """Copy a span to another start, or to another track, clipped to free time."""
-    frames = Frames.of(timebase)
-    span = labels.span(span_id)
-    track = span.track if track is None else track
-    # A recording has frames, so there is room.
-    wanted = frames.placed(start_s, span.duration_s, frames.whole) or frames.whole
-    start_s, end_s = clip_to_free(labels, track, wanted, frames)
-    made = replace(span, id=labels.next_id, track=track, start_s=start_s, end_s=end_s)
-    return Edit("Duplicate span", labels.with_spans([made]), (made.id,))
+    """Copy spans so that the first copy begins at a time, or to another track.
+
+    Each is clipped to free time.
+    """
+    frames, chosen = Frames.of(timebase), _chosen(labels, ids)
+    after = labels
+    made: list[int] = []
+    for span in chosen:
+        place_s = start_s + (span.start_s - chosen[0].start_s)
+        # A recording has frames, so there is room.
+        wanted = frames.placed(place_s, span.duration_s, frames.whole) or frames.whole
+        on = span.track if track is None else track
+        first_s, last_s = clip_to_free(after, on, wanted, frames)
+        copy = replace(span, id=after.next_id, track=on, start_s=first_s, end_s=last_s)
+        after = after.with_spans([copy])
+        made.append(copy.id)
+    return Edit(_name("Duplicate", chosen), after, tuple(made))
 
 
 def delete(labels: Labels, ids: Iterable[int]) -> Edit:
@@ -96,7 +108,7 @@ def resize(labels: Labels, timebase: Timebase, span_id: int, side: Side, time_s:
     """Move one edge of a span to the frame edge nearest to a time, as far as it can go."""
     frames = Frames.of(timebase)
     span = labels.span(span_id)
-    low_s, high_s = limits_of(labels, span, frames)
+    ((low_s, high_s),) = limits_of(labels, [span], frames)
     wanted_s = frames.nearest(time_s)
     if side == "start":
         latest_s = float(frames.times_s[max(frames.last_before(span.end_s), 0)])
@@ -108,33 +120,49 @@ def resize(labels: Labels, timebase: Timebase, span_id: int, side: Side, time_s:
     return Edit(f"Move {side} of span", labels.with_spans([changed]), (span_id,))
 
 
-def move(labels: Labels, timebase: Timebase, span_id: int, start_s: float) -> Edit:
-    """Move a span to begin at a time, keeping its duration; it stops at neighbours."""
-    frames = Frames.of(timebase)
-    span = labels.span(span_id)
-    place = frames.placed(start_s, span.duration_s, limits_of(labels, span, frames))
-    changed = _timed(span, *(place or (span.start_s, span.end_s)), frames)
-    return Edit("Move span", labels.with_spans([changed]), (span_id,))
+def move(
+    labels: Labels, timebase: Timebase, ids: Collection[int], lead_id: int, start_s: float
+) -> Edit:
+    """Move spans so that one of them, the dragged one, begins at a time.
 
-
-def nudge(labels: Labels, timebase: Timebase, span_id: int, count: int) -> Edit:
-    """Move a span by some frames, keeping their number; it stops at neighbours.
-
-    Where frames are not evenly spaced its duration changes, and a step back restores it. A
-    span between frames goes to them with the first step.
+    One alone keeps its duration; several keep their order and their contacts.
     """
     frames = Frames.of(timebase)
-    span = labels.span(span_id)
-    limits = limits_of(labels, span, frames)
-    count = steps_free(frames, span, limits, count)
-    if count == 0:
-        return Edit("Nudge span", labels, (span_id,))
-    start_s, end_s = (frames.stepped(time_s, count) for time_s in (span.start_s, span.end_s))
-    if not frames.held(start_s, end_s):  # one that lay between two frames
-        start_s, end_s = frames.stretch(start_s, start_s)
-        end_s = min(end_s, limits[1])
-    changed = _timed(span, start_s, end_s, frames)
-    return Edit("Nudge span", labels.with_spans([changed]), (span_id,))
+    chosen = _chosen(labels, {*ids, lead_id})
+    limits = limits_of(labels, chosen, frames)
+    if len(chosen) == 1:
+        (span,), (room,) = chosen, limits
+        place = frames.placed(start_s, span.duration_s, room)
+        moved = [_timed(span, *(place or (span.start_s, span.end_s)), frames)]
+    else:
+        by_s = frames.nearest(start_s) - labels.span(lead_id).start_s
+        moved = _moved_by(by_s, chosen, limits, frames)
+    return Edit(_name("Move", moved), labels.with_spans(moved), tuple(one.id for one in moved))
+
+
+def nudge(labels: Labels, timebase: Timebase, ids: Collection[int], count: int) -> Edit:
+    """Move spans by some frames, each keeping their number; they stop at neighbours.
+
+    Where frames are not evenly spaced their durations change, and a step back restores them. A
+    span alone that is between frames goes to them with the first step.
+    """
+    frames = Frames.of(timebase)
+    chosen = _chosen(labels, ids)
+    limits = limits_of(labels, chosen, frames)
+    alone = len(chosen) == 1
+    free = [
+        steps_free(frames, span, room, count) for span, room in zip(chosen, limits, strict=True)
+    ]
+    count = min(free, key=abs)
+    moved = []
+    for span, (_, high_s) in zip(chosen, limits, strict=True) if count else ():
+        start_s, end_s = (frames.stepped(time_s, count) for time_s in (span.start_s, span.end_s))
+        if alone and not frames.held(start_s, end_s):  # one that lay between two frames
+            start_s, end_s = frames.stretch(start_s, start_s)
+            end_s = min(end_s, high_s)
+        moved.append(_timed(span, start_s, end_s, frames, alone=alone))
+    after = labels.with_spans(moved)
+    return Edit(_name("Nudge", chosen), after, tuple(one.id for one in chosen))
 
 
 def split(labels: Labels, timebase: Timebase, span_id: int, time_s: float) -> Edit:
@@ -255,108 +283,44 @@ def overwrite(
     return Edit("Create span over others", labels.with_spans(put, without=gone), (made.id,))
 
 
-def _timed(span: Span, start_s: float, end_s: float, frames: Frames) -> Span:
-    if not frames.held(start_s, end_s):
+def _moved_by(
+    by_s: float, chosen: Sequence[Span], limits: Sequence[Stretch], frames: Frames
+) -> list[Span]:
+    """Several spans moved by a time, as far as all of them can go, each edge to the nearest."""
+    pairs = list(zip(chosen, limits, strict=True))
+    earliest_s = max(low_s - span.start_s for span, (low_s, _) in pairs)
+    latest_s = min(high_s - span.end_s for span, (_, high_s) in pairs)
+    # Whoever lies outside (an import) is not in the way of the others.
+    by_s = min(max(by_s, min(earliest_s, 0.0)), max(latest_s, 0.0))
+    moved = []
+    for span, (low_s, high_s) in pairs:
+        start_s, end_s = (frames.nearest(edge + by_s) for edge in (span.start_s, span.end_s))
+        start_s, end_s = max(start_s, low_s), min(end_s, high_s)
+        moved.append(_timed(span, start_s, end_s, frames, alone=False))
+    return moved if by_s else [*chosen]
+
+
+def _timed(span: Span, start_s: float, end_s: float, frames: Frames, *, alone: bool = True) -> Span:
+    if frames.held(start_s, end_s):
+        return replace(span, start_s=start_s, end_s=end_s)
+    if alone:
         raise Sd2Error(
             f"{span.words()} has no room for a frame",
             "room for one frame on its track, inside the recording",
             "Move or delete the spans beside it",
         )
-    return replace(span, start_s=start_s, end_s=end_s)
-
-
-def move_together(
-    labels: Labels, timebase: Timebase, ids: Collection[int], lead_id: int, start_s: float
-) -> Edit:
-    """Move spans so that one of them, the dragged one, begins at a time."""
-    frames = Frames.of(timebase)
-    chosen = _chosen(labels, {*ids, lead_id})
-    lead = labels.span(lead_id)
-    limits = _limits_of_all(labels, chosen, frames)
-    earliest_s = max(low_s - span.start_s for span, (low_s, _) in zip(chosen, limits, strict=True))
-    latest_s = min(high_s - span.end_s for span, (_, high_s) in zip(chosen, limits, strict=True))
-    by_s = frames.nearest(start_s) - lead.start_s
-    # Whoever lies outside (an import) is not in the way of the others.
-    by_s = min(max(by_s, min(earliest_s, 0.0)), max(latest_s, 0.0))
-    moved = []
-    for span, (low_s, high_s) in zip(chosen, limits, strict=True):
-        first_s, last_s = (frames.nearest(edge + by_s) for edge in (span.start_s, span.end_s))
-        moved.append(_put(span, max(first_s, low_s), min(last_s, high_s), frames))
-    if by_s == 0.0:
-        moved = chosen
-    return Edit(_name("Move", moved), labels.with_spans(moved), tuple(one.id for one in moved))
-
-
-def nudge_together(labels: Labels, timebase: Timebase, ids: Collection[int], count: int) -> Edit:
-    """Move spans by some frames, each keeping their number."""
-    frames = Frames.of(timebase)
-    chosen = _chosen(labels, ids)
-    limits = _limits_of_all(labels, chosen, frames)
-    free = [
-        steps_free(frames, span, limit, count) for span, limit in zip(chosen, limits, strict=True)
-    ]
-    count = min(free, key=abs)
-    moved = chosen
-    if count:
-        moved = []
-        for span in chosen:
-            start_s, end_s = frames.stepped(span.start_s, count), frames.stepped(span.end_s, count)
-            moved.append(_put(span, start_s, end_s, frames))
-    return Edit(_name("Nudge", moved), labels.with_spans(moved), tuple(one.id for one in moved))
-
-
-def duplicate_together(
-    labels: Labels, timebase: Timebase, ids: Collection[int], start_s: float
-) -> Edit:
-    """Copy spans so that the first copy begins at a time; each is clipped to free time."""
-    chosen = _chosen(labels, ids)
-    after = labels
-    made: list[int] = []
-    for span in chosen:
-        place_s = start_s + span.start_s - chosen[0].start_s
-        edit = duplicate(after, timebase, span.id, place_s)
-        after = edit.labels
-        made += edit.ids
-    return Edit(_name("Duplicate", chosen), after, tuple(made))
+    raise Sd2Error(
+        f"{span.words()} would hold no frame there",
+        "a place where each of the spans holds one",
+        "Move it by itself",
+    )
 
 
 def _chosen(labels: Labels, ids: Collection[int]) -> list[Span]:
-    wanted = set(ids)
-    chosen = [span for span in labels.spans if span.id in wanted]
-    if len(chosen) < max(len(wanted), 1):
-        raise Sd2Error(f"{len(chosen)} of {len(wanted)} spans are there", "spans that exist")
+    chosen = labels.these(ids)
+    if not chosen:
+        raise Sd2Error("0 of 0 spans are there", "spans that exist")
     return chosen
-
-
-def _limits_of_all(labels: Labels, chosen: Sequence[Span], frames: Frames) -> list[Stretch]:
-    """Limits of each span between spans that are not moved, in one pass for thousands."""
-    low_s, high_s = frames.whole
-    moving = {span.id for span in chosen}
-    exclusive = {track.name for track in labels.tracks if track.overlap == "exclusive"}
-    lows, highs = {}, {}
-    wall = dict.fromkeys(exclusive, low_s)
-    for span in labels.spans:
-        if span.id in moving:
-            lows[span.id] = wall.get(span.track, low_s)
-        elif span.track in exclusive:
-            wall[span.track] = max(wall[span.track], span.end_s)
-    wall = dict.fromkeys(exclusive, high_s)
-    for span in reversed(labels.spans):
-        if span.id in moving:
-            highs[span.id] = wall.get(span.track, high_s)
-        elif span.track in exclusive:
-            wall[span.track] = min(wall[span.track], span.start_s)
-    return [(lows[span.id], highs[span.id]) for span in chosen]
-
-
-def _put(span: Span, start_s: float, end_s: float, frames: Frames) -> Span:
-    if not frames.held(start_s, end_s):
-        raise Sd2Error(
-            f"{span.words()} would hold no frame there",
-            "a place where each of the spans holds one",
-            "Move it by itself",
-        )
-    return replace(span, start_s=start_s, end_s=end_s)
 
 
 def _name(verb: str, spans: Sequence[Span]) -> str:

@@ -58,7 +58,7 @@ def test_an_edit_in_the_window(
             c.label_edits.apply(
                 rng.choice(
                     [
-                        lambda labels, base: nudge(labels, base, span.id, rng.choice((-1, 1))),
+                        lambda labels, base: nudge(labels, base, [span.id], rng.choice((-1, 1))),
                         lambda labels, base: resize(labels, base, span.id, "end", to_s),
                     ]
                 )

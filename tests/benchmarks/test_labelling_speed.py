@@ -52,9 +52,9 @@ def test_one_edit(
         span = labels.spans[rng.randrange(len(labels.spans))]
         middle_s = (span.start_s + span.end_s) / 2
         choices = [
-            lambda: move(labels, FRAMES, span.id, span.start_s + rng.uniform(-0.3, 0.3)),
+            lambda: move(labels, FRAMES, [span.id], span.id, span.start_s + rng.uniform(-0.3, 0.3)),
             lambda: resize(labels, FRAMES, span.id, "end", span.end_s + rng.uniform(-0.3, 0.3)),
-            lambda: nudge(labels, FRAMES, span.id, 1),
+            lambda: nudge(labels, FRAMES, [span.id], 1),
             lambda: delete(labels, [span.id]),
         ]
         if FRAMES.frames_between(span.start_s, span.end_s)[1] > 2 and span.duration_s > 0.2:

@@ -15,7 +15,7 @@ from sd2app.session.playback import PlaybackModel
 from sd2core.errors import Sd2Error
 from sd2core.labels import edits, field_edits
 from sd2core.labels.comparison import changed_stretch
-from sd2core.labels.edits import Change, Edit, Side, duplicate_together, nudge_together
+from sd2core.labels.edits import Change, Edit, Side
 from sd2core.labels.spans import Labels, Span
 from sd2core.recording.divergence import State
 from sd2core.recording.edited import decoded_fields
@@ -125,11 +125,8 @@ class LabelEdits(QObject):
 
     def nudge(self, frames: int) -> None:
         """Move the selected spans together by some frames."""
-        ids = self._ids()
-        if len(ids) == 1:
-            self.apply(lambda labels, base: edits.nudge(labels, base, ids[0], frames))
-        elif ids:
-            self.apply(lambda labels, base: nudge_together(labels, base, ids, frames))
+        if ids := self._ids():
+            self.apply(lambda labels, base: edits.nudge(labels, base, ids, frames))
 
     def duplicate(self) -> None:
         """Copy the selected spans to the frame on screen; behind them where it is within them."""
@@ -139,7 +136,7 @@ class LabelEdits(QObject):
         ids, now_s = self._ids(), self._now_s
         first_s, last_s = chosen[0].start_s, max(span.end_s for span in chosen)
         start_s = last_s if first_s <= now_s < last_s else now_s
-        self.apply(lambda labels, base: duplicate_together(labels, base, ids, start_s))
+        self.apply(lambda labels, base: edits.duplicate(labels, base, ids, start_s))
 
     def meet(self) -> None:
         """Make the two selected neighbours meet at the frame on screen."""

@@ -123,46 +123,46 @@ class TestMove:
         [(1.54, (1.5, 2.5)), (2.3, (2.0, 3.0)), (9.0, (2.0, 3.0)), (-9.0, (0.0, 1.0))],
     )
     def test_keeps_its_duration_and_stops(self, to_s: float, expected: tuple[float, float]) -> None:
-        assert times(move(TWO, FRAMES, 1, to_s)) == [expected, (3.0, 4.0)]
+        assert times(move(TWO, FRAMES, [1], 1, to_s)) == [expected, (3.0, 4.0)]
 
     def test_stays_inside_the_recording(self) -> None:
-        assert times(move(TWO, FRAMES, 2, 50.0))[1] == (9.0, 10.0)
+        assert times(move(TWO, FRAMES, [2], 2, 50.0))[1] == (9.0, 10.0)
 
     def test_passes_others_where_spans_may_overlap(self) -> None:
         free = labels_of((1.0, 2.0), (3.0, 4.0), overlap="free")
-        assert times(move(free, FRAMES, 1, 3.5)) == [(3.0, 4.0), (3.5, 4.5)]
+        assert times(move(free, FRAMES, [1], 1, 3.5)) == [(3.0, 4.0), (3.5, 4.5)]
 
     def test_keeps_seconds_where_frames_are_uneven(self) -> None:
         labels = labels_of((0.0, 0.2))
-        assert times(move(labels, JUMPY, 1, 3.0)) == [(3.0, 3.2)]
-        assert times(move(labels, JUMPY, 1, 1.1)) == [(1.1, 3.0)]  # a frame that lasts longer
+        assert times(move(labels, JUMPY, [1], 1, 3.0)) == [(3.0, 3.2)]
+        assert times(move(labels, JUMPY, [1], 1, 1.1)) == [(1.1, 3.0)]  # a frame that lasts longer
 
     def test_where_it_is_changes_nothing(self) -> None:
-        assert move(TWO, FRAMES, 1, 1.01).labels is TWO
+        assert move(TWO, FRAMES, [1], 1, 1.01).labels is TWO
 
     def test_refuses_between_two_frames(self) -> None:
         labels = labels_of((1.01, 1.03), (1.03, 1.2), (0.9, 1.01))
         with pytest.raises(Sd2Error, match="no room for a frame"):
-            move(labels, FRAMES, 1, 1.0)
+            move(labels, FRAMES, [1], 1, 1.0)
 
 
 class TestNudge:
     def test_by_frames_until_the_neighbour(self) -> None:
-        assert times(nudge(TWO, FRAMES, 1, 3))[0] == (1.3, 2.3)
-        assert times(nudge(TWO, FRAMES, 1, 30))[0] == (2.0, 3.0)
-        assert times(nudge(TWO, FRAMES, 1, -30))[0] == (0.0, 1.0)
+        assert times(nudge(TWO, FRAMES, [1], 3))[0] == (1.3, 2.3)
+        assert times(nudge(TWO, FRAMES, [1], 30))[0] == (2.0, 3.0)
+        assert times(nudge(TWO, FRAMES, [1], -30))[0] == (0.0, 1.0)
 
     @given(count=st.integers(-3, 3))
     def test_there_and_back(self, count: int) -> None:
         labels = labels_of((1.0, 3.0))  # frames 3 and 4, of different lengths
-        there = nudge(labels, JUMPY, 1, count).labels
+        there = nudge(labels, JUMPY, [1], count).labels
         assert there.span(1).start_s == JUMPY.times_s[3 + count]
-        assert nudge(there, JUMPY, 1, -count).labels == labels
+        assert nudge(there, JUMPY, [1], -count).labels == labels
 
     def test_an_import_goes_to_frames(self) -> None:
         labels = labels_of((1.04, 2.04))
-        assert times(nudge(labels, FRAMES, 1, 1)) == [(1.1, 2.1)]
-        assert times(nudge(labels, FRAMES, 1, -2)) == [(0.9, 1.9)]
+        assert times(nudge(labels, FRAMES, [1], 1)) == [(1.1, 2.1)]
+        assert times(nudge(labels, FRAMES, [1], -2)) == [(0.9, 1.9)]
 
 
 class TestSplit:
@@ -275,11 +275,11 @@ class TestFillGaps:
 def test_a_copy_keeps_what_is_said_and_fits_in() -> None:
     labels = labels_of((1.0, 2.0), (3.0, 4.0))
     labels = labels.with_spans([replace(labels.span(1), note="clear", confidence=0.5)])
-    copy = duplicate(labels, FRAMES, 1, 2.5)
+    copy = duplicate(labels, FRAMES, [1], 2.5)
     assert times(copy)[1] == (2.5, 3.0)
     assert copy.labels.span(3) == replace(labels.span(1), id=3, start_s=2.5, end_s=3.0)
-    assert times(duplicate(labels, FRAMES, 1, 1.0, "Other"), "Other") == [(1.0, 2.0)]
-    assert times(duplicate(labels, FRAMES, 1, 9.8))[-1] == (9.0, 10.0)
+    assert times(duplicate(labels, FRAMES, [1], 1.0, "Other"), "Other") == [(1.0, 2.0)]
+    assert times(duplicate(labels, FRAMES, [1], 9.8))[-1] == (9.0, 10.0)
 
 
 def test_deleted_spans_are_gone() -> None:
