@@ -86,6 +86,13 @@ class Timebase:
         """Typical (median) time from one frame to the next; 1/30 s for a single frame."""
         return float(np.median(np.diff(self.times_s))) if len(self) > 1 else 1.0 / 30.0
 
+    @cached_property
+    def edges_s(self) -> NDArray[np.float64]:
+        """Times at which frames begin, and the end of the last one, (T + 1,)."""
+        edges_s = np.append(self.times_s, self.end_s)
+        edges_s.flags.writeable = False
+        return edges_s
+
     @property
     def frames_per_s(self) -> float:
         """Typical frame rate."""

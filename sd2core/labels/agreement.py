@@ -192,8 +192,8 @@ def disagreements(
         said = [
             tuple(label for label, there in zip(labels, row, strict=True) if there) for row in usual
         ]
-        end_s = timebase.time_of(stop) if stop < len(timebase) else timebase.end_s
-        found.append(Disagreement(timebase.time_of(start), end_s, stop - start, said[0], said[1]))
+        start_s, end_s = timebase.edges_s[[start, stop]].tolist()
+        found.append(Disagreement(start_s, end_s, stop - start, said[0], said[1]))
     return tuple(found)
 
 

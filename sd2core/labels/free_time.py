@@ -28,7 +28,7 @@ class Frames:
     @classmethod
     def of(cls, timebase: Timebase) -> Frames:
         """Return the edges of the frames of a recording."""
-        return cls(timebase.times_s, np.append(timebase.times_s, timebase.end_s))
+        return cls(timebase.times_s, timebase.edges_s)
 
     @property
     def whole(self) -> Stretch:

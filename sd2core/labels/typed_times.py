@@ -31,7 +31,9 @@ def typed_start(text: str, timebase: Timebase) -> float:
 def typed_end(text: str, timebase: Timebase) -> float:
     """Parse the end of a span, in seconds; errors are those of :func:`typed_start`."""
     frame = _typed_frames(text)
-    return _typed_seconds(text) if frame is None else _end_of(_known(frame, timebase), timebase)
+    if frame is None:
+        return _typed_seconds(text)
+    return float(timebase.edges_s[_known(frame, timebase) + 1])
 
 
 def typed_duration_end(text: str, start_s: float, timebase: Timebase) -> float:
@@ -39,8 +41,8 @@ def typed_duration_end(text: str, start_s: float, timebase: Timebase) -> float:
     frames = _typed_frames(text)
     if frames is None:
         return start_s + _typed_seconds(text)
-    last = timebase.frame_at(start_s) + frames - 1
-    return _end_of(min(max(last, 0), len(timebase) - 1), timebase)
+    end = timebase.frame_at(start_s) + frames
+    return float(timebase.edges_s[min(max(end, 1), len(timebase))])
 
 
 def _typed_frames(text: str) -> int | None:
@@ -62,7 +64,3 @@ def _known(frame: int, timebase: Timebase) -> int:
     if frame >= len(timebase):
         raise Sd2Error(f"Frame {frame} was typed", f"a frame from 0 to {len(timebase) - 1}")
     return frame
-
-
-def _end_of(frame: int, timebase: Timebase) -> float:
-    return timebase.time_of(frame + 1) if frame + 1 < len(timebase) else timebase.end_s

@@ -101,8 +101,7 @@ class LabelEdits(QObject):
         if not chosen:
             return
         # The frame on screen is the first of the span, or its last.
-        frame = self.playback.frame + (side == "end")
-        time_s = base.time_of(frame) if frame < len(base) else base.end_s
+        time_s = float(base.edges_s[self.playback.frame + (side == "end")])
         self.apply(lambda labels, base: edits.resize(labels, base, chosen[0].id, side, time_s))
 
     def split(self) -> None:

@@ -281,8 +281,7 @@ def _edges_s(
             f"frames of the {len(timebase)} of the recording, counted from 0",
             "Check that the table is of this recording",
         )
-    end_s = timebase.end_s if end == len(timebase) else timebase.time_of(end)
-    return timebase.time_of(first), end_s
+    return float(timebase.edges_s[first]), float(timebase.edges_s[end])
 
 
 def _frame(path: Path, line: int, column: str, text: str) -> int:
