@@ -20,7 +20,7 @@ import hashlib
 import os
 from collections.abc import Container, Iterable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path
 
@@ -32,7 +32,7 @@ from sd2core.files.edit_lock import EditLock, Holder
 from sd2core.files.lock import is_locked
 from sd2core.files.paths import user_data
 from sd2core.files.texts import first_fault, read_content
-from sd2core.labels.journal import SUFFIX, Journal, Replayed, replay, unpacked
+from sd2core.labels.journal import SUFFIX, Journal, Kept, replay, unpacked
 from sd2core.labels.spans import Labels
 
 DECLINED = ".declined"
@@ -45,8 +45,8 @@ class _NoHeadError(ValueError):
     """Error for a part of which nothing can be read."""
 
 
-@dataclass(frozen=True)
-class Offer(Replayed):
+@dataclass(frozen=True, kw_only=True)
+class Offer(Kept):
     """Unsaved labels of a session, and the parts that they were read from.
 
     ``declined`` is True if the user discarded them.
@@ -113,7 +113,7 @@ def _make_private(*paths: Path) -> None:
             path.chmod(path.stat().st_mode & 0o700)
 
 
-def _replayed(path: Path) -> tuple[Replayed, str]:
+def _replayed(path: Path) -> tuple[Kept, str]:
     content = read_content(path, "a journal of label edits")
     records, end = unpacked(content)
     if not records:
@@ -241,15 +241,11 @@ class RecoveryPlace:
         earlier = search(self._folder, (SUFFIX,), without=self._begun)
         known = journals(self._folder, (SUFFIX, DECLINED, DAMAGED))
         session = max(map(session_of, known), default=0) + 1
-        journal = Journal(
-            self._folder,
-            session,
-            self._recording,
-            labels,
-            unsaved=recovered.edits if recovered else 0,
-            last=recovered.last if recovered else "",
-            others=recovered.others if recovered else None,
-        )
+        kept = Kept(self._recording, labels)
+        if recovered is not None:
+            others = recovered.others
+            kept = replace(kept, edits=recovered.edits, last=recovered.last, others=others)
+        journal = Journal(self._folder, session, kept)
         self._begun.add(session)
         if recovered is not None:
             self.delete(recovered)

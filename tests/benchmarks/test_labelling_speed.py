@@ -19,7 +19,7 @@ from labelled import even, many_spans
 from sd2core.labels.edits import create, delete, move, nudge, resize, split
 from sd2core.labels.files import read_labels, write_labels
 from sd2core.labels.free_time import snap
-from sd2core.labels.journal import Journal
+from sd2core.labels.journal import Journal, Kept
 from sd2core.labels.recovery import RecoveryPlace
 from sd2core.labels.spans import Labels
 
@@ -44,7 +44,7 @@ def test_one_edit(
     rng = random.Random(1)
     state = [many_spans(SPANS)]
     worked_ms: list[float] = []
-    written = Journal(tmp_path, 1, tmp_path / "walk.sd2", state[0])
+    written = Journal(tmp_path, 1, Kept(tmp_path / "walk.sd2", state[0]))
 
     def edit() -> None:
         before_s = time.process_time()
