@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import count
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -19,34 +19,19 @@ from sd2core.labels.spans import Labels, LabelTrack, Overlap, Span
 from sd2core.labels.suggest import LABEL, TRACK
 from sd2core.timebase import Timebase
 
-
-def relabel(labels: Labels, ids: Iterable[int], label: str) -> Edit:
-    """Give spans another label."""
-    return _with(labels, ids, "Change label", label=label)
+SpanField = Literal["label", "note", "author", "confidence", "track"]
 
 
-def set_note(labels: Labels, ids: Iterable[int], note: str) -> Edit:
-    """Set the note of spans; an empty one removes it."""
-    return _with(labels, ids, "Change note", note=note)
+def set_field(labels: Labels, ids: Iterable[int], field: SpanField, value: Any) -> Edit:
+    """Set one field of spans, at the times they have.
 
-
-def set_author(labels: Labels, ids: Iterable[int], author: str) -> Edit:
-    """Set the author of spans."""
-    return _with(labels, ids, "Change author", author=author)
-
-
-def set_confidence(labels: Labels, ids: Iterable[int], confidence: float | None) -> Edit:
-    """Set the confidence of spans, 0 to 1 or None for unknown."""
-    return _with(labels, ids, "Change confidence", confidence=confidence)
-
-
-def set_track(labels: Labels, ids: Iterable[int], track: str) -> Edit:
-    """Put spans on another track, at the times they have.
-
-    Raises Sd2Error when they would overlap on an exclusive track; the message names both spans.
+    An empty note removes it; a confidence is 0 to 1, or None for unknown. Raises Sd2Error when
+    spans would overlap on an exclusive track; the message names both.
     """
-    labels.track(track)
-    return _with(labels, ids, "Change track", track=track)
+    if field == "track":
+        labels.track(value)
+    changed = [replace(span, **{field: value}) for span in labels.these(ids)]
+    return Edit(f"Change {field}", labels.with_spans(changed), tuple(one.id for one in changed))
 
 
 def accept(
@@ -67,11 +52,6 @@ def accept(
         taken = replace(span, origin="person", **place)
         after = after.with_spans([taken])
     return Edit(_name("Accept", len(chosen)), after, tuple(one.id for one in chosen))
-
-
-def _with(labels: Labels, ids: Iterable[int], name: str, **fields: Any) -> Edit:
-    changed = [replace(span, **fields) for span in labels.these(ids)]
-    return Edit(name, labels.with_spans(changed), tuple(span.id for span in changed))
 
 
 def _suggestions(labels: Labels, ids: Iterable[int]) -> list[Span]:
@@ -147,7 +127,7 @@ def take(
         done.append(one)
         known = span.label != LABEL or labels.label_set.find(span.label) is not None
         if not (keep_known and known):
-            after = relabel(after, [one], label).labels
+            after = set_field(after, [one], "label", label).labels
     if refusal is not None and not done:
         raise refusal
     return Edit(_name("Accept", len(done)), tidied(after), tuple(done))

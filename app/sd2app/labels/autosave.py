@@ -82,7 +82,7 @@ class LabelAutosave(QObject):
             self.close()
             self.waiting = Found()
             self._others = edited_fields(recording)
-            self._begin_at(_labelled_path(recording), reread=True)
+            self._begin_at(self._labelled_path, reread=True)
         self._recording = recording
         self._labels.open(self._document.labels)
 
@@ -103,6 +103,11 @@ class LabelAutosave(QObject):
             self._place.release()
         self._place = None
         self._refusal, self._offers, self.notes, self._keeping = "", (), (), True
+
+    @property
+    def _labelled_path(self) -> Path:
+        """Path that names a recording's recoveries: its folder, or the file it was made from."""
+        return next(iter(self._document.paths), UNTITLED)
 
     def _begin_at(self, path: Path, *, reread: bool) -> None:
         content = self._document.content
@@ -135,7 +140,7 @@ class LabelAutosave(QObject):
         recording = self._document.recording
         if recording is None:
             return
-        path = _labelled_path(recording)
+        path = self._labelled_path
         self._recording, self._others = recording, edited_fields(recording)
         if self._place is None or self._place.recording != path.resolve():
             self.close()
@@ -291,14 +296,6 @@ class LabelAutosave(QObject):
             else:
                 with suppress(OSError):
                     place.delete(offer)
-
-
-def _labelled_path(recording: Recording) -> Path:
-    """Path that names a recording's recoveries: its folder, or the file it was made from."""
-    if recording.folder != UNTITLED:
-        return recording.folder
-    parts = (recording.video, recording.mesh, recording.radar)
-    return next((path for path in parts if path is not None), recording.folder)
 
 
 def _held_words(place: RecoveryPlace, title: str) -> str:

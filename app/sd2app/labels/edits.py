@@ -88,12 +88,12 @@ class LabelEdits(QObject):
         """Give the selected spans another label."""
         self.labels.set_label(label)
         ids = self._ids()
-        self.apply(lambda labels, base: field_edits.relabel(labels, ids, label))
+        self.apply(lambda labels, base: field_edits.set_field(labels, ids, "label", label))
 
     def put_on_track(self, track: str) -> None:
         """Put the selected spans on another track."""
         ids = self._ids()
-        self.apply(lambda labels, base: field_edits.set_track(labels, ids, track))
+        self.apply(lambda labels, base: field_edits.set_field(labels, ids, "track", track))
 
     def edge_here(self, side: Side) -> None:
         """Put an edge of the selected span at the frame on screen."""

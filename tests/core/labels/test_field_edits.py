@@ -10,18 +10,15 @@ import pytest
 from sd2core.errors import Sd2Error
 from sd2core.labels.edits import Edit
 from sd2core.labels.field_edits import (
+    SpanField,
     accept,
     add_track,
     move_track,
     reject,
-    relabel,
     remove_track,
     rename_track,
-    set_author,
-    set_confidence,
-    set_note,
+    set_field,
     set_overlap,
-    set_track,
 )
 from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.timebase import Timebase
@@ -38,17 +35,19 @@ LABELS = Labels(
 
 
 @pytest.mark.parametrize(
-    ("edit", "field", "value"),
+    ("field", "value"),
     [
-        (lambda: relabel(LABELS, [1, 3], "left-to-right"), "label", "left-to-right"),
-        (lambda: set_note(LABELS, [1, 3], "clear"), "note", "clear"),
-        (lambda: set_author(LABELS, [1, 3], "B"), "author", "B"),
-        (lambda: set_confidence(LABELS, [1, 3], 0.2), "confidence", 0.2),
-        (lambda: set_track(LABELS, [1, 3], "Suggested"), "track", "Suggested"),
+        ("label", "left-to-right"),
+        ("note", "clear"),
+        ("author", "B"),
+        ("confidence", 0.2),
+        ("track", "Suggested"),
     ],
 )
-def test_one_field_changes(edit: Callable[[], Edit], field: str, value: object) -> None:
-    after = edit().labels
+def test_one_field_changes(field: SpanField, value: object) -> None:
+    edit = set_field(LABELS, [1, 3], field, value)
+    after = edit.labels
+    assert (edit.name, edit.ids) == (f"Change {field}", (1, 3))
     for span in LABELS.spans:
         expected = replace(span, **{field: value}) if span.id in (1, 3) else span
         assert after.span(span.id) == expected
@@ -57,11 +56,11 @@ def test_one_field_changes(edit: Callable[[], Edit], field: str, value: object) 
 
 def test_bad_values_are_refused() -> None:
     with pytest.raises(Sd2Error, match=r"confidence 1\.5.*0 to 1"):
-        set_confidence(LABELS, [1], 1.5)
+        set_field(LABELS, [1], "confidence", 1.5)
     with pytest.raises(Sd2Error, match="No track is called 'Feet'"):
-        set_track(LABELS, [1], "Feet")
+        set_field(LABELS, [1], "track", "Feet")
     with pytest.raises(Sd2Error, match=r"Span 1 .* and Span 2 .* overlap on 'Gestures'"):
-        set_track(LABELS, [2], "Gestures")
+        set_field(LABELS, [2], "track", "Gestures")
 
 
 class TestSuggestions:
