@@ -20,7 +20,7 @@ import hashlib
 import os
 from collections.abc import Container, Iterable
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import groupby
 from pathlib import Path
 
@@ -58,27 +58,24 @@ class Offer(Kept):
 
 @dataclass(frozen=True)
 class Found:
-    """Offers, the newest of a recording first, and notes on what could not be read."""
-
-    offers: tuple[Offer, ...] = ()
-    notes: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class Search:
-    """Content of the folder of one recording.
+    """Offers, the newest of a recording first, and notes on what could not be read.
 
     ``settled`` parts hold nothing but what the user's file holds as well; ``damaged`` ones are
     subject of a note, and no version of this program could offer them.
     """
 
-    found: Found
-    settled: tuple[Path, ...]
-    damaged: tuple[Path, ...]
+    offers: tuple[Offer, ...] = ()
+    notes: tuple[str, ...] = ()
+    settled: tuple[Path, ...] = field(default=(), compare=False)
+    damaged: tuple[Path, ...] = field(default=(), compare=False)
 
 
-def search(folder: Path, suffixes: Iterable[str], without: Container[int] = ()) -> Search:
-    """Read what sessions, except ``without``, left in a recording's folder, the newest first."""
+def search(folder: Path, *, declined: bool = False, without: Container[int] = ()) -> Found:
+    """Read what sessions, except ``without``, left in a recording's folder, the newest first.
+
+    ``declined`` ones only when asked for.
+    """
+    suffixes = (SUFFIX, DECLINED) if declined else (SUFFIX,)
     _make_private(folder, *(path for path in listed(folder) if path.is_file()))
     offers, notes = [], []
     settled: list[Path] = []
@@ -98,12 +95,12 @@ def search(folder: Path, suffixes: Iterable[str], without: Container[int] = ()) 
             if note:
                 notes.append(note)
             if replayed.edits:
-                declined = parts[0].suffix == DECLINED
-                offers.append(Offer(**vars(replayed), declined=declined, files=tuple(parts)))
+                discarded = parts[0].suffix == DECLINED
+                offers.append(Offer(**vars(replayed), declined=discarded, files=tuple(parts)))
             else:
                 (damaged if note else settled).extend(parts)
             break
-    return Search(Found(tuple(offers), tuple(notes)), tuple(settled), tuple(damaged))
+    return Found(tuple(offers), tuple(notes), tuple(settled), tuple(damaged))
 
 
 def _make_private(*paths: Path) -> None:
@@ -227,8 +224,7 @@ class RecoveryPlace:
 
     def offers(self, *, declined: bool = False) -> Found:
         """Find labels of earlier sessions; ``declined`` ones only when asked for."""
-        suffixes = (SUFFIX, DECLINED) if declined else (SUFFIX,)
-        return search(self._folder, suffixes, without=self._begun).found
+        return search(self._folder, declined=declined, without=self._begun)
 
     def begin(self, labels: Labels, recovered: Offer | None = None) -> Journal:
         """Begin a session, with the labels of the user's file or of an offer.
@@ -238,7 +234,7 @@ class RecoveryPlace:
         """
         self._check_held()
         remove_leftovers(self._folder)
-        earlier = search(self._folder, (SUFFIX,), without=self._begun)
+        earlier = self.offers()
         known = journals(self._folder, (SUFFIX, DECLINED, DAMAGED))
         session = max(map(session_of, known), default=0) + 1
         kept = Kept(self._recording, labels)
@@ -283,9 +279,8 @@ def offers_in(root: Path, *, declined: bool = False) -> Found:
 
     ``declined`` ones only when asked for.
     """
-    suffixes = (SUFFIX, DECLINED) if declined else (SUFFIX,)
     found = [
-        search(folder, suffixes).found
+        search(folder, declined=declined)
         for folder in listed(Path(root))
         if folder.is_dir() and not is_locked(folder / _LOCK_NAME)
     ]

@@ -82,7 +82,7 @@ class LabelAutosave(QObject):
             self.close()
             self.waiting = Found()
             self._others = edited_fields(recording)
-            self._begin_at(self._labelled_path, reread=True)
+            self._begin(reread=True)
         self._recording = recording
         self._labels.open(self._document.labels)
 
@@ -109,8 +109,8 @@ class LabelAutosave(QObject):
         """Path that names a recording's recoveries: its folder, or the file it was made from."""
         return next(iter(self._document.paths), UNTITLED)
 
-    def _begin_at(self, path: Path, *, reread: bool) -> None:
-        content = self._document.content
+    def _begin(self, *, reread: bool) -> None:
+        content, path = self._document.content, self._labelled_path
         beside = edit_lock(path) if content is not None and content.saved else None
         self._place = RecoveryPlace(self._root, path, beside)
         self._take(reread=reread)
@@ -140,11 +140,10 @@ class LabelAutosave(QObject):
         recording = self._document.recording
         if recording is None:
             return
-        path = self._labelled_path
         self._recording, self._others = recording, edited_fields(recording)
-        if self._place is None or self._place.recording != path.resolve():
+        if self._place is None or self._place.recording != self._labelled_path.resolve():
             self.close()
-            self._begin_at(path, reread=False)
+            self._begin(reread=False)
         elif self._journal is not None:
             # Unwritten, what is in the file is offered, found to be the same, and dropped.
             with suppress(OSError):

@@ -114,7 +114,7 @@ class LabelDragging(QObject):
     def _snapped(self, time_s: float, within_s: float, held: Collection[int] = ()) -> float:
         assert self._before is not None
         base = self._playback.timebase
-        return snap(self._before, base, time_s, within_s, ignore=held).time_s
+        return snap(self._before, base, time_s, within_s, ignore=held)
 
 
 class SpanDragger(QObject):

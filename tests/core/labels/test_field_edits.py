@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
 
 from sd2core.errors import Sd2Error
-from sd2core.labels.edits import Edit
 from sd2core.labels.field_edits import (
     SpanField,
     accept,
