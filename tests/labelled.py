@@ -88,9 +88,9 @@ def random_edit(labels: Labels, timebase: Timebase, rng: random.Random) -> Edit:
     side = rng.choice(("start", "end"))
     choices: list[Callable[[], Edit]] = [
         lambda: create(labels, timebase, track, time_s(), time_s(), label),
-        lambda: create(labels, timebase, track, near_s(), near_s(), label, author="B"),
+        lambda: create(labels, timebase, track, near_s(), near_s(), label),
         lambda: overwrite(labels, timebase, track, near_s(), near_s(), label),
-        lambda: duplicate(labels, timebase, [span_id], time_s(), rng.choice((None, track))),
+        lambda: duplicate(labels, timebase, [span_id], time_s()),
         lambda: delete(labels, some),
         lambda: resize(labels, timebase, span_id, side, near_s()),
         lambda: resize(labels, timebase, span_id, side, time_s()),
@@ -103,7 +103,6 @@ def random_edit(labels: Labels, timebase: Timebase, rng: random.Random) -> Edit:
         lambda: split(labels, timebase, span_id, near_s()),
         lambda: merge(labels, some),
         lambda: join_at(labels, timebase, span_id, rng.choice(ids or [1]), near_s()),
-        lambda: fill_gaps(labels, timebase, track, label, near_s(), near_s() + 0.5),
         lambda: field_edits.set_field(labels, some, "label", label),
         lambda: field_edits.set_field(labels, some, "note", rng.choice(("", "blurred", "sure?"))),
         lambda: field_edits.set_field(labels, some, "confidence", rng.choice((None, 0.5, 1.0))),
@@ -114,9 +113,7 @@ def random_edit(labels: Labels, timebase: Timebase, rng: random.Random) -> Edit:
         lambda: field_edits.move_track(labels, track, rng.randint(0, 2)),
         lambda: field_edits.rename_track(labels, track, rng.choice(("Left", "Right", "Both"))),
         lambda: field_edits.rename_label(labels, label, f"{label}'"),
-        lambda: field_edits.add_label(
-            labels, field_edits.new_label(labels.label_set), rng.choice((None, 0))
-        ),
+        lambda: field_edits.add_label(labels, field_edits.new_label(labels.label_set)),
         lambda: field_edits.remove_label(labels, label, rng.choice((None, NAMES[0]))),
         lambda: field_edits.move_label(labels, label, rng.randint(0, 3)),
         lambda: field_edits.set_colour(labels, label, rng.choice(("#0072b2", "#332288"))),
@@ -125,6 +122,7 @@ def random_edit(labels: Labels, timebase: Timebase, rng: random.Random) -> Edit:
     if rng.random() < 0.01:
         choices = [
             lambda: field_edits.remove_track(labels, track),
+            lambda: fill_gaps(labels, timebase, track, label),
             lambda: field_edits.add_track(labels, f"Track {rng.random()}", rng.choice(("free",))),
         ]
     try:

@@ -61,27 +61,16 @@ def create(
     start_s: float,
     end_s: float,
     label: str,
-    *,
-    author: str = "",
 ) -> Edit:
     """Create a span between two times, in either order, clipped to the free time of the track."""
     frames = Frames.of(timebase)
     part = clip_to_free(labels, track, frames.stretch(start_s, end_s), frames)
-    made = Span(labels.next_id, track, *part, label, author=author)
+    made = Span(labels.next_id, track, *part, label)
     return Edit("Create span", labels.with_spans([made]), (made.id,))
 
 
-def duplicate(
-    labels: Labels,
-    timebase: Timebase,
-    ids: Collection[int],
-    start_s: float,
-    track: str | None = None,
-) -> Edit:
-    """Copy spans so that the first copy begins at a time, or to another track.
-
-    Each is clipped to free time.
-    """
+def duplicate(labels: Labels, timebase: Timebase, ids: Collection[int], start_s: float) -> Edit:
+    """Copy spans so that the first copy begins at a time; each is clipped to free time."""
     frames, chosen = Frames.of(timebase), _chosen(labels, ids)
     after = labels
     made: list[int] = []
@@ -89,9 +78,8 @@ def duplicate(
         place_s = start_s + (span.start_s - chosen[0].start_s)
         # A recording has frames, so there is room.
         wanted = frames.placed(place_s, span.duration_s, frames.whole) or frames.whole
-        on = span.track if track is None else track
-        first_s, last_s = clip_to_free(after, on, wanted, frames)
-        copy = replace(span, id=after.next_id, track=on, start_s=first_s, end_s=last_s)
+        first_s, last_s = clip_to_free(after, span.track, wanted, frames)
+        copy = replace(span, id=after.next_id, start_s=first_s, end_s=last_s)
         after = after.with_spans([copy])
         made.append(copy.id)
     return Edit(_name("Duplicate", chosen), after, tuple(made))
@@ -227,29 +215,16 @@ def join_at(labels: Labels, timebase: Timebase, one_id: int, other_id: int, time
     return Edit("Let spans meet", labels.with_spans(met), (left.id, right.id))
 
 
-def fill_gaps(
-    labels: Labels,
-    timebase: Timebase,
-    track: str,
-    label: str,
-    start_s: float | None = None,
-    end_s: float | None = None,
-    *,
-    author: str = "",
-) -> Edit:
+def fill_gaps(labels: Labels, timebase: Timebase, track: str, label: str) -> Edit:
     """Create a span in every gap of a track that holds a frame, e.g. of background.
 
-    Gaps before the first and after the last span count; ``start_s`` and ``end_s`` limit it
-    to a part of the recording.
+    Gaps before the first and after the last span count.
     """
     frames = Frames.of(timebase)
     labels.track(track)
-    low_s, high_s = frames.whole
-    low_s = low_s if start_s is None else frames.nearest(start_s)
-    high_s = high_s if end_s is None else frames.nearest(end_s)
-    gaps = [gap for gap in free_parts(labels, track, (low_s, high_s)) if frames.held(*gap)]
+    gaps = [gap for gap in free_parts(labels, track, frames.whole) if frames.held(*gap)]
     free_id = labels.next_id
-    made = [Span(free_id + k, track, *gap, label, author=author) for k, gap in enumerate(gaps)]
+    made = [Span(free_id + k, track, *gap, label) for k, gap in enumerate(gaps)]
     return Edit("Fill gaps", labels.with_spans(made), tuple(span.id for span in made))
 
 
@@ -260,8 +235,6 @@ def overwrite(
     start_s: float,
     end_s: float,
     label: str,
-    *,
-    author: str = "",
 ) -> Edit:
     """Create a span between two times, cutting away other spans of the track there.
 
@@ -269,7 +242,7 @@ def overwrite(
     """
     frames = Frames.of(timebase)
     labels.track(track)
-    made = Span(labels.next_id, track, *frames.stretch(start_s, end_s), label, author=author)
+    made = Span(labels.next_id, track, *frames.stretch(start_s, end_s), label)
     free_id = made.id + 1
     put, gone = [made], set()
     for span in labels.of_track(track):

@@ -146,13 +146,10 @@ def tidied(labels: Labels) -> Labels:
     return replace(labels, tracks=tuple(one for one in labels.tracks if one.name != TRACK))
 
 
-def add_track(
-    labels: Labels, name: str, overlap: Overlap = "exclusive", place: int | None = None
-) -> Edit:
-    """Add a track, below the others or at a place among them (0: at the top)."""
-    tracks = list(labels.tracks)
-    tracks.insert(len(tracks) if place is None else place, LabelTrack(name, overlap))
-    return _edit("Add track", labels, replace(labels, tracks=tuple(tracks)))
+def add_track(labels: Labels, name: str, overlap: Overlap = "exclusive") -> Edit:
+    """Add a track, below the others."""
+    tracks = (*labels.tracks, LabelTrack(name, overlap))
+    return _edit("Add track", labels, replace(labels, tracks=tracks))
 
 
 def rename_track(labels: Labels, old: str, new: str) -> Edit:
@@ -218,11 +215,9 @@ def new_label(label_set: LabelSet) -> Label:
     )
 
 
-def add_label(labels: Labels, label: Label, place: int | None = None) -> Edit:
-    """Add a label, after the others or at a place among them (0: first)."""
-    offered = list(labels.label_set.labels)
-    offered.insert(len(offered) if place is None else place, label)
-    return _edit("Add label", labels, _with_set(labels, offered))
+def add_label(labels: Labels, label: Label) -> Edit:
+    """Add a label, after the others."""
+    return _edit("Add label", labels, _with_set(labels, [*labels.label_set.labels, label]))
 
 
 def rename_label(labels: Labels, old: str, new: str) -> Edit:

@@ -85,14 +85,9 @@ class TestSuggestions:
 
 
 class TestTracks:
-    def test_added_below_or_in_between(self) -> None:
-        assert [t.name for t in add_track(LABELS, "C").labels.tracks][-1] == "C"
-        added = add_track(LABELS, "C", "free", 1).labels.tracks
-        assert added == (
-            LabelTrack("Gestures"),
-            LabelTrack("C", "free"),
-            LabelTrack("Suggested", "free"),
-        )
+    def test_added_below(self) -> None:
+        assert add_track(LABELS, "C").labels.tracks == (*LABELS.tracks, LabelTrack("C"))
+        assert add_track(LABELS, "C", "free").labels.tracks[-1] == LabelTrack("C", "free")
         with pytest.raises(Sd2Error, match="a name of its own"):
             add_track(LABELS, "Gestures")
 
