@@ -108,7 +108,7 @@ def random_edit(labels: Labels, timebase: Timebase, rng: random.Random) -> Edit:
         lambda: field_edits.set_field(labels, some, "confidence", rng.choice((None, 0.5, 1.0))),
         lambda: field_edits.set_field(labels, some, "author", "C"),
         lambda: field_edits.set_field(labels, some, "track", track),
-        lambda: field_edits.accept(labels, timebase, some, track),
+        lambda: field_edits.take(labels, timebase, some, track, label),
         lambda: field_edits.set_overlap(labels, track, rng.choice(("exclusive", "free"))),
         lambda: field_edits.move_track(labels, track, rng.randint(0, 2)),
         lambda: field_edits.rename_track(labels, track, rng.choice(("Left", "Right", "Both"))),

@@ -34,34 +34,6 @@ def set_field(labels: Labels, ids: Iterable[int], field: SpanField, value: Any) 
     return Edit(f"Change {field}", labels.with_spans(changed), tuple(one.id for one in changed))
 
 
-def accept(
-    labels: Labels, timebase: Timebase, ids: Iterable[int], track: str | None = None
-) -> Edit:
-    """Accept suggestions as spans of the user, on another track if one is named.
-
-    There they are clipped like new spans to the longest free part, in the order of time. Raises
-    Sd2Error when one is no suggestion, or no frame of it is free; none is accepted then.
-    """
-    frames, after = Frames.of(timebase), labels
-    chosen = _suggestions(labels, ids)
-    for span in chosen:
-        place: dict[str, Any] = {}
-        if track is not None and track != span.track:
-            part = clip_to_free(after, track, (span.start_s, span.end_s), frames)
-            place = {"track": track, "start_s": part[0], "end_s": part[1]}
-        taken = replace(span, origin="person", **place)
-        after = after.with_spans([taken])
-    return Edit(_name("Accept", len(chosen)), after, tuple(one.id for one in chosen))
-
-
-def _suggestions(labels: Labels, ids: Iterable[int]) -> list[Span]:
-    chosen = labels.these(ids)
-    for span in chosen:
-        if span.origin != "suggestion":
-            raise Sd2Error(f"{span.words()} is of origin {span.origin!r}", "a suggestion")
-    return chosen
-
-
 def _name(verb: str, count: int) -> str:
     return f"{verb} suggestion" if count == 1 else f"{verb} {count} suggestions"
 
@@ -108,26 +80,33 @@ def take(
     *,
     keep_known: bool = False,
 ) -> Edit:
-    """Accept suggestions on a track and with a label.
+    """Accept suggestions as spans of the user, on a track and with a label.
 
-    A track that is not there is added. Those for which it has no free time stay suggestions.
-    ``keep_known`` keeps the label of suggestions that name a gesture or a label of the set. Raises
-    Sd2Error when one is no suggestion, or none has free time.
+    A track that is not there is added. On another track than their own they are clipped like new
+    spans to the longest free part, in the order given; those for which there is none stay
+    suggestions. ``keep_known`` keeps the label of suggestions that name a gesture or a label of the
+    set. Raises Sd2Error when one is no suggestion, or none has free time.
     """
+    frames = Frames.of(timebase)
     after, done, refusal = labels, [], None
     if track not in {one.name for one in labels.tracks}:
         after = replace(labels, tracks=(LabelTrack(track), *labels.tracks))
-    for one in ids:
-        span = labels.span(one)
+    for span in [labels.span(one) for one in dict.fromkeys(ids)]:
+        start_s, end_s = span.start_s, span.end_s
         try:
-            after = accept(after, timebase, [one], track).labels
+            _check_suggestion(span)
+            if track != span.track:
+                start_s, end_s = clip_to_free(after, track, (start_s, end_s), frames)
         except Sd2Error as error:
             refusal = refusal or error
             continue
-        done.append(one)
         known = span.label != LABEL or labels.label_set.find(span.label) is not None
-        if not (keep_known and known):
-            after = set_field(after, [one], "label", label).labels
+        given = span.label if keep_known and known else label
+        taken = replace(
+            span, track=track, start_s=start_s, end_s=end_s, label=given, origin="person"
+        )
+        after = after.with_spans([taken])
+        done.append(span.id)
     if refusal is not None and not done:
         raise refusal
     return Edit(_name("Accept", len(done)), tidied(after), tuple(done))
@@ -135,8 +114,16 @@ def take(
 
 def reject(labels: Labels, ids: Iterable[int]) -> Edit:
     """Delete suggestions, and nothing else by mistake."""
-    gone = {span.id for span in _suggestions(labels, ids)}
-    return Edit(_name("Reject", len(gone)), tidied(labels.with_spans(without=gone)))
+    gone = labels.these(ids)
+    for span in gone:
+        _check_suggestion(span)
+    after = labels.with_spans(without={span.id for span in gone})
+    return Edit(_name("Reject", len(gone)), tidied(after))
+
+
+def _check_suggestion(span: Span) -> None:
+    if span.origin != "suggestion":
+        raise Sd2Error(f"{span.words()} is of origin {span.origin!r}", "a suggestion")
 
 
 def tidied(labels: Labels) -> Labels:

@@ -9,7 +9,6 @@ import pytest
 from sd2core.errors import Sd2Error
 from sd2core.labels.field_edits import (
     SpanField,
-    accept,
     add_track,
     move_track,
     reject,
@@ -17,6 +16,7 @@ from sd2core.labels.field_edits import (
     rename_track,
     set_field,
     set_overlap,
+    take,
 )
 from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.timebase import Timebase
@@ -63,23 +63,26 @@ def test_bad_values_are_refused() -> None:
 
 class TestSuggestions:
     def test_accepted_it_is_a_persons(self) -> None:
-        edit = accept(LABELS, FRAMES, [2])
+        edit = take(LABELS, FRAMES, [2], "Suggested", "wave", keep_known=True)
         assert edit.labels.span(2) == replace(LABELS.span(2), origin="person")
         assert edit.name == "Accept suggestion"
 
     def test_on_another_track_it_takes_the_free_part(self) -> None:
-        after = accept(LABELS, FRAMES, [2], "Gestures").labels
+        after = take(LABELS, FRAMES, [2], "Gestures", "wave").labels
         assert (after.span(2).track, after.span(2).start_s, after.span(2).end_s) == (
             "Gestures", 2.0, 2.5,
         )  # fmt: skip
 
-    def test_all_or_none(self) -> None:
+    def test_without_room_the_refusal_says_where(self) -> None:
         with pytest.raises(Sd2Error, match=r"From 1\.600 to 1\.900 s every frame has a span"):
-            accept(LABELS, FRAMES, [2, 3], "Gestures")
+            take(LABELS, FRAMES, [3], "Gestures", "wave")
 
     def test_rejected_it_is_gone(self) -> None:
         assert [span.id for span in reject(LABELS, [2, 3]).labels.spans] == [1]
-        for edit in (lambda: reject(LABELS, [1]), lambda: accept(LABELS, FRAMES, [1])):
+        for edit in (
+            lambda: reject(LABELS, [1]),
+            lambda: take(LABELS, FRAMES, [1], "Gestures", "wave"),
+        ):
             with pytest.raises(Sd2Error, match=r"Span 1 .*origin 'person'. Expected: a sugg"):
                 edit()
 
