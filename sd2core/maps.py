@@ -514,7 +514,7 @@ def draw_cells(
 
     Returns what a colour bar is made for. ``present`` is False in frames without a person.
     """
-    times_s = np.append(timebase.times_s, timebase.end_s)
+    times_s = timebase.edges_s
     axes.set_facecolor(_NOTHING)
     shown = axes.pcolormesh(
         times_s,

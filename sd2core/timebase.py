@@ -86,6 +86,13 @@ class Timebase:
         """Typical (median) time from one frame to the next; 1/30 s for a single frame."""
         return float(np.median(np.diff(self.times_s))) if len(self) > 1 else 1.0 / 30.0
 
+    @cached_property
+    def edges_s(self) -> NDArray[np.float64]:
+        """Times at which frames begin, and the end of the last one, (T + 1,)."""
+        edges_s = np.append(self.times_s, self.end_s)
+        edges_s.flags.writeable = False
+        return edges_s
+
     @property
     def frames_per_s(self) -> float:
         """Typical frame rate."""
@@ -124,10 +131,6 @@ class Timebase:
         if not 0 <= frame < len(self):
             raise IndexError(f"frame {frame} of {len(self)}")
         return float(self.times_s[frame])
-
-    def end_of(self, frame: int) -> float:
-        """End of ``frame``, which must exist: the time of the next, or the end of all."""
-        return self.end_s if frame + 1 == len(self) else self.time_of(frame + 1)
 
     def frames_between(self, start_s: float, end_s: float) -> tuple[int, int]:
         """Half-open range of frames on screen during ``[start_s, end_s)``."""

@@ -39,7 +39,7 @@ def edit_on(root: Path, told: int) -> None:
     labels = offers[0].labels if offers else START
     session = place.begin(labels, offers[0] if offers else None)
     while True:
-        number = session.unsaved
+        number = session.kept.edits
         labels = after(labels, number)
         session.write("Edit", labels)
         os.write(told, b"%d\n" % (number + 1))

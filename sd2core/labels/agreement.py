@@ -105,10 +105,7 @@ def frame_agreement(a: Sequence[Span], b: Sequence[Span], timebase: Timebase) ->
     labels = sorted({span.label for span in (*a, *b)})
     held_a, held_b = (held_labels(spans, labels, timebase) for spans in (a, b))  # (labels, T)
     kinds, kind = np.unique(np.hstack([held_a, held_b]), axis=1, return_inverse=True)
-    said = [
-        tuple(label for label, holds in zip(labels, one, strict=True) if holds)
-        for one in kinds.T.tolist()
-    ]
+    said = [_answer(labels, one) for one in kinds.T]
     answers = tuple(sorted({(), *said}))
     numbers = np.array([answers.index(answer) for answer in said])[kind.ravel()]
     frames = len(timebase)
@@ -143,6 +140,10 @@ def held_labels(spans: Sequence[Span], labels: list[str], timebase: Timebase) ->
     for span, (first, stop) in zip(spans, edges, strict=True):
         held[rows[span.label], first:stop] = True
     return held
+
+
+def _answer(labels: list[str], held: NDArray[np.bool_]) -> Answer:
+    return tuple(label for label, holds in zip(labels, held.tolist(), strict=True) if holds)
 
 
 def _confusion(a: NDArray[np.int64], b: NDArray[np.int64], answers: int) -> NDArray[np.int64]:
@@ -189,11 +190,9 @@ def disagreements(
         both = held[:, :, start:stop].reshape(-1, stop - start)
         answers, counts = np.unique(both, axis=1, return_counts=True)
         usual = answers[:, int(np.argmax(counts))].reshape(2, -1)
-        said = [
-            tuple(label for label, there in zip(labels, row, strict=True) if there) for row in usual
-        ]
-        edges_s = timebase.time_of(start), timebase.end_of(stop - 1)
-        found.append(Disagreement(*edges_s, stop - start, said[0], said[1]))
+        said = [_answer(labels, row) for row in usual]
+        start_s, end_s = timebase.edges_s[[start, stop]].tolist()
+        found.append(Disagreement(start_s, end_s, stop - start, said[0], said[1]))
     return tuple(found)
 
 

@@ -29,6 +29,7 @@ from typing import Literal
 from sd2core.errors import Sd2Error
 from sd2core.labels.free_time import (
     Frames,
+    Stretch,
     clip_to_free,
     free_parts,
     limits_of,
@@ -60,29 +61,28 @@ def create(
     start_s: float,
     end_s: float,
     label: str,
-    *,
-    author: str = "",
 ) -> Edit:
     """Create a span between two times, in either order, clipped to the free time of the track."""
     frames = Frames.of(timebase)
     part = clip_to_free(labels, track, frames.stretch(start_s, end_s), frames)
-    made = Span(labels.next_id, track, *part, label, author=author)
+    made = Span(labels.next_id, track, *part, label)
     return Edit("Create span", labels.with_spans([made]), (made.id,))
 
 
 def duplicate(labels: Labels, timebase: Timebase, ids: Collection[int], start_s: float) -> Edit:
     """Copy spans so that the first copy begins at a time; each is clipped to free time."""
-    frames = Frames.of(timebase)
-    chosen = labels.these(ids)
-    after, made = labels, []
+    frames, chosen = Frames.of(timebase), _chosen(labels, ids)
+    after = labels
+    made: list[int] = []
     for span in chosen:
-        place_s = start_s + span.start_s - chosen[0].start_s
+        place_s = start_s + (span.start_s - chosen[0].start_s)
         # A recording has frames, so there is room.
         wanted = frames.placed(place_s, span.duration_s, frames.whole) or frames.whole
         first_s, last_s = clip_to_free(after, span.track, wanted, frames)
-        made.append(replace(span, id=after.next_id, start_s=first_s, end_s=last_s))
-        after = after.with_spans(made[-1:])
-    return Edit(_name("Duplicate", chosen), after, tuple(span.id for span in made))
+        copy = replace(span, id=after.next_id, start_s=first_s, end_s=last_s)
+        after = after.with_spans([copy])
+        made.append(copy.id)
+    return Edit(_name("Duplicate", chosen), after, tuple(made))
 
 
 def delete(labels: Labels, ids: Iterable[int]) -> Edit:
@@ -108,41 +108,49 @@ def resize(labels: Labels, timebase: Timebase, span_id: int, side: Side, time_s:
     return Edit(f"Move {side} of span", labels.with_spans([changed]), (span_id,))
 
 
-def move(labels: Labels, timebase: Timebase, span_id: int, start_s: float) -> Edit:
-    """Move a span to begin at a time, keeping its duration; it stops at neighbours."""
+def move(
+    labels: Labels, timebase: Timebase, ids: Collection[int], lead_id: int, start_s: float
+) -> Edit:
+    """Move spans so that one of them, the dragged one, begins at a time.
+
+    One alone keeps its duration; several keep their order and their contacts.
+    """
     frames = Frames.of(timebase)
-    span = labels.span(span_id)
-    (limits,) = limits_of(labels, [span], frames)
-    place = frames.placed(start_s, span.duration_s, limits)
-    changed = _timed(span, *(place or (span.start_s, span.end_s)), frames)
-    return Edit("Move span", labels.with_spans([changed]), (span_id,))
+    chosen = _chosen(labels, {*ids, lead_id})
+    limits = limits_of(labels, chosen, frames)
+    if len(chosen) == 1:
+        (span,), (room,) = chosen, limits
+        place = frames.placed(start_s, span.duration_s, room)
+        moved = [_timed(span, *(place or (span.start_s, span.end_s)), frames)]
+    else:
+        by_s = frames.nearest(start_s) - labels.span(lead_id).start_s
+        moved = _moved_by(by_s, chosen, limits, frames)
+    return Edit(_name("Move", moved), labels.with_spans(moved), tuple(one.id for one in moved))
 
 
 def nudge(labels: Labels, timebase: Timebase, ids: Collection[int], count: int) -> Edit:
     """Move spans by some frames, each keeping their number; they stop at neighbours.
 
-    Where frames are not evenly spaced durations change, and a step back restores them. A span
-    between frames, moved by itself, goes to them with the first step.
+    Where frames are not evenly spaced their durations change, and a step back restores them. A
+    span alone that is between frames goes to them with the first step.
     """
     frames = Frames.of(timebase)
-    chosen = labels.these(ids)
+    chosen = _chosen(labels, ids)
     limits = limits_of(labels, chosen, frames)
-    free = [
-        steps_free(frames, span, limit, count) for span, limit in zip(chosen, limits, strict=True)
-    ]
-    count = min(free, key=abs, default=0)
-    ids = tuple(span.id for span in chosen)
-    if count == 0:
-        return Edit(_name("Nudge", chosen), labels, ids)
     alone = len(chosen) == 1
+    free = [
+        steps_free(frames, span, room, count) for span, room in zip(chosen, limits, strict=True)
+    ]
+    count = min(free, key=abs)
     moved = []
-    for span, (_, high_s) in zip(chosen, limits, strict=True):
-        start_s, end_s = frames.stepped(span.start_s, count), frames.stepped(span.end_s, count)
-        if alone and not frames.held(start_s, end_s):
+    for span, (_, high_s) in zip(chosen, limits, strict=True) if count else ():
+        start_s, end_s = (frames.stepped(time_s, count) for time_s in (span.start_s, span.end_s))
+        if alone and not frames.held(start_s, end_s):  # one that lay between two frames
             start_s, end_s = frames.stretch(start_s, start_s)
             end_s = min(end_s, high_s)
-        moved.append((_timed if alone else _put)(span, start_s, end_s, frames))
-    return Edit(_name("Nudge", chosen), labels.with_spans(moved), ids)
+        moved.append(_timed(span, start_s, end_s, frames, alone=alone))
+    after = labels.with_spans(moved)
+    return Edit(_name("Nudge", chosen), after, tuple(one.id for one in chosen))
 
 
 def split(labels: Labels, timebase: Timebase, span_id: int, time_s: float) -> Edit:
@@ -207,29 +215,16 @@ def join_at(labels: Labels, timebase: Timebase, one_id: int, other_id: int, time
     return Edit("Let spans meet", labels.with_spans(met), (left.id, right.id))
 
 
-def fill_gaps(
-    labels: Labels,
-    timebase: Timebase,
-    track: str,
-    label: str,
-    start_s: float | None = None,
-    end_s: float | None = None,
-    *,
-    author: str = "",
-) -> Edit:
+def fill_gaps(labels: Labels, timebase: Timebase, track: str, label: str) -> Edit:
     """Create a span in every gap of a track that holds a frame, e.g. of background.
 
-    Gaps before the first and after the last span count; ``start_s`` and ``end_s`` limit it
-    to a part of the recording.
+    Gaps before the first and after the last span count.
     """
     frames = Frames.of(timebase)
     labels.track(track)
-    low_s, high_s = frames.whole
-    low_s = low_s if start_s is None else frames.nearest(start_s)
-    high_s = high_s if end_s is None else frames.nearest(end_s)
-    gaps = [gap for gap in free_parts(labels, track, (low_s, high_s)) if frames.held(*gap)]
+    gaps = [gap for gap in free_parts(labels, track, frames.whole) if frames.held(*gap)]
     free_id = labels.next_id
-    made = [Span(free_id + k, track, *gap, label, author=author) for k, gap in enumerate(gaps)]
+    made = [Span(free_id + k, track, *gap, label) for k, gap in enumerate(gaps)]
     return Edit("Fill gaps", labels.with_spans(made), tuple(span.id for span in made))
 
 
@@ -240,8 +235,6 @@ def overwrite(
     start_s: float,
     end_s: float,
     label: str,
-    *,
-    author: str = "",
 ) -> Edit:
     """Create a span between two times, cutting away other spans of the track there.
 
@@ -249,7 +242,7 @@ def overwrite(
     """
     frames = Frames.of(timebase)
     labels.track(track)
-    made = Span(labels.next_id, track, *frames.stretch(start_s, end_s), label, author=author)
+    made = Span(labels.next_id, track, *frames.stretch(start_s, end_s), label)
     free_id = made.id + 1
     put, gone = [made], set()
     for span in labels.of_track(track):
@@ -263,46 +256,44 @@ def overwrite(
     return Edit("Create span over others", labels.with_spans(put, without=gone), (made.id,))
 
 
-def _timed(span: Span, start_s: float, end_s: float, frames: Frames) -> Span:
-    if not frames.held(start_s, end_s):
+def _moved_by(
+    by_s: float, chosen: Sequence[Span], limits: Sequence[Stretch], frames: Frames
+) -> list[Span]:
+    """Several spans moved by a time, as far as all of them can go, each edge to the nearest."""
+    pairs = list(zip(chosen, limits, strict=True))
+    earliest_s = max(low_s - span.start_s for span, (low_s, _) in pairs)
+    latest_s = min(high_s - span.end_s for span, (_, high_s) in pairs)
+    # Whoever lies outside (an import) is not in the way of the others.
+    by_s = min(max(by_s, min(earliest_s, 0.0)), max(latest_s, 0.0))
+    moved = []
+    for span, (low_s, high_s) in pairs:
+        start_s, end_s = (frames.nearest(edge + by_s) for edge in (span.start_s, span.end_s))
+        start_s, end_s = max(start_s, low_s), min(end_s, high_s)
+        moved.append(_timed(span, start_s, end_s, frames, alone=False))
+    return moved if by_s else [*chosen]
+
+
+def _timed(span: Span, start_s: float, end_s: float, frames: Frames, *, alone: bool = True) -> Span:
+    if frames.held(start_s, end_s):
+        return replace(span, start_s=start_s, end_s=end_s)
+    if alone:
         raise Sd2Error(
             f"{span.words()} has no room for a frame",
             "room for one frame on its track, inside the recording",
             "Move or delete the spans beside it",
         )
-    return replace(span, start_s=start_s, end_s=end_s)
+    raise Sd2Error(
+        f"{span.words()} would hold no frame there",
+        "a place where each of the spans holds one",
+        "Move it by itself",
+    )
 
 
-def move_together(
-    labels: Labels, timebase: Timebase, ids: Collection[int], lead_id: int, start_s: float
-) -> Edit:
-    """Move spans so that one of them, the dragged one, begins at a time."""
-    frames = Frames.of(timebase)
-    chosen = labels.these({*ids, lead_id})
-    lead = labels.span(lead_id)
-    limits = limits_of(labels, chosen, frames)
-    earliest_s = max(low_s - span.start_s for span, (low_s, _) in zip(chosen, limits, strict=True))
-    latest_s = min(high_s - span.end_s for span, (_, high_s) in zip(chosen, limits, strict=True))
-    by_s = frames.nearest(start_s) - lead.start_s
-    # Whoever lies outside (an import) is not in the way of the others.
-    by_s = min(max(by_s, min(earliest_s, 0.0)), max(latest_s, 0.0))
-    moved = []
-    for span, (low_s, high_s) in zip(chosen, limits, strict=True):
-        first_s, last_s = (frames.nearest(edge + by_s) for edge in (span.start_s, span.end_s))
-        moved.append(_put(span, max(first_s, low_s), min(last_s, high_s), frames))
-    if by_s == 0.0:
-        moved = chosen
-    return Edit(_name("Move", moved), labels.with_spans(moved), tuple(one.id for one in moved))
-
-
-def _put(span: Span, start_s: float, end_s: float, frames: Frames) -> Span:
-    if not frames.held(start_s, end_s):
-        raise Sd2Error(
-            f"{span.words()} would hold no frame there",
-            "a place where each of the spans holds one",
-            "Move it by itself",
-        )
-    return replace(span, start_s=start_s, end_s=end_s)
+def _chosen(labels: Labels, ids: Collection[int]) -> list[Span]:
+    chosen = labels.these(ids)
+    if not chosen:
+        raise Sd2Error("0 of 0 spans are there", "spans that exist")
+    return chosen
 
 
 def _name(verb: str, spans: Sequence[Span]) -> str:

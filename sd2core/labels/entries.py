@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, NonNegativeInt
 
-from sd2core.labels.label_set import Label, LabelSet
+from sd2core.labels.label_set import LabelSet
 from sd2core.labels.spans import Labels, LabelTrack, Origin, ShownFrames, Span
 from sd2core.timebase import Timebase
 
@@ -45,7 +45,7 @@ class SpanEntry(Entry):
 
     def made(self) -> Span:
         """Make the span."""
-        return Span(**{name: getattr(self, name) for name in _SPAN_FIELDS})
+        return Span(**{name: getattr(self, name) for name in _SPAN_DEFAULTS})
 
 
 class LabelsEntry(Entry):
@@ -60,13 +60,14 @@ class LabelsEntry(Entry):
         return Labels(self.tracks, tuple(entry.made() for entry in self.spans), self.label_set)
 
 
-_SPAN_FIELDS = {field.name: field.default for field in fields(Span)}
+_SPAN_DEFAULTS = {field.name: field.default for field in fields(Span)}
+"""Names of all fields; those that a span must have are never at their default."""
 
 
 def span_entry(span: Span, frames: ShownFrames | None = None) -> dict[str, Any]:
     """Encode a span; fields at their defaults are left out."""
     entry: dict[str, Any] = {}
-    for name, default in _SPAN_FIELDS.items():
+    for name, default in _SPAN_DEFAULTS.items():
         value = getattr(span, name)
         if value != default:
             entry[name] = value
@@ -77,14 +78,12 @@ def span_entry(span: Span, frames: ShownFrames | None = None) -> dict[str, Any]:
 
 def track_entries(tracks: tuple[LabelTrack, ...]) -> list[dict[str, Any]]:
     """Encode tracks."""
-    return [{"name": track.name, "overlap": track.overlap} for track in tracks]
+    return [asdict(track) for track in tracks]
 
 
 def label_set_entry(label_set: LabelSet) -> dict[str, Any]:
     """Encode a label set."""
-    names = [field.name for field in fields(Label)]
-    labels = [{name: getattr(label, name) for name in names} for label in label_set.labels]
-    return {"name": label_set.name, "labels": labels}
+    return {"name": label_set.name, "labels": [asdict(label) for label in label_set.labels]}
 
 
 def labels_entry(labels: Labels, timebase: Timebase | None = None) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import count
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -19,67 +19,19 @@ from sd2core.labels.spans import Labels, LabelTrack, Overlap, Span
 from sd2core.labels.suggest import LABEL, TRACK
 from sd2core.timebase import Timebase
 
-
-def relabel(labels: Labels, ids: Iterable[int], label: str) -> Edit:
-    """Give spans another label."""
-    return _with(labels, ids, "Change label", label=label)
+SpanField = Literal["label", "note", "author", "confidence", "track"]
 
 
-def set_note(labels: Labels, ids: Iterable[int], note: str) -> Edit:
-    """Set the note of spans; an empty one removes it."""
-    return _with(labels, ids, "Change note", note=note)
+def set_field(labels: Labels, ids: Iterable[int], field: SpanField, value: Any) -> Edit:
+    """Set one field of spans, at the times they have.
 
-
-def set_author(labels: Labels, ids: Iterable[int], author: str) -> Edit:
-    """Set the author of spans."""
-    return _with(labels, ids, "Change author", author=author)
-
-
-def set_confidence(labels: Labels, ids: Iterable[int], confidence: float | None) -> Edit:
-    """Set the confidence of spans, 0 to 1 or None for unknown."""
-    return _with(labels, ids, "Change confidence", confidence=confidence)
-
-
-def set_track(labels: Labels, ids: Iterable[int], track: str) -> Edit:
-    """Put spans on another track, at the times they have.
-
-    Raises Sd2Error when they would overlap on an exclusive track; the message names both spans.
+    An empty note removes it; a confidence is 0 to 1, or None for unknown. Raises Sd2Error when
+    spans would overlap on an exclusive track; the message names both.
     """
-    labels.track(track)
-    return _with(labels, ids, "Change track", track=track)
-
-
-def accept(
-    labels: Labels, timebase: Timebase, ids: Iterable[int], track: str | None = None
-) -> Edit:
-    """Accept suggestions as spans of the user, on another track if one is named.
-
-    There they are clipped like new spans to the longest free part, in the order of time. Raises
-    Sd2Error when one is no suggestion, or no frame of it is free; none is accepted then.
-    """
-    frames, after = Frames.of(timebase), labels
-    chosen = _suggestions(labels, ids)
-    for span in chosen:
-        place: dict[str, Any] = {}
-        if track is not None and track != span.track:
-            part = clip_to_free(after, track, (span.start_s, span.end_s), frames)
-            place = {"track": track, "start_s": part[0], "end_s": part[1]}
-        taken = replace(span, origin="person", **place)
-        after = after.with_spans([taken])
-    return Edit(_name("Accept", len(chosen)), after, tuple(one.id for one in chosen))
-
-
-def _with(labels: Labels, ids: Iterable[int], name: str, **fields: Any) -> Edit:
-    changed = [replace(span, **fields) for span in labels.these(ids)]
-    return Edit(name, labels.with_spans(changed), tuple(span.id for span in changed))
-
-
-def _suggestions(labels: Labels, ids: Iterable[int]) -> list[Span]:
-    chosen = labels.these(ids)
-    for span in chosen:
-        if span.origin != "suggestion":
-            raise Sd2Error(f"{span.words()} is of origin {span.origin!r}", "a suggestion")
-    return chosen
+    if field == "track":
+        labels.track(value)
+    changed = [replace(span, **{field: value}) for span in labels.these(ids)]
+    return Edit(f"Change {field}", labels.with_spans(changed), tuple(one.id for one in changed))
 
 
 def _name(verb: str, count: int) -> str:
@@ -128,26 +80,33 @@ def take(
     *,
     keep_known: bool = False,
 ) -> Edit:
-    """Accept suggestions on a track and with a label.
+    """Accept suggestions as spans of the user, on a track and with a label.
 
-    A track that is not there is added. Those for which it has no free time stay suggestions.
-    ``keep_known`` keeps the label of suggestions that name a gesture or a label of the set. Raises
-    Sd2Error when one is no suggestion, or none has free time.
+    A track that is not there is added. On another track than their own they are clipped like new
+    spans to the longest free part, in the order given; those for which there is none stay
+    suggestions. ``keep_known`` keeps the label of suggestions that name a gesture or a label of the
+    set. Raises Sd2Error when one is no suggestion, or none has free time.
     """
+    frames = Frames.of(timebase)
     after, done, refusal = labels, [], None
     if track not in {one.name for one in labels.tracks}:
         after = replace(labels, tracks=(LabelTrack(track), *labels.tracks))
-    for one in ids:
-        span = labels.span(one)
+    for span in [labels.span(one) for one in dict.fromkeys(ids)]:
+        start_s, end_s = span.start_s, span.end_s
         try:
-            after = accept(after, timebase, [one], track).labels
+            _check_suggestion(span)
+            if track != span.track:
+                start_s, end_s = clip_to_free(after, track, (start_s, end_s), frames)
         except Sd2Error as error:
             refusal = refusal or error
             continue
-        done.append(one)
         known = span.label != LABEL or labels.label_set.find(span.label) is not None
-        if not (keep_known and known):
-            after = relabel(after, [one], label).labels
+        given = span.label if keep_known and known else label
+        taken = replace(
+            span, track=track, start_s=start_s, end_s=end_s, label=given, origin="person"
+        )
+        after = after.with_spans([taken])
+        done.append(span.id)
     if refusal is not None and not done:
         raise refusal
     return Edit(_name("Accept", len(done)), tidied(after), tuple(done))
@@ -155,8 +114,16 @@ def take(
 
 def reject(labels: Labels, ids: Iterable[int]) -> Edit:
     """Delete suggestions, and nothing else by mistake."""
-    gone = {span.id for span in _suggestions(labels, ids)}
-    return Edit(_name("Reject", len(gone)), tidied(labels.with_spans(without=gone)))
+    gone = labels.these(ids)
+    for span in gone:
+        _check_suggestion(span)
+    after = labels.with_spans(without={span.id for span in gone})
+    return Edit(_name("Reject", len(gone)), tidied(after))
+
+
+def _check_suggestion(span: Span) -> None:
+    if span.origin != "suggestion":
+        raise Sd2Error(f"{span.words()} is of origin {span.origin!r}", "a suggestion")
 
 
 def tidied(labels: Labels) -> Labels:
@@ -166,13 +133,10 @@ def tidied(labels: Labels) -> Labels:
     return replace(labels, tracks=tuple(one for one in labels.tracks if one.name != TRACK))
 
 
-def add_track(
-    labels: Labels, name: str, overlap: Overlap = "exclusive", place: int | None = None
-) -> Edit:
-    """Add a track, below the others or at a place among them (0: at the top)."""
-    tracks = list(labels.tracks)
-    tracks.insert(len(tracks) if place is None else place, LabelTrack(name, overlap))
-    return _edit("Add track", labels, replace(labels, tracks=tuple(tracks)))
+def add_track(labels: Labels, name: str, overlap: Overlap = "exclusive") -> Edit:
+    """Add a track, below the others."""
+    tracks = (*labels.tracks, LabelTrack(name, overlap))
+    return _edit("Add track", labels, replace(labels, tracks=tracks))
 
 
 def rename_track(labels: Labels, old: str, new: str) -> Edit:
@@ -238,11 +202,9 @@ def new_label(label_set: LabelSet) -> Label:
     )
 
 
-def add_label(labels: Labels, label: Label, place: int | None = None) -> Edit:
-    """Add a label, after the others or at a place among them (0: first)."""
-    offered = list(labels.label_set.labels)
-    offered.insert(len(offered) if place is None else place, label)
-    return _edit("Add label", labels, _with_set(labels, offered))
+def add_label(labels: Labels, label: Label) -> Edit:
+    """Add a label, after the others."""
+    return _edit("Add label", labels, _with_set(labels, [*labels.label_set.labels, label]))
 
 
 def rename_label(labels: Labels, old: str, new: str) -> Edit:

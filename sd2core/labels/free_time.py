@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from operator import attrgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +29,7 @@ class Frames:
     @classmethod
     def of(cls, timebase: Timebase) -> Frames:
         """Return the edges of the frames of a recording."""
-        return cls(timebase.times_s, np.append(timebase.times_s, timebase.end_s))
+        return cls(timebase.times_s, timebase.edges_s)
 
     @property
     def whole(self) -> Stretch:
@@ -96,28 +97,27 @@ class Frames:
         return float(start_s), float(end_s)
 
 
-def limits_of(labels: Labels, chosen: Sequence[Span], frames: Frames) -> list[Stretch]:
-    """Return the times between which each of some spans can be moved, in one pass for thousands.
+def limits_of(labels: Labels, moved: Sequence[Span], frames: Frames) -> list[Stretch]:
+    """Return the times between which each of some spans can be moved.
 
-    On an exclusive track these are its neighbours, as far as they are not moved as well.
+    On an exclusive track these are its neighbours that are not moved as well.
     """
-    low_s, high_s = frames.whole
-    moving = {span.id for span in chosen}
-    exclusive = {track.name for track in labels.tracks if track.overlap == "exclusive"}
-    lows, highs = {}, {}
-    wall = dict.fromkeys(exclusive, low_s)
-    for span in labels.spans:
-        if span.id in moving:
-            lows[span.id] = wall.get(span.track, low_s)
-        elif span.track in exclusive:
-            wall[span.track] = max(wall[span.track], span.end_s)
-    wall = dict.fromkeys(exclusive, high_s)
-    for span in reversed(labels.spans):
-        if span.id in moving:
-            highs[span.id] = wall.get(span.track, high_s)
-        elif span.track in exclusive:
-            wall[span.track] = min(wall[span.track], span.start_s)
-    return [(lows[span.id], highs[span.id]) for span in chosen]
+    ids = {span.id for span in moved}
+    staying: dict[str, list[Span]] = {}
+    for name in {span.track for span in moved}:
+        if labels.track(name).overlap == "exclusive":
+            staying[name] = [one for one in labels.of_track(name) if one.id not in ids]
+    limits = []
+    for span in moved:
+        low_s, high_s = frames.whole
+        others = staying.get(span.track, [])
+        after = bisect_left(others, span.start_s, key=attrgetter("start_s"))
+        if after > 0:
+            low_s = max(low_s, others[after - 1].end_s)
+        if after < len(others):
+            high_s = min(high_s, others[after].start_s)
+        limits.append((low_s, high_s))
+    return limits
 
 
 def steps_free(frames: Frames, span: Span, room: Stretch, count: int) -> int:
@@ -165,15 +165,6 @@ def clip_to_free(labels: Labels, track: str, wanted: Stretch, frames: Frames) ->
     return max(parts, key=lambda part: part[1] - part[0])
 
 
-@dataclass(frozen=True)
-class Snap:
-    """Time that a dragged edge snaps to; ``span_id`` is the span whose edge it is."""
-
-    time_s: float
-    at: Literal["frame", "span", "suggestion"]
-    span_id: int | None = None
-
-
 def snap(
     labels: Labels,
     timebase: Timebase,
@@ -181,7 +172,7 @@ def snap(
     within_s: float,
     *,
     ignore: Collection[int] = (),
-) -> Snap:
+) -> float:
     """Snap a time to the nearest edge of a span within a distance, else to the nearest frame edge.
 
     Frames are always near: were they to compete with spans, spans would hardly ever win. Of edges
@@ -190,19 +181,18 @@ def snap(
     A span attracts from ``within_s``, some pixels of the time axis; 0: only exact hits. Spans to
     ``ignore``, such as those being dragged, do not attract.
     """
-    nearest = Frames.of(timebase).nearest(time_s)
-    best: tuple[tuple[float, bool, float], Snap] | None = None
+    nearest_s = Frames.of(timebase).nearest(time_s)
+    best: tuple[float, bool, float] | None = None
     for span in labels.spans:
         if span.start_s > time_s + within_s:
             break
         if span.end_s < time_s - within_s or span.id in ignore:
             continue
-        suggested = span.origin == "suggestion"
         for edge_s in (span.start_s, span.end_s):
-            rank = (abs(edge_s - time_s), suggested, edge_s)
-            if rank[0] <= within_s and (best is None or rank < best[0]):
-                best = rank, Snap(edge_s, "suggestion" if suggested else "span", span.id)
-    return Snap(nearest, "frame") if best is None else best[1]
+            rank = (abs(edge_s - time_s), span.origin == "suggestion", edge_s)
+            if rank[0] <= within_s and (best is None or rank < best):
+                best = rank
+    return nearest_s if best is None else best[-1]
 
 
 LONGEST_REACTION_S = 1.0

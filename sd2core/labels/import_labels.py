@@ -10,7 +10,7 @@ from typing import Literal
 from sd2core.errors import Sd2Error
 from sd2core.labels.edits import Edit
 from sd2core.labels.free_time import Frames
-from sd2core.labels.label_set import GESTURES, LONGEST_NAME, LabelSet
+from sd2core.labels.label_set import GESTURES, LONGEST_NAME, LabelSet, with_own_keys
 from sd2core.labels.spans import Labels, Span
 from sd2core.timebase import Timebase
 
@@ -111,12 +111,8 @@ def set_after(label_set: LabelSet, incoming: Incoming, way: Way) -> LabelSet:
     if way == "replace":
         # A file that says nothing of labels is read with the default set.
         return theirs if theirs != GESTURES else label_set
-    keys = {one.key.casefold() for one in label_set.labels if one.key}
-    added = []
-    for name in incoming.unknown(label_set):
-        brought = theirs.find(name)
-        if brought is not None:
-            key = "" if brought.key.casefold() in keys else brought.key
-            keys.add(key.casefold())
-            added.append(replace(brought, key=key))
+    brought = (theirs.find(name) for name in incoming.unknown(label_set))
+    added = with_own_keys(
+        (one for one in brought if one is not None), (one.key for one in label_set.labels)
+    )
     return replace(label_set, labels=(*label_set.labels, *added)) if added else label_set

@@ -21,7 +21,7 @@ import json
 import os
 import time
 import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -83,15 +83,15 @@ class Change(Entry):
 
 
 @dataclass(frozen=True)
-class Replayed:
-    """Labels replayed from a part, with ``edits`` that the user's file does not hold."""
+class Kept:
+    """Labels that a journal keeps, with ``edits`` that the user's file does not hold."""
 
     recording: Path  # Absolute path of the labelled recording or video.
     labels: Labels  # After the last whole edit.
-    edits: int  # Number of unsaved edits.
-    last: str  # Name of the last edit, such as "Move span".
-    time_unix_s: float  # Time of the last edit.
-    others: dict[str, Any] | None  # Other fields of the recording, where they were edited.
+    edits: int = 0  # Number of unsaved edits.
+    last: str = ""  # Name of the last edit, such as "Move span".
+    time_unix_s: float = 0.0  # Time of the last edit.
+    others: dict[str, Any] | None = None  # Other fields of the recording, where they were edited.
 
 
 def packed(content: dict[str, Any]) -> bytes:
@@ -122,24 +122,17 @@ def unpacked(content: bytes) -> tuple[list[bytes], int]:
         at = end + 1
 
 
-def head(
-    recording: str,
-    labels: Labels,
-    unsaved: int,
-    last: str,
-    time_unix_s: float,
-    others: dict[str, Any] | None = None,
-) -> dict[str, Any]:
+def head(kept: Kept) -> dict[str, Any]:
     """Return the content of the first record."""
     return {
         "format": FORMAT,
         "version": VERSION,
-        "recording": recording,
-        "unsaved": unsaved,
-        "last": last,
-        "time_unix_s": time_unix_s,
-        "labels": labels_entry(labels),
-        "others": others,
+        "recording": str(kept.recording),
+        "unsaved": kept.edits,
+        "last": kept.last,
+        "time_unix_s": kept.time_unix_s,
+        "labels": labels_entry(kept.labels),
+        "others": kept.others,
     }
 
 
@@ -163,7 +156,7 @@ def change(name: str, time_unix_s: float, before: Labels, after: Labels) -> dict
     return content
 
 
-def replay(records: list[bytes]) -> Replayed:
+def replay(records: list[bytes]) -> Kept:
     """Replay the edits of a part.
 
     Raises ValueError (pydantic's) when a record holds something else than this version writes;
@@ -186,7 +179,7 @@ def replay(records: list[bytes]) -> Replayed:
         last, time_unix_s = edit.name, edit.time_unix_s
     # Only the end is checked: what is between was whole when it was written.
     entry = LabelsEntry(label_set=label_set, tracks=tracks, spans=tuple(spans.values()))
-    return Replayed(Path(first.recording), entry.made(), unsaved, last, time_unix_s, others)
+    return Kept(Path(first.recording), entry.made(), unsaved, last, time_unix_s, others)
 
 
 SUFFIX = ".journal"
@@ -198,37 +191,19 @@ SHORTEST_BYTES = 1 << 18
 class Journal:
     """Journal of one editing session; made by :meth:`.recovery.RecoveryPlace.begin`.
 
-    ``folder`` holds the parts, ``SESSION-PART.journal``; ``labels`` are those at the beginning of
-    the session, with ``unsaved`` edits that the user's file does not hold by then, the last of them
-    called ``last``; ``others`` the other fields of the recording, where they were edited by then.
-    Raises OSError when the first part cannot be written: editing may go on without a journal, but
-    tell the user.
+    ``folder`` holds the parts, ``SESSION-PART.journal``; ``kept`` is what there is at the beginning
+    of the session, and from then on. Raises OSError when the first part cannot be written: editing
+    may go on without a journal, but tell the user.
     """
 
-    def __init__(
-        self,
-        folder: Path,
-        session: int,
-        recording: Path,
-        labels: Labels,
-        *,
-        unsaved: int = 0,
-        last: str = "",
-        others: dict[str, Any] | None = None,
-    ) -> None:
-        self._folder, self._session, self._recording = folder, session, recording
-        self._labels, self._unsaved, self._last = labels, unsaved, last
-        self._others = others
+    def __init__(self, folder: Path, session: int, kept: Kept) -> None:
+        self._folder, self._session = folder, session
+        self.kept = replace(kept, time_unix_s=time.time())
         self._parts: list[Path] = []
         self._part = 0
         self._stream: int | None = None
         self._left_bytes = 0
         self._begin_part()
-
-    @property
-    def unsaved(self) -> int:
-        """Number of edits since the user's file was last saved."""
-        return self._unsaved
 
     def write(self, name: str, labels: Labels, others: dict[str, Any] | None = None) -> None:
         """Record an edit, an undo or a redo; on disk on return.
@@ -237,19 +212,20 @@ class Journal:
         Raises OSError when it cannot be written. The next one is tried in a new part, with all
         labels.
         """
-        now_s = time.time()
-        content = change(name, now_s, self._labels, labels)
+        before, now_s = self.kept, time.time()
+        content = change(name, now_s, before.labels, labels)
         if others is not None:
-            content["others"] = self._others = others
-        record = packed(content)
-        self._labels, self._last = labels, name
-        self._unsaved += 1
-        self._append(record)
+            content["others"] = others
+        self.kept = Kept(
+            before.recording, labels, before.edits + 1, name, now_s, others or before.others
+        )
+        self._append(packed(content))
 
     def saved(self) -> None:
         """Record that the user's file holds the current labels."""
-        self._unsaved, self._others = 0, None
-        self._append(packed({"name": self._last, "time_unix_s": time.time(), "saved": True}))
+        now_s = time.time()
+        self.kept = replace(self.kept, edits=0, time_unix_s=now_s, others=None)
+        self._append(packed({"name": self.kept.last, "time_unix_s": now_s, "saved": True}))
 
     def close(self) -> None:
         """End the session and delete its parts: all is saved, or the user discards it."""
@@ -279,8 +255,7 @@ class Journal:
         self._close_stream()
         self._part += 1
         path = self._folder / f"{self._session:06d}-{self._part:06d}{SUFFIX}"
-        begun = str(self._recording), self._labels, self._unsaved, self._last
-        record = packed(head(*begun, time.time(), self._others))
+        record = packed(head(self.kept))
         with atomic_write(path, mode=0o600) as stream:
             stream.write(record)
         self._parts.append(path)

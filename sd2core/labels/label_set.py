@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
 from sd2core.errors import Sd2Error
 
@@ -63,6 +64,18 @@ class LabelSet:
     def of_class(self, name: str) -> tuple[Label, ...]:
         """Return the labels of a class of the classifier."""
         return tuple(one for one in self.labels if one.gesture_class == name)
+
+
+def with_own_keys(labels: Iterable[Label], taken: Iterable[str] = ()) -> list[Label]:
+    """Return labels without the keys that are taken, or that one before them has."""
+    keys = {key.casefold() for key in taken}
+    found = []
+    for label in labels:
+        if label.key.casefold() in keys:
+            label = replace(label, key="")
+        keys.add(label.key.casefold())
+        found.append(label)
+    return found
 
 
 def check_name(name: str, what: str) -> None:

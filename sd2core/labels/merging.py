@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 from sd2core.labels.import_labels import free_name
-from sd2core.labels.label_set import Label, LabelSet
+from sd2core.labels.label_set import LabelSet, with_own_keys
 from sd2core.labels.spans import Labels, LabelTrack, Span
 
 Value = TypeVar("Value")
@@ -120,11 +120,7 @@ def _label_set(base: LabelSet, mine: LabelSet, theirs: LabelSet) -> LabelSet:
         return chosen(base, mine, theirs)
     named = [{one.name: one for one in side.labels} for side in (base, mine, theirs)]
     found = _by_name(*named)
-    keys = {one.key.casefold() for name, one in found.items() if one == named[1].get(name)}
-    labels: list[Label] = []
-    for name, one in found.items():
-        if one != named[1].get(name):
-            one = replace(one, key="") if one.key.casefold() in keys else one
-            keys.add(one.key.casefold())
-        labels.append(one)
-    return LabelSet(chosen(base.name, mine.name, theirs.name), tuple(labels))
+    brought = [one for name, one in found.items() if one != named[1].get(name)]
+    kept_keys = (one.key for name, one in found.items() if one == named[1].get(name))
+    found |= {one.name: one for one in with_own_keys(brought, [*kept_keys])}
+    return LabelSet(chosen(base.name, mine.name, theirs.name), tuple(found.values()))

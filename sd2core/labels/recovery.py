@@ -20,7 +20,7 @@ import hashlib
 import os
 from collections.abc import Container, Iterable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from itertools import groupby
 from pathlib import Path
 
@@ -32,7 +32,7 @@ from sd2core.files.edit_lock import EditLock, Holder
 from sd2core.files.lock import is_locked
 from sd2core.files.paths import user_data
 from sd2core.files.texts import first_fault, read_content
-from sd2core.labels.journal import SUFFIX, Journal, Replayed, replay, unpacked
+from sd2core.labels.journal import SUFFIX, Journal, Kept, replay, unpacked
 from sd2core.labels.spans import Labels
 
 DECLINED = ".declined"
@@ -45,8 +45,8 @@ class _NoHeadError(ValueError):
     """Error for a part of which nothing can be read."""
 
 
-@dataclass(frozen=True)
-class Offer(Replayed):
+@dataclass(frozen=True, kw_only=True)
+class Offer(Kept):
     """Unsaved labels of a session, and the parts that they were read from.
 
     ``declined`` is True if the user discarded them.
@@ -58,27 +58,24 @@ class Offer(Replayed):
 
 @dataclass(frozen=True)
 class Found:
-    """Offers, the newest of a recording first, and notes on what could not be read."""
-
-    offers: tuple[Offer, ...] = ()
-    notes: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class Search:
-    """Content of the folder of one recording.
+    """Offers, the newest of a recording first, and notes on what could not be read.
 
     ``settled`` parts hold nothing but what the user's file holds as well; ``damaged`` ones are
     subject of a note, and no version of this program could offer them.
     """
 
-    found: Found
-    settled: tuple[Path, ...]
-    damaged: tuple[Path, ...]
+    offers: tuple[Offer, ...] = ()
+    notes: tuple[str, ...] = ()
+    settled: tuple[Path, ...] = field(default=(), compare=False)
+    damaged: tuple[Path, ...] = field(default=(), compare=False)
 
 
-def search(folder: Path, suffixes: Iterable[str], without: Container[int] = ()) -> Search:
-    """Read what sessions, except ``without``, left in a recording's folder, the newest first."""
+def search(folder: Path, *, declined: bool = False, without: Container[int] = ()) -> Found:
+    """Read what sessions, except ``without``, left in a recording's folder, the newest first.
+
+    ``declined`` ones only when asked for.
+    """
+    suffixes = (SUFFIX, DECLINED) if declined else (SUFFIX,)
     _make_private(folder, *(path for path in listed(folder) if path.is_file()))
     offers, notes = [], []
     settled: list[Path] = []
@@ -98,12 +95,12 @@ def search(folder: Path, suffixes: Iterable[str], without: Container[int] = ()) 
             if note:
                 notes.append(note)
             if replayed.edits:
-                declined = parts[0].suffix == DECLINED
-                offers.append(Offer(**vars(replayed), declined=declined, files=tuple(parts)))
+                discarded = parts[0].suffix == DECLINED
+                offers.append(Offer(**vars(replayed), declined=discarded, files=tuple(parts)))
             else:
                 (damaged if note else settled).extend(parts)
             break
-    return Search(Found(tuple(offers), tuple(notes)), tuple(settled), tuple(damaged))
+    return Found(tuple(offers), tuple(notes), tuple(settled), tuple(damaged))
 
 
 def _make_private(*paths: Path) -> None:
@@ -113,7 +110,7 @@ def _make_private(*paths: Path) -> None:
             path.chmod(path.stat().st_mode & 0o700)
 
 
-def _replayed(path: Path) -> tuple[Replayed, str]:
+def _replayed(path: Path) -> tuple[Kept, str]:
     content = read_content(path, "a journal of label edits")
     records, end = unpacked(content)
     if not records:
@@ -227,8 +224,7 @@ class RecoveryPlace:
 
     def offers(self, *, declined: bool = False) -> Found:
         """Find labels of earlier sessions; ``declined`` ones only when asked for."""
-        suffixes = (SUFFIX, DECLINED) if declined else (SUFFIX,)
-        return search(self._folder, suffixes, without=self._begun).found
+        return search(self._folder, declined=declined, without=self._begun)
 
     def begin(self, labels: Labels, recovered: Offer | None = None) -> Journal:
         """Begin a session, with the labels of the user's file or of an offer.
@@ -238,18 +234,14 @@ class RecoveryPlace:
         """
         self._check_held()
         remove_leftovers(self._folder)
-        earlier = search(self._folder, (SUFFIX,), without=self._begun)
+        earlier = self.offers()
         known = journals(self._folder, (SUFFIX, DECLINED, DAMAGED))
         session = max(map(session_of, known), default=0) + 1
-        journal = Journal(
-            self._folder,
-            session,
-            self._recording,
-            labels,
-            unsaved=recovered.edits if recovered else 0,
-            last=recovered.last if recovered else "",
-            others=recovered.others if recovered else None,
-        )
+        kept = Kept(self._recording, labels)
+        if recovered is not None:
+            others = recovered.others
+            kept = replace(kept, edits=recovered.edits, last=recovered.last, others=others)
+        journal = Journal(self._folder, session, kept)
         self._begun.add(session)
         if recovered is not None:
             self.delete(recovered)
@@ -287,9 +279,8 @@ def offers_in(root: Path, *, declined: bool = False) -> Found:
 
     ``declined`` ones only when asked for.
     """
-    suffixes = (SUFFIX, DECLINED) if declined else (SUFFIX,)
     found = [
-        search(folder, suffixes).found
+        search(folder, declined=declined)
         for folder in listed(Path(root))
         if folder.is_dir() and not is_locked(folder / _LOCK_NAME)
     ]

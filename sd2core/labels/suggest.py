@@ -217,8 +217,7 @@ def stretches(
 
 def frame_ends_s(timebase: Timebase, last: NDArray[np.int64]) -> NDArray[np.float64]:
     """Return the end of each frame, (T,): the next one, or its usual duration before a pause."""
-    ends_s = np.append(timebase.times_s[1:], timebase.end_s)
-    usual_s = timebase.times_s + timebase.frame_duration_s
+    ends_s, usual_s = timebase.edges_s[1:], timebase.times_s + timebase.frame_duration_s
     before_a_break = last == np.arange(len(timebase))
     return np.where(before_a_break, np.minimum(ends_s, usual_s), ends_s)
 

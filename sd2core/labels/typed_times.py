@@ -31,7 +31,9 @@ def typed_start(text: str, timebase: Timebase) -> float:
 def typed_end(text: str, timebase: Timebase) -> float:
     """Parse the end of a span, in seconds; errors are those of :func:`typed_start`."""
     frame = _typed_frames(text)
-    return _typed_seconds(text) if frame is None else timebase.end_of(_known(frame, timebase))
+    if frame is None:
+        return _typed_seconds(text)
+    return float(timebase.edges_s[_known(frame, timebase) + 1])
 
 
 def typed_duration_end(text: str, start_s: float, timebase: Timebase) -> float:
@@ -39,8 +41,8 @@ def typed_duration_end(text: str, start_s: float, timebase: Timebase) -> float:
     frames = _typed_frames(text)
     if frames is None:
         return start_s + _typed_seconds(text)
-    last = timebase.frame_at(start_s) + frames - 1
-    return timebase.end_of(min(max(last, 0), len(timebase) - 1))
+    end = timebase.frame_at(start_s) + frames
+    return float(timebase.edges_s[min(max(end, 1), len(timebase))])
 
 
 def _typed_frames(text: str) -> int | None:

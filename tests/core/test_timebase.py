@@ -75,6 +75,14 @@ def test_a_regular_timebase_has_its_rate():
     assert timebase.frame_at(124 / 30) == 124
 
 
+@given(starts, steps)
+def test_every_frame_goes_from_edge_to_edge(start_s, steps_s):
+    timebase = timebase_of(start_s, steps_s)
+    ends_s = [*timebase.times_s[1:], timebase.end_s]
+    assert timebase.edges_s[:-1].tolist() == timebase.times_s.tolist()
+    assert timebase.edges_s[1:].tolist() == ends_s
+
+
 def test_one_frame_has_a_duration():
     timebase = Timebase([2.0])
     assert timebase.duration_s == pytest.approx(1 / 30)

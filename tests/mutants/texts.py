@@ -22,7 +22,7 @@ from sd2core.io.radar.mars import mars_parts, read_mars
 from sd2core.io.video import open_video
 from sd2core.labels import files
 from sd2core.labels.formats import read_labels, write_labels
-from sd2core.labels.journal import SUFFIX, change, head, packed
+from sd2core.labels.journal import Kept, change, head, packed
 from sd2core.labels.label_set import GESTURES
 from sd2core.labels.recovery import search
 from sd2core.labels.spans import Labels
@@ -121,12 +121,12 @@ def _write_recording(path: Path) -> None:
 
 def _journal() -> bytes:
     before, after = Labels(), replace(_LABELS, label_set=GESTURES)
-    first = head("/walk.sd2", before, 0, "", 1.0)
+    first = head(Kept(Path("/walk.sd2"), before, time_unix_s=1.0))
     return packed(first) + packed(change("Add", 2.0, before, after) | {"others": {"title": "x"}})
 
 
 def _read_journal(path: Path) -> None:
-    for note in search(path.parent, [SUFFIX]).found.notes:
+    for note in search(path.parent).notes:
         raise Sd2Error(note)
 
 

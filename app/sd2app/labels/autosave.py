@@ -82,7 +82,7 @@ class LabelAutosave(QObject):
             self.close()
             self.waiting = Found()
             self._others = edited_fields(recording)
-            self._begin_at(_labelled_path(recording), reread=True)
+            self._begin(reread=True)
         self._recording = recording
         self._labels.open(self._document.labels)
 
@@ -104,8 +104,13 @@ class LabelAutosave(QObject):
         self._place = None
         self._refusal, self._offers, self.notes, self._keeping = "", (), (), True
 
-    def _begin_at(self, path: Path, *, reread: bool) -> None:
-        content = self._document.content
+    @property
+    def _labelled_path(self) -> Path:
+        """Path that names a recording's recoveries: its folder, or the file it was made from."""
+        return next(iter(self._document.paths), UNTITLED)
+
+    def _begin(self, *, reread: bool) -> None:
+        content, path = self._document.content, self._labelled_path
         beside = edit_lock(path) if content is not None and content.saved else None
         self._place = RecoveryPlace(self._root, path, beside)
         self._take(reread=reread)
@@ -135,11 +140,10 @@ class LabelAutosave(QObject):
         recording = self._document.recording
         if recording is None:
             return
-        path = _labelled_path(recording)
         self._recording, self._others = recording, edited_fields(recording)
-        if self._place is None or self._place.recording != path.resolve():
+        if self._place is None or self._place.recording != self._labelled_path.resolve():
             self.close()
-            self._begin_at(path, reread=False)
+            self._begin(reread=False)
         elif self._journal is not None:
             # Unwritten, what is in the file is offered, found to be the same, and dropped.
             with suppress(OSError):
@@ -291,14 +295,6 @@ class LabelAutosave(QObject):
             else:
                 with suppress(OSError):
                     place.delete(offer)
-
-
-def _labelled_path(recording: Recording) -> Path:
-    """Path that names a recording's recoveries: its folder, or the file it was made from."""
-    if recording.folder != UNTITLED:
-        return recording.folder
-    parts = (recording.video, recording.mesh, recording.radar)
-    return next((path for path in parts if path is not None), recording.folder)
 
 
 def _held_words(place: RecoveryPlace, title: str) -> str:

@@ -13,7 +13,7 @@ from sd2app.maps.track_mouse import TimePlot
 from sd2app.widgets.time_axis import TimeScale
 from sd2core.errors import Sd2Error
 from sd2core.labels import edits
-from sd2core.labels.edits import Change, Edit, Side, move_together
+from sd2core.labels.edits import Change, Edit, Side
 from sd2core.labels.free_time import snap
 from sd2core.labels.spans import Labels
 
@@ -78,10 +78,7 @@ class LabelDragging(QObject):
             (self._snapped(start_s + length_s, within_s, ids), length_s),
         )
         near_s = min((at_s - offset_s for at_s, offset_s in ends), key=lambda t: abs(t - start_s))
-        if len(ids) == 1:
-            self._drag(lambda labels, base: edits.move(labels, base, span_id, near_s))
-        else:
-            self._drag(lambda labels, base: move_together(labels, base, ids, span_id, near_s))
+        self._drag(lambda labels, base: edits.move(labels, base, ids, span_id, near_s))
 
     def drag_new(
         self, track: str, from_s: float, to_s: float, within_s: float, *, cutting: bool = False
@@ -117,7 +114,7 @@ class LabelDragging(QObject):
     def _snapped(self, time_s: float, within_s: float, held: Collection[int] = ()) -> float:
         assert self._before is not None
         base = self._playback.timebase
-        return snap(self._before, base, time_s, within_s, ignore=held).time_s
+        return snap(self._before, base, time_s, within_s, ignore=held)
 
 
 class SpanDragger(QObject):

@@ -88,12 +88,12 @@ class LabelEdits(QObject):
         """Give the selected spans another label."""
         self.labels.set_label(label)
         ids = self._ids()
-        self.apply(lambda labels, base: field_edits.relabel(labels, ids, label))
+        self.apply(lambda labels, base: field_edits.set_field(labels, ids, "label", label))
 
     def put_on_track(self, track: str) -> None:
         """Put the selected spans on another track."""
         ids = self._ids()
-        self.apply(lambda labels, base: field_edits.set_track(labels, ids, track))
+        self.apply(lambda labels, base: field_edits.set_field(labels, ids, "track", track))
 
     def edge_here(self, side: Side) -> None:
         """Put an edge of the selected span at the frame on screen."""
@@ -101,8 +101,7 @@ class LabelEdits(QObject):
         if not chosen:
             return
         # The frame on screen is the first of the span, or its last.
-        frame = self.playback.frame + (side == "end")
-        time_s = base.time_of(frame) if frame < len(base) else base.end_s
+        time_s = float(base.edges_s[self.playback.frame + (side == "end")])
         self.apply(lambda labels, base: edits.resize(labels, base, chosen[0].id, side, time_s))
 
     def split(self) -> None:
@@ -125,8 +124,7 @@ class LabelEdits(QObject):
 
     def nudge(self, frames: int) -> None:
         """Move the selected spans together by some frames."""
-        ids = self._ids()
-        if ids:
+        if ids := self._ids():
             self.apply(lambda labels, base: edits.nudge(labels, base, ids, frames))
 
     def duplicate(self) -> None:

@@ -14,9 +14,10 @@ from sd2app.widgets.icons import swatch_icon
 from sd2app.widgets.record_table import NO_PARENT, Heading, Index, RecordTableModel
 from sd2app.widgets.text import counted
 from sd2core.errors import Sd2Error
-from sd2core.labels import field_edits
-from sd2core.labels.edits import Change, Edit, Side, resize
-from sd2core.labels.spans import Labels, Span
+from sd2core.labels.comparison import same_ends
+from sd2core.labels.edits import Change, Side, resize
+from sd2core.labels.field_edits import SpanField, set_field
+from sd2core.labels.spans import Span
 from sd2core.labels.typed_times import typed_duration_end, typed_end, typed_start
 from sd2core.timebase import Timebase
 
@@ -72,14 +73,12 @@ def _frames(span: Span, timebase: Timebase) -> str:
     return "" if frames is None else frames.words()
 
 
-def _given(
-    edit: Callable[[Labels, Sequence[int], Any], Edit], value: Callable[[str], Any] = str.strip
-) -> Typed:
-    """Typing that gives spans a value, read from the text."""
+def _given(field: SpanField, value: Callable[[str], Any] = str.strip) -> Typed:
+    """Typing that gives a field of spans a value, read from the text."""
 
     def typed(text: str, spans: Sequence[Span]) -> Change:
         ids = [span.id for span in spans]
-        return lambda labels, _: edit(labels, ids, value(text))
+        return lambda labels, _: set_field(labels, ids, field, value(text))
 
     return typed
 
@@ -108,7 +107,7 @@ COLUMNS: tuple[Column, ...] = (
     Column(
         "label", "Label", "Label of the set, given to all selected spans",
         lambda span, _: span.label, lambda span: span.label.casefold(),
-        _given(field_edits.relabel, str), "label",
+        _given("label", str), "label",
         wide="■ right-to-left ",
     ),
     Column(
@@ -123,25 +122,25 @@ COLUMNS: tuple[Column, ...] = (
     Column(
         "track", "Track", "Track, for all selected spans",
         lambda span, _: span.track, lambda span: span.track.casefold(),
-        _given(field_edits.set_track, str), "track",
+        _given("track", str), "track",
         wide="Gestures",
     ),
     Column(
         "note", "Note", "Any text",
-        lambda span, _: span.note, lambda span: span.note.casefold(), _given(field_edits.set_note),
+        lambda span, _: span.note, lambda span: span.note.casefold(), _given("note"),
         wide="Note",
     ),
     Column(
         "author", "Author", "Person who marked it",
         lambda span, _: span.author, lambda span: span.author.casefold(),
-        _given(field_edits.set_author),
+        _given("author"),
         wide="some name", hidden=True,
     ),
     Column(
         "confidence", "Sure", "Confidence, 0 to 1",
         lambda span, _: "" if span.confidence is None else f"{span.confidence:g}",
         lambda span: -1.0 if span.confidence is None else span.confidence,
-        _given(field_edits.set_confidence, _confidence),
+        _given("confidence", _confidence),
         wide="0.00", number=True, hidden=True,
     ),
     Column(
@@ -253,13 +252,11 @@ class SpanTableModel(RecordTableModel[Span]):
         there = {span.id: span for span in rows}
         self._replace([there.get(span.id, span) for span in self.rows])
         before = self.rows
+        head, tail = same_ends(rows, before)
         if len(rows) == len(before) and all(span.id in there for span in before):
-            if _alike(rows, before, range(len(rows))) < len(rows):
+            if head < len(rows):
                 self._reorder(rows)
             return
-        shorter = min(len(rows), len(before))
-        head = _alike(rows, before, range(shorter))
-        tail = _alike(rows, before, range(-1, -1 - (shorter - head), -1))
         if (stop := len(before) - tail) > head:
             self.beginRemoveRows(NO_PARENT, head, stop - 1)
             self._assign([*before[:head], *before[stop:]])
@@ -333,11 +330,3 @@ class SpanTableModel(RecordTableModel[Span]):
                 f"The {edge.side} of the span is at {there_s:.3f} s, as near to {wanted_s:.3f} s as"
                 " its other edge, its neighbours and the recording allow."
             )
-
-
-def _alike(rows: Sequence[Span], before: Sequence[Span], places: range) -> int:
-    """Number of leading rows that hold the same span."""
-    for count, place in enumerate(places):
-        if rows[place].id != before[place].id:
-            return count
-    return len(places)

@@ -107,12 +107,9 @@ class MapModel(QObject):
     def _seconds(self, stretches: Iterable[tuple[int, int]]) -> tuple[tuple[float, float], ...]:
         if self.map is None:
             return ()
-        timebase, offset_s = self.map.timebase, self.offset_s
+        edges_s, offset_s = self.map.timebase.edges_s, self.offset_s
         return tuple(
-            (
-                timebase.time_of(start) + offset_s,
-                (timebase.time_of(stop) if stop < len(timebase) else timebase.end_s) + offset_s,
-            )
+            (float(edges_s[start]) + offset_s, float(edges_s[stop]) + offset_s)
             for start, stop in stretches
         )
 

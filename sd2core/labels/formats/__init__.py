@@ -26,7 +26,14 @@ from sd2core.labels.formats import (
     mne_annotations,
     textgrid,
 )
-from sd2core.labels.formats.losses import ASPECTS, Aspect, LabelFormat, Loss, sentences
+from sd2core.labels.formats.losses import (
+    ASPECTS,
+    Aspect,
+    LabelFormat,
+    Loss,
+    losses_by_format,
+    sentences,
+)
 from sd2core.labels.spans import Labels
 from sd2core.timebase import Timebase
 
@@ -46,7 +53,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class _Program:
-    """Reader and writer of a format."""
+    """Reader and writer of a format; the writer returns losses that depend on more than it."""
 
     about: LabelFormat
     read: Callable[[Path, Timebase | None, str | None], Labels]
@@ -164,7 +171,8 @@ def write_labels(
     path = Path(path)
     chosen = format_for(path, writing=True) if format is None else _named(format)
     linked = None if media is None else Path(media)
-    return _PROGRAMS[chosen.name].write(path, labels, timebase, linked)
+    unheld = _PROGRAMS[chosen.name].write(path, labels, timebase, linked)
+    return losses_by_format(labels, chosen) + unheld
 
 
 def would_lose(

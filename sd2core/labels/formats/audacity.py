@@ -11,7 +11,7 @@ from pathlib import Path
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.texts import read_text
-from sd2core.labels.formats.losses import LabelFormat, Loss, losses_by_format
+from sd2core.labels.formats.losses import LabelFormat, Loss
 from sd2core.labels.formats.numbers import finite_number, positional
 from sd2core.labels.formats.rows import UNNAMED, Row, assemble
 from sd2core.labels.spans import Labels
@@ -30,14 +30,14 @@ _EXPECTED = "an Audacity label file: start, end and text in each line, separated
 
 
 def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = None) -> list[Loss]:
-    """Write all tracks as one label track; what it cannot hold is returned."""
+    """Write all tracks as one label track."""
     lines = [
         f"{positional(span.start_s, min_digits=6)}\t{positional(span.end_s, min_digits=6)}"
         f"\t{span.label}\n"
         for span in labels.spans
     ]
     atomic_write_text(path, "".join(lines))
-    return losses_by_format(labels, FORMAT)
+    return []
 
 
 def read(path: Path, timebase: Timebase | None = None, observation: str | None = None) -> Labels:

@@ -19,9 +19,9 @@ from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.paths import plain_path, stored_path
 from sd2core.files.texts import read_json
-from sd2core.labels.formats.losses import ASPECTS, LabelFormat, Loss, counted, losses_by_format
+from sd2core.labels.formats.losses import ASPECTS, LabelFormat, Loss, counted
 from sd2core.labels.formats.rows import Lane, Row, assemble, clean_name, edges_s, lanes_of, track_of
-from sd2core.labels.label_set import GESTURES, Label, LabelSet
+from sd2core.labels.label_set import GESTURES, Label, LabelSet, with_own_keys
 from sd2core.labels.spans import Labels, Overlap, Span
 from sd2core.timebase import Timebase
 
@@ -96,7 +96,7 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
         },
     }
     atomic_write_text(path, json.dumps(project, indent=1, allow_nan=False) + "\n")
-    return losses_by_format(labels, FORMAT) + _unwelcome(labels)
+    return _unwelcome(labels)
 
 
 def read(path: Path, timebase: Timebase | None = None, observation: str | None = None) -> Labels:
@@ -232,21 +232,20 @@ def _label_set(kept: Any, behaviours: list[dict[str, Any]]) -> LabelSet:
     if not behaviours and not ours:
         return GESTURES
     labels: dict[str, Label] = {}
-    keys: set[str] = set()
     for one in behaviours:
         code = str(one.get("code", ""))
         name = clean_name(code)
         if name in labels or (ours and code not in kept["labels"]):
             continue
         key = str(one.get("key") or "")
-        key = key if len(key) == 1 and not key.isspace() and key.casefold() not in keys else ""
-        keys.add(key.casefold())
+        key = key if len(key) == 1 and not key.isspace() else ""
         category = str(one.get("category") or "")
         try:
             labels[name] = Label(name, str(one.get("color") or ""), key, category)
         except Sd2Error:  # BORIS' colours may be names, or absent
-            labels[name] = Label(name, "#999999", key, category)
-    return LabelSet(str(kept.get("name", "")) if ours else "BORIS", tuple(labels.values()))
+            labels[name] = Label(name, _GREY, key, category)
+    set_name = str(kept.get("name", "")) if ours else "BORIS"
+    return LabelSet(set_name, tuple(with_own_keys(labels.values())))
 
 
 def _observation(

@@ -26,7 +26,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.tables import as_cell, of_cell
 from sd2core.files.texts import read_text
-from sd2core.labels.formats.losses import ASPECTS, LabelFormat, Loss, hold_texts, losses_by_format
+from sd2core.labels.formats.losses import ASPECTS, LabelFormat, Loss, hold_texts
 from sd2core.labels.formats.numbers import finite_number, whole_number
 from sd2core.labels.formats.rows import UNNAMED, TableRows, assemble
 from sd2core.labels.spans import Labels
@@ -98,7 +98,7 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
             )
         )
     atomic_write_text(path, text.getvalue())
-    return losses_by_format(labels, FORMAT) + replaced
+    return replaced
 
 
 def read(path: Path, timebase: Timebase | None = None, observation: str | None = None) -> Labels:
@@ -281,7 +281,7 @@ def _edges_s(
             f"frames of the {len(timebase)} of the recording, counted from 0",
             "Check that the table is of this recording",
         )
-    return timebase.time_of(first), timebase.end_of(end - 1)
+    return float(timebase.edges_s[first]), float(timebase.edges_s[end])
 
 
 def _frame(path: Path, line: int, column: str, text: str) -> int:

@@ -35,7 +35,6 @@ from sd2core.labels.formats.losses import (
     Loss,
     counted,
     hold_texts,
-    losses_by_format,
 )
 from sd2core.labels.formats.rows import Lane, edges_s, lanes_of
 from sd2core.labels.label_set import LabelSet
@@ -109,7 +108,7 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
     content = '<?xml version="1.0" encoding="UTF-8"?>\n' + text.replace("\r", "&#13;") + "\n"
     with atomic_write(path) as stream:
         stream.write(content.encode("utf-8"))
-    return losses_by_format(labels, FORMAT) + replaced + moved
+    return replaced + moved
 
 
 def edges_ms(span: Span) -> tuple[int, int]:

@@ -15,7 +15,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.texts import read_content
 from sd2core.labels.formats.numbers import whole_number
 from sd2core.labels.formats.rows import Row, assemble, clean_name, track_of
-from sd2core.labels.label_set import GESTURES, Label, LabelSet
+from sd2core.labels.label_set import GESTURES, Label, LabelSet, with_own_keys
 from sd2core.labels.spans import Labels
 from sd2core.timebase import Timebase
 
@@ -200,21 +200,19 @@ def _label_set(document: Element) -> LabelSet:
         return GESTURES
     set_name, shown = _kept_label_set(document)
     labels: dict[str, Label] = {}
-    keys: set[str] = set()
     for value in _entries(vocabulary):
         name = clean_name(value.text or "")
         if name in labels:
             continue
         default = (_COLOURS[len(labels) % len(_COLOURS)], "")
         colour, key = shown.get(name, default)
-        key = "" if key.casefold() in keys else key
-        keys.add(key.casefold())
         try:
             labels[name] = Label(name, colour, key, value.get("DESCRIPTION", ""))
         except Sd2Error:  # somebody edited the property
             labels[name] = Label(name, default[0], "", value.get("DESCRIPTION", ""))
     exact = set_name is not None and vocabulary_id(set_name) == wanted
-    return LabelSet(set_name if exact and set_name else wanted, tuple(labels.values()))
+    own_keys = tuple(with_own_keys(labels.values()))
+    return LabelSet(set_name if exact and set_name else wanted, own_keys)
 
 
 def _entries(vocabulary: Element) -> list[Element]:

@@ -17,7 +17,7 @@ from urllib.parse import quote, unquote
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.texts import read_text
-from sd2core.labels.formats.losses import ASPECTS, LabelFormat, Loss, counted, losses_by_format
+from sd2core.labels.formats.losses import ASPECTS, LabelFormat, Loss, counted
 from sd2core.labels.formats.numbers import finite_number, positional
 from sd2core.labels.formats.rows import TableRows, assemble
 from sd2core.labels.spans import Labels, Span
@@ -61,7 +61,7 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
         extras = (_encoded(texts[name](span)) for name in _EXTRAS)
         lines.append(",".join((*edges, _encoded(span.label), *extras)))
     atomic_write_text(path, "\n".join(lines) + "\n")
-    return losses_by_format(labels, FORMAT) + _changed(labels)
+    return _changed(labels)
 
 
 def read(path: Path, timebase: Timebase | None = None, observation: str | None = None) -> Labels:

@@ -154,7 +154,7 @@ def _span(path: Path, row: Row, number: int, timebase: Timebase | None) -> Span:
                 "Read the file together with its recording: such a mark becomes one frame",
             )
         frame = timebase.frame_at(start_s)
-        start_s, end_s = timebase.time_of(frame), timebase.end_of(frame)
+        start_s, end_s = timebase.edges_s[frame : frame + 2].tolist()
     origin: Origin = next((one for one in ORIGINS if one == row.origin), "import")
     try:
         return Span(

@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
 
 from sd2core.errors import Sd2Error
-from sd2core.labels.edits import Edit
 from sd2core.labels.field_edits import (
-    accept,
+    SpanField,
     add_track,
     move_track,
     reject,
-    relabel,
     remove_track,
     rename_track,
-    set_author,
-    set_confidence,
-    set_note,
+    set_field,
     set_overlap,
-    set_track,
+    take,
 )
 from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.timebase import Timebase
@@ -38,17 +33,19 @@ LABELS = Labels(
 
 
 @pytest.mark.parametrize(
-    ("edit", "field", "value"),
+    ("field", "value"),
     [
-        (lambda: relabel(LABELS, [1, 3], "left-to-right"), "label", "left-to-right"),
-        (lambda: set_note(LABELS, [1, 3], "clear"), "note", "clear"),
-        (lambda: set_author(LABELS, [1, 3], "B"), "author", "B"),
-        (lambda: set_confidence(LABELS, [1, 3], 0.2), "confidence", 0.2),
-        (lambda: set_track(LABELS, [1, 3], "Suggested"), "track", "Suggested"),
+        ("label", "left-to-right"),
+        ("note", "clear"),
+        ("author", "B"),
+        ("confidence", 0.2),
+        ("track", "Suggested"),
     ],
 )
-def test_one_field_changes(edit: Callable[[], Edit], field: str, value: object) -> None:
-    after = edit().labels
+def test_one_field_changes(field: SpanField, value: object) -> None:
+    edit = set_field(LABELS, [1, 3], field, value)
+    after = edit.labels
+    assert (edit.name, edit.ids) == (f"Change {field}", (1, 3))
     for span in LABELS.spans:
         expected = replace(span, **{field: value}) if span.id in (1, 3) else span
         assert after.span(span.id) == expected
@@ -57,45 +54,43 @@ def test_one_field_changes(edit: Callable[[], Edit], field: str, value: object) 
 
 def test_bad_values_are_refused() -> None:
     with pytest.raises(Sd2Error, match=r"confidence 1\.5.*0 to 1"):
-        set_confidence(LABELS, [1], 1.5)
+        set_field(LABELS, [1], "confidence", 1.5)
     with pytest.raises(Sd2Error, match="No track is called 'Feet'"):
-        set_track(LABELS, [1], "Feet")
+        set_field(LABELS, [1], "track", "Feet")
     with pytest.raises(Sd2Error, match=r"Span 1 .* and Span 2 .* overlap on 'Gestures'"):
-        set_track(LABELS, [2], "Gestures")
+        set_field(LABELS, [2], "track", "Gestures")
 
 
 class TestSuggestions:
     def test_accepted_it_is_a_persons(self) -> None:
-        edit = accept(LABELS, FRAMES, [2])
+        edit = take(LABELS, FRAMES, [2], "Suggested", "wave", keep_known=True)
         assert edit.labels.span(2) == replace(LABELS.span(2), origin="person")
         assert edit.name == "Accept suggestion"
 
     def test_on_another_track_it_takes_the_free_part(self) -> None:
-        after = accept(LABELS, FRAMES, [2], "Gestures").labels
+        after = take(LABELS, FRAMES, [2], "Gestures", "wave").labels
         assert (after.span(2).track, after.span(2).start_s, after.span(2).end_s) == (
             "Gestures", 2.0, 2.5,
         )  # fmt: skip
 
-    def test_all_or_none(self) -> None:
+    def test_without_room_the_refusal_says_where(self) -> None:
         with pytest.raises(Sd2Error, match=r"From 1\.600 to 1\.900 s every frame has a span"):
-            accept(LABELS, FRAMES, [2, 3], "Gestures")
+            take(LABELS, FRAMES, [3], "Gestures", "wave")
 
     def test_rejected_it_is_gone(self) -> None:
         assert [span.id for span in reject(LABELS, [2, 3]).labels.spans] == [1]
-        for edit in (lambda: reject(LABELS, [1]), lambda: accept(LABELS, FRAMES, [1])):
+        for edit in (
+            lambda: reject(LABELS, [1]),
+            lambda: take(LABELS, FRAMES, [1], "Gestures", "wave"),
+        ):
             with pytest.raises(Sd2Error, match=r"Span 1 .*origin 'person'. Expected: a sugg"):
                 edit()
 
 
 class TestTracks:
-    def test_added_below_or_in_between(self) -> None:
-        assert [t.name for t in add_track(LABELS, "C").labels.tracks][-1] == "C"
-        added = add_track(LABELS, "C", "free", 1).labels.tracks
-        assert added == (
-            LabelTrack("Gestures"),
-            LabelTrack("C", "free"),
-            LabelTrack("Suggested", "free"),
-        )
+    def test_added_below(self) -> None:
+        assert add_track(LABELS, "C").labels.tracks == (*LABELS.tracks, LabelTrack("C"))
+        assert add_track(LABELS, "C", "free").labels.tracks[-1] == LabelTrack("C", "free")
         with pytest.raises(Sd2Error, match="a name of its own"):
             add_track(LABELS, "Gestures")
 

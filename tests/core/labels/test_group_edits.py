@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import pytest
@@ -14,7 +15,6 @@ from sd2core.labels.edits import (
     Edit,
     duplicate,
     move,
-    move_together,
     nudge,
 )
 from sd2core.labels.spans import Labels, LabelTrack, Span
@@ -37,7 +37,7 @@ LABELS = labels_of((1, 2), (2, 2.5), (3, 3.5), (5, 6))
 
 
 def test_they_move_by_what_the_one_in_the_hand_moves() -> None:
-    edit = move_together(LABELS, FRAMES, (2, 3), 3, 3.52)
+    edit = move(LABELS, FRAMES, (2, 3), 3, 3.52)
     assert times(edit) == [(1, 2), (2.5, 3), (3.5, 4), (5, 6)]
     assert (edit.name, edit.ids) == ("Move 2 spans", (2, 3))
 
@@ -46,7 +46,7 @@ def test_they_move_by_what_the_one_in_the_hand_moves() -> None:
     ("start_s", "second"), [(9.0, (3.5, 4.0)), (0.0, (2.0, 2.5)), (2.6, (2.0, 2.5))]
 )
 def test_they_stop_as_a_whole_where_the_first_meets_a_neighbour(start_s, second) -> None:
-    edit = move_together(LABELS, FRAMES, (2, 3), 3, start_s)
+    edit = move(LABELS, FRAMES, (2, 3), 3, start_s)
     found = times(edit)
     assert found[1] == second
     assert found[2] == (second[0] + 1, second[1] + 1)
@@ -55,8 +55,8 @@ def test_they_stop_as_a_whole_where_the_first_meets_a_neighbour(start_s, second)
 
 def test_they_do_not_leave_the_recording() -> None:
     everything = (1, 2, 3, 4)
-    assert times(move_together(LABELS, FRAMES, everything, 1, 99.0))[-1] == (9, 10)
-    assert times(move_together(LABELS, FRAMES, everything, 1, -99.0))[0] == (0, 1)
+    assert times(move(LABELS, FRAMES, everything, 1, 99.0))[-1] == (9, 10)
+    assert times(move(LABELS, FRAMES, everything, 1, -99.0))[0] == (0, 1)
     assert times(nudge(LABELS, FRAMES, everything, 99))[-1] == (9, 10)
     assert times(nudge(LABELS, FRAMES, everything, -99))[0] == (0, 1)
 
@@ -92,7 +92,7 @@ def test_touching_ones_still_touch_where_frames_are_uneven(times_s, edges, to_s,
     ids = [span.id for span in labels.spans]
     lead = data.draw(st.sampled_from(ids))
     try:
-        edit = move_together(labels, base, ids, lead, to_s)
+        edit = move(labels, base, ids, lead, to_s)
     except Sd2Error:
         assume(False)  # a span between frames further apart than it is long
     spans = edit.labels.spans
@@ -101,11 +101,16 @@ def test_touching_ones_still_touch_where_frames_are_uneven(times_s, edges, to_s,
     assert all({span.start_s, span.end_s} <= held for span in spans)
 
 
-@given(st.integers(1, 4), st.integers(-120, 120))
-def test_one_alone_goes_as_it_always_does(number: int, step: int) -> None:
-    start_s = LABELS.span(number).start_s + step / 10
-    together = move_together(LABELS, FRAMES, (number,), number, start_s)
-    assert times(together) == times(move(LABELS, FRAMES, number, start_s))
+@given(st.integers(1, 3), st.integers(-120, 120))
+def test_several_go_as_far_as_one_alone_does(number: int, step: int) -> None:
+    both = labels_of(*((2 * k, 2 * k + 1) for k in range(4)))
+    start_s = both.span(number).start_s + step / 10
+    alone = move(both, FRAMES, (number,), number, start_s).labels.span(number)
+    beside = Labels(TRACKS, (*both.spans, replace(both.span(number), id=9, track="Free")))
+    together = move(beside, FRAMES, (number, 9), number, start_s).labels
+    assert together.span(number) == alone
+    nudged = nudge(both, FRAMES, (number,), step).labels.span(number)
+    assert nudge(beside, FRAMES, (number, 9), step).labels.span(number) == nudged
 
 
 def test_thousands_at_once() -> None:

@@ -12,15 +12,16 @@ from hypothesis import strategies as st
 from labelled import even, imported, many_spans, random_edit
 
 from sd2core.labels import journal as journal_module
-from sd2core.labels.journal import Journal, change, head, packed, replay, unpacked
+from sd2core.labels.journal import Journal, Kept, change, head, packed, replay, unpacked
 from sd2core.labels.spans import Labels, Span
 
 FRAMES = even()
 START = imported(FRAMES, 7)
+WALK = Path("/walk.sd2")
 
 
 def test_a_length_that_leads_back_ends_the_reading() -> None:
-    record = packed(head("/walk.sd2", START, 0, "", 0.0))
+    record = packed(head(Kept(WALK, START)))
     # As long as its prefix and the newline before it: its end would be its own start.
     assert unpacked(record + b"-0000013 00000000 ") == ([record[18:-1]], len(record))
 
@@ -28,7 +29,7 @@ def test_a_length_that_leads_back_ends_the_reading() -> None:
 def session(labels: Labels, seed: int, edits: int) -> tuple[list[bytes], list[Labels]]:
     """Records of a session, and the labels after each."""
     rng = random.Random(seed)
-    records, states = [packed(head("/walk.sd2", labels, 0, "", 0.0))], [labels]
+    records, states = [packed(head(Kept(WALK, labels)))], [labels]
     for count in range(edits):
         edit = random_edit(states[-1], FRAMES, rng)
         records.append(packed(change(edit.name, float(count), states[-1], edit.labels)))
@@ -44,7 +45,7 @@ def test_edits_are_done_again(seed: int, edits: int) -> None:
     assert end == sum(map(len, records))
     replayed = replay(payloads)
     assert replayed.labels == states[-1]
-    assert (replayed.edits, replayed.recording) == (edits, Path("/walk.sd2"))
+    assert (replayed.edits, replayed.recording) == (edits, WALK)
 
 
 @settings(max_examples=20)
@@ -85,7 +86,7 @@ def test_an_edit_writes_what_it_changed_and_no_more() -> None:
 
 
 def test_a_journal_of_the_first_version_is_read() -> None:
-    content = head("/walk.sd2", START, 1, "Move span", 0.0) | {"version": 1}
+    content = head(Kept(WALK, START, 1, "Move span")) | {"version": 1}
     del content["others"]
     payloads, _ = unpacked(packed(content))
     replayed = replay(payloads)
@@ -94,7 +95,7 @@ def test_a_journal_of_the_first_version_is_read() -> None:
 
 class TestJournal:
     def begun(self, folder: Path, labels: Labels = START) -> Journal:
-        return Journal(folder, 1, Path("/walk.sd2"), labels)
+        return Journal(folder, 1, Kept(WALK, labels))
 
     def read(self, path: Path) -> Labels:
         return replay(unpacked(path.read_bytes())[0]).labels
@@ -106,7 +107,7 @@ class TestJournal:
             labels = random_edit(labels, FRAMES, rng).labels
             journal.write("Edit", labels)
             assert self.read(tmp_path / "000001-000001.journal") == labels
-        assert journal.unsaved == 50
+        assert journal.kept.edits == 50
         journal.close()
         assert list(tmp_path.iterdir()) == []
 
@@ -159,7 +160,7 @@ class TestJournal:
         after = Labels(spans=(Span(1, "Gestures", 0.0, 1.0, "wave"),))
         journal.write("Edit", after)
         assert self.read(tmp_path / "000001-000002.journal") == after
-        assert journal.unsaved == 2
+        assert journal.kept.edits == 2
 
     @pytest.mark.skipif(os.name == "nt", reason="an open file cannot be deleted there")
     def test_a_deleted_file_is_made_again(self, tmp_path: Path) -> None:
@@ -174,7 +175,7 @@ class TestJournal:
         self, steps: list[int | str | None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr(journal_module, "SHORTEST_BYTES", 1)  # many parts
-        journal = Journal(tmp_path, 1, Path("/walk.sd2"), START)
+        journal = Journal(tmp_path, 1, Kept(WALK, START))
         expected = None
         for step in steps:
             if step == "saved":

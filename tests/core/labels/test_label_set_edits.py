@@ -117,9 +117,9 @@ def test_there_is_always_room_for_a_new_label(count: int) -> None:
     assert [one.key for one in made] == [*"6789", *[""] * count][:count]
 
 
-def test_a_label_comes_first_where_it_is_put_there() -> None:
+def test_a_label_is_added_after_the_others() -> None:
     made = Label("wave", "#882255")
-    assert add_label(LABELS, made, 0).labels.label_set.labels == (made, *GESTURES.labels)
+    assert add_label(LABELS, made).labels.label_set.labels == (*GESTURES.labels, made)
     with pytest.raises(Sd2Error, match="share the name"):
         add_label(LABELS, replace(made, name="background"))
 

@@ -124,7 +124,7 @@ class TestOffers:
         (offer,) = place.offers().offers
         journal = place.begin(offer.labels, offer)
         assert not any(path.exists() for path in offer.files)
-        assert journal.unsaved == 3
+        assert journal.kept.edits == 3
         journal.write("Edit 4", edited(4))
         abandon(place, journal)
         (again,) = taken(root, recording).offers().offers

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from labelled import imported, uneven
 
-from sd2core.labels.free_time import Snap, snap
+from sd2core.labels.free_time import snap
 from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.timebase import Timebase
 
@@ -21,15 +21,15 @@ LABELS = Labels(
 
 
 def test_spans_attract_within_the_distance() -> None:
-    assert snap(LABELS, FRAMES, 2.2, 0.25) == Snap(2.0, "span", 1)
-    assert snap(LABELS, FRAMES, 2.2, 0.1) == Snap(FRAMES.times_s[22], "frame")
-    assert snap(LABELS, FRAMES, 2.9, 0.25) == Snap(3.0, "suggestion", 2)
-    assert snap(LABELS, FRAMES, 1.961, 0.25) == Snap(1.96, "suggestion", 2)
+    assert snap(LABELS, FRAMES, 2.2, 0.25) == 2.0
+    assert snap(LABELS, FRAMES, 2.2, 0.1) == FRAMES.times_s[22]
+    assert snap(LABELS, FRAMES, 2.9, 0.25) == 3.0
+    assert snap(LABELS, FRAMES, 1.961, 0.25) == 1.96
 
 
 def test_spans_in_the_hand_do_not_attract() -> None:
-    assert snap(LABELS, FRAMES, 2.2, 0.25, ignore={1}) == Snap(1.96, "suggestion", 2)
-    assert snap(LABELS, FRAMES, 2.2, 0.25, ignore={1, 2}).at == "frame"
+    assert snap(LABELS, FRAMES, 2.2, 0.25, ignore={1}) == 1.96
+    assert snap(LABELS, FRAMES, 2.2, 0.25, ignore={1, 2}) == FRAMES.times_s[22]
 
 
 def test_on_a_tie_a_span_goes_before_a_suggestion() -> None:
@@ -37,10 +37,13 @@ def test_on_a_tie_a_span_goes_before_a_suggestion() -> None:
         (LabelTrack("Gestures"), LabelTrack("Suggested")),
         (
             Span(1, "Suggested", 1.0, 2.0, "up", origin="suggestion"),
-            Span(2, "Gestures", 2.0, 3.0, "up"),
+            Span(2, "Gestures", 2.5, 3.0, "up"),
         ),
     )
-    assert snap(labels, FRAMES, 2.05, 0.1) == Snap(2.0, "span", 2)
+    assert snap(labels, FRAMES, 2.25, 0.25) == 2.5
+    assert snap(labels, FRAMES, 2.25, 0.25, ignore={2}) == 2.0
+    both = labels.with_spans([Span(1, "Gestures", 1.0, 2.0, "up")])
+    assert snap(both, FRAMES, 2.25, 0.25) == 2.0, "the earlier one"
 
 
 @given(st.integers(0, 99), st.floats(-3, 12), st.floats(0, 1))
@@ -51,10 +54,9 @@ def test_nothing_that_may_attract_is_nearer(seed: int, time_s: float, within_s: 
     edges = [edge for span in labels.spans for edge in (span.start_s, span.end_s)]
     near = [edge for edge in edges if abs(edge - time_s) <= within_s]
     if near:
-        assert found.at != "frame"
-        assert abs(found.time_s - time_s) == min(abs(edge - time_s) for edge in near)
+        assert found in near
+        assert abs(found - time_s) == min(abs(edge - time_s) for edge in near)
     else:
         frames = [*timebase.times_s.tolist(), timebase.end_s]
-        assert found.at == "frame"
-        assert found.time_s in frames
-        assert abs(found.time_s - time_s) == min(abs(edge - time_s) for edge in frames)
+        assert found in frames
+        assert abs(found - time_s) == min(abs(edge - time_s) for edge in frames)
