@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.body.array_store import ArrayStore
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.evidence import EvidenceInParts, sight_of, trust_of
 from sd2core.body.fit_windows import Windows
@@ -114,16 +115,17 @@ class Fitting:
         self._lifter = Lifter.load()
         lifted = LiftedInParts(self._lifter, track, camera) if lift is None else lift(track, camera)
         self._evidence = EvidenceInParts(track, lifted, camera, stature_m)
-        self.windows = Windows(track.present, workspace)
+        self.windows = Windows(track.present, ArrayStore(workspace))
 
     def finished(self, progress: Progress) -> Iterator[BodyFit]:
         """Fits of successive stretches, each as soon as its pose is final."""
         spans = self.windows.spans
         looked = sum(1 for _ in parts(len(self._track)))
         total = looked + len(spans) * ROUNDS
-        people = _People()
-        shape = self._shape(people, lambda number: progress(number, total))
-        rig = people.rig(shape)
+        space = ShapeSpace()
+        keypoints = KeypointSpace(space)
+        shape = self._shape(space, keypoints, lambda number: progress(number, total))
+        rig = keypoints.rig(shape)
         done = 0
         for number in range(len(spans)):
             progress(looked + number * ROUNDS, total)
@@ -146,7 +148,9 @@ class Fitting:
         first = initial_pose(rig, part.points_m, trust_of(track))
         self.windows.keep(number, part, solve(rig, part, first, tick))
 
-    def _shape(self, people: _People, looked: Callable[[int], None]) -> BodyShape:
+    def _shape(
+        self, space: ShapeSpace, keypoints: KeypointSpace, looked: Callable[[int], None]
+    ) -> BodyShape:
         """Bone lengths from evenly chosen frames, then girth from those with outlines."""
         track = self._track
         there = track.present & ~track.bridged
@@ -158,11 +162,11 @@ class Fitting:
         evidence, trust = self._evidence.chosen(known, looked)
         rows = np.searchsorted(known, frames)
         shape, spread = shape_of_lengths(
-            people.space, people.keypoints, evidence[rows].points_m, trust[rows], self._stature_m
+            space, keypoints, evidence[rows].points_m, trust[rows], self._stature_m
         )
         if not len(outlined):
             return shape
-        rig = people.rig(shape)
+        rig = keypoints.rig(shape)
         rows = np.searchsorted(known, outlined_frames)
         stills = evidence[rows]
         pose = solve_stills(rig, stills, initial_pose(rig, stills.points_m, trust[rows]))
@@ -170,12 +174,12 @@ class Fitting:
         rotations = rig.body_rotations(pose.turns)
 
         def transforms_of(other: BodyShape) -> Floats:
-            changed = people.space.skeleton(other)
+            changed = space.skeleton(other)
             # The pelvis stays where it is when the legs grow.
             return changed.transforms(rotations, pose.translation_m + root - changed.heads_m[0])
 
         outlines = [mask >= _MASK_SURE for mask in track.silhouettes[outlined]]
-        return shape_of_outlines(people.space, shape, spread, transforms_of, self._camera, outlines)
+        return shape_of_outlines(space, shape, spread, transforms_of, self._camera, outlines)
 
     def _finished(self, rig: Rig, shape: BodyShape, start: int, stop: int) -> BodyFit:
         evidence, track, lifted = self._evidence.part(start, stop)
@@ -204,17 +208,6 @@ class Fitting:
                 _ACROSS_PER_S * lifted.across_sigma * keypoints_m[..., 2], track.present
             ),
         )
-
-
-class _People:
-    """Rigs of bodies of any shape."""
-
-    def __init__(self) -> None:
-        self.space = ShapeSpace()
-        self.keypoints = KeypointSpace(self.space)
-
-    def rig(self, shape: BodyShape) -> Rig:
-        return Rig(self.space.skeleton(shape), self.keypoints.of(shape))
 
 
 def _outlined(track: Landmarks, there: NDArray[np.bool_]) -> NDArray[np.intp]:

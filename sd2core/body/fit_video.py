@@ -21,7 +21,7 @@ from sd2core.body.fit import fit_motion
 from sd2core.body.fitted import FittedMotion
 from sd2core.body.landmark_files import save_track
 from sd2core.body.landmark_models import DEFAULT_MODEL, LandmarkModel, landmark_models
-from sd2core.body.landmarks import DEFAULT_MAX_GAP_S, SIGHTINGS, OnFrame, find_landmarks
+from sd2core.body.landmarks import DEFAULT_MAX_GAP_S, SIGHTINGS, find_landmarks
 from sd2core.body.limbs import LIMB_LANDMARKS, LIMBS
 from sd2core.body.model import Resolution
 from sd2core.body.person_selection import Rectangle
@@ -144,15 +144,13 @@ def fit_video(
         )
         with claim_folder(partial, restart), remove_without_landmarks(partial), one_thread():
             report.started(video, (partial / LANDMARKS).is_dir())
-            stages = _Stages(report)
             track = find_landmarks(
                 video,
                 found_models,
                 person=choices.person,
                 max_gap_s=choices.max_gap_s,
-                progress=stages.progress,
-                on_stage=stages.begin,
-                on_frame=stages.on_frame,
+                progress_of=report.progress_of,
+                on_frame=report.on_frame,
                 workspace=partial / LANDMARKS,
             )
             video.close()
@@ -224,27 +222,6 @@ def provenance(made: FittedVideo, path: Path, choices: FitChoices) -> dict[str, 
         "notes": list(made.notes),
         "doubts": list(made.doubts),
     }
-
-
-class _Stages:
-    """Hands the reports of the landmark search to the stage that runs."""
-
-    def __init__(self, report: FitReport) -> None:
-        self._report = report
-        self._stage: Stage = "find"
-        self._progress: Progress = report.progress_of("find")
-
-    def begin(self, stage: str) -> None:
-        if stage == "refine":
-            self._stage = "refine"
-            self._progress = self._report.progress_of("refine")
-
-    def progress(self, done: int, total: int) -> None:
-        self._progress(done, total)
-
-    @property
-    def on_frame(self) -> OnFrame:
-        return lambda frame, points, seen: self._report.on_frame(self._stage, frame, points, seen)
 
 
 def _fit_folder(

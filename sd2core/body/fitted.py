@@ -102,7 +102,7 @@ def surface(
     """The moving surface of a body; standard deviations are those of limbs, (T, L)."""
     space = ShapeSpace()
     body = space.load(resolution, shape)
-    rig = Rig(body.skeleton, KeypointSpace(space).of(shape))
+    rig = KeypointSpace(space).rig(shape)
     return MeshSequence(
         FittedVertices(body, rig, len(timebase), poses),
         body.faces,

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.body.array_store import ArrayStore
 from sd2core.body.blazepose import Pose, PoseDetector, PoseLandmarker
-from sd2core.body.landmark_files import RefinedStretches, SearchStore, TrackInParts
+from sd2core.body.landmark_files import RefinedStretches, TrackInParts, search_store
 from sd2core.body.landmark_models import LandmarkModels
 from sd2core.body.landmark_repair import who_else
 from sd2core.body.person_selection import Rectangle, Start, find_person_in, find_prominent_person
@@ -22,8 +24,11 @@ from sd2core.io.video import VideoReader
 from sd2core.numerics.compiled import worker_count
 from sd2core.progress import Progress, silent
 
-OnFrame = Callable[[int, NDArray[np.float32], NDArray[np.float32]], None]
-"""``on_frame(frame, image_px (33, 2), visibility (33,))``."""
+SearchStage = Literal["find", "refine"]
+"""Passes over the video, in order."""
+
+OnFrame = Callable[[SearchStage, int, NDArray[np.float32], NDArray[np.float32]], None]
+"""``on_frame(stage, frame, image_px (33, 2), visibility (33,))``."""
 
 DEFAULT_MAX_GAP_S = 0.5
 DEFAULT_SILHOUETTES = 24
@@ -44,9 +49,8 @@ def find_landmarks(
     max_gap_s: float = DEFAULT_MAX_GAP_S,
     silhouettes: int | None = DEFAULT_SILHOUETTES,
     threads: int | None = None,
-    progress: Progress = silent,
-    on_stage: Callable[[str], None] | None = None,
-    on_frame: OnFrame | None = None,
+    progress_of: Callable[[SearchStage], Progress] = lambda stage: silent,
+    on_frame: OnFrame = lambda *_: None,
     workspace: Path | None = None,
 ) -> TrackInParts:
     """Find the landmarks of one person in every frame.
@@ -67,12 +71,11 @@ def find_landmarks(
         Number of frames, evenly spread, whose mask is kept; None for all.
     threads : int, optional
         All cores (up to 8) unless given.
-    progress : callable
-        Counts the frames of each stage; may raise ``Cancelled``.
-    on_stage : callable, optional
-        Called with ``"find"`` and ``"refine"`` when that stage begins.
+    progress_of : callable, optional
+        Gives the progress callback of a stage that begins, which counts frames and may raise
+        ``Cancelled``.
     on_frame : callable, optional
-        Called with the findings of each stage in a frame.
+        Called with the findings of each stage in a frame; may raise ``Cancelled``.
     workspace : Path, optional
         Folder from which a stopped search can go on. Results of another video or other options
         in it are not used. Without it the track is in memory.
@@ -90,11 +93,9 @@ def find_landmarks(
         raise Sd2Error(f"the longest gap to bridge is {max_gap_s} s", "0 s or more")
     if threads is None:
         threads = min(worker_count(), _MOST_THREADS)
-    store = SearchStore(workspace, video, person, silhouettes, models.name)
-    begin = on_stage or (lambda stage: None)
-    begin("find")
-    sightings = _found(video, models, person, threads, progress, on_frame, store)
-    begin("refine")
+    store = search_store(workspace, video, person, silhouettes, models.name)
+    sightings = _found(video, models, person, threads, progress_of("find"), on_frame, store)
+    progress = progress_of("refine")
     refined = _refined(video, models, sightings, silhouettes, threads, progress, on_frame, store)
     if not refined.confidence.any():
         raise Sd2Error(
@@ -120,8 +121,8 @@ def _found(
     person: Rectangle | None,
     threads: int,
     progress: Progress,
-    on_frame: OnFrame | None,
-    store: SearchStore,
+    on_frame: OnFrame,
+    store: ArrayStore,
 ) -> Sightings:
     """The first pass."""
     kept = store.read(SIGHTINGS)
@@ -145,7 +146,7 @@ def _found(
 
     def seen(frame: int, pose: Pose | None) -> None:
         done, total = search.done
-        _show(frame, pose, on_frame)
+        _show("find", frame, pose, on_frame)
         if done % _SAVE_EVERY == 0 and done < total and search.settled:
             store.write("search.npz", search.state())
         progress(round(done * len(video) / total), len(video))
@@ -162,8 +163,8 @@ def _refined(
     silhouettes: int | None,
     threads: int,
     progress: Progress,
-    on_frame: OnFrame | None,
-    store: SearchStore,
+    on_frame: OnFrame,
+    store: ArrayStore,
 ) -> RefinedStretches:
     """The second pass."""
     frames = len(video)
@@ -171,7 +172,7 @@ def _refined(
     kept = _spread(np.flatnonzero(np.isfinite(path[:, 0])), silhouettes)
 
     def seen(frame: int, pose: Pose | None) -> None:
-        _show(frame, pose, on_frame)
+        _show("refine", frame, pose, on_frame)
         progress(frame + 1, frames)
 
     refined = RefinedStretches(store, video, _STRETCH_FRAMES)
@@ -194,7 +195,7 @@ def _spread(frames: NDArray[np.intp], count: int | None) -> frozenset[int]:
     return frozenset(frames[rows].tolist())
 
 
-def _show(frame: int, pose: Pose | None, on_frame: OnFrame | None) -> None:
-    if pose is not None and on_frame is not None:
-        visibility = pose.visibility * pose.presence
-        on_frame(frame, pose.image_px[:33].astype(np.float32), visibility.astype(np.float32))
+def _show(stage: SearchStage, frame: int, pose: Pose | None, on_frame: OnFrame) -> None:
+    if pose is not None:
+        visibility = (pose.visibility * pose.presence).astype(np.float32)
+        on_frame(stage, frame, pose.image_px[:33].astype(np.float32), visibility)

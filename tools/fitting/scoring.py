@@ -49,7 +49,9 @@ class MeshSource(NamedTuple):
         name = f"real-{video.stem}"
         path, _ = self._fitted(name, video, [])
         with progress_bar(f"Looking at {video.name}") as progress, open_video(video) as reader:
-            found = find_landmarks(reader, landmark_models(), silhouettes=None, progress=progress)
+            found = find_landmarks(
+                reader, landmark_models(), silhouettes=None, progress_of=lambda _: progress
+            )
         track = found.part(0, len(found))
         camera = PinholeCamera.default(track.width, track.height)
         return score_real(name, load_mesh(path), track, camera)

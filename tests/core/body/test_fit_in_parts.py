@@ -19,10 +19,10 @@ from sd2core.body.camera import PinholeCamera
 from sd2core.body.fit import fit_motion
 from sd2core.body.landmark_files import (
     RefinedStretches,
-    SearchStore,
     TrackInParts,
     load_track,
     save_track,
+    search_store,
 )
 from sd2core.body.lifter import LiftedInParts, Lifter
 from sd2core.body.raw_track import RawTrack
@@ -100,7 +100,7 @@ def stored(known: LandmarkTrack, folder: Path | None, max_gap_s: float = 0.5) ->
     """These landmarks as a search leaves them, and mended."""
     path = Path(__file__)  # any file
     video: Any = Video(known.timebase, known.width, known.height, path)
-    store = SearchStore(folder, video, None, None, "full")
+    store = search_store(folder, video, None, None, "full")
     refined = RefinedStretches(store, video, 32)
     for start in range(0, len(known), 32):
         part = known.part(start, min(start + 32, len(known)))

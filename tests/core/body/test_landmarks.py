@@ -24,7 +24,7 @@ from sd2core.body.person_selection import Rectangle
 from sd2core.body.track import LANDMARKS, LandmarkTrack
 from sd2core.errors import Sd2Error
 from sd2core.io.video import open_video
-from sd2core.progress import Cancelled
+from sd2core.progress import Cancelled, Progress
 
 TORSO = [LANDMARKS.index(name) for name in ("shoulder.L", "shoulder.R", "hip.L", "hip.R")]
 WRIST = LANDMARKS.index("wrist.R")
@@ -89,12 +89,16 @@ class TestOnePerson:
         stages: list[str] = []
         seen: dict[str, list[int]] = {"find": [], "refine": []}
         reports: dict[str, list[tuple[int, int]]] = {"find": [], "refine": []}
+
+        def progress_of(stage: str) -> Progress:
+            stages.append(stage)
+            return lambda *report: reports[stage].append(report)
+
         found(
             swipe,
             models,
-            on_stage=stages.append,
-            on_frame=lambda frame, points, seeing: seen[stages[-1]].append(frame),
-            progress=lambda *report: reports[stages[-1]].append(report),
+            on_frame=lambda stage, frame, points, seeing: seen[stage].append(frame),
+            progress_of=progress_of,
             silhouettes=3,
         )
         assert stages == ["find", "refine"]
@@ -308,14 +312,8 @@ class TestTimes:
         """At 120 frames/s, the first pass looks at one in eight."""
         pictures = [each for each in swiping()[0][4:6] for _ in range(8)]
         path = film(tmp_path / "fast.mp4", pictures, frames_per_s=120)
-        stages: list[str] = []
         seen: list[tuple[str, int]] = []
-        track = found(
-            path,
-            models,
-            on_stage=stages.append,
-            on_frame=lambda frame, points, seeing: seen.append((stages[-1], frame)),
-        )
+        track = found(path, models, on_frame=lambda stage, frame, *_: seen.append((stage, frame)))
         assert len([frame for stage, frame in seen if stage == "find"]) <= 4
         assert len([frame for stage, frame in seen if stage == "refine"]) == 16
         assert track.present.all()
@@ -349,7 +347,7 @@ class TestStopped:
             found(swipe, models, workspace=tmp_path, on_frame=cancel)
         again: list[int] = []
         resumed = found(
-            swipe, models, workspace=tmp_path, on_frame=lambda frame, *_: again.append(frame)
+            swipe, models, workspace=tmp_path, on_frame=lambda _, frame, *__: again.append(frame)
         )
         for name, value in vars(track).items():
             if isinstance(value, np.ndarray):

@@ -137,7 +137,7 @@ def test_real_videos_are_looked_at_too(
     body = Body.load("low")
     mask = silhouette(body.vertices_m + np.array([0.0, 1.0, 2.5]), body.faces, PinholeCamera())
 
-    def look(reader: Any, models: Any, *, silhouettes: Any, progress: Any) -> LandmarkTrack:
+    def look(reader: Any, models: Any, *, silhouettes: Any, progress_of: Any) -> LandmarkTrack:
         assert silhouettes is None
         none = np.zeros((14, 33), np.float32)
         masks = np.repeat(255 * mask[None].astype(np.uint8), 14, axis=0)
