@@ -6,8 +6,9 @@ import hashlib
 import json
 import os
 import zipfile
-from collections.abc import Mapping, Sequence
-from functools import lru_cache
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import IO, Any
 
@@ -63,7 +64,7 @@ def save_track(track: Landmarks, path: Path | str) -> None:
 def _write_parts(member: IO[bytes], track: Landmarks, name: str) -> None:
     """One array of a track as ``.npy``."""
     for start, stop in parts(len(track)):
-        values = getattr(track.part(start, stop), name)
+        values = track.rows(start, stop)[name]
         if start == 0:
             shape = (len(track), *values.shape[1:])
             header = {"descr": values.dtype.str, "fortran_order": False, "shape": shape}
@@ -123,63 +124,64 @@ def search_store(
     return ArrayStore(folder, hashlib.sha256(json.dumps(identity).encode()).hexdigest())
 
 
-class TrackInParts:
-    """Landmarks in a store, repaired; see :class:`~sd2core.body.track.Landmarks`."""
+def repaired_track(
+    store: ArrayStore,
+    video: VideoReader,
+    refined: RefinedStretches,
+    max_gap_s: float,
+    unclear: NDArray[np.bool_] | None = None,
+    notes: tuple[str, ...] = (),
+) -> TrackInParts:
+    """Repair what was found, into a store; see :func:`repair_landmarks`."""
+    present, bridged = np.zeros((2, len(video)), bool)
+    written = 0
 
-    def __init__(
-        self,
-        store: ArrayStore,
-        timebase: Timebase,
-        width: int,
-        height: int,
-        refined: RefinedStretches,
-        max_gap_s: float,
-        unclear: NDArray[np.bool_] | None = None,
-        notes: tuple[str, ...] = (),
-    ) -> None:
-        self.timebase, self.width, self.height = timebase, width, height
-        self.silhouette_frames, self.silhouettes = refined.silhouettes()
-        self._store = store
-        self._starts = [start for start, _ in parts(len(timebase))]
-        self._kept = lru_cache(maxsize=2)(self._read)
-        self.present, self.bridged = np.zeros((2, len(timebase)), bool)
-        written = 0
+    def write(found: RawTrack) -> None:
+        nonlocal written
+        frames = slice(written, written + len(found.present))
+        known = vars(found) | {"confidence": refined.confidence[frames]}
+        store.write(_name(written), {name: known[name] for name in PER_FRAME})
+        present[frames], bridged[frames] = found.present, found.bridged
+        written = frames.stop
 
-        def write(found: RawTrack) -> None:
-            nonlocal written
-            frames = slice(written, written + len(found.present))
-            known = vars(found) | {"confidence": refined.confidence[frames]}
-            store.write(_name(written), {name: known[name] for name in PER_FRAME})
-            self.present[frames], self.bridged[frames] = found.present, found.bridged
-            written = frames.stop
+    times_s, seen = video.timebase.times_s, refined.confidence > 0.0
+    repairs = repair_landmarks(refined.found, times_s, seen, max_gap_s, write, unclear)
+    silhouette_frames, silhouettes = refined.silhouettes()
+    return TrackInParts(
+        timebase=video.timebase,
+        width=video.width,
+        height=video.height,
+        present=present,
+        bridged=bridged,
+        silhouette_frames=silhouette_frames,
+        silhouettes=silhouettes,
+        notes=(*repairs, *notes),
+        store=store,
+    )
 
-        repairs = repair_landmarks(
-            refined.found, timebase.times_s, refined.confidence > 0.0, max_gap_s, write, unclear
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TrackInParts(Landmarks):
+    """Landmarks in a store, repaired, a stretch at a time in memory."""
+
+    store: ArrayStore
+
+    def rows(self, start: int, stop: int) -> dict[str, NDArray[Any]]:
+        """Frames ``start`` to ``stop`` of the arrays of a track."""
+        starts = [first for first, _ in parts(len(self))]
+        first = int(np.searchsorted(starts, start, side="right")) - 1
+        last = max(int(np.searchsorted(starts, stop)), first + 1)
+        pieces = [self._kept(begin) for begin in starts[first:last]]
+        cut = slice(start - starts[first], stop - starts[first])
+        return {name: _joined(pieces, name)[cut] for name in PER_FRAME}
+
+    @cached_property
+    def _kept(self) -> Callable[[int], Mapping[str, NDArray[Any]]]:
+        return lru_cache(maxsize=2)(
+            lambda start: self.store.needed(
+                _name(start), f"The landmarks of frames {start} and on have"
+            )
         )
-        self.notes = (*repairs, *notes)
-
-    def __len__(self) -> int:
-        return len(self.timebase)
-
-    def part(self, start: int, stop: int) -> LandmarkTrack:
-        """Frames ``start`` to ``stop`` as a track of their own."""
-        first = int(np.searchsorted(self._starts, start, side="right")) - 1
-        last = max(int(np.searchsorted(self._starts, stop)), first + 1)
-        pieces = [self._kept(begin) for begin in self._starts[first:last]]
-        cut = slice(start - self._starts[first], stop - self._starts[first])
-        kept = (self.silhouette_frames >= start) & (self.silhouette_frames < stop)
-        return LandmarkTrack(
-            timebase=Timebase(self.timebase.times_s[start:stop]),
-            width=self.width,
-            height=self.height,
-            silhouette_frames=self.silhouette_frames[kept] - start,
-            silhouettes=self.silhouettes[kept],
-            notes=self.notes,
-            **{name: _joined(pieces, name)[cut] for name in PER_FRAME},
-        )
-
-    def _read(self, start: int) -> Mapping[str, NDArray[Any]]:
-        return self._store.needed(_name(start), f"The landmarks of frames {start} and on have")
 
 
 class RefinedStretches:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from sd2core.body.array_store import ArrayStore
 from sd2core.body.blazepose import Pose, PoseDetector, PoseLandmarker
-from sd2core.body.landmark_files import RefinedStretches, TrackInParts, search_store
+from sd2core.body.landmark_files import RefinedStretches, TrackInParts, repaired_track, search_store
 from sd2core.body.landmark_models import LandmarkModels
 from sd2core.body.landmark_repair import who_else
 from sd2core.body.person_selection import Rectangle, Start, find_person_in, find_prominent_person
@@ -103,16 +103,9 @@ def find_landmarks(
             "a person who is seen in some frames in succession",
             "Say where the person is: --person-box X,Y,WIDTH,HEIGHT --person-frame FRAME",
         )
-    return TrackInParts(
-        store,
-        video.timebase,
-        video.width,
-        video.height,
-        refined,
-        max_gap_s,
-        sightings.unclear_frames(len(video)),
-        who_else(sightings, video.timebase.times_s),
-    )
+    unclear = sightings.unclear_frames(len(video))
+    others = who_else(sightings, video.timebase.times_s)
+    return repaired_track(store, video, refined, max_gap_s, unclear, others)
 
 
 def _found(

@@ -21,6 +21,7 @@ from sd2core.body.landmark_files import (
     RefinedStretches,
     TrackInParts,
     load_track,
+    repaired_track,
     save_track,
     search_store,
 )
@@ -113,7 +114,7 @@ def stored(known: LandmarkTrack, folder: Path | None, max_gap_s: float = 0.5) ->
                 silhouettes=part.silhouettes,
             ),
         )
-    return TrackInParts(store, known.timebase, known.width, known.height, refined, max_gap_s)
+    return repaired_track(store, video, refined, max_gap_s)
 
 
 @pytest.fixture
