@@ -39,9 +39,11 @@ class PinholeCamera:
             )
 
     @classmethod
-    def default(cls, width: int, height: int) -> PinholeCamera:
-        """Camera of :data:`DEFAULT_FIELD_OF_VIEW_DEG` for pictures of this size."""
-        half = math.radians(DEFAULT_FIELD_OF_VIEW_DEG) / 2.0
+    def default(
+        cls, width: int, height: int, field_of_view_deg: float = DEFAULT_FIELD_OF_VIEW_DEG
+    ) -> PinholeCamera:
+        """Camera for pictures of this size, by the angle across their longer side."""
+        half = math.radians(field_of_view_deg) / 2.0
         return cls(width, height, max(width, height) / 2.0 / math.tan(half))
 
     @property
@@ -93,8 +95,7 @@ def camera_of(
                 f"The field of view is {field_of_view_deg:g}°",
                 "1° to 170°, across the longer side of the picture",
             )
-        half = math.radians(field_of_view_deg) / 2.0
-        return PinholeCamera(*size, max(size) / 2.0 / math.tan(half)), "user"
+        return PinholeCamera.default(*size, field_of_view_deg), "user"
     written = written_focal_mm(video.metadata)
     if written is not None:
         return PinholeCamera(*size, written * math.hypot(*size) / _DIAGONAL_35MM), "metadata"

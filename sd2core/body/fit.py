@@ -11,18 +11,18 @@ from numpy.typing import NDArray
 
 from sd2core.body.array_store import ArrayStore
 from sd2core.body.camera import PinholeCamera
-from sd2core.body.evidence import EvidenceInParts, sight_of, trust_of
+from sd2core.body.evidence import Evidence, evidence_of, joined, sight_of, trust_of
 from sd2core.body.fit_windows import Windows
 from sd2core.body.fitted import BodyFit, FittedMotion, mean_over_limbs
 from sd2core.body.initial import initial_pose
-from sd2core.body.lifter import Lifted, LiftedInParts, Lifter
+from sd2core.body.lifter import Lifted, LiftedInParts, LiftedTrack, Lifter
 from sd2core.body.limbs import LIMBS
 from sd2core.body.rig import KeypointSpace, Rig
 from sd2core.body.rotations import Floats
 from sd2core.body.shape import DEFAULT_STATURE_M, BodyShape, ShapeSpace
 from sd2core.body.shaping import shape_of_lengths, shape_of_outlines
 from sd2core.body.solve import ROUNDS, solve, solve_stills
-from sd2core.body.track import LANDMARKS, PART_FRAMES, Landmarks, parts
+from sd2core.body.track import LANDMARKS, PART_FRAMES, Landmarks, LandmarkTrack, parts
 from sd2core.errors import Sd2Error
 from sd2core.progress import Progress, silent
 
@@ -113,8 +113,11 @@ class Fitting:
             raise Sd2Error("No frame of the video shows a person", "at least one")
         self._track, self._camera, self._stature_m = track, camera, stature_m
         self._lifter = Lifter.load()
-        lifted = LiftedInParts(self._lifter, track, camera) if lift is None else lift(track, camera)
-        self._evidence = EvidenceInParts(track, lifted, camera, stature_m)
+        self._lifted: Lifted
+        if lift is None:
+            self._lifted = LiftedInParts(self._lifter, track, camera)
+        else:
+            self._lifted = lift(track, camera)
         self.windows = Windows(track.present, ArrayStore(workspace))
 
     def finished(self, progress: Progress) -> Iterator[BodyFit]:
@@ -140,9 +143,31 @@ class Fitting:
             done = final
         progress(total, total)
 
+    def _part(self, start: int, stop: int) -> tuple[Evidence, LandmarkTrack, LiftedTrack]:
+        """Evidence of frames ``start`` to ``stop``, with its track and lifted track."""
+        track, lifted = self._track.part(start, stop), self._lifted.part(start, stop)
+        return evidence_of(track, lifted, self._camera, self._stature_m), track, lifted
+
+    def _chosen(
+        self, frames: NDArray[np.intp], looked: Callable[[int], None]
+    ) -> tuple[Evidence, Floats]:
+        """Evidence of some frames (ascending), and the trust in their landmarks (n, 33).
+
+        ``looked`` is called with the number of parts that were read.
+        """
+        pieces, trust = [], []
+        for number, (start, stop) in enumerate(parts(len(self._track))):
+            looked(number)
+            rows = frames[(frames >= start) & (frames < stop)] - start
+            if len(rows):
+                evidence, track, _ = self._part(start, stop)
+                pieces.append(evidence[rows])
+                trust.append(trust_of(track)[rows])
+        return joined(pieces), np.concatenate(trust)
+
     def _solve(self, rig: Rig, number: int, tick: Callable[[int], None]) -> None:
         start, stop, _ = self.windows.spans[number]
-        part, track, _ = self._evidence.part(start, stop)
+        part, track, _ = self._part(start, stop)
         if self.windows.is_kept(number, part):
             return
         first = initial_pose(rig, part.points_m, trust_of(track))
@@ -159,7 +184,7 @@ class Fitting:
         outlined_frames = track.silhouette_frames[outlined]
         frames = _thinned(np.flatnonzero(there), PART_FRAMES)
         known = np.union1d(frames, outlined_frames)
-        evidence, trust = self._evidence.chosen(known, looked)
+        evidence, trust = self._chosen(known, looked)
         rows = np.searchsorted(known, frames)
         shape, spread = shape_of_lengths(
             space, keypoints, evidence[rows].points_m, trust[rows], self._stature_m
@@ -182,7 +207,7 @@ class Fitting:
         return shape_of_outlines(space, shape, spread, transforms_of, self._camera, outlines)
 
     def _finished(self, rig: Rig, shape: BodyShape, start: int, stop: int) -> BodyFit:
-        evidence, track, lifted = self._evidence.part(start, stop)
+        evidence, track, lifted = self._part(start, stop)
         before = min(start, 1)
         frames = np.arange(start - before, stop)
         pose = self.windows.poses(frames)

@@ -13,8 +13,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sd2core.body import evidence, fit_windows, landmark_repair, lifter, sides, track
 from sd2core.body import fit as fitting
+from sd2core.body import fit_windows, landmark_repair, lifter, sides, track
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.fit import fit_motion
 from sd2core.body.landmark_files import (
@@ -382,7 +382,7 @@ class TestMotion:
         watched(LiftedInParts, "part")
         watched(LiftedInParts, "_sampled")
         watched(fit_windows.Windows, "poses")
-        watched(evidence, "evidence_of")
+        watched(fitting, "evidence_of")
         known = swiping(400)
         kept = stored(known, tmp_path)
         motion = fit_motion(kept, CAMERA, stature_m=STATURE_M, workspace=tmp_path)
