@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.mesh.vertex_parts import other_side
 from sd2core.timebase import Timebase
 
 LANDMARKS = (
@@ -53,12 +54,7 @@ LANDMARKS = (
 LANDMARK = {name: number for number, name in enumerate(LANDMARKS)}
 """Number of a landmark by its name."""
 
-MIRRORED = tuple(
-    LANDMARKS.index(
-        name[:-1] + {"L": "R", "R": "L"}[name[-1]] if name[-2:] in (".L", ".R") else name
-    )
-    for name in LANDMARKS
-)
+MIRRORED = tuple(LANDMARKS.index(other_side(name)) for name in LANDMARKS)
 """For every landmark the one on the other side."""
 
 TORSO_CORNERS = tuple(
