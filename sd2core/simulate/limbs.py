@@ -19,7 +19,7 @@ _KNEES_REACH = 0.995
 
 
 class Motion(NamedTuple):
-    """Rotations (T, B, 3, 3) and translation (T, 3) for :meth:`sd2core.body.model.Body.pose`."""
+    """Rotations (T, B, 3, 3) and translation (T, 3) for :meth:`Skeleton.transforms`."""
 
     rotations: Floats
     translation_m: Floats
