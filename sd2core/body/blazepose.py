@@ -112,9 +112,8 @@ class PoseDetector:
         for stride in _STRIDES:
             cells = _DETECTOR_PX // stride
             y, x = np.mgrid[:cells, :cells]
-            cell = (np.stack([x, y], axis=-1).reshape(-1, 2) + 0.5) / cells
-            layers.append(cell)
-        return _joined(layers)
+            layers.append((np.stack([x, y], axis=-1).reshape(-1, 2) + 0.5) / cells)
+        return np.repeat(np.concatenate(layers), _ANCHORS_PER_CELL, axis=0)
 
 
 class PoseLandmarker:
@@ -293,7 +292,3 @@ def _refined(points_px: Floats, heat: Singles) -> Floats:
 
 def _sigmoid(logits: NDArray[np.floating]) -> Floats:
     return 0.5 + 0.5 * np.tanh(0.5 * logits.astype(np.float64))
-
-
-def _joined(layers: list[Floats]) -> Floats:
-    return np.concatenate([np.repeat(layer, _ANCHORS_PER_CELL, axis=0) for layer in layers])

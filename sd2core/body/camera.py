@@ -40,9 +40,11 @@ class PinholeCamera:
             )
 
     @classmethod
-    def default(cls, width: int, height: int) -> PinholeCamera:
-        """Camera of :data:`DEFAULT_FIELD_OF_VIEW_DEG` for pictures of this size."""
-        half = math.radians(DEFAULT_FIELD_OF_VIEW_DEG) / 2.0
+    def default(
+        cls, width: int, height: int, field_of_view_deg: float = DEFAULT_FIELD_OF_VIEW_DEG
+    ) -> PinholeCamera:
+        """Camera for pictures of this size, by the angle across their longer side."""
+        half = math.radians(field_of_view_deg) / 2.0
         return cls(width, height, max(width, height) / 2.0 / math.tan(half))
 
     @property
@@ -90,8 +92,7 @@ def camera_of(
         return PinholeCamera(*size, float(focal_px)), "user"
     if field_of_view_deg is not None:
         check_field_of_view(field_of_view_deg)
-        half = math.radians(field_of_view_deg) / 2.0
-        return PinholeCamera(*size, max(size) / 2.0 / math.tan(half)), "user"
+        return PinholeCamera.default(*size, field_of_view_deg), "user"
     written = written_focal_mm(video.metadata)
     if written is not None:
         return PinholeCamera(*size, written * math.hypot(*size) / _DIAGONAL_35MM), "metadata"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.camera import PinholeCamera
-from sd2core.body.lifter import FEET, Lifted, LiftedTrack
+from sd2core.body.lifter import FEET, LiftedTrack
 from sd2core.body.rotations import Floats
-from sd2core.body.track import TORSO_CORNERS, Landmarks, LandmarkTrack, parts
+from sd2core.body.track import TORSO_CORNERS, LandmarkTrack
 
 _ACROSS_SHARE = 0.5
 """Standard deviation of a landmark across the view over the lifter's: errors there are those of
@@ -110,37 +110,9 @@ def _trust(track: LandmarkTrack, drawn_in: float) -> Floats:
     return np.asarray(np.clip(track.visibility * inside, _LEAST_TRUST, 1.0), np.float64)
 
 
-class EvidenceInParts:
-    """Evidence of a clip of any length, made part by part."""
-
-    def __init__(
-        self, track: Landmarks, lifted: Lifted, camera: PinholeCamera, stature_m: float
-    ) -> None:
-        self._track, self._lifted = track, lifted
-        self._camera, self._stature_m = camera, stature_m
-
-    def part(self, start: int, stop: int) -> tuple[Evidence, LandmarkTrack, LiftedTrack]:
-        """Evidence of frames ``start`` to ``stop``, with its track and lifted track."""
-        track, lifted = self._track.part(start, stop), self._lifted.part(start, stop)
-        return evidence_of(track, lifted, self._camera, self._stature_m), track, lifted
-
-    def chosen(
-        self, frames: NDArray[np.intp], looked: Callable[[int], None]
-    ) -> tuple[Evidence, Floats]:
-        """Evidence of some frames (ascending), and the trust in their landmarks (n, 33).
-
-        ``looked`` is called with the number of parts that were read.
-        """
-        pieces, trust = [], []
-        for number, (start, stop) in enumerate(parts(len(self._track))):
-            looked(number)
-            rows = frames[(frames >= start) & (frames < stop)] - start
-            if len(rows):
-                evidence, track, _ = self.part(start, stop)
-                pieces.append(evidence[rows])
-                trust.append(trust_of(track)[rows])
-        joined: dict[str, Any] = {
-            name: np.concatenate([getattr(piece, name) for piece in pieces])
-            for name in _per_frame()
-        }
-        return replace(pieces[0], **joined), np.concatenate(trust)
+def joined(pieces: Sequence[Evidence]) -> Evidence:
+    """Evidence of the frames of all pieces."""
+    arrays: dict[str, Any] = {
+        name: np.concatenate([getattr(piece, name) for piece in pieces]) for name in _per_frame()
+    }
+    return replace(pieces[0], **arrays)

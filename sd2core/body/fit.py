@@ -9,19 +9,20 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.body.array_store import ArrayStore
 from sd2core.body.camera import PinholeCamera
-from sd2core.body.evidence import EvidenceInParts, sight_of, trust_of
+from sd2core.body.evidence import Evidence, evidence_of, joined, sight_of, trust_of
 from sd2core.body.fit_windows import Windows
 from sd2core.body.fitted import BodyFit, FittedMotion, mean_over_limbs
 from sd2core.body.initial import initial_pose
-from sd2core.body.lifter import Lifted, LiftedInParts, Lifter
+from sd2core.body.lifter import Lifted, LiftedInParts, LiftedTrack, Lifter
 from sd2core.body.limbs import LIMBS
 from sd2core.body.rig import KeypointSpace, Rig
 from sd2core.body.rotations import Floats
 from sd2core.body.shape import DEFAULT_STATURE_M, BodyShape, ShapeSpace, check_stature
 from sd2core.body.shaping import shape_of_lengths, shape_of_outlines
 from sd2core.body.solve import ROUNDS, solve, solve_stills
-from sd2core.body.track import LANDMARKS, PART_FRAMES, Landmarks, parts
+from sd2core.body.track import LANDMARKS, PART_FRAMES, Landmarks, LandmarkTrack, parts
 from sd2core.errors import Sd2Error
 from sd2core.progress import Progress, silent
 
@@ -106,18 +107,22 @@ class Fitting:
             raise Sd2Error("No frame of the video shows a person", "at least one")
         self._track, self._camera, self._stature_m = track, camera, stature_m
         self._lifter = Lifter.load()
-        lifted = LiftedInParts(self._lifter, track, camera) if lift is None else lift(track, camera)
-        self._evidence = EvidenceInParts(track, lifted, camera, stature_m)
-        self.windows = Windows(track.present, workspace)
+        self._lifted: Lifted
+        if lift is None:
+            self._lifted = LiftedInParts(self._lifter, track, camera)
+        else:
+            self._lifted = lift(track, camera)
+        self.windows = Windows(track.present, ArrayStore(workspace))
 
     def finished(self, progress: Progress) -> Iterator[BodyFit]:
         """Fits of successive stretches, each as soon as its pose is final."""
         spans = self.windows.spans
         looked = sum(1 for _ in parts(len(self._track)))
         total = looked + len(spans) * ROUNDS
-        people = _People()
-        shape = self._shape(people, lambda number: progress(number, total))
-        rig = people.rig(shape)
+        space = ShapeSpace()
+        keypoints = KeypointSpace(space)
+        shape = self._shape(space, keypoints, lambda number: progress(number, total))
+        rig = keypoints.rig(shape)
         done = 0
         for number in range(len(spans)):
             progress(looked + number * ROUNDS, total)
@@ -132,15 +137,39 @@ class Fitting:
             done = final
         progress(total, total)
 
+    def _part(self, start: int, stop: int) -> tuple[Evidence, LandmarkTrack, LiftedTrack]:
+        """Evidence of frames ``start`` to ``stop``, with its track and lifted track."""
+        track, lifted = self._track.part(start, stop), self._lifted.part(start, stop)
+        return evidence_of(track, lifted, self._camera, self._stature_m), track, lifted
+
+    def _chosen(
+        self, frames: NDArray[np.intp], looked: Callable[[int], None]
+    ) -> tuple[Evidence, Floats]:
+        """Evidence of some frames (ascending), and the trust in their landmarks (n, 33).
+
+        ``looked`` is called with the number of parts that were read.
+        """
+        pieces, trust = [], []
+        for number, (start, stop) in enumerate(parts(len(self._track))):
+            looked(number)
+            rows = frames[(frames >= start) & (frames < stop)] - start
+            if len(rows):
+                evidence, track, _ = self._part(start, stop)
+                pieces.append(evidence[rows])
+                trust.append(trust_of(track)[rows])
+        return joined(pieces), np.concatenate(trust)
+
     def _solve(self, rig: Rig, number: int, tick: Callable[[int], None]) -> None:
         start, stop, _ = self.windows.spans[number]
-        part, track, _ = self._evidence.part(start, stop)
+        part, track, _ = self._part(start, stop)
         if self.windows.is_kept(number, part):
             return
         first = initial_pose(rig, part.points_m, trust_of(track))
         self.windows.keep(number, part, solve(rig, part, first, tick))
 
-    def _shape(self, people: _People, looked: Callable[[int], None]) -> BodyShape:
+    def _shape(
+        self, space: ShapeSpace, keypoints: KeypointSpace, looked: Callable[[int], None]
+    ) -> BodyShape:
         """Bone lengths from evenly chosen frames, then girth from those with outlines."""
         track = self._track
         there = track.present & ~track.bridged
@@ -149,14 +178,14 @@ class Fitting:
         outlined_frames = track.silhouette_frames[outlined]
         frames = _thinned(np.flatnonzero(there), PART_FRAMES)
         known = np.union1d(frames, outlined_frames)
-        evidence, trust = self._evidence.chosen(known, looked)
+        evidence, trust = self._chosen(known, looked)
         rows = np.searchsorted(known, frames)
         shape, spread = shape_of_lengths(
-            people.space, people.keypoints, evidence[rows].points_m, trust[rows], self._stature_m
+            space, keypoints, evidence[rows].points_m, trust[rows], self._stature_m
         )
         if not len(outlined):
             return shape
-        rig = people.rig(shape)
+        rig = keypoints.rig(shape)
         rows = np.searchsorted(known, outlined_frames)
         stills = evidence[rows]
         pose = solve_stills(rig, stills, initial_pose(rig, stills.points_m, trust[rows]))
@@ -164,15 +193,15 @@ class Fitting:
         rotations = rig.body_rotations(pose.turns)
 
         def transforms_of(other: BodyShape) -> Floats:
-            changed = people.space.skeleton(other)
+            changed = space.skeleton(other)
             # The pelvis stays where it is when the legs grow.
             return changed.transforms(rotations, pose.translation_m + root - changed.heads_m[0])
 
         outlines = [mask >= _MASK_SURE for mask in track.silhouettes[outlined]]
-        return shape_of_outlines(people.space, shape, spread, transforms_of, self._camera, outlines)
+        return shape_of_outlines(space, shape, spread, transforms_of, self._camera, outlines)
 
     def _finished(self, rig: Rig, shape: BodyShape, start: int, stop: int) -> BodyFit:
-        evidence, track, lifted = self._evidence.part(start, stop)
+        evidence, track, lifted = self._part(start, stop)
         before = min(start, 1)
         frames = np.arange(start - before, stop)
         pose = self.windows.poses(frames)
@@ -198,17 +227,6 @@ class Fitting:
                 _ACROSS_PER_S * lifted.across_sigma * keypoints_m[..., 2], track.present
             ),
         )
-
-
-class _People:
-    """Rigs of bodies of any shape."""
-
-    def __init__(self) -> None:
-        self.space = ShapeSpace()
-        self.keypoints = KeypointSpace(self.space)
-
-    def rig(self, shape: BodyShape) -> Rig:
-        return Rig(self.space.skeleton(shape), self.keypoints.of(shape))
 
 
 def _outlined(track: Landmarks, there: NDArray[np.bool_]) -> NDArray[np.intp]:

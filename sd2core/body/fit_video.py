@@ -180,11 +180,12 @@ def fit_video(
                 (*video.notes, *track.notes),
                 fit_doubts(motion),
             )
-            _write(motion, out, partial, choices.resolution, report.progress_of("write"))
-            _describe(partial / _new(out), provenance(made, path, choices))
+            new = partial / f"mesh{out.suffix.lower()}"
+            save_mesh(motion.mesh(choices.resolution), new, report.progress_of("write"))
+            _describe(new, provenance(made, path, choices))
             if landmarks_out is not None:
                 save_track(track, landmarks_out)
-            _take_place(partial, out)
+            _take_place(new, out)
     shutil.rmtree(partial, ignore_errors=True)
     return made
 
@@ -253,19 +254,6 @@ def _fit_folder(
     return folder
 
 
-def _new(out: Path) -> str:
-    return "mesh" + out.suffix.lower()
-
-
-def _write(
-    motion: FittedMotion, out: Path, partial: Path, resolution: Resolution, progress: Progress
-) -> None:
-    new = partial / _new(out)
-    if new.is_dir():
-        shutil.rmtree(new)
-    save_mesh(motion.mesh(resolution), new, progress)
-
-
 def _describe(mesh: Path, about: Mapping[str, Any]) -> None:
     """Write provenance into a mesh file."""
     if mesh.is_dir():
@@ -279,11 +267,10 @@ def _describe(mesh: Path, about: Mapping[str, Any]) -> None:
         np.lib.format.write_array(member, text, allow_pickle=False)
 
 
-def _take_place(partial: Path, out: Path) -> None:
+def _take_place(new: Path, out: Path) -> None:
     """Rename the complete mesh, replacing an earlier one."""
-    new = partial / _new(out)
     if new.is_dir():
-        replaced = partial / "replaced"
+        replaced = new.with_name("replaced")
         if replaced.exists():
             shutil.rmtree(replaced)
         replace_folder(new, out, replaced)

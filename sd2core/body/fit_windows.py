@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.body.array_store import ArrayStore
 from sd2core.body.evidence import Evidence
 from sd2core.body.initial import Pose
-from sd2core.body.landmark_files import read_arrays, write_arrays
 from sd2core.body.rig import JOINTS
 from sd2core.body.rotations import from_vector, to_vector, transposed
-from sd2core.errors import Sd2Error
 from sd2core.mesh.presence import runs
 
 _WINDOW_FRAMES = 600
@@ -26,37 +24,29 @@ _TOLD_BY = ("slopes", "depth_m", "trunk_m")
 
 
 class Windows:
-    """Poses of a clip, fitted window by window, in a folder or in memory.
+    """Poses of a clip, fitted window by window, in a store.
 
     ``spans`` holds of each window its start, its stop and the frames shared with the one before.
     """
 
-    def __init__(self, present: NDArray[np.bool_], workspace: Path | None) -> None:
+    def __init__(self, present: NDArray[np.bool_], store: ArrayStore) -> None:
         self.spans = [span for stretch in runs(present) for span in _windows(*stretch)]
         self._known = np.flatnonzero(present)
         self._starts = np.array([start for start, _, _ in self.spans])
-        self._workspace = workspace
-        self._in_memory: dict[int, Pose] = {}
+        self._store = store
         self._recent = lru_cache(maxsize=2)(self._read)
 
     def keep(self, number: int, part: Evidence, found: Pose) -> None:
         """Keep the pose that was found for a window's evidence."""
-        if self._workspace is None:
-            self._in_memory[number] = found
-        else:
-            told = {name: getattr(part, name) for name in _TOLD_BY}
-            write_arrays(self._file(number), told | found._asdict(), {})
+        told = {name: getattr(part, name) for name in _TOLD_BY}
+        self._store.write(_name(number), told | found._asdict())
 
     def is_kept(self, number: int, part: Evidence) -> bool:
         """True if an earlier run has finished a window with the same evidence."""
-        if self._workspace is None:
+        kept = self._store.read(_name(number))
+        if kept is None or not {*_TOLD_BY, *Pose._fields} <= kept.keys():
             return False
-        try:
-            arrays, _ = read_arrays(self._file(number))
-            _pose_in(arrays)
-            return all(np.array_equal(arrays[name], getattr(part, name)) for name in _TOLD_BY)
-        except (Sd2Error, KeyError):
-            return False  # Missing or damaged: it is made again.
+        return all(np.array_equal(kept[name], getattr(part, name)) for name in _TOLD_BY)
 
     def poses(self, frames: NDArray[np.intp]) -> Pose:
         """The pose in each of some frames (n,), of windows that are kept.
@@ -96,17 +86,13 @@ class Windows:
         pose.translation_m[middle:high] = found.translation_m[middle - low :]
 
     def _read(self, number: int) -> Pose:
-        if self._workspace is None:
-            return self._in_memory[number]
-        return _pose_in(read_arrays(self._file(number))[0])
-
-    def _file(self, number: int) -> Path:
-        assert self._workspace is not None
-        return self._workspace / f"pose-{number:05d}.npz"
+        what = f"The pose of frame {self.spans[number][0]} and on has"
+        arrays = self._store.needed(_name(number), what)
+        return Pose(*(arrays[name] for name in Pose._fields))
 
 
-def _pose_in(arrays: dict[str, NDArray[np.float64]]) -> Pose:
-    return Pose(arrays["turns"], arrays["translation_m"])
+def _name(number: int) -> str:
+    return f"pose-{number:05d}.npz"
 
 
 def _windows(start: int, stop: int) -> Iterator[tuple[int, int, int]]:

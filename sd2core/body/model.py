@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal
 
@@ -41,6 +42,11 @@ class Skeleton:
 
     def __len__(self) -> int:
         return len(self.names)
+
+    def length_m(self, *bones: str) -> float:
+        """Length at rest of the way from head to head of some bones."""
+        heads = [self.heads_m[self.index[bone]] for bone in bones]
+        return sum(float(np.linalg.norm(end - start)) for start, end in pairwise(heads))
 
     def pruned(self, names: Collection[str]) -> tuple[Skeleton, NDArray[np.intp]]:
         """Only these bones and those above them, and their numbers here."""

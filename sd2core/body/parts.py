@@ -23,7 +23,7 @@ from sd2core.body.rotations import Floats
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.mesh.vertex_parts import PARTS, VertexParts
+from sd2core.mesh.vertex_parts import PARTS, VertexParts, other_side
 from sd2core.progress import Progress, silent
 from sd2core.sensor import VirtualSensor
 
@@ -40,7 +40,7 @@ _PART_OF = {
     "shank": "lower_leg",
     "foot": "lower_leg",
 }
-_MIRRORED = np.array([0, 2, 1, 4, 3, 6, 5, 8, 7], np.uint8)
+_MIRRORED = np.array([PARTS.index(other_side(name)) for name in PARTS], np.uint8)
 
 _TIPS = 5
 _LEAST_SHARE = 0.6

@@ -98,6 +98,10 @@ class KeypointSpace:
         moved = self.base_m + np.tensordot(shape.coefficients, self.directions_m, 1)
         return Keypoints(self.bones, shape.stature_m / self._space.base_stature_m * moved)
 
+    def rig(self, shape: BodyShape) -> Rig:
+        """Joints of one body, and its landmarks."""
+        return Rig(self._space.skeleton(shape), self.of(shape))
+
 
 def _sided(name: str, mirrored: bool) -> str:
     return name.replace(".L", ".R") if mirrored else name

@@ -1,7 +1,7 @@
 """Fast posing of a surface: linear blend skinning of many frames, compiled and on all cores.
 
-:meth:`Body.pose` does the same slot by slot in double precision and comes out
-bit for bit alike everywhere, which the bundled sample rests on.
+The bundled sample is posed by ``tools.build_sample.posing``, slot by slot in double precision,
+which comes out bit for bit alike everywhere.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ _JOB_FRAMES = 8
 
 
 def pose_vertices(body: Body, transforms: Floats) -> NDArray[np.float32]:
-    """Vertices (T, V, 3) in float32, within rounding those of :meth:`Body.pose`.
+    """Vertices (T, V, 3) of a posed surface, in float32.
 
     ``transforms`` (T, B, 3, 4) are those of :meth:`Skeleton.transforms`.
     """

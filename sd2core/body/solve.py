@@ -205,15 +205,13 @@ class Objective:
 
     def trust(self, residuals: Residuals) -> Residuals:
         """Square roots of the weights that make far residuals count less."""
-        size = (residuals.picture**2).sum(axis=-1, keepdims=True)
-        ones = [np.ones(1)] * 4
+        picture, depth, trunk, velocity, standing, *others = residuals
+        size = (picture**2).sum(axis=-1, keepdims=True)
+        far = (depth, trunk, velocity, standing)
         return Residuals(
             1.0 / (1.0 + size / _FAR_PX**2),
-            1.0 / np.sqrt(1.0 + (residuals.depth / _FAR_DEPTH) ** 2),
-            1.0 / np.sqrt(1.0 + (residuals.trunk / _FAR_DEPTH) ** 2),
-            1.0 / np.sqrt(1.0 + (residuals.velocity / _FAR_DEPTH) ** 2),
-            1.0 / np.sqrt(1.0 + (residuals.standing / _FAR_DEPTH) ** 2),
-            *ones,
+            *(1.0 / np.sqrt(1.0 + (each / _FAR_DEPTH) ** 2) for each in far),
+            *(np.ones(1) for _ in others),
         )
 
     def normal(self, pose: Pose, trust: Residuals) -> tuple[float, Normal]:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.mesh.vertex_parts import other_side
 from sd2core.timebase import Timebase
 
 LANDMARKS = (
@@ -52,12 +54,7 @@ LANDMARKS = (
 LANDMARK = {name: number for number, name in enumerate(LANDMARKS)}
 """Number of a landmark by its name."""
 
-MIRRORED = tuple(
-    LANDMARKS.index(
-        name[:-1] + {"L": "R", "R": "L"}[name[-1]] if name[-2:] in (".L", ".R") else name
-    )
-    for name in LANDMARKS
-)
+MIRRORED = tuple(LANDMARKS.index(other_side(name)) for name in LANDMARKS)
 """For every landmark the one on the other side."""
 
 TORSO_CORNERS = tuple(
@@ -89,65 +86,13 @@ def with_margin(start: int, stop: int, frames: int) -> tuple[int, int]:
     return max(start - _MARGIN_FRAMES, 0), min(stop + _MARGIN_FRAMES, frames)
 
 
-class Landmarks(Protocol):
-    """A track of landmarks that need not be in memory as a whole; see :class:`LandmarkTrack`."""
-
-    @property
-    def timebase(self) -> Timebase:
-        """Presentation times of the frames."""
-
-    @property
-    def width(self) -> int:
-        """Width of the upright picture in pixels."""
-
-    @property
-    def height(self) -> int:
-        """Height of the upright picture in pixels."""
-
-    @property
-    def present(self) -> NDArray[np.bool_]:
-        """Frames with the person, (T,)."""
-
-    @property
-    def bridged(self) -> NDArray[np.bool_]:
-        """Frames that were interpolated, (T,)."""
-
-    @property
-    def silhouette_frames(self) -> NDArray[np.intp]:
-        """Frames of which the model's mask is kept, (K,)."""
-
-    @property
-    def silhouettes(self) -> NDArray[np.uint8]:
-        """The masks, (K, h, w)."""
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """Sentences about repairs."""
-
-    def __len__(self) -> int: ...
-    def part(self, start: int, stop: int) -> LandmarkTrack:
-        """Frames ``start`` to ``stop`` as a track of their own."""
-
-
-@dataclass(frozen=True, eq=False)
-class LandmarkTrack:
-    """33 landmarks of one person in T frames of a video."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Landmarks(ABC):
+    """33 landmarks of one person in T frames of a video; not all need be in memory."""
 
     timebase: Timebase
     width: int  # of the upright picture, in pixels
     height: int
-    image_px: NDArray[np.float32]
-    """Landmarks in the picture (also outside it), (T, 33, 2); NaN in empty frames."""
-    depth_px: NDArray[np.float32]
-    """The landmark model's own depth behind the hips at the scale of the picture, (T, 33), in
-    pixels; weak. NaN in empty frames."""
-    world_m: NDArray[np.float32]
-    """The landmark model's own place from the middle of the hips, x right, y down, z away, (T, 33,
-    3); its depth is weak. NaN in empty frames."""
-    visibility: NDArray[np.float32]
-    """From 0 (hidden or outside the picture) to 1, (T, 33); 0 in empty frames."""
-    confidence: NDArray[np.float32]
-    """Of the model that there is a person, (T,); 0 where it found none."""
     present: NDArray[np.bool_]
     """False in empty frames, (T,): no person, and the gap too long to be bridged."""
     bridged: NDArray[np.bool_]
@@ -163,13 +108,39 @@ class LandmarkTrack:
 
     def part(self, start: int, stop: int) -> LandmarkTrack:
         """Frames ``start`` to ``stop`` as a track of their own, with the same notes."""
-        frames = slice(start, stop)
         kept = (self.silhouette_frames >= start) & (self.silhouette_frames < stop)
-        cut = {name: getattr(self, name)[frames] for name in PER_FRAME}
-        return replace(
-            self,
-            timebase=Timebase(self.timebase.times_s[frames]),
+        return LandmarkTrack(
+            timebase=Timebase(self.timebase.times_s[start:stop]),
+            width=self.width,
+            height=self.height,
             silhouette_frames=self.silhouette_frames[kept] - start,
             silhouettes=self.silhouettes[kept],
-            **cut,
+            notes=self.notes,
+            **self.rows(start, stop),
         )
+
+    @abstractmethod
+    def rows(self, start: int, stop: int) -> dict[str, NDArray[Any]]:
+        """Frames ``start`` to ``stop`` of the arrays :data:`PER_FRAME`."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LandmarkTrack(Landmarks):
+    """Landmarks in memory."""
+
+    image_px: NDArray[np.float32]
+    """Landmarks in the picture (also outside it), (T, 33, 2); NaN in empty frames."""
+    depth_px: NDArray[np.float32]
+    """The landmark model's own depth behind the hips at the scale of the picture, (T, 33), in
+    pixels; weak. NaN in empty frames."""
+    world_m: NDArray[np.float32]
+    """The landmark model's own place from the middle of the hips, x right, y down, z away, (T, 33,
+    3); its depth is weak. NaN in empty frames."""
+    visibility: NDArray[np.float32]
+    """From 0 (hidden or outside the picture) to 1, (T, 33); 0 in empty frames."""
+    confidence: NDArray[np.float32]
+    """Of the model that there is a person, (T,); 0 where it found none."""
+
+    def rows(self, start: int, stop: int) -> dict[str, NDArray[Any]]:
+        """Frames ``start`` to ``stop`` of the arrays :data:`PER_FRAME`."""
+        return {name: getattr(self, name)[start:stop] for name in PER_FRAME}

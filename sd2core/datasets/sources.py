@@ -36,7 +36,8 @@ from sd2core.labels.formats import read_labels
 from sd2core.labels.label_set import GESTURES
 from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap, MapKind
-from sd2core.pairs.store import limbs_between, open_takes
+from sd2core.pairs.store import limbs_of, open_takes
+from sd2core.pairs.summary import TakeEntry
 from sd2core.progress import Progress
 from sd2core.recording.recording import SUFFIX, is_recording
 from sd2core.sensor import VelocityAxis, VirtualSensor
@@ -187,7 +188,7 @@ def pair_sources(paths: Sequence[Path], making: Making) -> list[LazySource]:
     without limb maps raise Sd2Error.
     """
     stores = [_PairStore(path, making) for path in paths]
-    unsplit = [str(one.path) for one in stores if not one.parts]
+    unsplit = [str(one.path) for one in stores if not one.facts.parts]
     if making.limbs and unsplit:
         raise Sd2Error(
             f"{', '.join(unsplit)}: pairs without limb maps",
@@ -195,11 +196,11 @@ def pair_sources(paths: Sequence[Path], making: Making) -> list[LazySource]:
             "Make them again with `sd2 simulate campaign --limbs` or `sd2 pairs … --limbs`, or"
             " export without limbs",
         )
-    people = Counter(name for one in stores for name in {take["subject"] for take in one.takes})
+    people = Counter(name for one in stores for name in set(one.facts.subjects))
     return [
         one.lazy(number, f"{one.path.stem}:{name}" if people[name] > 1 else name)
         for one in stores
-        for number, name in enumerate(take["subject"] for take in one.takes)
+        for number, name in enumerate(take.subject for take in one.facts.takes)
     ]
 
 
@@ -207,21 +208,18 @@ class _PairStore:
     def __init__(self, path: Path, making: Making) -> None:
         self.path = path
         self._texture = making.texture
-        self._header, self.takes, self._arrays = open_takes(path)
-        self._radar: MapKind = self._header["kind"]
+        self.facts, self._arrays = open_takes(path)
+        self._radar: MapKind = self.facts.kind
         possible: tuple[MapKind, ...] = ("synthetic", "denoised", self._radar)
         self._kinds = tuple(kind for kind in possible if kind in making.kinds)
-        self._axis = VelocityAxis(int(self._header["bins"]), float(self._header["v_max_mps"]))
-        self._null_bins = tuple(self._header["null_bins"])
-        self._labels = tuple(self._header["labels"])
-        self.parts = tuple(self._header.get("parts", ()))
+        self._axis = VelocityAxis(self.facts.bins, self.facts.v_max_mps)
         self._model: Path | None = None
         if "denoised" in self._kinds:
-            self._model = find_model(making.model or default_name(limbs=bool(self.parts)))
+            self._model = find_model(making.model or default_name(limbs=self.facts.has_limbs))
 
     def lazy(self, number: int, subject: str) -> LazySource:
-        take = self.takes[number]
-        key = SourceKey(subject, take["name"], take["placement"])
+        take = self.facts.takes[number]
+        key = SourceKey(subject, take.name, take.placement)
         return LazySource(
             key,
             lambda progress: self._source(key, take),
@@ -229,41 +227,43 @@ class _PairStore:
             lambda: self._outline(take),
         )
 
-    def _fingerprint(self, take: dict[str, Any]) -> str:
+    def _fingerprint(self, take: TakeEntry) -> str:
         """Hash of the take's own rows, as a store may grow."""
         model = "" if self._model is None else cached_digest(self._model)
         texture = [] if self._texture is None else [self._texture]
-        about = {name: value for name, value in take.items() if name not in ("start", "stop")}
+        about = take.model_dump(exclude={"start", "stop"})
         sums = hashlib.blake2b(
-            json.dumps([about, self._header["kind"], self._kinds, model, *texture]).encode(),
+            json.dumps([about, self._radar, self._kinds, model, *texture]).encode(),
             digest_size=16,
         )
         for name in self._arrays:
             sums.update(np.ascontiguousarray(self._part(name, take)).data)
         return sums.hexdigest()
 
-    def _part(self, name: str, take: dict[str, Any]) -> Any:
-        return np.asarray(self._arrays[name][take["start"] : take["stop"]])
+    def _part(self, name: str, take: TakeEntry) -> Any:
+        return np.asarray(self._arrays[name][take.rows])
 
-    def _outline(self, take: dict[str, Any]) -> Outline:
+    def _outline(self, take: TakeEntry) -> Outline:
         label = self._part("label", take)
         times_s = self._part("times_s", take)
         runs = runs_of(label, times_s)
-        return Outline(self._kinds, times_s, None, label, self._labels, runs)
+        return Outline(self._kinds, times_s, None, label, self.facts.labels, runs)
 
-    def _source(self, key: SourceKey, take: dict[str, Any]) -> Source:
+    def _source(self, key: SourceKey, take: TakeEntry) -> Source:
         clock = Timebase(self._part("times_s", take))
-        sensor = VirtualSensor(tuple(take["sensor_position_m"]))
+        sensor = VirtualSensor(take.sensor_position_m)
         meta = {"sensor": {"position_m": list(sensor.position_m)}}
 
         def as_map(name: str, kind: MapKind, unit: str) -> DopplerMap:
             values = self._part(name, take).T
-            return DopplerMap(values, self._axis, clock, kind, unit, self._null_bins, meta=meta)
+            return DopplerMap(
+                values, self._axis, clock, kind, unit, self.facts.null_bins, meta=meta
+            )
 
         maps: dict[MapKind, DopplerMap] = {}
         if {"synthetic", "denoised"} & {*self._kinds}:
             counted = as_map("synthetic", "synthetic", "share of vertices")
-            limbs = limbs_between(self._header, self._arrays, take["start"], take["stop"])
+            limbs = limbs_of(self.facts, self._arrays, take)
             maps["synthetic"] = replace(counted, limbs=limbs)
         if self._model is not None:
             maps["denoised"] = denoised(maps["synthetic"], self._model, self._texture)
@@ -275,8 +275,8 @@ class _PairStore:
             sensor,
             {kind: maps[kind] for kind in self._kinds},
             self._part("label", take).astype(np.int16),
-            self._labels,
-            {name: known[name] for name in self._labels if known.get(name)},
+            self.facts.labels,
+            {name: known[name] for name in self.facts.labels if known.get(name)},
             None,
-            {"pairs": self.path.name, "take": take["name"]},
+            {"pairs": self.path.name, "take": take.name},
         )

@@ -11,7 +11,7 @@ from sd2core.files.limits import check_regular
 from sd2core.files.paths import PICKLE_SUFFIXES, is_pattern
 from sd2core.files.stores import read_attributes
 from sd2core.io.imu_columns import holds_inertial_signals
-from sd2core.pairs.store import is_pair_store
+from sd2core.pairs.summary import is_pair_store
 
 Kind = Literal["recording", "video", "mesh", "radar", "map", "imu", "pairs", "model", "dataset"]
 

@@ -56,14 +56,15 @@ def mirrored_columns() -> tuple[NDArray[np.intp], NDArray[np.float32]]:
     Columns are the quantities of each joint, and then one for each of :data:`PARTS`.
     """
     columns = np.arange(len(JOINTS) * len(QUANTITIES)).reshape(len(JOINTS), -1)
-    joints = [JOINTS.index(_other_side(name)) for name in JOINTS]
-    parts = [columns.size + PARTS.index(_other_side(name)) for name in PARTS]
+    joints = [JOINTS.index(other_side(name)) for name in JOINTS]
+    parts = [columns.size + PARTS.index(other_side(name)) for name in PARTS]
     signs = np.ones(columns.size + len(PARTS), np.float32)
     signs[columns[:, QUANTITIES.index("aside_m")]] = -1.0
     return np.array([*columns[joints].ravel(), *parts], np.intp), signs
 
 
-def _other_side(name: str) -> str:
+def other_side(name: str) -> str:
+    """Name of a part, joint or landmark on the other side: ``knee.L`` of ``knee.R``."""
     base, dot, side = name.partition(".")
     return base + dot + {"L": "R", "R": "L", "": ""}[side]
 

@@ -32,7 +32,8 @@ from sd2core.maps import DopplerMap
 from sd2core.mesh.vertex_parts import PARTS
 from sd2core.mocap.driving import KINECT_MARKERS, DrivenClip, SkeletonClip, puppet_of
 from sd2core.mocap.radar_place import RadarPlace, Seen, estimate_place
-from sd2core.pairs.store import PairWriter, Take, TakeKey
+from sd2core.pairs.store import PairWriter, Take
+from sd2core.pairs.summary import TakeKey
 from sd2core.progress import Progress, silent
 from sd2core.sensor import VelocityAxis, VirtualSensor
 from sd2core.timebase import Timebase

@@ -18,7 +18,8 @@ from sd2core.fmcw.processing import doppler_map
 from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import Presence, runs
 from sd2core.mesh.vertex_parts import PARTS
-from sd2core.pairs.store import PairWriter, Take, TakeKey
+from sd2core.pairs.store import PairWriter, Take
+from sd2core.pairs.summary import TakeKey
 from sd2core.progress import Progress, part_of, silent
 from sd2core.radar_config import CLUTTER
 from sd2core.recording.recording import Recording, open_recording

@@ -67,16 +67,14 @@ def label_pairs(path: Path, rows: Sequence[TakeLabel]) -> dict[str, int]:
     Later rows lie over earlier ones; frames without a label are background. All placements of a
     take get the same. Raises Sd2Error, and changes nothing, if a row is of no take.
     """
-    header, index, arrays = open_takes(path)
-    labels = _together(header["labels"], rows)
-    values = np.zeros(max(entry["stop"] for entry in index), np.int8)
+    facts, arrays = open_takes(path)
+    labels = _together(facts.labels, rows)
+    values = np.zeros(facts.frames, np.int8)
     used: set[int] = set()
-    for entry in index:
-        frames = slice(entry["start"], entry["stop"])
-        times_s = np.asarray(arrays["times_s"][frames])
-        values[frames] = _numbers(entry["subject"], entry["name"], times_s, rows, labels, used)
-    takes = [(entry["subject"], entry["name"]) for entry in index]
-    _refuse_unused(str(path), rows, used, takes)
+    for take in facts.takes:
+        times_s = np.asarray(arrays["times_s"][take.rows])
+        values[take.rows] = _numbers(take.subject, take.name, times_s, rows, labels, used)
+    _refuse_unused(str(path), rows, used, [take.key[:2] for take in facts.takes])
     group = open_group(path, "r+")
     # First the names: no number is ever without one.
     group.attrs["labels"] = list(labels)

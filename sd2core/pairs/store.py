@@ -11,7 +11,7 @@ import json
 from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,29 +25,25 @@ from sd2core.files.stores import (
     create_group,
     growing,
     open_group,
-    read_attributes,
 )
 from sd2core.files.texts import append_lines, drop_torn_line
 from sd2core.maps import LimbMaps
 from sd2core.mesh.vertex_parts import JOINTS, PARTS
-from sd2core.pairs.rows import (
+from sd2core.pairs.rows import check_array, read_rows, row_kinds
+from sd2core.pairs.summary import (
+    FORMAT,
     INDEX_NAME,
     REMAKE,
+    VERSION,
+    PairFacts,
+    PairKind,
+    TakeEntry,
     TakeKey,
-    check_array,
-    check_header,
-    key_of,
-    read_rows,
+    is_pair_store,
+    pair_facts,
     read_takes,
-    row_kinds,
 )
 from sd2core.sensor import VelocityAxis
-
-PairKind = Literal["simulated", "real"]
-"""Radar that the targets come from: simulated or real."""
-
-FORMAT = "sd2-pairs"
-VERSION = 1
 
 _ARRAYS = ("synthetic", "radar", "times_s", "label")
 _CHUNK_FRAMES = 2250
@@ -218,12 +214,12 @@ class PairWriter:
         if not (self._path / "zarr.json").exists() or _stillborn(self._path):
             _begin(self._path, header)
         self._group = _reopened(self._path, header)
-        names = row_kinds(header)
+        names = row_kinds(axis.bins, parts, header["joints"])
         self._arrays = {name: growing(self._group, self._path, name) for name in names}
-        index = read_takes(self._path, provenance)
+        takes = read_takes(self._path, provenance)
         drop_torn_line(self._path / INDEX_NAME)
-        self._done = {key_of(entry) for entry in index}
-        self._frames = max((entry["stop"] for entry in index), default=0)
+        self._done = {take.key for take in takes}
+        self._frames = max((take.stop for take in takes), default=0)
 
     @property
     def done(self) -> Set[TakeKey]:
@@ -272,22 +268,11 @@ class PairWriter:
             if array.shape[0] < stop:
                 array.resize((stop, *array.shape[1:]))
             array[start:stop] = values
-        entry = {
-            "subject": take.subject,
-            "name": take.name,
-            "placement": take.placement,
-            "start": start,
-            "stop": stop,
-            "sensor_position_m": [float(x) for x in take.sensor_position_m],
-        }
-        append_lines(self._path / INDEX_NAME, [json.dumps(entry) + "\n"])
+        x, y, z = (float(value) for value in take.sensor_position_m)
+        entry = TakeEntry(**take.key._asdict(), start=start, stop=stop, sensor_position_m=(x, y, z))
+        append_lines(self._path / INDEX_NAME, [json.dumps(entry.model_dump()) + "\n"])
         self._done.add(take.key)
         self._frames = stop
-
-
-def is_pair_store(path: Path) -> bool:
-    """Tell if a folder looks like pairs, from one small file."""
-    return bool(read_attributes(Path(path)).get("format") == FORMAT)
 
 
 def read_pairs(path: Path) -> PairSet:
@@ -299,102 +284,67 @@ def read_pairs(path: Path) -> PairSet:
         When it is none, of a newer version, empty or damaged.
     """
     path = Path(path)
-    header, index, lazily = open_takes(path)
-    arrays = read_rows(path, lazily, index)
+    facts, lazily = open_takes(path)
+    arrays = read_rows(path, lazily, facts.takes)
     split: dict[str, Any] = {}
     split |= {name: arrays.pop(name) for name in ("limbs", "kinematics") if name in arrays}
     try:
         takes = tuple(
             Take(
-                subject=entry["subject"],
-                name=entry["name"],
-                placement=entry["placement"],
-                sensor_position_m=np.array(entry["sensor_position_m"], np.float64),
-                limbs=limbs_between(header, split, entry["start"], entry["stop"]),
-                **{name: array[entry["start"] : entry["stop"]] for name, array in arrays.items()},
+                subject=entry.subject,
+                name=entry.name,
+                placement=entry.placement,
+                sensor_position_m=np.array(entry.sensor_position_m, np.float64),
+                limbs=limbs_of(facts, split, entry),
+                **{name: array[entry.rows] for name, array in arrays.items()},
             )
-            for entry in index
+            for entry in facts.takes
         )
     except Sd2Error as error:
         raise Sd2Error(f"{path}: {error.found}", error.expected, REMAKE) from error
-    labels = tuple(header["labels"])
     for take in takes:
-        if not 0 <= take.label.min() <= take.label.max() < len(labels):
+        if not 0 <= take.label.min() <= take.label.max() < len(facts.labels):
             raise Sd2Error(
                 f"{path}: take {take.title} has labels from {take.label.min()} to"
                 f" {take.label.max()}",
-                f"0 to {len(labels) - 1}",
+                f"0 to {len(facts.labels) - 1}",
                 REMAKE,
             )
     return PairSet(
-        kind=header["kind"],
-        axis=VelocityAxis(int(header["bins"]), float(header["v_max_mps"])),
-        null_bins=tuple(header["null_bins"]),
-        frame_rate_hz=float(header["frame_rate_hz"]),
-        labels=labels,
+        kind=facts.kind,
+        axis=VelocityAxis(facts.bins, facts.v_max_mps),
+        null_bins=facts.null_bins,
+        frame_rate_hz=facts.frame_rate_hz,
+        labels=facts.labels,
         takes=takes,
-        provenance=header["provenance"],
+        provenance=facts.provenance,
     )
 
 
-def open_takes(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]], dict[str, StoredArray]]:
-    """Open a store: header, lines of takes, and arrays not yet read.
+def open_takes(path: Path) -> tuple[PairFacts, dict[str, StoredArray]]:
+    """Open a store: its description, and arrays not yet read.
 
     Raises Sd2Error when it holds no pairs, of a newer version, empty or damaged.
     """
-    path = Path(path)
-    header, index = read_description(path)
-    group = open_group(path)
+    facts = pair_facts(path)
+    group = open_group(facts.path)
     arrays: dict[str, StoredArray] = {}
-    frames = max(entry["stop"] for entry in index)
-    for name, (row, kind) in row_kinds(header).items():
-        arrays[name] = array_in(group, path, name, "frames")
-        check_array(arrays[name], frames, row, kind)
-    return header, index, arrays
+    for name, (row, kind) in row_kinds(facts.bins, facts.parts, facts.joints).items():
+        arrays[name] = array_in(group, facts.path, name, "frames")
+        check_array(arrays[name], facts.frames, row, kind)
+    return facts, arrays
 
 
-def limbs_between(
-    header: Mapping[str, Any], arrays: Mapping[str, Any], start: int, stop: int
-) -> LimbMaps | None:
-    """Limb maps of frames of a store; None where it has none."""
-    if not header.get("parts"):
+def limbs_of(facts: PairFacts, arrays: Mapping[str, Any], take: TakeEntry) -> LimbMaps | None:
+    """Limb maps of a take of a store; None where it has none."""
+    if not facts.parts:
         return None
     limbs, moves = (
-        np.asarray(arrays[name][start:stop]).transpose(1, 2, 0) if name in arrays else None
+        np.asarray(arrays[name][take.rows]).transpose(1, 2, 0) if name in arrays else None
         for name in ("limbs", "kinematics")
     )
     assert limbs is not None
-    return LimbMaps(tuple(header["parts"]), limbs, moves)
-
-
-def read_description(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """Read the header of a store and its lines of takes, but no array.
-
-    Raises Sd2Error when it is none, of another version or kind, or empty.
-    """
-    if not is_pair_store(path):
-        raise Sd2Error(
-            f"{path} holds no pairs of synthetic and radar Doppler",
-            "a folder made by `sd2 simulate campaign` or `sd2 pairs`",
-        )
-    header = read_attributes(path)
-    if header.get("version") != VERSION:
-        raise Sd2Error(
-            f"{path} is of version {header.get('version')}", f"version {VERSION}", REMAKE
-        )
-    if header.get("kind") not in get_args(PairKind):
-        raise Sd2Error(
-            f"{path}: its kind is {header.get('kind')!r}", f"one of {get_args(PairKind)}", REMAKE
-        )
-    check_header(path, header)
-    takes = read_takes(path, header["provenance"])
-    if not takes:
-        raise Sd2Error(
-            f"{path} holds no take yet",
-            "at least one",
-            "Wait until the first one is made, or make the pairs again",
-        )
-    return header, takes
+    return LimbMaps(facts.parts, limbs, moves)
 
 
 def _stillborn(path: Path) -> bool:
@@ -410,7 +360,9 @@ def _begin(path: Path, header: dict[str, Any]) -> None:
         raise Sd2Error(f"{path} is there and holds no pairs", "a new or empty folder")
     with atomic_folder(path) as folder:
         group = create_group(folder, header)
-        for name, (row, kind) in row_kinds(header).items():
+        for name, (row, kind) in row_kinds(
+            header["bins"], header["parts"], header["joints"]
+        ).items():
             chunks = (_CHUNK_FRAMES, *row)
             create_array(group, name, shape=(0, *row), dtype=kind, chunks=chunks, fill_value=0)
 

@@ -1,36 +1,87 @@
-"""Summary of a store of pairs from its description; no array is read."""
+"""Description of a store of pairs: its header and its takes; no array is read."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated, Any, Literal, NamedTuple, get_args
 
-from sd2core.files.texts import damage_in
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from sd2core.errors import Sd2Error
+from sd2core.files.limits import open_regular
+from sd2core.files.stores import read_attributes
+from sd2core.files.texts import first_fault, parse_json, whole_lines
 from sd2core.pairs.segments import segment_starts
-from sd2core.pairs.store import PairKind, read_description
+
+PairKind = Literal["simulated", "real"]
+"""Radar that the targets come from: simulated or real."""
+
+FORMAT = "sd2-pairs"
+VERSION = 1
+INDEX_NAME = "takes.jsonl"
+REMAKE = "Make the pairs again with `sd2 simulate campaign` or `sd2 pairs`"
+
+_Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
-@dataclass(frozen=True)
-class TakeFacts:
-    """Subject, placement and length of one take."""
+class TakeKey(NamedTuple):
+    """Key of a take, unique in a set."""
 
     subject: str
+    name: str
     placement: int
-    frames: int
 
 
-@dataclass(frozen=True)
-class PairFacts:
+class TakeEntry(BaseModel):
+    """One take as a line of the store describes it."""
+
+    model_config = ConfigDict(frozen=True)
+
+    subject: str
+    name: str
+    placement: Annotated[int, Field(ge=0)]
+    start: Annotated[int, Field(ge=0)]
+    stop: Annotated[int, Field(le=1 << 40)]  # Its frames in all arrays, from start on.
+    sensor_position_m: tuple[_Finite, _Finite, _Finite]
+
+    @property
+    def key(self) -> TakeKey:
+        """Key of the take."""
+        return TakeKey(self.subject, self.name, self.placement)
+
+    @property
+    def rows(self) -> slice:
+        """Its frames in all arrays."""
+        return slice(self.start, self.stop)
+
+
+class PairFacts(BaseModel):
     """Facts of a store of pairs, without its values."""
+
+    model_config = ConfigDict(frozen=True)
 
     path: Path
     kind: PairKind
-    bins: int
-    v_max_mps: float
-    frame_rate_hz: float
-    takes: tuple[TakeFacts, ...]
-    has_limbs: bool = False  # The input is also split by the parts of the body.
+    bins: Annotated[int, Field(ge=2, le=1 << 16)]
+    v_max_mps: Annotated[_Finite, Field(gt=0)]
+    null_bins: tuple[int, ...]
+    frame_rate_hz: Annotated[_Finite, Field(gt=0)]
+    labels: Annotated[tuple[str, ...], Field(min_length=1)]
+    provenance: dict[str, Any]
+    parts: tuple[str, ...] = ()  # Of the body, by which the input is also split.
+    joints: tuple[str, ...] = ()
+    takes: tuple[TakeEntry, ...] = ()
+
+    @property
+    def has_limbs(self) -> bool:
+        """True if the input is also split by the parts of the body."""
+        return bool(self.parts)
+
+    @property
+    def frames(self) -> int:
+        """Number of rows of the arrays that count."""
+        return max(take.stop for take in self.takes)
 
     @property
     def subjects(self) -> tuple[str, ...]:
@@ -45,7 +96,8 @@ class PairFacts:
     @property
     def duration_s(self) -> float:
         """Duration of the movements, each counted once."""
-        return sum(take.frames for take in self.takes if take.placement == 0) / self.frame_rate_hz
+        seen = [take for take in self.takes if take.placement == 0]
+        return sum(take.stop - take.start for take in seen) / self.frame_rate_hz
 
     def segments(
         self, subjects: Iterable[str], length: int, overlap: int, *, first_only: bool = False
@@ -53,27 +105,92 @@ class PairFacts:
         """Count the windows of the takes of these subjects."""
         wanted = set(subjects)
         return sum(
-            len(segment_starts(take.frames, length, overlap))
+            len(segment_starts(take.stop - take.start, length, overlap))
             for take in self.takes
             if take.subject in wanted and not (first_only and take.placement)
         )
 
 
+def is_pair_store(path: Path) -> bool:
+    """Tell if a folder looks like pairs, from one small file."""
+    return bool(read_attributes(Path(path)).get("format") == FORMAT)
+
+
 def pair_facts(path: Path) -> PairFacts:
-    """Read the description of a store of pairs."""
+    """Read the description of a store of pairs.
+
+    Raises Sd2Error when it is none, of another version or kind, damaged or empty.
+    """
     path = Path(path)
-    header, index = read_description(path)
-    takes = tuple(
-        TakeFacts(entry["subject"], int(entry["placement"]), entry["stop"] - entry["start"])
-        for entry in index
-    )
-    with damage_in(path):
-        return PairFacts(
-            path=path,
-            kind=header["kind"],
-            bins=int(header["bins"]),
-            v_max_mps=float(header["v_max_mps"]),
-            frame_rate_hz=float(header["frame_rate_hz"]),
-            takes=takes,
-            has_limbs=bool(header.get("parts")),
+    if not is_pair_store(path):
+        raise Sd2Error(
+            f"{path} holds no pairs of synthetic and radar Doppler",
+            "a folder made by `sd2 simulate campaign` or `sd2 pairs`",
         )
+    header = read_attributes(path)
+    if header.get("version") != VERSION:
+        raise Sd2Error(
+            f"{path} is of version {header.get('version')}", f"version {VERSION}", REMAKE
+        )
+    if header.get("kind") not in get_args(PairKind):
+        raise Sd2Error(
+            f"{path}: its kind is {header.get('kind')!r}", f"one of {get_args(PairKind)}", REMAKE
+        )
+    try:
+        facts = PairFacts.model_validate({**header, "path": path, "takes": ()})
+        if any(not 0 <= number < facts.bins for number in facts.null_bins):
+            raise ValueError(f"null_bins are {list(facts.null_bins)}")
+    except ValueError as error:
+        raise Sd2Error(
+            f"{path}: its header is damaged ({_reason_of(error)})", "one as it was written", REMAKE
+        ) from error
+    takes = read_takes(path, facts.provenance)
+    if not takes:
+        raise Sd2Error(
+            f"{path} holds no take yet",
+            "at least one",
+            "Wait until the first one is made, or make the pairs again",
+        )
+    return facts.model_copy(update={"takes": takes})
+
+
+def read_takes(path: Path, provenance: dict[str, Any]) -> tuple[TakeEntry, ...]:
+    """Read the lines of takes; an incomplete last line is left out."""
+    by_part = provenance.get("made_by") == "sd2 pairs mars"
+    index = path / INDEX_NAME
+    if not index.exists():
+        return ()
+    with open_regular(index) as stream:
+        lines = [line.decode(errors="replace") for line in whole_lines(stream)]
+    takes = []
+    for number, line in enumerate(lines, start=1):
+        try:
+            take = _read_take(line)
+        except ValueError as error:
+            raise Sd2Error(
+                f"{index}: line {number} cannot be read ({_reason_of(error)}): {line[:80]!r}",
+                "one take, as JSON",
+                "Delete the line to lose that take alone",
+            ) from None
+        if by_part and take.name.startswith("stretch-"):
+            # Written when the parts of one person were subjects of their own: "1-test".
+            subject, _, part = take.subject.rpartition("-")
+            take = take.model_copy(update={"subject": subject, "name": f"{part}-{take.name}"})
+        takes.append(take)
+    return tuple(takes)
+
+
+def _read_take(line: str) -> TakeEntry:
+    """Return the take that a line describes; ValueError if it is none."""
+    try:
+        take = TakeEntry.model_validate(parse_json(line, "it", "one take"))
+    except Sd2Error as error:
+        raise ValueError(error.found) from None
+    if take.stop <= take.start:
+        raise ValueError(f"its frames are {take.start} to {take.stop}")
+    return take
+
+
+def _reason_of(error: ValueError) -> str:
+    """Place and reason of what pydantic refused, or what else was said."""
+    return first_fault(error) if isinstance(error, ValidationError) else str(error)

@@ -21,8 +21,8 @@ from sd2core.body.rotations import Floats, about, applied, product, transposed
 from sd2core.simulate.limbs import (
     HANGING,
     Motion,
-    bend,
     minimum_jerk,
+    place_limb,
     reach,
     relax_fingers,
     turn_torso,
@@ -232,23 +232,13 @@ def _stand(
     yaw_deg: Floats,
 ) -> None:
     """Bring one ankle to its place and turn the foot."""
-    index, heads = skeleton.index, skeleton.heads_m
-    upper, lower = index[f"upperleg01.{side}"], index[f"lowerleg01.{side}"]
-    end = index[f"foot.{side}"]
+    index = skeleton.index
     above = skeleton.transforms(rotations, translation)[:, index[f"pelvis.{side}"]]
-    hip = applied(above[..., :3], heads[upper]) + above[..., 3]
-    target, longest = foot.ankle_m, 0.999 * _leg_length_m(skeleton)
-    line = target - hip
-    distance = np.linalg.norm(line, axis=1, keepdims=True)
-    target = hip + line * np.minimum(1.0, longest / distance)
-    knees = np.tile([0.06 if side == "L" else -0.06, 0.0, -1.0], (len(hip), 1))
+    knees = np.tile([0.06 if side == "L" else -0.06, 0.0, -1.0], (len(above), 1))
     pole = applied(about(_DOWN, yaw_deg), knees)
-    upper_turn, lower_turn = bend(
-        hip, target, heads[lower] - heads[upper], heads[end] - heads[lower], pole
-    )
-    rotations[:, upper] = product(transposed(above[..., :3]), upper_turn)
-    rotations[:, lower] = product(transposed(upper_turn), lower_turn)
-    rotations[:, end] = product(transposed(lower_turn), foot.turn)
+    bones = (f"upperleg01.{side}", f"lowerleg01.{side}", f"foot.{side}")
+    shank = place_limb(skeleton, rotations, bones, above, foot.ankle_m, pole, stretch=0.999)
+    rotations[:, index[bones[-1]]] = product(transposed(shank), foot.turn)
     # Toes stay on the floor while the heel leaves it.
     flat = about(_ACROSS, -0.9 * np.clip(foot.pitch_deg, 0.0, None))
     for toe in range(1, 6):
@@ -276,9 +266,7 @@ def _swing_arms(
 
 
 def _leg_length_m(skeleton: Skeleton) -> float:
-    heads, index = skeleton.heads_m, skeleton.index
-    hip, knee, ankle = (heads[index[f"{bone}.L"]] for bone in ("upperleg01", "lowerleg01", "foot"))
-    return float(np.linalg.norm(knee - hip) + np.linalg.norm(ankle - knee))
+    return skeleton.length_m("upperleg01.L", "lowerleg01.L", "foot.L")
 
 
 def _smoothed(values: Floats, sigma_s: float) -> Floats:

@@ -19,7 +19,7 @@ _KNEES_REACH = 0.995
 
 
 class Motion(NamedTuple):
-    """Rotations (T, B, 3, 3) and translation (T, 3) for :meth:`sd2core.body.model.Body.pose`."""
+    """Rotations (T, B, 3, 3) and translation (T, 3) for :meth:`Skeleton.transforms`."""
 
     rotations: Floats
     translation_m: Floats
@@ -121,11 +121,7 @@ def reach(
 
 def arm_length_m(skeleton: Skeleton) -> float:
     """From shoulder over elbow to wrist, by the bones at rest."""
-    heads, index = skeleton.heads_m, skeleton.index
-    shoulder, elbow, wrist = (
-        heads[index[f"{bone}.R"]] for bone in ("upperarm01", "lowerarm01", "wrist")
-    )
-    return float(np.linalg.norm(elbow - shoulder) + np.linalg.norm(wrist - elbow))
+    return skeleton.length_m("upperarm01.R", "lowerarm01.R", "wrist.R")
 
 
 def bend(
@@ -179,14 +175,15 @@ def place_limb(
     root: Floats,
     target_m: Floats,
     pole: Floats,
+    stretch: float = _KNEES_REACH,
 ) -> Floats:
     """Bring the end of a limb of two bones to a place.
 
     ``bones`` are thigh, shank, foot; or upper arm, forearm, wrist. The first two are written in
     ``rotations``, (T, B, 3, 3). ``root``, (T, 3, 4), is the transform of the parent of the limb;
-    ``target_m``, (T, 3), is brought nearer where it is out of reach; ``pole``, (T, 3), is where the
-    joint bends to. Returns the turn of the second bone against rest, (T, 3, 3), in the axes of
-    ``target_m``.
+    ``target_m``, (T, 3), is brought nearer where it is out of reach, which is ``stretch`` of the
+    limb's length; ``pole``, (T, 3), is where the joint bends to. Returns the turn of the second
+    bone against rest, (T, 3, 3), in the axes of ``target_m``.
     """
     first, second, end = (skeleton.index[bone] for bone in bones)
     heads = skeleton.heads_m
@@ -195,7 +192,7 @@ def place_limb(
     start = applied(root[..., :3], heads[first]) + root[..., 3]
     line = target_m - start
     far = np.linalg.norm(line, axis=1, keepdims=True)
-    reach = np.clip(far, 1.05 * abs(upper - lower) + 0.02, _KNEES_REACH * (upper + lower))
+    reach = np.clip(far, 1.05 * abs(upper - lower) + 0.02, stretch * (upper + lower))
     target = start + line * (reach / far)
     upper_turn, lower_turn = bend(start, target, upper_rest, lower_rest, pole)
     rotations[:, first] = product(transposed(root[..., :3]), upper_turn)

@@ -27,7 +27,8 @@ from sd2core.mocap.recording_pairs import (
     named_recordings,
     take_frames,
 )
-from sd2core.pairs.store import PairSet, PairWriter, Take, TakeKey, read_pairs
+from sd2core.pairs.store import PairSet, PairWriter, Take, read_pairs
+from sd2core.pairs.summary import TakeKey
 from sd2core.progress import Progress, silent
 from sd2core.radar_config import PAPER_RADAR, RadarConfig
 from sd2core.recording.recording import Recording

@@ -127,7 +127,7 @@ def check(config: TrainConfig) -> None:
     Raises Sd2Error for paths that are no store of pairs, unknown models and their options.
     """
     from sd2core.denoise.registry import MODELS, options
-    from sd2core.pairs.store import is_pair_store
+    from sd2core.pairs.summary import is_pair_store
 
     for path in config.data.pairs:
         if not is_pair_store(path):

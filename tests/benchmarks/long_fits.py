@@ -31,9 +31,10 @@ from peaks import forget_peak, peak_mb
 from sd2core.body import fit as fitting
 from sd2core.body import fit_windows, lifter
 from sd2core.body import track as tracks
+from sd2core.body.array_store import ArrayStore
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.fit_video import LANDMARKS, MARKER, PARTIAL, FitChoices, FitReport, fit_video
-from sd2core.body.landmark_files import RefinedStretches, SearchStore
+from sd2core.body.landmark_files import RefinedStretches, search_store
 from sd2core.body.landmark_models import DEFAULT_MODEL, landmark_models
 from sd2core.body.landmarks import DEFAULT_SILHOUETTES, SIGHTINGS, find_landmarks
 from sd2core.body.refining import Stretch
@@ -97,7 +98,7 @@ def long_fit(track: LandmarkTrack, frames: int, folder: Path) -> LongFit:
     (partial / MARKER).write_text("{}")
     with open_video(path) as video:
         _fill(
-            SearchStore(partial / LANDMARKS, video, None, DEFAULT_SILHOUETTES, DEFAULT_MODEL),
+            search_store(partial / LANDMARKS, video, None, DEFAULT_SILHOUETTES, DEFAULT_MODEL),
             video,
             track,
         )
@@ -166,7 +167,7 @@ def there_and_back(count: int, frames: int) -> NDArray[np.intp]:
     return np.minimum(place, 2 * count - 2 - place)
 
 
-def _fill(store: SearchStore, video: VideoReader, track: LandmarkTrack) -> None:
+def _fill(store: ArrayStore, video: VideoReader, track: LandmarkTrack) -> None:
     """As if they had been found."""
     rows = there_and_back(len(track), len(video))
     nobody = np.zeros((0, 4))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.fit import Fitting, Lift
-from sd2core.body.fitted import PER_FRAME, BodyFit, Pose, mean_over_limbs, surface
+from sd2core.body.fitted import PER_FRAME, BodyFit, FittedMotion, Pose, mean_over_limbs
 from sd2core.body.model import Resolution
 from sd2core.body.track import Landmarks
 from sd2core.mesh.sequence import MeshSequence
@@ -46,12 +46,15 @@ def fit_body(
 
 def mesh_of(fit: BodyFit, resolution: Resolution) -> MeshSequence:
     """The moving surface, posed where it is read."""
-    return surface(
-        fit.shape,
-        fit.timebase,
-        Pose(fit.turns, fit.translation_m).at,
-        fit.present,
-        mean_over_limbs(fit.along_sd_mps),
-        mean_over_limbs(fit.across_sd_mps),
-        resolution,
+    motion = FittedMotion(
+        timebase=fit.timebase,
+        shape=fit.shape,
+        poses=Pose(fit.turns, fit.translation_m).at,
+        present=fit.present,
+        along_sd_mps=mean_over_limbs(fit.along_sd_mps),
+        across_sd_mps=mean_over_limbs(fit.across_sd_mps),
+        seen=np.isfinite(fit.residual_m).mean(axis=0),
+        residual_m=float(np.nanmean(fit.residual_m)),
+        quality=float(fit.quality.mean()),
     )
+    return motion.mesh(resolution)

@@ -26,7 +26,8 @@ from sd2core.cli.bars import bar
 from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.io.radar.kkt import BIN_WIDTH_MPS, FRAME_S
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.pairs.store import PairWriter, Take, TakeKey
+from sd2core.pairs.store import PairWriter, Take
+from sd2core.pairs.summary import TakeKey
 from sd2core.radar_config import PAPER_RADAR
 from sd2core.sensor import VelocityAxis, VirtualSensor
 from sd2core.simulate.campaign.motion import Move, arm_through_time

@@ -15,8 +15,9 @@ from sd2core.doppler import Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.vertex_parts import PARTS
-from sd2core.pairs.store import PairWriter, TakeKey
+from sd2core.pairs.store import PairWriter
 from sd2core.pairs.store import Take as Pair
+from sd2core.pairs.summary import TakeKey
 from sd2core.progress import Progress, silent
 from sd2core.radar_config import PAPER_RADAR
 from sd2core.sensor import Vector, VirtualSensor, aimed_at, position_from_spherical

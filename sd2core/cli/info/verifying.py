@@ -40,8 +40,8 @@ def _arrays(path: Path, kind: Kind, stack: ExitStack) -> tuple[Sequence[Any], ra
     if kind == "pairs":
         from sd2core.pairs.store import open_takes
 
-        _, index, arrays = open_takes(path)
-        return list(arrays.values()), range(max(entry["stop"] for entry in index))
+        facts, arrays = open_takes(path)
+        return list(arrays.values()), range(facts.frames)
     if kind == "dataset":
         from sd2core.datasets.reading import open_dataset
 

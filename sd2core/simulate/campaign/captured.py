@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from sd2core.body.model import Skeleton
-from sd2core.body.rig import KeypointSpace, Rig
+from sd2core.body.rig import KeypointSpace
 from sd2core.body.rotations import Floats
 from sd2core.body.shape import ShapeSpace
 from sd2core.errors import Sd2Error
@@ -83,7 +83,7 @@ class CapturedMotions:
         pose = resample_pose(pose, np.arange(needed) / RATE_HZ, times_s[:frames] * pace)
         if rng.random() < 0.5:
             pose = pose.at(slice(None, None, -1))
-        rig = Rig(skeleton, self._keypoints.of(subject.shape))
+        rig = self._keypoints.rig(subject.shape)
         place = pose.translation_m.copy()
         middle = place.min(axis=0) + 0.5 * np.ptp(place, axis=0)
         place[:, [0, 2]] -= middle[[0, 2]]

@@ -18,7 +18,8 @@ from pathlib import Path
 from sd2core.body.shape import ShapeSpace
 from sd2core.errors import Sd2Error
 from sd2core.mesh.vertex_parts import PARTS
-from sd2core.pairs.store import PairWriter, Take, TakeKey
+from sd2core.pairs.store import PairWriter, Take
+from sd2core.pairs.summary import TakeKey
 from sd2core.processes import ONE_THREAD, end_with_parent
 from sd2core.progress import Progress, silent
 from sd2core.simulate.campaign.fit_errors import FitErrors

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -149,7 +148,7 @@ def _step(
     """Bring the feet to their places; the translation is lowered where they are out of reach."""
     heads, index = skeleton.heads_m, skeleton.index
     forward = turn_about(1, feet.heading_deg) @ np.array([0.0, 0.0, -1.0])
-    targets, longest = [], []
+    legs, targets = [], []
     for number, side in enumerate("LR"):
         ankle = heads[index[f"foot.{side}"]]
         target = np.empty((len(rotations), 3))
@@ -157,20 +156,20 @@ def _step(
         target[:, 1] = ankle[1] - stature_m * feet.feet[:, number, 2]
         target[:, 2] = stature_m * feet.feet[:, number, 1] + heads[0][2]
         targets.append(target)
-        hip, knee = heads[index[f"upperleg01.{side}"]], heads[index[f"lowerleg01.{side}"]]
-        longest.append(0.99 * (np.linalg.norm(knee - hip) + np.linalg.norm(ankle - knee)))
+        hip = heads[index[f"upperleg01.{side}"]]
+        legs.append((f"upperleg01.{side}", f"lowerleg01.{side}", f"foot.{side}"))
+        longest = 0.99 * skeleton.length_m(*legs[-1])
         over = target - (hip + translation)
-        level = np.minimum(np.hypot(over[:, 0], over[:, 2]), 0.9 * longest[-1])
-        high = np.sqrt(longest[-1] ** 2 - level**2)
+        level = np.minimum(np.hypot(over[:, 0], over[:, 2]), 0.9 * longest)
+        high = np.sqrt(longest**2 - level**2)
         translation[:, 1] = np.maximum(translation[:, 1], target[:, 1] - hip[1] - high)
     transforms = skeleton.transforms(rotations, translation)
     for number, side in enumerate("LR"):
-        bones = (f"upperleg01.{side}", f"lowerleg01.{side}", f"foot.{side}")
         out = np.array([0.15 if side == "L" else -0.15, 0.0, 0.0])
         turn = place_limb(
             skeleton,
             rotations,
-            bones,
+            legs[number],
             transforms[:, index[f"pelvis.{side}"]],
             targets[number],
             forward + turn_about(1, feet.heading_deg) @ out,
@@ -179,17 +178,14 @@ def _step(
             turn_about(1, feet.feet_heading_deg[:, number]),
             turn_about(0, 600.0 * feet.feet[:, number, 2]),
         )
-        rotations[:, index[f"foot.{side}"]] = product(transposed(turn), foot)
+        rotations[:, index[legs[number][-1]]] = product(transposed(turn), foot)
 
 
 def _reach(skeleton: Skeleton, rotations: Floats, side: str, arm: Floats) -> None:
     """Bring one wrist to its place, outside the trunk."""
     index, heads = skeleton.index, skeleton.heads_m
     bones = (f"upperarm01.{side}", f"lowerarm01.{side}", f"wrist.{side}")
-    length = sum(
-        float(np.linalg.norm(heads[index[b]] - heads[index[a]]))
-        for a, b in itertools.pairwise(bones)
-    )
+    length = skeleton.length_m(*bones)
     out = 1.0 if side == "L" else -1.0
     chest = skeleton.transforms(rotations)
     shoulder = index[f"shoulder01.{side}"]

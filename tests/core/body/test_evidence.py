@@ -52,18 +52,18 @@ def track(x_px: float, visibility: float) -> LandmarkTrack:
     points[:, LANDMARK["wrist.L"], 0] = x_px
     told = np.full((1, 33), visibility, np.float32)
     return LandmarkTrack(
-        Timebase(np.zeros(1)),
-        640,
-        480,
-        points,
-        0.0 * told,
-        np.zeros((1, 33, 3), np.float32),
-        told,
-        np.ones(1, np.float32),
-        np.ones(1, bool),
-        np.zeros(1, bool),
-        np.zeros(0, np.intp),
-        np.zeros((0, 2, 2), np.uint8),
+        timebase=Timebase(np.zeros(1)),
+        width=640,
+        height=480,
+        image_px=points,
+        depth_px=0.0 * told,
+        world_m=np.zeros((1, 33, 3), np.float32),
+        visibility=told,
+        confidence=np.ones(1, np.float32),
+        present=np.ones(1, bool),
+        bridged=np.zeros(1, bool),
+        silhouette_frames=np.zeros(0, np.intp),
+        silhouettes=np.zeros((0, 2, 2), np.uint8),
     )
 
 
@@ -94,7 +94,6 @@ def test_landmarks_are_where_the_lifter_says_and_as_sure_as_it_says() -> None:
     across, across_sigma = np.zeros((1, 33, 2)), 0.004 * ones
     across[0, wrist], across_sigma[0, wrist] = (0.02, -0.01), 0.04
     lifted = LiftedTrack(
-        Timebase(np.zeros(1)),
         *(2.0 * ones[:, 0], 0.1 * ones[:, 0], 0.0 * ones, 0.01 * ones),
         *(0.0 * ones, ones, across, across_sigma, ones[:, :4]),
     )

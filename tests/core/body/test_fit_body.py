@@ -37,7 +37,6 @@ class Known:
         centre = depth[:, TORSO_CORNERS].mean(axis=1)
         velocity = np.gradient(depth, times_s, axis=0) if len(times_s) > 1 else 0.0 * depth
         self.lifted = LiftedTrack(
-            timebase=Timebase(times_s),
             centre_depth=(centre + 0.02) / stature_m,
             centre_sigma=np.full(len(depth), 0.03) / stature_m,
             depth=(depth - centre[:, None] + 0.02 * rng.standard_normal(33)) / stature_m,

@@ -13,16 +13,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sd2core.body import evidence, fit_windows, landmark_repair, lifter, sides, track
 from sd2core.body import fit as fitting
+from sd2core.body import fit_windows, landmark_repair, lifter, sides, track
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.fit import fit_motion
 from sd2core.body.landmark_files import (
     RefinedStretches,
-    SearchStore,
     TrackInParts,
     load_track,
+    repaired_track,
     save_track,
+    search_store,
 )
 from sd2core.body.lifter import LiftedInParts, Lifter
 from sd2core.body.raw_track import RawTrack
@@ -100,7 +101,7 @@ def stored(known: LandmarkTrack, folder: Path | None, max_gap_s: float = 0.5) ->
     """These landmarks as a search leaves them, and mended."""
     path = Path(__file__)  # any file
     video: Any = Video(known.timebase, known.width, known.height, path)
-    store = SearchStore(folder, video, None, None, "full")
+    store = search_store(folder, video, None, None, "full")
     refined = RefinedStretches(store, video, 32)
     for start in range(0, len(known), 32):
         part = known.part(start, min(start + 32, len(known)))
@@ -113,7 +114,7 @@ def stored(known: LandmarkTrack, folder: Path | None, max_gap_s: float = 0.5) ->
                 silhouettes=part.silhouettes,
             ),
         )
-    return TrackInParts(store, known.timebase, known.width, known.height, refined, max_gap_s)
+    return repaired_track(store, video, refined, max_gap_s)
 
 
 @pytest.fixture
@@ -381,7 +382,7 @@ class TestMotion:
         watched(LiftedInParts, "part")
         watched(LiftedInParts, "_sampled")
         watched(fit_windows.Windows, "poses")
-        watched(evidence, "evidence_of")
+        watched(fitting, "evidence_of")
         known = swiping(400)
         kept = stored(known, tmp_path)
         motion = fit_motion(kept, CAMERA, stature_m=STATURE_M, workspace=tmp_path)

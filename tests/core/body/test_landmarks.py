@@ -313,11 +313,7 @@ class TestTimes:
         pictures = [each for each in swiping()[0][4:6] for _ in range(8)]
         path = film(tmp_path / "fast.mp4", pictures, frames_per_s=120)
         seen: list[tuple[str, int]] = []
-        track = found(
-            path,
-            models,
-            on_frame=lambda stage, frame, points, seeing: seen.append((stage, frame)),
-        )
+        track = found(path, models, on_frame=lambda stage, frame, *_: seen.append((stage, frame)))
         assert len([frame for stage, frame in seen if stage == "find"]) <= 4
         assert len([frame for stage, frame in seen if stage == "refine"]) == 16
         assert track.present.all()

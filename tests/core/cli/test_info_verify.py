@@ -15,7 +15,7 @@ from zarr.codecs import BloscCodec
 
 from sd2core.files.resources import resource_path
 from sd2core.io.mesh import load_mesh
-from sd2core.pairs.store import INDEX_NAME
+from sd2core.pairs.summary import INDEX_NAME
 from tests.damaged_files import change, cut, lose
 from tests.small_pairs import write_pairs
 

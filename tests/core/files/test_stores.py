@@ -23,7 +23,7 @@ from sd2core.files.limits import VARIABLE
 from sd2core.files.stores import StoredArray, array_in, create_array, create_group, open_group
 from sd2core.io.kinds import is_dataset
 from sd2core.io.mesh import load_mesh
-from sd2core.pairs.store import is_pair_store
+from sd2core.pairs.summary import is_pair_store
 from tests.damaged_files import change
 
 ROWS, CHUNK = 40, 10

@@ -17,7 +17,8 @@ from hypothesis import strategies as st
 from sd2core.errors import Sd2Error
 from sd2core.maps import LimbMaps
 from sd2core.pairs.segments import cut, join, segment_starts
-from sd2core.pairs.store import INDEX_NAME, PairWriter, Take, TakeKey, is_pair_store, read_pairs
+from sd2core.pairs.store import PairWriter, Take, read_pairs
+from sd2core.pairs.summary import INDEX_NAME, TakeKey, is_pair_store
 from sd2core.sensor import VelocityAxis
 from tests.damaged_files import change, lose, states_of
 

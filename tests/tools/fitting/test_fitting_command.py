@@ -137,14 +137,23 @@ def test_real_videos_are_looked_at_too(
     body = Body.load("low")
     mask = silhouette(body.vertices_m + np.array([0.0, 1.0, 2.5]), body.faces, PinholeCamera())
 
-    def look(reader: Any, models: Any, *, silhouettes: Any, progress: Any) -> LandmarkTrack:
+    def look(reader: Any, models: Any, *, silhouettes: Any, progress_of: Any) -> LandmarkTrack:
         assert silhouettes is None
         none = np.zeros((14, 33), np.float32)
         masks = np.repeat(255 * mask[None].astype(np.uint8), 14, axis=0)
         return LandmarkTrack(
-            *(reader.timebase, 640, 480, np.zeros((14, 33, 2), np.float32), none),
-            *(np.zeros((14, 33, 3), np.float32), none, none[:, 0] + 1, np.ones(14, bool)),
-            *(np.zeros(14, bool), np.arange(14), masks),
+            timebase=reader.timebase,
+            width=640,
+            height=480,
+            image_px=np.zeros((14, 33, 2), np.float32),
+            depth_px=none,
+            world_m=np.zeros((14, 33, 3), np.float32),
+            visibility=none,
+            confidence=none[:, 0] + 1,
+            present=np.ones(14, bool),
+            bridged=np.zeros(14, bool),
+            silhouette_frames=np.arange(14),
+            silhouettes=masks,
         )
 
     monkeypatch.setattr("tools.fitting.scoring.landmark_models", lambda: None)

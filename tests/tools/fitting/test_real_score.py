@@ -37,18 +37,18 @@ def track(mesh: MeshSequence) -> LandmarkTrack:
             image[:, number] = CAMERA.project(joints[:, JOINTS.index(name)])
     masks = [silhouette(mesh.frame(frame), mesh.faces, CAMERA, (160, 120)) for frame in frames]
     return LandmarkTrack(
-        Timebase(TIMES),
-        640,
-        480,
-        image,
-        np.zeros((count, 33), np.float32),
-        np.zeros((count, 33, 3), np.float32),
-        np.ones((count, 33), np.float32),
-        np.ones(count, np.float32),
-        np.ones(count, bool),
-        np.zeros(count, bool),
-        frames,
-        (255 * np.array(masks)).astype(np.uint8),
+        timebase=Timebase(TIMES),
+        width=640,
+        height=480,
+        image_px=image,
+        depth_px=np.zeros((count, 33), np.float32),
+        world_m=np.zeros((count, 33, 3), np.float32),
+        visibility=np.ones((count, 33), np.float32),
+        confidence=np.ones(count, np.float32),
+        present=np.ones(count, bool),
+        bridged=np.zeros(count, bool),
+        silhouette_frames=frames,
+        silhouettes=(255 * np.array(masks)).astype(np.uint8),
     )
 
 
