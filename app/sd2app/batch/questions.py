@@ -102,7 +102,7 @@ class BatchQuestions(QObject):
         """Denoise with another model, from the maps that it takes."""
         card = self.models.get(name)
         if card is not None:
-            self._batch.setup.set_value("limbs", card.inputs == "limbs")
+            self._batch.setup.set_value("limbs", bool(card.parts))
         self._batch.setup.set_value("model", name)
 
     def placement_choices(self) -> Sequence[str]:

@@ -23,6 +23,7 @@ from sd2app.settings import Settings
 from sd2app.shell.parts import Parts
 from sd2app.shell.window import MainWindow
 from sd2core.batch.plan_file import read_plan
+from sd2core.mesh.vertex_parts import KINEMATICS
 from sd2core.placements.placements import PlacementGrid, write_placements
 from sd2core.recording.recording import open_recording
 
@@ -223,13 +224,14 @@ def test_placements_of_the_recording_or_of_a_file_are_taken(opened, qtbot, tmp_p
     assert read_plan(tmp_path / "plan.toml") == setup.plan()
 
 
+@pytest.mark.parametrize("part", ["trunk", KINEMATICS])
 def test_a_batch_begins_with_planned_places_and_the_model_in_use(
-    opened, qtbot, fake_models, tmp_path
+    opened, qtbot, fake_models, tmp_path, part
 ):
     own = tmp_path / "hall.safetensors"
     own.write_bytes(b"weights")
     fake_models.add(own, 3.0)
-    fake_models.add(Path("/models/limbs.safetensors"), 3.0, parts=("trunk",))
+    fake_models.add(Path("/models/limbs.safetensors"), 3.0, parts=(part,))
     window = opened()
     c = models_of(window)
     c.denoise.use(own)
