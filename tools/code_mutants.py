@@ -1,7 +1,7 @@
 """Break the program in known places, and say which tests notice: ``python -m tools.code_mutants``.
 
 Every mutant of ``code_mutants.toml`` is one wrong line in a copy of the checkout, where the tests
-that stand beside it are run. One that survives is an error. Half an hour of two cores.
+that stand beside it are run. One that survives is an error. Some minutes of two cores.
 """
 
 from __future__ import annotations

@@ -111,3 +111,9 @@ def test_times_cannot_be_changed_behind_its_back():
     assert timebase.times_s[1] == 1.0
     with pytest.raises(ValueError, match="read-only"):
         timebase.times_s[0] = 3
+
+
+def test_a_time_a_rounding_early_is_that_of_its_frame() -> None:
+    times = Timebase.regular(90, 30.0)
+    early_s = times.times_s - 1e-10
+    assert [times.frame_at(float(time_s)) for time_s in early_s] == list(range(90))

@@ -208,6 +208,11 @@ def test_holm_is_monotonic_and_no_smaller(values: list[float]) -> None:
     assert (np.diff(np.array(found)[order]) >= 0).all()
 
 
+def test_holm_as_in_a_table() -> None:
+    # The smallest of four counts four times, the next three times, and none less than before.
+    assert adjusted([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
+
+
 PLAN = 'title = "t"\nout = "made"\ndata = ["a.zarr", "eve=b.sd2"]\n'
 
 
