@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,8 +65,7 @@ def make_recording_pairs(
     """
     named = named_recordings(recordings, subjects)
     opened = [recording for recording, _ in named]
-    for recording in opened:
-        _check(recording)
+    check_there(opened, ("mesh", "radar"))
     labels = (BACKGROUND, *sorted({span.label for one in opened for span in one.labelled.spans}))
     channels = [one.channel_in_words for one in opened]
     writer: PairWriter | None = None
@@ -131,14 +131,17 @@ def named_recordings(
     return list(zip(opened, folders if subjects is None else subjects, strict=True))
 
 
-def _check(recording: Recording) -> None:
-    for what, path in (("mesh", recording.mesh), ("radar capture", recording.radar)):
-        if path is None:
-            raise Sd2Error(
-                f"{recording.folder} has no {what}",
-                "a recording with a mesh and a radar capture",
-                "Fit one with `sd2 fit`" if what == "mesh" else "",
-            )
+def check_there(recordings: Sequence[Recording], roles: Sequence[Literal["mesh", "radar"]]) -> None:
+    """Refuse recordings without a mesh, or without a radar capture."""
+    for recording in recordings:
+        for role in roles:
+            if getattr(recording, role) is None:
+                what = "mesh" if role == "mesh" else "radar capture"
+                raise Sd2Error(
+                    f"{recording.folder} has no {what}",
+                    "a recording with a mesh" + " and a radar capture" * ("radar" in roles),
+                    "Fit one with `sd2 fit`" if role == "mesh" else "",
+                )
 
 
 def _maps(

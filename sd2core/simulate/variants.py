@@ -15,7 +15,6 @@ from sd2core.body.parts import synthetic_map
 from sd2core.body.reshaping import coarser, reshaped
 from sd2core.body.shape import ShapeSpace
 from sd2core.doppler import SynthesisOptions, Synthesizer
-from sd2core.errors import Sd2Error
 from sd2core.io.radar.mars import FRAMES_PER_S, MarsStretch, mars_parts, read_mars
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.vertex_parts import PARTS
@@ -23,6 +22,7 @@ from sd2core.mocap.mars_pairs import driven_clips, takes_of
 from sd2core.mocap.recording_pairs import (
     BACKGROUND,
     check_rates,
+    check_there,
     frame_labels,
     named_recordings,
     take_frames,
@@ -41,7 +41,12 @@ Variant = Literal["places", "shapes", "mirrored"]
 random shape; or the sensor's mirror image in the upright plane through camera and body."""
 
 _ASIDE_DEG, _ABOVE_DEG, _FARTHER = 25.0, 10.0, (0.8, 1.25)
-_OTHER_SIDE = {"left": "right", "right": "left"}
+_SIDE = re.compile(r"(?<![A-Za-z])(?:left|right|LEFT|RIGHT)(?![A-Za-z])|(?:Left|Right)(?![a-z])")
+_OTHER_SIDE = {
+    side(one): side(other)
+    for one, other in (("left", "right"), ("right", "left"))
+    for side in (str.lower, str.upper, str.capitalize)
+}
 
 
 @dataclass(frozen=True)
@@ -82,13 +87,7 @@ def vary_recordings(
     (shapes) a mesh has another surface than the bundled body.
     """
     named = named_recordings(recordings, subjects)
-    for recording, _ in named:
-        if recording.mesh is None:
-            raise Sd2Error(
-                f"{recording.folder} has no mesh",
-                "a recording with a mesh",
-                "Fit one with `sd2 fit`",
-            )
+    check_there([recording for recording, _ in named], ("mesh",))
     meshes = [recording.load_mesh() for recording, _ in named]
     rates_hz = [mesh.timebase.frames_per_s for mesh in meshes]
     check_rates({one.folder: rate for (one, _), rate in zip(named, rates_hz, strict=True)})
@@ -100,7 +99,7 @@ def vary_recordings(
     for number, ((recording, subject), mesh) in enumerate(zip(named, meshes, strict=True)):
         progress(number, len(named))
         _append(writer, options, names, _of_recording(recording, subject, mesh))
-    progress(1, 1)
+    progress(len(named), len(named))
     return read_pairs(out)
 
 
@@ -132,7 +131,7 @@ def vary_mars(
         own = dict(take for part in parts if part.subject == person for take in takes_of(part))
         if not own.keys() <= writer.done:
             _append(writer, options, names, _of_person(own))
-    progress(1, 1)
+    progress(len(people), len(people))
     return read_pairs(out)
 
 
@@ -140,7 +139,8 @@ def _of_person(stretches: Mapping[TakeKey, MarsStretch]) -> Iterator[_Movement]:
     driven, place = driven_clips([*stretches.values()])
     for key, one in zip(stretches, driven, strict=True):
         times_s = one.clip.times_s
-        mesh = one.mesh(times_s + place.offset_s, "low")
+        # In memory: it is read several times, and would be posed each time.
+        mesh = one.mesh(times_s + place.offset_s, "low").between(0, len(times_s))
         yield _Movement(key, mesh, place.position_m, [BACKGROUND] * len(times_s))
 
 
@@ -241,10 +241,10 @@ def mirrored_label(label: str) -> str:
 
     Examples
     --------
-    >>> mirrored_label("left-to-right"), mirrored_label("Swipe up")
-    ('right-to-left', 'Swipe up')
+    >>> mirrored_label("left-to-right"), mirrored_label("SwipeLeft"), mirrored_label("upright")
+    ('right-to-left', 'SwipeRight', 'upright')
     """
-    return re.sub("left|right", lambda found: _OTHER_SIDE[found[0]], label)
+    return _SIDE.sub(lambda found: _OTHER_SIDE[found[0]], label)
 
 
 def _middle_m(mesh: MeshSequence) -> tuple[float, float, float]:

@@ -110,3 +110,5 @@ def test_left_and_right_change_places_in_labels() -> None:
         "up",
         "arm_right",
     ]
+    assert mirrored_label("Left to right, LEFT") == "Right to left, RIGHT"
+    assert [mirrored_label(one) for one in ("bright", "upright")] == ["bright", "upright"]
