@@ -20,8 +20,7 @@ WIDTHS = Bounds(1, 1024, whole=True)
 DELAY_S = 0.5
 """Frames of so many seconds after a frame are seen before its answer (the paper's: none)."""
 
-LONGEST_DELAY_S = 5.0
-DELAYS_S = Bounds(0.0, LONGEST_DELAY_S)
+DELAYS_S = Bounds(0.0, 5.0)
 
 
 def pace_kind(model: str, features: str, width: int) -> Kind:

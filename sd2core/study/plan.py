@@ -9,7 +9,7 @@ from pydantic import Field, FiniteFloat, model_validator
 
 from sd2core.batch.plan import Section, Share, Text
 from sd2core.batch.plan_file import parsed
-from sd2core.classify.defaults import DELAY_S, LONGEST_DELAY_S, WIDTH
+from sd2core.classify.defaults import DELAY_S, DELAYS_S, WIDTH, WIDTHS
 from sd2core.datasets.labelled import LabelledSource
 from sd2core.denoise.card import Inputs
 from sd2core.files.paths import located_path
@@ -37,8 +37,8 @@ class Learner(Section):
     """Time that ridge regression looks at."""
     # The others are not those of ridge regression.
     features: Literal["peak", "columns"] = "columns"
-    width: Annotated[int, Field(ge=1, le=1024)] = WIDTH
-    delay_s: Annotated[FiniteFloat, Field(ge=0, le=LONGEST_DELAY_S)] = DELAY_S
+    width: Annotated[int, Field(ge=WIDTHS.low, le=WIDTHS.high)] = WIDTH
+    delay_s: Annotated[FiniteFloat, Field(ge=DELAYS_S.low, le=DELAYS_S.high)] = DELAY_S
     steps: Annotated[int, Field(ge=1)] | None = None
 
     @property
