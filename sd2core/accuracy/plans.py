@@ -7,16 +7,10 @@ from dataclasses import asdict, dataclass, fields, replace
 from itertools import product
 from typing import Any, Literal, get_args
 
-from sd2core.doppler.options import (
-    Beyond,
-    DepthResolution,
-    RangeLaw,
-    SynthesisOptions,
-    Visibility,
-    Weight,
-)
+from sd2core.doppler.options import SynthesisOptions
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.options import Motion, WaveOptions
+from sd2core.options.synthesis import Beyond, DepthResolution, RangeLaw, Visibility, Weight
 
 Signal = Literal["histogram", "fmcw", "direct"]
 Family = Literal["histogram", "fmcw"]
@@ -154,18 +148,6 @@ class AccuracyPlan:
         if unknown:
             raise Sd2Error(f"A plan names {', '.join(sorted(unknown))}", "settings of this version")
         return cls(**content)
-
-
-CHOSEN = (
-    "visibility",
-    "depth_resolution",
-    "mask_stride",
-    "vertices_kept",
-    "range_law",
-    "beyond",
-    "oversampling",
-)
-"""Options of a synthesis that a counting plan sets."""
 
 
 def reference_plan(

@@ -9,8 +9,8 @@ from typing import Any
 from sd2core.accuracy.plans import MASK_REUSE_M, AccuracyPlan
 from sd2core.accuracy.results import Errors, Reason
 from sd2core.accuracy.survey import Survey
-from sd2core.doppler.options import Visibility
 from sd2core.numerics.map_accuracy import percent
+from sd2core.options.synthesis import Visibility
 
 
 def reasons_for(

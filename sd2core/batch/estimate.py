@@ -23,6 +23,7 @@ from sd2core.batch.inputs import (
 from sd2core.batch.plan import BatchPlan, Step
 from sd2core.batch.task_graph import TaskGraph
 from sd2core.batch.tasks import Task
+from sd2core.doppler.options import chosen_options
 from sd2core.errors import Sd2Error
 from sd2core.mesh.vertex_parts import PARTS
 from sd2core.progress import Progress, silent
@@ -120,15 +121,12 @@ def pace_kind(plan: BatchPlan, step: Step) -> Kind:
     if step == "fit":
         assert plan.fit is not None
         return fit_kind(plan.fit.resolution)
-    section = getattr(plan, step, None)
-    if section is None:
+    if getattr(plan, step, None) is None:
         return ("batch", step)
-    told = section.model_dump(
-        mode="json",
-        exclude_defaults=True,
-        exclude={"seed", "title", "validation_subjects", "test_subjects"},
-    )
-    return ("batch", step, json.dumps(told, sort_keys=True))
+    content = plan.model_dump(mode="json", exclude_defaults=True)[step]
+    for name in ("seed", "title", "validation_subjects", "test_subjects"):
+        content.pop(name, None)
+    return ("batch", step, json.dumps(content, sort_keys=True))
 
 
 def _glances(
@@ -184,4 +182,4 @@ def _add_costs(plan: BatchPlan, step: Step, steps: dict[str, StepEstimate]) -> N
         frames = sum(steps[name].frames for name in kinds) if step == "export" else one.frames
         if getattr(getattr(plan, step), "limbs", False):  # a map of each part besides
             frames += len(PARTS) * steps["synthesise"].frames
-        one.bytes = 4 * plan.synthesise.options().axis.bins * frames
+        one.bytes = 4 * chosen_options(plan.synthesise).axis.bins * frames

@@ -10,30 +10,19 @@ from pydantic import (
     ConfigDict,
     Field,
     FiniteFloat,
-    PositiveInt,
     StringConstraints,
     field_validator,
     model_validator,
 )
 
-from sd2core.accuracy.plans import CHOSEN
 from sd2core.body.model import Resolution
 from sd2core.datasets.options import SpanOptions
 from sd2core.datasets.source import KINDS
-from sd2core.doppler.options import (
-    PRESETS,
-    Beyond,
-    Count,
-    DepthResolution,
-    RangeLaw,
-    SynthesisOptions,
-    Visibility,
-    Weight,
-    chosen_options,
-)
+from sd2core.doppler.options import chosen_options
 from sd2core.errors import Sd2Error
 from sd2core.maps import MapKind
-from sd2core.numerics.bounds import FIELD_OF_VIEW_DEG, STATURE_M
+from sd2core.options.bounds import FIELD_OF_VIEW_DEG, STATURE_M
+from sd2core.options.synthesis import Synthesis
 from sd2core.pairs.segments import LENGTH, OVERLAP
 from sd2core.placements.placements import Placements, placements_from_dict
 from sd2core.sensor import Vector, VirtualSensor
@@ -84,61 +73,6 @@ class Fit(Section):
     field_of_view_deg: Angle | None = None
     max_gap_s: NotNegative | None = None  # longest gap that is bridged
     models: Text | None = None  # folder of the landmark models
-
-
-class Synthesise(Section):
-    """Section ``[synthesise]``: options of ``sd2 synth``.
-
-    Options that are not given come from the preset, see
-    :class:`~sd2core.doppler.options.SynthesisOptions`.
-    """
-
-    preset: Literal["paper", "vid2doppler"] = "paper"
-    tolerance: Share | None = None
-    """Allowed error, as a share. The cheapest plan within it is chosen once for each mesh and
-    checked at the first, the middle and the last of its placements. Without it the options
-    decide."""
-    vertices_kept: Share | None = None
-    visibility: Visibility | None = None
-    depth_resolution: DepthResolution | None = None
-    mask_stride: PositiveInt | None = None
-    weight: Weight | None = None
-    count: Count | None = None
-    bins: PositiveInt | None = None
-    v_max_mps: Positive | None = None
-    null_bins: tuple[int, ...] | None = None
-    beyond: Beyond | None = None
-    range_exponent: NotNegative | None = None
-    reference_range_m: Positive | None = None
-    range_law: RangeLaw | None = None
-    trajectory_smoothing_s: NotNegative | None = None
-    oversampling: PositiveInt | None = None
-    velocity_sigma_bins: NotNegative | None = None
-    time_sigma_s: NotNegative | None = None
-    limbs: bool = False  # also the map of each part of the body, which some models want
-
-    @model_validator(mode="after")
-    def _consistent(self) -> Synthesise:
-        if self.tolerance is not None:
-            for name in CHOSEN:
-                if getattr(self, name) is not None:
-                    raise ValueError(f"tolerance chooses {name}; give one of the two")
-            if PRESETS[self.preset].velocity != "central":
-                raise ValueError(f"the preset {self.preset} has nothing that tolerance can choose")
-        try:
-            self.options()
-        except Sd2Error as error:
-            raise ValueError(str(error)) from None
-        return self
-
-    def options(self) -> SynthesisOptions:
-        """Synthesis options: the preset with the given values in place of its own."""
-        given = {
-            name: value
-            for name in SynthesisOptions.__dataclass_fields__
-            if (value := getattr(self, name, None)) is not None
-        }
-        return chosen_options(self.preset, self.bins, self.v_max_mps, given)
 
 
 class Denoise(Section):
@@ -196,10 +130,20 @@ class BatchPlan(Section):
     :func:`~sd2core.placements.placements.placements_from_dict` (``"grid"``, ``"cloud"``),
     around the body of each recording. With ``own = true`` the recording's own sensor besides."""
     fit: Fit | None = None
-    synthesise: Synthesise | None = None
+    synthesise: Synthesis | None = None
     denoise: Denoise | None = None
     simulate: Simulate | None = None
     export: Export | None = None
+
+    @field_validator("synthesise")
+    @classmethod
+    def _made(cls, section: Synthesis | None) -> Synthesis | None:
+        try:
+            if section is not None:
+                chosen_options(section)
+        except Sd2Error as error:
+            raise ValueError(str(error)) from None
+        return section
 
     @field_validator("placements")
     @classmethod

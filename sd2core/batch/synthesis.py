@@ -11,9 +11,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.batch.inputs import MeshInput, open_mesh
-from sd2core.batch.plan import Synthesise
+from sd2core.doppler.options import chosen_options
 from sd2core.errors import Sd2Error
 from sd2core.files.texts import read_json
+from sd2core.options.synthesis import Synthesis
 from sd2core.sensor import VelocityAxis, VirtualSensor
 
 if TYPE_CHECKING:
@@ -66,7 +67,7 @@ _kept = _Kept()
 def synthesise(
     mesh: MeshInput,
     sensor: VirtualSensor,
-    section: Synthesise,
+    section: Synthesis,
     stretch: Stretch,
     choosing: Choosing | None,
     out: Path,
@@ -134,7 +135,7 @@ def kept_mesh(wanted: MeshInput) -> MeshSequence:
     return _kept.mesh
 
 
-def _synthesizer(mesh: MeshInput, section: Synthesise, plan: dict[str, Any] | None) -> Synthesizer:
+def _synthesizer(mesh: MeshInput, section: Synthesis, plan: dict[str, Any] | None) -> Synthesizer:
     from sd2core.accuracy.plans import AccuracyPlan
     from sd2core.doppler import Synthesizer
     from sd2core.mesh.decimation import decimate
@@ -143,7 +144,7 @@ def _synthesizer(mesh: MeshInput, section: Synthesise, plan: dict[str, Any] | No
     wanted = (section, None if plan is None else json.dumps(plan["plan"], sort_keys=True))
     if _kept.synthesizer is None or _kept.made_for != wanted:
         _kept.synthesizer = None
-        options, share = section.options(), section.vertices_kept or 1.0
+        options, share = chosen_options(section), section.vertices_kept or 1.0
         if plan is not None:
             settings = AccuracyPlan.from_json(plan["plan"])
             options, share = settings.options(options), settings.vertices_kept
@@ -154,7 +155,7 @@ def _synthesizer(mesh: MeshInput, section: Synthesise, plan: dict[str, Any] | No
     return _kept.synthesizer
 
 
-def chosen_plan(mesh: MeshInput, section: Synthesise, choosing: Choosing) -> dict[str, Any]:
+def chosen_plan(mesh: MeshInput, section: Synthesis, choosing: Choosing) -> dict[str, Any]:
     """Return the accuracy plan that the first process chose: measured costs always differ."""
     path = choosing.path
     if (known := read_plan_of(path)) is not None:
@@ -163,7 +164,11 @@ def chosen_plan(mesh: MeshInput, section: Synthesise, choosing: Choosing) -> dic
 
     assert section.tolerance is not None
     found = choose_for_places(
-        kept_mesh(mesh), choosing.places, choosing.frames, section.tolerance, section.options()
+        kept_mesh(mesh),
+        choosing.places,
+        choosing.frames,
+        section.tolerance,
+        chosen_options(section),
     )
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, temporary = tempfile.mkstemp(prefix=".sd2-", suffix=".tmp", dir=path.parent)

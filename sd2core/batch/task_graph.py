@@ -17,6 +17,7 @@ from sd2core.batch.keys import key_of
 from sd2core.batch.plan import STEPS, BatchPlan, Simulate, Step
 from sd2core.batch.synthesis import Choosing, Stretch, stretches_of
 from sd2core.batch.tasks import Task
+from sd2core.doppler.options import chosen_options
 from sd2core.errors import Sd2Error
 from sd2core.files.digests import file_digest
 from sd2core.sensor import VirtualSensor
@@ -67,7 +68,7 @@ class TaskGraph:
             {}
             if section is None
             else {
-                "options": asdict(section.options()),
+                "options": asdict(chosen_options(section)),
                 "tolerance": section.tolerance,
                 "vertices_kept": section.vertices_kept,
             }
@@ -235,7 +236,7 @@ class TaskGraph:
     def _simulation_task(self, where: _View, stretch: Stretch) -> Task:
         assert self._simulation is not None
         assert self.plan.synthesise is not None
-        axis = self.plan.synthesise.options().axis
+        axis = chosen_options(self.plan.synthesise).axis
         content = {"axis": asdict(axis), "simulation": self._simulation.as_json()}
         arguments = {"axis": axis, "simulation": self._simulation}
         return self._map_task("simulate", "simulated", where, stretch, content, arguments)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.io.video import VideoReader
-from sd2core.numerics.bounds import FIELD_OF_VIEW_DEG
+from sd2core.options.bounds import FIELD_OF_VIEW_DEG
 
 DEFAULT_FIELD_OF_VIEW_DEG = 2.0 * math.degrees(math.atan(320.0 / 600.0))
 """Across the longer side, where neither file nor user says: 56°, a webcam's or phone's."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from sd2core.body.model import Body, Resolution, Skeleton, load_skeleton, read_body_arrays
 from sd2core.errors import Sd2Error
-from sd2core.numerics.bounds import STATURE_M
+from sd2core.options.bounds import STATURE_M
 
 DEFAULT_STATURE_M = 1.72
 """Body height if none is given; distances and speeds scale with it."""

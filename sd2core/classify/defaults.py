@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sd2core.numerics.bounds import Bounds
+from sd2core.options.bounds import Bounds
 
 if TYPE_CHECKING:
     from sd2core.runs.pace import Kind

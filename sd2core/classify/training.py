@@ -22,7 +22,7 @@ from sd2core.classify.live import TrainedClassifier
 from sd2core.classify.metrics import confusion_of, mean_recall
 from sd2core.classify.models import Classifier, build, options, parameter_groups
 from sd2core.errors import Sd2Error
-from sd2core.numerics.bounds import LEARNING_RATE, STEPS
+from sd2core.options.bounds import LEARNING_RATE, STEPS
 from sd2core.train.checkpoint import Position
 from sd2core.train.loop import Loop
 from sd2core.train.steps import set_rate

@@ -6,8 +6,9 @@ import argparse
 import inspect
 import re
 from collections.abc import Callable, Iterable
+from dataclasses import MISSING
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TypeVar
 
 from sd2core.cli.options import (
     add_json,
@@ -20,6 +21,10 @@ from sd2core.cli.options import (
 )
 from sd2core.errors import Sd2Error
 from sd2core.files.figure_files import SUFFIXES as FIGURES
+from sd2core.options.records import Group, Option, OptionRecord, options_of
+from sd2core.options.shared import MapOutput
+
+Record = TypeVar("Record", bound=OptionRecord)
 
 
 class UsageError(Sd2Error):
@@ -87,7 +92,7 @@ class Options(argparse._ActionsContainer):
         """Add the velocity axis."""
         self.add_value("--bins", positive_int, "N", "velocity bins (default: 32)")
         text = "end of the velocity axis in m/s (default: 2)"
-        self.add_value("--v-max", positive_float, "MPS", text)
+        self.add_value("--v-max", positive_float, "MPS", text, dest="v_max_mps")
 
     def add_mesh_and_sensor(self) -> None:
         """Add what is looked at, and from where."""
@@ -242,17 +247,81 @@ class CommandParser(Options, argparse.ArgumentParser):
         raise UsageError(found, remedy=f"{meant}`{self.prog} --help` lists all")
 
 
+def add_options(parser: argparse._ActionsContainer, kind: type[OptionRecord]) -> None:
+    """Add the options of a record to a parser, under their headings."""
+    groups: dict[Group | None, argparse._ActionsContainer] = {None: parser}
+    exclusive: dict[str, argparse._ActionsContainer] = {}
+    for option in options_of(kind):
+        group = option.group
+        if group is not None and group not in groups:
+            groups[group] = parser.add_argument_group(group.title, group.text)
+        holder = groups[group]
+        if name := option.place.one_of:
+            if name not in exclusive:
+                exclusive[name] = holder.add_mutually_exclusive_group()
+            holder = exclusive[name]
+        holder.add_argument(*_names(option), **_keywords(option))
+        if option.place.endings:
+            parser.set_defaults(**{f"{option.name}_endings": option.place.endings})
+
+
+def _names(option: Option) -> tuple[str, ...]:
+    return (option.dest,) if option.place.argument else option.flags
+
+
+def _keywords(option: Option) -> dict[str, Any]:
+    """How argparse wants to know an option; in a section what is not typed is None."""
+    from sd2core.radar_profiles import RADARS
+
+    place, required = option.place, option.default is MISSING
+    words = option.words.replace("{radars}", ", ".join(RADARS)).replace("%", "%%")
+    about: dict[str, Any] = {"help": words}
+    if not place.argument:
+        about["dest"] = option.dest
+    default = None if option.section or required else option.default
+    if option.kind is bool:
+        return about | {"action": "store_true", "default": default}
+    about |= {"type": option.read, "metavar": option.called, "default": default}
+    about["choices"] = option.choices or None
+    if place.many == "again":
+        about |= {"action": "append", "default": None}
+    elif place.many:
+        about["nargs"] = "+" if required else "*"
+    elif place.bare is not None:
+        about |= {"nargs": "?", "const": place.bare}
+    elif place.argument:
+        about["nargs"] = None if required else "?"
+    elif required:
+        about["required"] = True
+    return about
+
+
+def record_of(kind: type[Record], typed: argparse.Namespace) -> Record:
+    """Make the record of a command from what was typed."""
+    values: dict[str, Any] = {}
+    for option in options_of(kind):
+        value = getattr(typed, option.dest)
+        if option.section:
+            section = values.setdefault(option.section, {})
+            if value is not None:
+                section[option.name] = value
+        elif value is not None:
+            values[option.name] = tuple(value) if option.place.many else value
+    return kind(**values)
+
+
 def add_command(
     commands: argparse._SubParsersAction,
     name: str,
     summary: str = "",
     *,
-    handler: Callable[[argparse.Namespace], int | None] | None = None,
+    options: type[Record] | None = None,
+    handler: Callable[[Any], int | None] | None = None,
     about: Callable[..., Any] | None = None,
     description: str = "",
     examples: str = "",
 ) -> CommandParser:
-    """Add a subcommand with its help.
+    """Add a subcommand with its help, and the options of a record, which the handler gets.
 
     Without a summary the docstring of the handler, or of what is given in its place (``about``),
     is the help: a summary, a description, and examples from the first line on that begins with
@@ -272,6 +341,11 @@ def add_command(
         epilog=f"examples:\n{examples}" if examples else None,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    if handler is not None:
+    if options is not None:
+        add_options(parser, options)
+        parser.set_defaults(writes_map=issubclass(options, MapOutput))
+    if handler is not None and options is not None:
+        parser.set_defaults(handler=lambda typed: handler(record_of(options, typed)))
+    elif handler is not None:
         parser.set_defaults(handler=handler)
     return parser

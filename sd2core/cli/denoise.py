@@ -3,26 +3,40 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import progress_bar
 from sd2core.errors import Sd2Error
+from sd2core.options.records import ARGUMENT
+from sd2core.options.shared import Json, MapOutput, Texture
+
+
+@dataclass(frozen=True, kw_only=True)
+class Denoise(MapOutput, Texture, Json):
+    """Options of ``sd2 denoise``.
+
+    Parameters
+    ----------
+    map : MAP
+        a map from `sd2 synth`
+    model : FILE|NAME
+        a model file from `sd2 train`, or the name of one that is installed (default: of those
+        that come with SD² Studio the one for limb maps, where there are such)
+    """
+
+    map: Annotated[Path, ARGUMENT]
+    model: str | None = None
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``denoise``."""
-    parser = add_command(commands, "denoise", handler=_denoise)
-    parser.add_value("map", Path, "MAP", "a map from `sd2 synth`")
-    parser.add_map_output()
-    text = "a model file from `sd2 train`, or the name of one that is installed (default: of"
-    text += " those that come with SD² Studio the one for limb maps, where there are such)"
-    parser.add_argument("--model", metavar="FILE|NAME", help=text)
-    parser.add_texture()
-    parser.add_json()
+    add_command(commands, "denoise", options=Denoise, handler=_denoise)
 
 
-def _denoise(options: argparse.Namespace) -> None:
+def _denoise(options: Denoise) -> None:
     """Turn a synthetic Doppler map into what a radar would show.
 
     A trained model estimates what a radar would have measured, from the map that
@@ -57,7 +71,7 @@ def _denoise(options: argparse.Namespace) -> None:
     texture = None if options.texture is None else card.needed_texture()
     with progress_bar("Denoising") as progress:
         denoised = load_model(path).denoise(doppler, progress)
-    if texture is not None:
+    if texture is not None and options.texture is not None:
         denoised = texture.on(denoised, options.texture)
     denoised.save(options.out)
     description = describe_map(options.out, denoised)

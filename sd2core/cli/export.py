@@ -185,12 +185,14 @@ def _making(options: argparse.Namespace) -> Making:
     from sd2core.datasets.simulating import Simulation
     from sd2core.doppler.options import chosen_options
     from sd2core.io.radar import named_radar
+    from sd2core.options.synthesis import Synthesis
     from sd2core.placements.placements import read_placements
 
-    chosen = given(options, ("null_bins", "count"))
     return Making(
         kinds=_dataset_options(options).kinds,
-        synthesis=chosen_options("paper", options.bins, options.v_max, chosen),
+        synthesis=chosen_options(
+            Synthesis(**given(options, ("bins", "v_max_mps", "null_bins", "count")))
+        ),
         tolerance=options.tolerance,
         placements=options.placements
         if options.placements in (None, "planned")

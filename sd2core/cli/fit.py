@@ -20,7 +20,7 @@ from sd2core.cli.output import (
     progress_events,
 )
 from sd2core.errors import Sd2Error
-from sd2core.numerics.bounds import FIELD_OF_VIEW_DEG, STATURE_M
+from sd2core.options.bounds import FIELD_OF_VIEW_DEG, STATURE_M
 
 if TYPE_CHECKING:
     import numpy as np

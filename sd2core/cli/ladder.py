@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.command_parser import Options, add_command
 from sd2core.cli.options import given, positive_float, positive_int, share
@@ -36,7 +36,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     parser.add_json()
 
 
-def _ladder(options: argparse.Namespace) -> int:
+def _ladder(options: Any) -> int:
     """Measure what accuracy costs on a scene, and say what the scene requires.
 
     Tries every sensible way of computing the Doppler of a mesh on some of its frames:
@@ -103,7 +103,7 @@ def chosen(
     mesh: MeshSequence,
     sensor: VirtualSensor,
     synthesis: SynthesisOptions,
-    options: argparse.Namespace,
+    options: Any,
     *,
     dragging: bool = True,
 ) -> Choice:
@@ -132,7 +132,7 @@ def _measured(
     mesh: MeshSequence,
     sensor: VirtualSensor,
     synthesis: SynthesisOptions,
-    options: argparse.Namespace,
+    options: Any,
 ) -> Measurement:
     from sd2core.accuracy.cache import cached_measurement, store_measurement
     from sd2core.accuracy.measuring import REPEATS, measure

@@ -8,7 +8,7 @@ import re
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from sd2core.numerics.bounds import Bounds
+from sd2core.options.bounds import Bounds
 
 
 def add_json(parser: argparse._ActionsContainer) -> None:

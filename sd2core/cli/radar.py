@@ -143,7 +143,8 @@ def _write_recorded(recorded: RecordedMap, offset_s: float, options: argparse.Na
 def _of_processing(options: argparse.Namespace) -> list[str]:
     """Options of the processing to a map that are given."""
     clutter = ["--clutter"] if options.clutter != "none" else []
-    return [*map(flag, given(options, ("bins", "v_max", "range"))), *clutter]
+    of_axis = {"bins": "--bins", "v_max_mps": "--v-max", "range": "--range"}
+    return [*(of_axis[name] for name in given(options, of_axis)), *clutter]
 
 
 def _of_channels(options: argparse.Namespace) -> list[str]:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.options import flag, given
 from sd2core.cli.output import picked, progress_bar
@@ -22,7 +21,7 @@ _OF_THE_MESH = ("faces", "fps", "scale", "person", "distance_m", "image_size", "
 _OF_BODY_MODELS = ("person", "image_size", "focal_px")
 
 
-def mesh_reading(options: argparse.Namespace) -> MeshReading:
+def mesh_reading(options: Any) -> MeshReading:
     """Options for reading a mesh from the command line."""
     from sd2core.recording.recording import MeshReading
 
@@ -30,7 +29,7 @@ def mesh_reading(options: argparse.Namespace) -> MeshReading:
     return MeshReading(frames_per_s=options.fps, **alike)
 
 
-def load_mesh_from_options(path: Path, options: argparse.Namespace) -> MeshSequence:
+def load_mesh_from_options(path: Path, options: Any) -> MeshSequence:
     """Load a mesh with the options on how to read it."""
     from sd2core.io.mesh import load_mesh
 
@@ -41,7 +40,7 @@ def load_mesh_from_options(path: Path, options: argparse.Namespace) -> MeshSeque
         )
 
 
-def mesh_and_sensor(options: argparse.Namespace) -> tuple[MeshSequence, VirtualSensor]:
+def mesh_and_sensor(options: Any) -> tuple[MeshSequence, VirtualSensor]:
     """Mesh, and sensor of the recording or the camera, with ``--sensor`` in its place."""
     from sd2core.recording.recording import is_recording
     from sd2core.sensor import VirtualSensor
@@ -59,7 +58,7 @@ def mesh_and_sensor(options: argparse.Namespace) -> tuple[MeshSequence, VirtualS
     return mesh, sensor
 
 
-def open_recording_from_options(path: Path, options: argparse.Namespace) -> Recording:
+def open_recording_from_options(path: Path, options: Any) -> Recording:
     """Open a recording; options on how to read its mesh replace the stored ones."""
     from sd2core.recording.recording import open_recording
 
@@ -76,7 +75,7 @@ def open_recording_from_options(path: Path, options: argparse.Namespace) -> Reco
 
 
 def refuse_unused_mesh_options(
-    options: argparse.Namespace, path: Path, mesh: Path | None, *, but: tuple[str, ...] = ()
+    options: Any, path: Path, mesh: Path | None, *, but: tuple[str, ...] = ()
 ) -> None:
     """Refuse options on how to read a mesh that would change nothing, except ``but``."""
     if mesh is None:
@@ -90,9 +89,9 @@ def refuse_unused_mesh_options(
             )
 
 
-def chosen_axis(options: argparse.Namespace, usual: VelocityAxis | None = None) -> VelocityAxis:
+def chosen_axis(options: Any, usual: VelocityAxis | None = None) -> VelocityAxis:
     """Velocity axis of ``--bins`` and ``--v-max``; what is not given is as usual."""
     from sd2core.sensor import VelocityAxis
 
     usual = usual or VelocityAxis()
-    return VelocityAxis(options.bins or usual.bins, options.v_max or usual.v_max_mps)
+    return VelocityAxis(options.bins or usual.bins, options.v_max_mps or usual.v_max_mps)

@@ -288,6 +288,7 @@ def _campaign(options: argparse.Namespace) -> None:
     from sd2core.doppler.options import chosen_options
     from sd2core.io.radar import named_radar
     from sd2core.numerics.compiled import worker_count
+    from sd2core.options.synthesis import Synthesis
     from sd2core.pairs.store import read_pairs
     from sd2core.simulate.campaign.making import make_campaign
     from sd2core.simulate.campaign.radar import radar_at
@@ -307,7 +308,7 @@ def _campaign(options: argparse.Namespace) -> None:
         motions=options.motions,
         role=options.motion_role,
         error_sizes=options.fit_error_sizes,
-        synthesis=chosen_options("paper", bins, None, {}),
+        synthesis=chosen_options(Synthesis(bins=bins)),
     )
     with progress_bar("Simulating", unit="take") as progress:
         made = make_campaign(

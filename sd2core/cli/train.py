@@ -14,7 +14,7 @@ from sd2core.cli.command_parser import Options, add_command
 from sd2core.cli.options import flag, given, positive_float, positive_int, within
 from sd2core.cli.output import picked, print_facts, print_json
 from sd2core.errors import Sd2Error
-from sd2core.numerics import bounds
+from sd2core.options import bounds
 from sd2core.processes import INTERRUPTED
 
 if TYPE_CHECKING:

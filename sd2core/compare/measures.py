@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sd2core.doppler import PRESETS, Synthesizer
-from sd2core.doppler.options import Count
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import Presence
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics.map_accuracy import relative_l1
+from sd2core.options.synthesis import HowCounted
 from sd2core.progress import Progress, silent
 from sd2core.scattering.trajectory import cubic_weights
 from sd2core.scattering.velocity import moments, radial_velocity
@@ -149,9 +149,9 @@ def synthesize_alike(
     meshes: Sequence[MeshSequence],
     sensor: VirtualSensor,
     progress: Progress = silent,
-    count: Count = "plain",
+    count: HowCounted = "plain",
 ) -> tuple[DopplerMap, ...]:
-    """Count maps of all meshes by the paper's preset, plainly unless asked otherwise.
+    """HowCounted maps of all meshes by the paper's preset, plainly unless asked otherwise.
 
     Hidden vertices are left out where every mesh has faces; otherwise all vertices of
     all meshes count, so that none is compared with another kind of map.

@@ -2,32 +2,32 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from typing import Any, Literal, get_args
+from dataclasses import dataclass, field, fields, replace
+from typing import Annotated, Literal
 
 from sd2core.errors import Sd2Error
+from sd2core.options import bounds
+from sd2core.options.kinds import Count, NotNegative
+from sd2core.options.records import OptionRecord, given
+from sd2core.options.synthesis import (
+    Beyond,
+    DepthResolution,
+    HowCounted,
+    RangeLaw,
+    Synthesis,
+    Visibility,
+    Weight,
+)
 from sd2core.sensor import VelocityAxis
 
-Visibility = Literal["none", "facing", "depth", "exact"]
-DepthResolution = Literal[128, 256]
-Weight = Literal["count", "area", "projected"]
-Count = Literal["plain", "expected"]
-RangeLaw = Literal["vertex", "frame"]
-Beyond = Literal["drop", "wrap", "clip"]
 VelocityRule = Literal["central", "vid2doppler"]
 
 MOST_BINS = 254
 """Bin numbers are bytes, and two values say "beyond the axis" and "hidden"."""
 
-STEEPEST_RANGE_LAW = 8
-FARTHEST_REFERENCE_M = 1000
-"""Within these, the range law stays within single precision at any range."""
-
 
 @dataclass(frozen=True)
-class SynthesisOptions:
+class SynthesisOptions(OptionRecord):
     """Options of the synthesis of a Doppler map from a mesh.
 
     Parameters
@@ -91,65 +91,30 @@ class SynthesisOptions:
 
     visibility: Visibility = "exact"
     depth_resolution: DepthResolution = 256
-    mask_stride: int = 1
+    mask_stride: Count = 1
     weight: Weight = "count"
     axis: VelocityAxis = field(default_factory=VelocityAxis)
     null_bins: tuple[int, ...] = (14, 15, 16)
     beyond: Beyond = "drop"
-    range_exponent: float = 4.0
-    reference_range_m: float = 2.2
+    range_exponent: Annotated[float, bounds.RANGE_EXPONENT] = 4.0
+    reference_range_m: Annotated[float, bounds.REFERENCE_RANGE_M] = 2.2
     range_law: RangeLaw = "vertex"
     velocity: VelocityRule = "central"
-    oversampling: int = 1
-    trajectory_smoothing_s: float = 0.0
-    velocity_sigma_bins: float = 1.0
-    time_sigma_s: float = 1.0 / 30.0
+    oversampling: Count = 1
+    trajectory_smoothing_s: NotNegative = 0.0
+    velocity_sigma_bins: NotNegative = 1.0
+    time_sigma_s: NotNegative = 1.0 / 30.0
     null_after_smoothing: bool = True
-    count: Count = "expected"
+    count: HowCounted = "expected"
 
     def __post_init__(self) -> None:
-        for name, allowed in (
-            ("visibility", Visibility),
-            ("depth_resolution", DepthResolution),
-            ("weight", Weight),
-            ("beyond", Beyond),
-            ("range_law", RangeLaw),
-            ("velocity", VelocityRule),
-            ("count", Count),
-        ):
-            value = getattr(self, name)
-            if value not in get_args(allowed):
-                raise Sd2Error(
-                    f"{name} is {value!r}", f"one of {', '.join(map(str, get_args(allowed)))}"
-                )
+        super().__post_init__()
         if self.axis.bins > MOST_BINS:
             raise Sd2Error(f"The velocity axis has {self.axis.bins} bins", f"up to {MOST_BINS}")
         nulled = tuple(sorted({int(number) for number in self.null_bins}))
         if nulled and not 0 <= nulled[0] <= nulled[-1] < self.axis.bins:
             raise Sd2Error(f"null_bins is {nulled}", f"bins from 0 to {self.axis.bins - 1}")
         object.__setattr__(self, "null_bins", nulled)
-        for name in (
-            "range_exponent",
-            "trajectory_smoothing_s",
-            "velocity_sigma_bins",
-            "time_sigma_s",
-        ):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0):
-                raise Sd2Error(f"{name} is {value}", "0 or more")
-        if self.range_exponent > STEEPEST_RANGE_LAW:
-            raise Sd2Error(
-                f"range_exponent is {self.range_exponent}", f"up to {STEEPEST_RANGE_LAW}"
-            )
-        if not 0 < self.reference_range_m <= FARTHEST_REFERENCE_M:
-            raise Sd2Error(
-                f"The reference range is {self.reference_range_m} m",
-                f"more than 0 and up to {FARTHEST_REFERENCE_M} m",
-            )
-        if self.mask_stride < 1:
-            raise Sd2Error(f"mask_stride is {self.mask_stride}", "1 or more frames")
-        if self.oversampling < 1:
-            raise Sd2Error(f"The oversampling is {self.oversampling}", "1 or more")
         if self.velocity == "vid2doppler" and self.oversampling > 1:
             raise Sd2Error(
                 f"The oversampling is {self.oversampling} with vid2doppler's velocities",
@@ -187,22 +152,17 @@ Examples
 """
 
 
-def chosen_options(
-    preset: str, bins: int | None, v_max_mps: float | None, given: Mapping[str, Any]
-) -> SynthesisOptions:
-    """Preset with some options replaced, ``given`` by name.
+def chosen_options(synthesis: Synthesis) -> SynthesisOptions:
+    """Return the preset with what is given in place of its own.
 
     On another axis than the preset's the same velocities are nulled, unless ``null_bins``
     is given. Raises Sd2Error for values that are not allowed.
     """
-    base = PRESETS[preset]
-    if base.velocity == "vid2doppler" and given.get("count") == "expected":
-        raise Sd2Error(
-            "count is 'expected' with vid2doppler's velocities",
-            "plain: that tool counts each vertex in one bin",
-        )
-    axis = VelocityAxis(bins or base.axis.bins, v_max_mps or base.axis.v_max_mps)
-    values = dict(given)
+    base = PRESETS[synthesis.preset]
+    values = given(synthesis, (one.name for one in fields(SynthesisOptions)))
+    axis = VelocityAxis(
+        synthesis.bins or base.axis.bins, synthesis.v_max_mps or base.axis.v_max_mps
+    )
     if axis != base.axis and "null_bins" not in values:
         values["null_bins"] = same_velocities(base.null_bins, base.axis, axis)
     return replace(base, axis=axis, **values)

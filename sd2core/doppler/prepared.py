@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 from sd2core.doppler import vid2doppler
 from sd2core.doppler.histogram import Counting, Frames
 from sd2core.doppler.moving import MovingVertices, find_moving, still_bins
-from sd2core.doppler.options import STEEPEST_RANGE_LAW, SynthesisOptions
+from sd2core.doppler.options import SynthesisOptions
 from sd2core.mesh.sequence import MeshSequence, refuse_missing
 from sd2core.numerics.compiled import kernels_ready
 from sd2core.numerics.precision import single_is_enough
+from sd2core.options.bounds import RANGE_EXPONENT
 from sd2core.scattering import amplitude, visibility
 from sd2core.scattering.trajectory import Trajectory
 from sd2core.scattering.velocity import moments
@@ -452,7 +453,7 @@ class PreparedMesh:
             size_m=float((positions[0].max(axis=1) - positions[0].min(axis=1)).max()),
             duration_s=float(measured.min(initial=np.inf)),
             bin_width_mps=self.options.axis.bin_width_mps,
-            range_exponent=STEEPEST_RANGE_LAW,
+            range_exponent=RANGE_EXPONENT.high,
             nearest_range_m=amplitude.NEAREST_RANGE_M,
         ):
             return positions, reach_m

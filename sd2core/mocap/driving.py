@@ -27,7 +27,7 @@ from sd2core.body.track import LANDMARK, LANDMARKS, TORSO_CORNERS
 from sd2core.errors import Sd2Error
 from sd2core.io.radar.mars import JOINTS
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.numerics.bounds import STATURE_M
+from sd2core.options.bounds import STATURE_M
 from sd2core.timebase import Timebase
 
 _STILLS = 150

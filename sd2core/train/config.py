@@ -11,8 +11,8 @@ from sd2core.errors import Sd2Error
 from sd2core.files.paths import located_path
 from sd2core.files.texts import errors_in, read_toml
 from sd2core.files.toml import toml_lines
-from sd2core.numerics import bounds
-from sd2core.numerics.bounds import Bounds
+from sd2core.options import bounds
+from sd2core.options.bounds import Bounds
 from sd2core.pairs.segments import LENGTH, OVERLAP
 from sd2core.runs.pace import Kind
 

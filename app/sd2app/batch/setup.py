@@ -122,7 +122,8 @@ class BatchSetupModel(RunSetup[Entry]):
 
     def plan(self) -> BatchPlan:
         """Plan in the form that the library takes; Sd2Error if something is missing."""
-        from sd2core.batch.plan import BatchPlan, Denoise, Export, Fit, Recordings, Synthesise
+        from sd2core.batch.plan import BatchPlan, Denoise, Export, Fit, Recordings
+        from sd2core.options.synthesis import Synthesis
 
         if self.problem:
             raise Sd2Error(self.problem)
@@ -138,7 +139,7 @@ class BatchSetupModel(RunSetup[Entry]):
             ),
             placements=where,
             fit=Fit() if values["fit"] else None,
-            synthesise=Synthesise(tolerance=tolerance, limbs=values["denoise"] and values["limbs"]),
+            synthesise=Synthesis(tolerance=tolerance, limbs=values["denoise"] and values["limbs"]),
             denoise=Denoise(model=values["model"]) if values["denoise"] else None,
             export=Export(format=values["format"]) if values["export"] else None,
         )

@@ -28,7 +28,7 @@ from sd2app.widgets.run_panel import Button, RunPanel, RunView, RunWords
 from sd2app.widgets.text import counted
 from sd2app.widgets.training_form import Field, TrainingForm, labelled
 from sd2core.classify.defaults import DELAYS_S, WIDTHS
-from sd2core.numerics.bounds import SEED, STEPS
+from sd2core.options.bounds import SEED, STEPS
 
 _DATA = "Data sets and labelled radar files (*.h5 *.hdf5 *.npz)"
 _MAP_TIPS = {

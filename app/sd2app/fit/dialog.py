@@ -16,7 +16,7 @@ from sd2app.widgets.layouts import STRETCH, column_of, form_of, row_of
 from sd2app.widgets.mesh_painting import paint_picture
 from sd2app.widgets.panel import ElidedLabel, outlined, say, sentence, side_by_side
 from sd2app.widgets.time_axis import clock_text
-from sd2core.numerics.bounds import FIELD_OF_VIEW_DEG, STATURE_M
+from sd2core.options.bounds import FIELD_OF_VIEW_DEG, STATURE_M
 
 VIDEOS = "Video (*.mp4 *.mkv *.mov *.avi *.webm *.m4v *.mpg *.ts *.wmv);;All files (*)"
 _CAMERAS = {

@@ -17,7 +17,7 @@ from sd2app.fit.request import FitRequest, Person, read_request
 from sd2core.body.camera import DEFAULT_FIELD_OF_VIEW_DEG
 from sd2core.body.shape import DEFAULT_STATURE_M as DEFAULT_STATURE_M
 from sd2core.io.video import VideoReader, open_video
-from sd2core.numerics.bounds import FIELD_OF_VIEW_DEG, STATURE_M
+from sd2core.options.bounds import FIELD_OF_VIEW_DEG, STATURE_M
 from sd2core.recording.recording import FILE_NAME, SUFFIX, Recording
 
 CameraWay = Literal["file", "angle", "focal"]

@@ -21,10 +21,10 @@ from sd2app.session.content import (
 )
 from sd2app.session.tasks import Job, ListedRunner, TaskList
 from sd2core.body.camera import PinholeCamera
-from sd2core.doppler.options import Count
 from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.options.synthesis import HowCounted
 from sd2core.radar_config import CLUTTER, Clutter
 from sd2core.recording.edited import EDITED
 from sd2core.recording.recording import Recording
@@ -52,7 +52,7 @@ class DocumentModel(QObject):
         self.undo_stack = QUndoStack(self)
         self.content: Content | None = None  # all parts; None while nothing is open
         self.clutter: Clutter = CLUTTER  # method that removes static echoes from the capture
-        self.count: Count = "expected"  # how vertices of a mesh that states its uncertainty count
+        self.count: HowCounted = "expected"  # of vertices whose mesh states its uncertainty
         self.goes_on = False  # the recording is the one that was open before, with other files
         self.growing = False  # a radar is listened to, and adds frames
         self._base: Recording | None = None
@@ -275,8 +275,8 @@ class DocumentModel(QObject):
         self.changed.emit()
         self._process_capture()
 
-    def set_count(self, count: Count) -> None:
-        """Count the vertices of synthetic maps another way."""
+    def set_count(self, count: HowCounted) -> None:
+        """HowCounted the vertices of synthetic maps another way."""
         if count != self.count:
             self.count = count
             self.changed.emit()

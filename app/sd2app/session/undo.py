@@ -12,7 +12,7 @@ from PySide6.QtGui import QUndoCommand
 from sd2app.session.denoiser_choice import DenoiserChoice
 from sd2app.session.document import DocumentModel
 from sd2app.session.sensor import SensorModel
-from sd2core.doppler.options import Count
+from sd2core.options.synthesis import HowCounted
 from sd2core.placements.placements import Placements
 from sd2core.radar_config import Clutter
 from sd2core.recording.recording import Recording
@@ -168,8 +168,8 @@ class Edits:
 
     # --- synthesis ------------------------------------------------------------------------
 
-    def choose_count(self, count: Count) -> None:
-        """Count the vertices of synthetic maps another way."""
+    def choose_count(self, count: HowCounted) -> None:
+        """HowCounted the vertices of synthetic maps another way."""
         before = self._document.count
         self._document.set_count(count)
         self._push("Choose counting", self._document.set_count, before, count)

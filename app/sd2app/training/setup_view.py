@@ -15,7 +15,7 @@ from sd2app.widgets.panel import ElidedLabel, Fold, outlined, sentence, title
 from sd2app.widgets.progress_bar import ProgressBar
 from sd2app.widgets.text import counted
 from sd2app.widgets.training_form import Field, TrainingForm, labelled
-from sd2core.numerics import bounds
+from sd2core.options import bounds
 
 _FIELDS = (
     Field("epochs", "Epochs", bounds.EPOCHS, 50, "Passes over all segments; the paper's is 500"),

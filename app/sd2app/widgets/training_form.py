@@ -15,7 +15,7 @@ from sd2app.widgets.inputs import Choice, NumberBox
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import ElidedLabel, outlined, sentence, show_words, side_by_side, title
 from sd2app.widgets.text import about
-from sd2core.numerics.bounds import Bounds
+from sd2core.options.bounds import Bounds
 
 
 class Field(NamedTuple):

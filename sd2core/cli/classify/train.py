@@ -15,7 +15,7 @@ from sd2core.cli.classify.data import DATA_HELP, add_data, asked_maps, clips_of,
 from sd2core.cli.command_parser import Options, add_command
 from sd2core.cli.options import given, positive_int, within
 from sd2core.cli.output import finite, print_event, print_facts, print_json
-from sd2core.numerics.bounds import LEARNING_RATE, STEPS
+from sd2core.options.bounds import LEARNING_RATE, STEPS
 from sd2core.processes import INTERRUPTED
 
 if TYPE_CHECKING:

@@ -29,11 +29,12 @@ from sd2app.batch.text import (
 from sd2app.settings import Settings
 from sd2core.batch.estimate import BatchEstimate, StepEstimate
 from sd2core.batch.folder import BatchFolder
-from sd2core.batch.plan import BatchPlan, Recordings, Synthesise
+from sd2core.batch.plan import BatchPlan, Recordings
 from sd2core.batch.plan_file import read_plan, write_plan
 from sd2core.errors import Sd2Error
 from sd2core.io.mesh import save_mesh
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.options.synthesis import Synthesis
 from sd2core.placements.placements import PlacementGrid
 from sd2core.processes import ProcessId
 from sd2core.timebase import Timebase
@@ -389,7 +390,7 @@ def test_a_batch_that_was_too_quick_to_be_seen_at_work_is_told_from_one_that_was
     write_plan(
         plan_of(out),
         BatchPlan(
-            out=str(out), recordings=Recordings(files=(str(meshes[0]),)), synthesise=Synthesise()
+            out=str(out), recordings=Recordings(files=(str(meshes[0]),)), synthesise=Synthesis()
         ),
     )
     command = [sys.executable, str(FAKE), "batch", str(plan_of(out)), "--workers", "1"]

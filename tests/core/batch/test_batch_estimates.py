@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -87,7 +88,7 @@ def test_options_are_part_of_the_kind_and_names_are_not(tmp_path: Path) -> None:
     assert plan.export is not None
     titled = plan.model_copy(update={"export": plan.export.model_copy(update={"title": "mine"})})
     assert pace_kind(titled, "export") == pace_kind(plan, "export")
-    loose = plan.synthesise.model_copy(update={"tolerance": 0.02})
+    loose = replace(plan.synthesise, tolerance=0.02)
     other = plan.model_copy(update={"synthesise": loose})
     assert pace_kind(other, "synthesise") != pace_kind(plan, "synthesise")
 

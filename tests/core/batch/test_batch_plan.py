@@ -8,10 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sd2core.batch.plan import BatchPlan, Denoise, Export, Fit, Recordings, Synthesise
+from sd2core.batch.plan import BatchPlan, Denoise, Export, Fit, Recordings
 from sd2core.batch.plan_file import line_of, plan_from_text, plan_text, read_plan, write_plan
-from sd2core.doppler.options import PRESETS
+from sd2core.doppler.options import PRESETS, chosen_options
 from sd2core.errors import Sd2Error
+from sd2core.options.synthesis import Synthesis
 from sd2core.sensor import VirtualSensor
 
 FOLDER = Path("/data/study").absolute()
@@ -46,7 +47,7 @@ plans = st.builds(
         stature_of=st.dictionaries(subjects, st.floats(1, 2), max_size=2),
     ),
     synthesise=st.builds(
-        Synthesise,
+        Synthesis,
         tolerance=st.none() | st.floats(0.001, 0.5),
         bins=st.none() | st.integers(16, 64),
         null_bins=st.none() | st.just((1, 2)),
@@ -82,7 +83,7 @@ def test_paths_are_relative_to_the_plan_s_folder(tmp_path: Path) -> None:
         (LEAST + "mask_strid = 2\n", 5, ("synthesise.mask_strid", "not known")),
         (LEAST + 'bins = "32"\n', 5, ("synthesise.bins", "integer")),
         (LEAST + "null_bins = [40]\n", 4, ("synthesise", "null_bins", "40")),
-        (LEAST + "tolerance = 2\n", 5, ("synthesise.tolerance", "less than or equal to 1")),
+        (LEAST + "tolerance = 2\n", 5, ("synthesise.tolerance", "above 0 and up to 1")),
         (LEAST + "tolerance = 0.02\nvisibility = 'none'\n", 4, ("tolerance", "visibility")),
         (LEAST + "[fit]\nstature_m = 178.0\n", 6, ("fit.stature_m is 178.0", "2.6")),
         (LEAST + "[fit]\n[fit.stature_of]\nanna = 0.4\n", 7, ("fit.stature_of.anna", "0.5")),
@@ -131,8 +132,8 @@ def test_the_line_of_a_key_or_of_the_table_around_it() -> None:
 
 
 def test_options_are_those_of_the_preset_but_for_what_is_given() -> None:
-    assert Synthesise().options() == PRESETS["paper"]
-    options = Synthesise(preset="vid2doppler", bins=64).options()
+    assert chosen_options(Synthesis()) == PRESETS["paper"]
+    options = chosen_options(Synthesis(preset="vid2doppler", bins=64))
     assert options.velocity == "vid2doppler"
     assert options.axis.bins == 64
     # The same velocities are nulled on twice as many bins.
@@ -165,8 +166,8 @@ def test_nothing_to_do_is_refused() -> None:
 
 
 def test_the_count_of_a_plan_arrives() -> None:
-    assert Synthesise(count="plain", tolerance=0.05).options().count == "plain"
-    assert Synthesise().options().count == "expected"
-    assert Synthesise(preset="vid2doppler").options().count == "plain"
+    assert chosen_options(Synthesis(count="plain", tolerance=0.05)).count == "plain"
+    assert chosen_options(Synthesis()).count == "expected"
+    assert chosen_options(Synthesis(preset="vid2doppler")).count == "plain"
     with pytest.raises(ValueError, match="vid2doppler"):
-        Synthesise(preset="vid2doppler", count="expected")
+        Synthesis(preset="vid2doppler", count="expected")

@@ -14,13 +14,14 @@ from moving_spheres import swinging_sphere
 
 from sd2core.batch.denoising import denoise
 from sd2core.batch.inputs import mesh_input_of
-from sd2core.batch.plan import Synthesise
 from sd2core.batch.synthesis import LONGEST_FRAMES, stretches_of, synthesise
 from sd2core.denoise.files import find_model, load_model
 from sd2core.doppler import Synthesizer
+from sd2core.doppler.options import chosen_options
 from sd2core.io.mesh import load_mesh, save_mesh
 from sd2core.maps import DopplerMap, joined
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.options.synthesis import Synthesis
 from sd2core.sensor import VelocityAxis, VirtualSensor
 from sd2core.timebase import Timebase
 
@@ -54,17 +55,17 @@ def _mesh(frames: int = 300) -> MeshSequence:
 @pytest.mark.parametrize(
     "told",
     [
-        Synthesise(),
-        Synthesise(trajectory_smoothing_s=0.1, time_sigma_s=0.2),
-        Synthesise(oversampling=2, visibility="facing"),
-        Synthesise(mask_stride=7),
-        Synthesise(visibility="depth", depth_resolution=128, mask_stride=4),
-        Synthesise(vertices_kept=0.5, range_law="frame"),
-        Synthesise(preset="vid2doppler"),
+        Synthesis(),
+        Synthesis(trajectory_smoothing_s=0.1, time_sigma_s=0.2),
+        Synthesis(oversampling=2, visibility="facing"),
+        Synthesis(mask_stride=7),
+        Synthesis(visibility="depth", depth_resolution=128, mask_stride=4),
+        Synthesis(vertices_kept=0.5, range_law="frame"),
+        Synthesis(preset="vid2doppler"),
     ],
     ids=["paper", "smooth", "oversampled", "shared masks", "depth", "decimated", "vid2doppler"],
 )
-def test_maps_of_stretches_are_columns_of_the_whole_map(told: Synthesise, tmp_path: Path) -> None:
+def test_maps_of_stretches_are_columns_of_the_whole_map(told: Synthesis, tmp_path: Path) -> None:
     path = tmp_path / "mesh.zarr"
     save_mesh(_mesh(), path)
     mesh = mesh_input_of(path, "name")
@@ -87,11 +88,11 @@ def test_maps_of_stretches_are_columns_of_the_whole_map(told: Synthesise, tmp_pa
 
 def test_a_map_names_sensor_and_options(tmp_path: Path) -> None:
     save_mesh(swinging_sphere(20), tmp_path / "mesh.npz")
-    sensor, told = VirtualSensor(position_m=(0.4, 0.0, 0.0)), Synthesise(bins=64)
+    sensor, told = VirtualSensor(position_m=(0.4, 0.0, 0.0)), Synthesis(bins=64)
     mesh = mesh_input_of(tmp_path / "mesh.npz", "name")
     synthesise(mesh, sensor, told, (0, 20), None, tmp_path / "map.npz")
     made = DopplerMap.load(tmp_path / "map.npz")
-    expected = Synthesizer(load_mesh(tmp_path / "mesh.npz"), told.options()).map(sensor)
+    expected = Synthesizer(load_mesh(tmp_path / "mesh.npz"), chosen_options(told)).map(sensor)
     np.testing.assert_array_equal(made.values, expected.values)
     assert made.meta["sensor"]["position_m"] == [0.4, 0.0, 0.0]
     assert made.meta["options"]["axis"] == asdict(VelocityAxis(64))

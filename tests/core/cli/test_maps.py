@@ -12,9 +12,10 @@ import pytest
 from cli_outcome import Sd2
 
 from sd2core.cli import build_parser
-from sd2core.cli.synth import synthesis_options
+from sd2core.cli.command_parser import record_of
+from sd2core.cli.synth import Synth
 from sd2core.doppler import PRESETS
-from sd2core.doppler.options import same_velocities
+from sd2core.doppler.options import chosen_options, same_velocities
 from sd2core.files.resources import resource_path
 from sd2core.maps import DopplerMap
 from sd2core.sensor import VelocityAxis
@@ -22,7 +23,9 @@ from sd2core.sensor import VelocityAxis
 
 def options_of(*arguments: str) -> object:
     parser, _ = build_parser()
-    return synthesis_options(parser.parse_args(["synth", "a", "--out", "b.npz", *arguments]))
+    return chosen_options(
+        record_of(Synth, parser.parse_args(["synth", "a", "--out", "b.npz", *arguments]))
+    )
 
 
 def test_without_options_it_is_the_preset() -> None:

@@ -20,6 +20,7 @@ from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
 from sd2core.mesh.vertex_parts import VertexParts
+from sd2core.options.synthesis import Synthesis
 from sd2core.progress import Cancelled
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
@@ -242,6 +243,6 @@ def test_vid2doppler_counts_in_one_bin() -> None:
     np.testing.assert_array_equal(found.values, plain.values)
     assert found.meta["count"] == found.meta["options"]["count"] == "plain"
     with pytest.raises(Sd2Error, match="vid2doppler"):
-        chosen_options("vid2doppler", None, None, {"count": "expected"})
+        chosen_options(Synthesis(preset="vid2doppler", count="expected"))
     with pytest.raises(Sd2Error, match="count is 'mean'"):
         replace(PRESETS["paper"], count="mean")

@@ -18,6 +18,7 @@ from sd2core.doppler.options import chosen_options
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.vertex_parts import JOINTS, QUANTITIES
+from sd2core.options.synthesis import Synthesis
 from sd2core.pairs.store import PairSet, PairWriter, Take, read_pairs
 from sd2core.progress import Cancelled
 from sd2core.radar_config import PAPER_RADAR
@@ -129,9 +130,7 @@ def test_limbs_err_along_the_line_of_sight_and_across() -> None:
 
 
 def test_frames_and_bins_of_ones_own(tmp_path: Path) -> None:
-    asked = replace(
-        SHORT, radar=radar_at(60.0, 64), synthesis=chosen_options("paper", 64, None, {})
-    )
+    asked = replace(SHORT, radar=radar_at(60.0, 64), synthesis=chosen_options(Synthesis(bins=64)))
     assert asked.radar.chirps_per_frame == 42  # as many as fit
     assert radar_at(30.0, 32) == PAPER_RADAR
     assert radar_at(10.0, 128).chirps_per_frame == 256

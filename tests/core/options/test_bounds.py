@@ -8,7 +8,7 @@ import pytest
 
 from sd2core.body.fit_video import FitChoices
 from sd2core.errors import Sd2Error
-from sd2core.numerics.bounds import EPOCHS, LEARNING_RATE, Bounds
+from sd2core.options.bounds import EPOCHS, LEARNING_RATE, Bounds
 
 
 def test_both_ends_are_within_and_nan_is_not() -> None:

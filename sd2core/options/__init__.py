@@ -1,0 +1,1 @@
+"""Options of operations, each declared once, for command line, plans, forms and checks."""

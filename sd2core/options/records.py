@@ -1,0 +1,308 @@
+"""Records of options: what each field says of itself, for all that offer it.
+
+A record is a frozen dataclass. Type, bounds and default of an option stand at its field; its words
+are in the docstring's ``Parameters``, with what a value is called after the name, and without the
+default where that is a number or a choice. A command of ``sd2`` is such a record, and takes options
+from others by inheriting from them; a section of a plan is one, too.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import types
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import MISSING, dataclass, fields, is_dataclass
+from functools import cache
+from inspect import cleandoc, get_annotations
+from pathlib import Path
+from typing import (
+    Annotated,
+    Any,
+    Literal,
+    TypeVar,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
+
+from sd2core.errors import Sd2Error
+from sd2core.options.bounds import Bounds
+from sd2core.options.kinds import Typed, number_reader
+
+Note = TypeVar("Note")
+
+
+class OptionError(Sd2Error, ValueError):
+    """Options that cannot be; a plan that is read says where in it they stand."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """How a field is typed where it is not an option of its own name with one value.
+
+    Parameters
+    ----------
+    flags : tuple of str
+        Names of the option, the first being the usual one.
+    argument : bool
+        True if it has a place and no name.
+    one_of : str
+        Of the options with the same word here only one may be given.
+    many : {"", "together", "again"}
+        Of a field that is a tuple: its values stand after one another, or each after the option.
+    bare : object
+        Value of the option where it is typed without one; None: it needs one.
+    endings : tuple of str
+        Of a file that is written: how its name may end.
+    """
+
+    flags: tuple[str, ...] = ()
+    argument: bool = False
+    one_of: str = ""
+    many: Literal["", "together", "again"] = ""
+    bare: Any = None
+    endings: tuple[str, ...] = ()
+
+
+ARGUMENT = Place(argument=True)
+ARGUMENTS = Place(argument=True, many="together")
+NOT_TYPED = Place(flags=("",))
+"""Of a field for files and programs only."""
+
+
+@dataclass(frozen=True)
+class Section:
+    """Marks a mapping of those options of another record that are given."""
+
+    kind: type
+
+
+@dataclass(frozen=True)
+class Group:
+    """Heading that the options of a record stand under, and a sentence below it."""
+
+    title: str
+    text: str | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class OptionRecord:
+    """Base of records of options: their fields are checked when one is made."""
+
+    # A class may have a GROUP for the fields that it declares itself. Without a type these
+    # are no fields, nor what is taken for one.
+    __pydantic_config__ = {"extra": "forbid", "strict": True}  # noqa: RUF012
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+@dataclass(frozen=True)
+class Option:
+    """A field of a record, as what offers it wants to know it."""
+
+    name: str
+    kind: Any  # int, float, bool, str, Path, tuple; of one value where there are several
+    default: Any  # MISSING where it must be given
+    words: str  # of the help, with the default
+    called: str | None  # a value, as in "--bins N"
+    bounds: Bounds | None
+    typed: Typed | None
+    choices: tuple[Any, ...]
+    place: Place
+    group: Group | None
+    section: str = ""  # field of the command's record with what is given of this one's
+
+    @property
+    def flags(self) -> tuple[str, ...]:
+        """Names as they are typed; of an argument its own."""
+        if self.place.argument:
+            return (self.name,)
+        return self.place.flags or (flag(self.name),)
+
+    @property
+    def read(self) -> Callable[[str], Any] | None:
+        """Function that reads a typed value, or None for a text."""
+        if self.typed is not None:
+            return self.typed.read
+        if self.kind in (int, float) and not self.choices:
+            return number_reader(self.bounds or Bounds(whole=self.kind is int))
+        return self.kind if self.kind in (int, str, Path) else None
+
+    @property
+    def dest(self) -> str:
+        """Name that no option of another section of the command has."""
+        return f"{self.section}.{self.name}" if self.section else self.name
+
+    def of(self, record: OptionRecord) -> Any:
+        """Value in a record, None where it is not given in its section."""
+        if self.section:
+            return getattr(record, self.section).get(self.name)
+        return getattr(record, self.name)
+
+    def values(self, value: Any) -> tuple[Any, ...]:
+        """The values of an option that takes several, or its only one."""
+        return tuple(value) if self.place.many else (value,)
+
+    def written(self, value: Any) -> list[str]:
+        """The words that say this value; of a value as it is by default there are none."""
+        if value is None or value is False or (value == self.default and not self.place.argument):
+            return []
+        if value is True and self.kind is bool:
+            return [self.flags[0]]
+        texts = [self.typed.write(one) if self.typed else str(one) for one in self.values(value)]
+        if self.place.argument:
+            return texts
+        if self.place.many == "again":
+            return [word for text in texts for word in (self.flags[0], text)]
+        return [self.flags[0], *texts]
+
+
+def flag(name: str) -> str:
+    """Option of a name as it is typed: ``--v-max`` of ``v_max``."""
+    return f"--{name.replace('_', '-')}"
+
+
+def options_of(kind: type[OptionRecord]) -> tuple[Option, ...]:
+    """Options of a record: its own, then those of its bases."""
+    read_once: Any = _options_of  # of a class, which has a hash whatever its records have
+    return read_once(kind)
+
+
+@cache
+def _options_of(kind: Any) -> tuple[Option, ...]:
+    return tuple(_options(kind))
+
+
+def given(record: Any, names: Iterable[str]) -> dict[str, Any]:
+    """Those of the named options that the command has and the user gave."""
+    values = {name: getattr(record, name, None) for name in names}
+    return {name: value for name, value in values.items() if value is not None}
+
+
+def given_flags(record: OptionRecord, names: Iterable[str]) -> list[str]:
+    """Those of the named options that the user gave, as they are typed."""
+    flags = {one.name: one.flags[0] for one in options_of(type(record))}
+    return [flags[name] for name in given(record, names)]
+
+
+def changed(record: OptionRecord) -> list[str]:
+    """Names of the options that are not as by default."""
+    options = [one for one in options_of(type(record)) if not one.section]
+    return [one.name for one in options if one.of(record) != one.default]
+
+
+def check(record: OptionRecord) -> None:
+    """Refuse a value that its field does not allow."""
+    for option in options_of(type(record)):
+        value = option.of(record)
+        if value is not None and value != option.default:
+            for one in option.values(value):
+                _check_value(option, one)
+
+
+def _check_value(option: Option, value: Any) -> None:
+    if option.choices:
+        fits = value in option.choices
+        words = f"one of {', '.join(map(str, option.choices))}"
+    elif option.kind in (int, float):
+        bounds = option.bounds or Bounds(whole=option.kind is int)
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        fits, words = number and math.isfinite(value) and value in bounds, bounds.words
+    else:
+        return
+    if not fits:
+        raise OptionError(f"{option.name} is {value!r}", words)
+
+
+def words_of(record: OptionRecord) -> list[str]:
+    """Arguments of ``sd2`` that say the same; what is as by default is left out."""
+    arguments: list[str] = []
+    words: list[str] = []
+    for option in options_of(type(record)):
+        (arguments if option.place.argument else words).extend(option.written(option.of(record)))
+    return [*arguments, *words]
+
+
+def _options(kind: type, section: str = "") -> Iterator[Option]:
+    hints = get_type_hints(kind, include_extras=True)
+    ready = {one.name: one for one in fields(kind)}
+    for name, owner in _declared(kind).items():
+        plain, notes = _unwrapped(hints[name])
+        if inner := _note(notes, Section):
+            yield from _options(inner.kind, name)
+            continue
+        place = _note(notes, Place) or Place()
+        if place is NOT_TYPED:
+            continue
+        if place.many:
+            plain, of_each = _unwrapped(get_args(plain)[0])
+            notes += of_each
+        choices = get_args(plain) if get_origin(plain) is Literal else ()
+        factory = ready[name].default_factory
+        default = ready[name].default if factory is MISSING else factory()
+        called, words = _documented(owner)[name]
+        if _is_said(default, choices) and "(default" not in words:
+            words += f" (default: {default})" if choices else f" (default: {default:g})"
+        yield Option(
+            name,
+            type(choices[0]) if choices else get_origin(plain) or plain,
+            default,
+            words,
+            called,
+            _note(notes, Bounds),
+            _note(notes, Typed),
+            choices,
+            place,
+            vars(owner).get("GROUP"),
+            section,
+        )
+
+
+def _note(notes: list[Any], kind: type[Note]) -> Note | None:
+    return next((note for note in notes if isinstance(note, kind)), None)
+
+
+def _is_said(default: Any, choices: tuple[Any, ...]) -> bool:
+    """True if the words of an option end with its default."""
+    number = isinstance(default, int | float) and not isinstance(default, bool)
+    return number or (bool(choices) and default in choices)
+
+
+def _declared(kind: type) -> dict[str, type]:
+    """The fields, own ones first, and the class that says most about each."""
+    own = get_annotations(kind)
+    found = dict.fromkeys((one.name for one in fields(kind) if one.name in own), kind)
+    for base in kind.__bases__:
+        if is_dataclass(base):
+            for name, owner in _declared(base).items():
+                found.setdefault(name, owner)
+    return found
+
+
+@cache
+def _documented(kind: Any) -> Mapping[str, tuple[str | None, str]]:
+    """What a value is called, and the words, of the fields that a docstring speaks of."""
+    _, _, text = cleandoc(kind.__doc__ or "").partition("Parameters\n----------\n")
+    found: dict[str, tuple[str | None, str]] = {}
+    for block in re.split(r"\n(?=\S)", text.partition("\n\n")[0]):
+        head, _, body = block.partition("\n")
+        names, _, called = map(str.strip, head.partition(" : "))
+        for name in names.split(", "):
+            found[name] = called or None, " ".join(body.split())
+    return found
+
+
+def _unwrapped(hint: Any) -> tuple[Any, list[Any]]:
+    """Type and notes of ``Annotated[…] | None`` in any nesting; the outer notes first."""
+    notes: list[Any] = []
+    while True:
+        if get_origin(hint) is Annotated:
+            hint, *more = get_args(hint)
+            notes += reversed(more)
+        elif get_origin(hint) in (Union, types.UnionType) and type(None) in get_args(hint):
+            hint = next(one for one in get_args(hint) if one is not type(None))
+        else:
+            return hint, notes

@@ -1,0 +1,244 @@
+"""Options that several commands take."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+from sd2core.files.figure_files import SUFFIXES as FIGURES
+from sd2core.options.kinds import Count, ImageSize, Names, Positive, Vector
+from sd2core.options.records import ARGUMENT, Group, OptionRecord, Place
+
+
+@dataclass(frozen=True, kw_only=True)
+class Json(OptionRecord):
+    """How a result is printed.
+
+    Parameters
+    ----------
+    json
+        print JSON, for other programs; an error as well
+    """
+
+    json: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class JsonAndProgress(Json):
+    """How a result, and the way to it, are printed.
+
+    Parameters
+    ----------
+    json
+        print JSON, for other programs; an error as well
+    progress_json
+        print progress as JSON lines, for other programs (docs/formats.md)
+    """
+
+    json: Annotated[bool, Place(one_of="json")] = False
+    progress_json: Annotated[bool, Place(one_of="json")] = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Overwrite(OptionRecord):
+    """What becomes of outputs that exist: without the option they are refused.
+
+    Parameters
+    ----------
+    overwrite
+        replace outputs that exist
+    """
+
+    # It was called --replace where labels are written.
+    overwrite: Annotated[bool, Place(("--overwrite", "--replace"))] = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sensor(OptionRecord):
+    """Where the radar is.
+
+    Parameters
+    ----------
+    sensor : X,Y,Z
+        where the radar is, in metres (default: the recording's sensor, or the camera)
+    """
+
+    sensor: Vector | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeshReading(OptionRecord):
+    """What a mesh file may not say about itself.
+
+    Parameters
+    ----------
+    faces : FILE
+        triangles (.npy or .obj) for a mesh that has none of its own
+    fps : FPS
+        frames per second of a mesh that does not say
+    scale : M
+        metres per unit of the mesh, e.g. 0.001 for millimetres (default: 1)
+    person : ID
+        which person of a file of several (default: seen longest)
+    distance_m : M
+        move a mesh that is centred on the body's root this far forward
+    image_size : WxH
+        size of the video in pixels, to place the output of VIBE (default: that of the
+        recording's video)
+    focal_px : PX
+        focal length of the video in pixels, likewise (default: the diagonal)
+    """
+
+    GROUP = Group("mesh file", "what it may not say about itself")
+
+    faces: Path | None = None
+    fps: Positive | None = None
+    scale: Positive | None = None
+    person: str | None = None
+    distance_m: float | None = None
+    image_size: ImageSize | None = None
+    focal_px: Positive | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeshAndSensor(Sensor, MeshReading):
+    """What is looked at, and from where.
+
+    Parameters
+    ----------
+    mesh : MESH
+        a mesh, or a recording
+    """
+
+    mesh: Annotated[Path, ARGUMENT]
+
+
+@dataclass(frozen=True, kw_only=True)
+class MapOutput(Overwrite):
+    """Doppler map to write, which replaces nothing but another one.
+
+    Parameters
+    ----------
+    out : FILE.npz
+        the map to write
+    """
+
+    out: Annotated[Path, Place(endings=(".npz",))]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Figure(Overwrite):
+    """Picture of a result.
+
+    Parameters
+    ----------
+    figure : FILE
+        draw the result, as .png, .svg or .pdf
+    """
+
+    figure: Annotated[Path | None, Place(endings=FIGURES)] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Axis(OptionRecord):
+    """The velocity axis.
+
+    Parameters
+    ----------
+    bins : N
+        velocity bins (default: 32)
+    v_max_mps : MPS
+        end of the velocity axis in m/s (default: 2)
+    """
+
+    bins: Count | None = None
+    v_max_mps: Annotated[Positive | None, Place(("--v-max",))] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Channel(OptionRecord):
+    """Channel of a radar.
+
+    Parameters
+    ----------
+    receiver : N
+        take this receiver, counted from 1 (default: the mean power of all)
+    transmitter : N
+        take this transmitter, likewise
+    """
+
+    receiver: Count | None = None
+    transmitter: Count | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Method(OptionRecord):
+    """How Doppler is computed.
+
+    Parameters
+    ----------
+    method
+        count vertices, or simulate the radar's signal
+    """
+
+    method: Literal["histogram", "fmcw"] = "histogram"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limbs(OptionRecord):
+    """Maps of the parts of the body.
+
+    Parameters
+    ----------
+    limbs
+        also keep the synthetic map of each part of the body (trunk, upper arms, forearms,
+        thighs, lower legs)
+    """
+
+    limbs: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Texture(OptionRecord):
+    """How denoised maps are shown.
+
+    Parameters
+    ----------
+    texture : SEED
+        draw denoised maps as a radar would show them, with its speckle and gaps, instead of
+        the mean (SEED of the random numbers: 0)
+    """
+
+    texture: Annotated[int | None, Place(bare=0)] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class RadarChoice(OptionRecord):
+    """Radar to simulate.
+
+    Parameters
+    ----------
+    radar : NAME|CONFIG.json
+        a radar by its name ({radars}; docs/radar-files.md), or that of a capture's config.json
+        (default: paper)
+    """
+
+    radar: str = "paper"
+
+
+@dataclass(frozen=True, kw_only=True)
+class KeptOut(OptionRecord):
+    """People that are not learnt from.
+
+    Parameters
+    ----------
+    validation_subjects : LIST
+        kept out for validation, separated by commas, or none (default: as the data set says,
+        or a sixth of all)
+    test_subjects : LIST
+        kept out for a test, or none (default: as the data set says, or a sixth of all)
+    """
+
+    validation_subjects: Names | None = None
+    test_subjects: Names | None = None
