@@ -21,7 +21,7 @@ from sd2core.cli.options import (
 )
 from sd2core.errors import Sd2Error
 from sd2core.files.figure_files import SUFFIXES as FIGURES
-from sd2core.options.records import Group, Option, OptionRecord, options_of
+from sd2core.options.records import Group, Option, OptionRecord, typed_options
 from sd2core.options.shared import MapOutput
 
 Record = TypeVar("Record", bound=OptionRecord)
@@ -251,7 +251,7 @@ def add_options(parser: argparse._ActionsContainer, kind: type[OptionRecord]) ->
     """Add the options of a record to a parser, under their headings."""
     groups: dict[Group | None, argparse._ActionsContainer] = {None: parser}
     exclusive: dict[str, argparse._ActionsContainer] = {}
-    for option in options_of(kind):
+    for option in typed_options(kind):
         group = option.group
         if group is not None and group not in groups:
             groups[group] = parser.add_argument_group(group.title, group.text)
@@ -299,7 +299,7 @@ def _keywords(option: Option) -> dict[str, Any]:
 def record_of(kind: type[Record], typed: argparse.Namespace) -> Record:
     """Make the record of a command from what was typed."""
     values: dict[str, Any] = {}
-    for option in options_of(kind):
+    for option in typed_options(kind):
         value = getattr(typed, option.dest)
         if option.section:
             section = values.setdefault(option.section, {})
