@@ -296,8 +296,11 @@ def _keywords(option: Option) -> dict[str, Any]:
     return about
 
 
-def record_of(kind: type[Record], typed: argparse.Namespace) -> Record:
-    """Make the record of a command from what was typed."""
+def record_of(typed: argparse.Namespace) -> Any:
+    """Make the record of the command that was typed."""
+    if "record" not in typed:
+        return typed
+    kind: type[OptionRecord] = typed.record
     values: dict[str, Any] = {}
     for option in typed_options(kind):
         value = getattr(typed, option.dest)
@@ -343,9 +346,7 @@ def add_command(
     )
     if options is not None:
         add_options(parser, options)
-        parser.set_defaults(writes_map=issubclass(options, MapOutput))
-    if handler is not None and options is not None:
-        parser.set_defaults(handler=lambda typed: handler(record_of(options, typed)))
-    elif handler is not None:
+        parser.set_defaults(record=options, writes_map=issubclass(options, MapOutput))
+    if handler is not None:
         parser.set_defaults(handler=handler)
     return parser
