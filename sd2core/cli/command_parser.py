@@ -5,10 +5,10 @@ from __future__ import annotations
 import argparse
 import inspect
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import MISSING
 from pathlib import Path
-from typing import Any, NoReturn, TypeVar
+from typing import Any, NamedTuple, NoReturn, TypeVar
 
 from sd2core.cli.options import (
     add_json,
@@ -294,6 +294,27 @@ def _keywords(option: Option) -> dict[str, Any]:
     elif required:
         about["required"] = True
     return about
+
+
+class Command(NamedTuple):
+    """A command, or one of a group of commands."""
+
+    name: str  # as it is typed, without "sd2"
+    summary: str
+    record: type[OptionRecord]
+
+
+def commands_of(parser: argparse.ArgumentParser) -> Iterator[Command]:
+    """Yield the commands of a parser that have a record, in the order of the help."""
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for row in action._choices_actions:
+                command = action.choices[row.dest]
+                record = command.get_default("record")
+                if record is not None:
+                    name = command.prog.partition(" ")[2]
+                    yield Command(name, str(row.help), record)
+                yield from commands_of(command)
 
 
 def record_of(typed: argparse.Namespace) -> Any:

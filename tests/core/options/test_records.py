@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Iterator
 from dataclasses import MISSING, dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -15,7 +13,13 @@ from hypothesis import strategies as st
 from pydantic import BaseModel
 
 from sd2app.command_line import full_parser
-from sd2core.cli.command_parser import CommandParser, UsageError, add_options, record_of
+from sd2core.cli.command_parser import (
+    CommandParser,
+    UsageError,
+    add_options,
+    commands_of,
+    record_of,
+)
 from sd2core.cli.running import attach_negative_values
 from sd2core.errors import Sd2Error
 from sd2core.options.bounds import Bounds
@@ -47,21 +51,7 @@ TYPED: dict[str, st.SearchStrategy[Any]] = {
 """Values of what is typed in a way of its own, by the reader."""
 
 
-def commands() -> Iterator[tuple[str, type[OptionRecord]]]:
-    """Every command with its record."""
-
-    def below(parser: argparse.ArgumentParser) -> Iterator[tuple[str, type[OptionRecord]]]:
-        if (kind := parser.get_default("record")) is not None:
-            yield parser.prog, kind
-        for action in parser._actions:
-            if isinstance(action, argparse._SubParsersAction):
-                for one in dict.fromkeys(action.choices.values()):
-                    yield from below(one)
-
-    return below(full_parser())
-
-
-RECORDS = dict(commands())
+RECORDS = {one.name: one.record for one in commands_of(full_parser())}
 
 
 def values_of(option: Option) -> st.SearchStrategy[Any] | None:
@@ -82,6 +72,8 @@ def values_of(option: Option) -> st.SearchStrategy[Any] | None:
             one = st.floats(low, high, exclude_min=bounds.above)
     else:
         one = PLAIN[option.kind]
+    if option.section and option.kind is bool:
+        return st.just(True)  # a switch cannot be typed to be off
     least = 1 if option.default is MISSING else 0
     return st.lists(one, min_size=least, max_size=3).map(tuple) if option.place.many else one
 
