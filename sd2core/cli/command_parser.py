@@ -258,7 +258,8 @@ def add_options(parser: argparse._ActionsContainer, kind: type[OptionRecord]) ->
         holder = groups[group]
         if name := option.place.one_of:
             if name not in exclusive:
-                exclusive[name] = holder.add_mutually_exclusive_group()
+                needed = option.place.needed
+                exclusive[name] = holder.add_mutually_exclusive_group(required=needed)
             holder = exclusive[name]
         holder.add_argument(*_names(option), **_keywords(option))
         if option.place.endings:
