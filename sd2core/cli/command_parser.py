@@ -22,7 +22,7 @@ from sd2core.cli.options import (
 from sd2core.errors import Sd2Error
 from sd2core.files.figure_files import SUFFIXES as FIGURES
 from sd2core.options.records import Group, Option, OptionRecord, options_of
-from sd2core.options.shared import MapOutput
+from sd2core.options.shared import ReplacesMaps
 
 Record = TypeVar("Record", bound=OptionRecord)
 
@@ -344,7 +344,7 @@ def add_command(
     )
     if options is not None:
         add_options(parser, options)
-        parser.set_defaults(writes_map=issubclass(options, MapOutput))
+        parser.set_defaults(writes_map=issubclass(options, ReplacesMaps))
     if handler is not None and options is not None:
         parser.set_defaults(handler=lambda typed: handler(record_of(options, typed)))
     elif handler is not None:

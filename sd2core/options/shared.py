@@ -115,8 +115,13 @@ class MeshAndSensor(Sensor, MeshReading):
 
 
 @dataclass(frozen=True, kw_only=True)
-class MapOutput(Overwrite):
-    """Doppler map to write, which replaces nothing but another one.
+class ReplacesMaps(Overwrite):
+    """What ``out`` may replace: nothing but a Doppler map."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MapOutput(ReplacesMaps):
+    """Doppler map to write.
 
     Parameters
     ----------
