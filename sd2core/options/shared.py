@@ -102,8 +102,8 @@ class MeshReading(OptionRecord):
 
 
 @dataclass(frozen=True, kw_only=True)
-class MeshAndSensor(Sensor, MeshReading):
-    """What is looked at, and from where.
+class MeshInput(MeshReading):
+    """What is looked at.
 
     Parameters
     ----------
@@ -112,6 +112,11 @@ class MeshAndSensor(Sensor, MeshReading):
     """
 
     mesh: Annotated[Path, ARGUMENT]
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeshAndSensor(Sensor, MeshInput):
+    """What is looked at, and from where."""
 
 
 @dataclass(frozen=True, kw_only=True)
