@@ -22,7 +22,7 @@ from sd2core.cli.options import (
 from sd2core.errors import Sd2Error
 from sd2core.files.figure_files import SUFFIXES as FIGURES
 from sd2core.options.records import Group, Option, OptionRecord, typed_options
-from sd2core.options.shared import MapOutput
+from sd2core.options.shared import ReplacesMaps
 
 Record = TypeVar("Record", bound=OptionRecord)
 
@@ -258,7 +258,8 @@ def add_options(parser: argparse._ActionsContainer, kind: type[OptionRecord]) ->
         holder = groups[group]
         if name := option.place.one_of:
             if name not in exclusive:
-                exclusive[name] = holder.add_mutually_exclusive_group()
+                needed = option.place.needed
+                exclusive[name] = holder.add_mutually_exclusive_group(required=needed)
             holder = exclusive[name]
         holder.add_argument(*_names(option), **_keywords(option))
         if option.place.endings:
@@ -367,7 +368,7 @@ def add_command(
     )
     if options is not None:
         add_options(parser, options)
-        parser.set_defaults(record=options, writes_map=issubclass(options, MapOutput))
+        parser.set_defaults(record=options, writes_map=issubclass(options, ReplacesMaps))
     if handler is not None:
         parser.set_defaults(handler=handler)
     return parser

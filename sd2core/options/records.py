@@ -50,6 +50,8 @@ class Place:
         True if it has a place and no name.
     one_of : str
         Of the options with the same word here only one may be given.
+    needed : bool
+        True if one of these must be given.
     many : {"", "together", "again"}
         Of a field that is a tuple: its values stand after one another, or each after the option.
     bare : object
@@ -63,6 +65,7 @@ class Place:
     flags: tuple[str, ...] = ()
     argument: bool = False
     one_of: str = ""
+    needed: bool = False
     many: Literal["", "together", "again"] = ""
     bare: Any = None
     endings: tuple[str, ...] = ()
