@@ -223,12 +223,24 @@ def changed_flags(record: OptionRecord) -> list[str]:
 
 
 def check(record: OptionRecord) -> None:
-    """Refuse a value that its field does not allow."""
+    """Refuse a value that its field does not allow, and two of which one may be given."""
+    rivals: dict[str, list[Option]] = {}
     for option in options_of(type(record)):
         value = option.of(record)
-        if value is not None and value != option.default:
+        is_given = value is not None and value != option.default
+        if is_given:
             for one in option.values(value):
                 _check_value(option, one)
+        if option.place.one_of and (is_given or option.place.needed):
+            known = rivals.setdefault(option.place.one_of, [])
+            known += [option] * is_given
+    for name, found in rivals.items():
+        if len(found) > 1:
+            first, second = (one.flags[0] for one in found[:2])
+            raise OptionError(f"{first} is given with {second}", "one of them")
+        if not found:
+            every = [one.flags[0] for one in options_of(type(record)) if one.place.one_of == name]
+            raise OptionError(f"None of {', '.join(every)} is given", "one of them")
 
 
 def _check_value(option: Option, value: Any) -> None:
