@@ -41,12 +41,37 @@ well, {{"error": {{"found": …, "expected": …, "remedy": …}}}}, and the exi
 """
 
 
-_MODULES = (
-    *("info", "importing", "align", "fit", "synth", "radar", "listen", "imu", "denoise"),
-    *("classify", "labels", "pairs", "export", "ladder", "placements", "compare_meshes"),
-    *("strip", "simulate", "train", "runs", "eval", "study", "batch", "preparing"),
-)
-"""Modules with commands, in the order of the help."""
+COMMANDS = {
+    "info": "what is in a recording, video, mesh, radar or IMU file, map, pairs, data set or model",
+    "import": "make a recording from a video, a mesh and a radar capture",
+    "set": "change what a recording is made of: its files, its clocks, where its radar is",
+    "relink": "find the missing files of a recording in another folder",
+    "align": "find the time offset of video and radar from what both saw",
+    "fit": "make a moving mesh from a video of a person",
+    "synth": "compute the Doppler that a radar would have measured of a moving mesh",
+    "radar": "turn a raw radar capture into a Doppler map, or say what limits it has",
+    "listen": "record a radar while it runs, and follow its Doppler map",
+    "imu": "what an inertial sensor on the body would measure (simulated)",
+    "denoise": "turn a synthetic Doppler map into what a radar would show",
+    "classify": "train, evaluate and apply gesture classifiers",
+    "labels": "show, count, convert, suggest, compare, draw and cut out labelled spans",
+    "pairs": "make pairs of synthetic and radar Doppler to learn from",
+    "export": "write a data set to learn from: segments with labels, sensors and provenance",
+    "ladder": "measure what accuracy costs on a scene, and say what the scene requires",
+    "placements": "plan sensors around a body, and say what a map from each would cost",
+    "compare-meshes": "compare meshes of one video: joints, velocities along the line of sight,"
+    " Doppler maps",
+    "strip": "draw frames side by side: the video above its mesh",
+    "simulate": "make radar samples of any mesh, or pairs of simulated people to train on",
+    "train": "train a denoiser that turns synthetic Doppler into what a radar would show",
+    "runs": "list training runs, and pause, stop or cancel one",
+    "eval": "measure denoisers on people that they have not learnt from",
+    "study": "find out whether synthetic data help a classifier on a real radar",
+    "batch": "fit, synthesise, denoise and export many recordings from many places",
+    "warm-up": "compile the numerical kernels once, after installing",
+    "fetch-models": "fetch the landmark models that `sd2 fit` needs, once",
+}
+"""Commands, and what each does in a line, in the order of the help."""
 
 _MODULE_OF = {
     **dict.fromkeys(("import", "set", "relink"), "importing"),
@@ -60,8 +85,8 @@ def build_parser(
 ) -> tuple[argparse.ArgumentParser, argparse._SubParsersAction]:
     """Parser of the library's commands, and where others are added, with their examples.
 
-    Where the first of the ``typed`` words is a command, the others are left out: they take longer
-    to load than most commands work.
+    Where the first of the ``typed`` words is a command, the others are left out, and where it asks
+    for help, all are but named: they take longer to load than most commands work.
     """
     parser = CommandParser(
         prog="sd2",
@@ -72,7 +97,12 @@ def build_parser(
     parser.add_argument("--version", action="version", version=f"SD² Studio {__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     name = typed[0] if typed else ""
-    named = _MODULE_OF.get(name, name.replace("-", "_"))
-    for module in (named,) if named in _MODULES else _MODULES:
+    if name in ("-h", "--help"):
+        for command, summary in COMMANDS.items():
+            commands.add_parser(command, help=summary, add_help=False)
+        return parser, commands
+    wanted = [name] if name in COMMANDS else COMMANDS
+    modules = (_MODULE_OF.get(one, one.replace("-", "_")) for one in wanted)
+    for module in dict.fromkeys(modules):
         import_module(f"sd2core.cli.{module}").add_commands(commands)
     return parser, commands
