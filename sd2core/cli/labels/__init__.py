@@ -59,8 +59,6 @@ class Statistics(LabelFile, Json):
     ----------
     csv
         print comma-separated values
-    json
-        print JSON, for other programs; an error as well
     """
 
     csv: Annotated[bool, Place(one_of="form")] = False

@@ -54,8 +54,6 @@ class Suggest(SearchedMap, SuggestOptions, Json):
 
     Parameters
     ----------
-    of
-        which map of a recording (default: synthetic where there is a mesh)
     label : LABEL
         label of the spans (default: gesture)
     """
