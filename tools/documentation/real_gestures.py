@@ -25,7 +25,8 @@ from sd2core.classify.spans import SpanOptions, predicted_spans
 from sd2core.classify.splitting import dealt
 from sd2core.classify.training import TrainOptions, train
 from sd2core.cli.classify.data import clips_of
-from sd2core.datasets.labelled import LabelledSource, unfolded
+from sd2core.datasets.labelled import unfolded
+from sd2core.datasets.labelled_source import LabelledSource
 from sd2core.files.tables import markdown_table
 from sd2core.io.radar.kkt import RecordedMap, load_kkt
 from sd2core.labels.matching import match_spans

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from sd2core.cli.classify.data import DATA_HELP, add_data, asked_maps, clips_of
-from sd2core.cli.command_parser import Options, add_command
-from sd2core.cli.eval import add_judging, named_subjects
+from sd2core.cli.classify.data import DATA_HELP, SourcesAndMaps, clips_of
+from sd2core.cli.command_parser import add_command
+from sd2core.cli.eval import Judging, named_subjects
 from sd2core.cli.labels.reading import check_label_output, print_lost
 from sd2core.cli.labels.suggest import (
     SearchedMap,
@@ -19,6 +19,7 @@ from sd2core.cli.labels.suggest import (
     write_found,
 )
 from sd2core.cli.output import counted, print_json, print_rows, progress_bar
+from sd2core.cli.recording_maps import parsed_maps
 from sd2core.errors import Sd2Error
 from sd2core.options.kinds import NotNegative
 from sd2core.options.records import OptionRecord, Place
@@ -47,6 +48,20 @@ class TrainedModel(OptionRecord):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Evaluate(SourcesAndMaps, TrainedModel, Judging):
+    """Options of ``sd2 classify eval``.
+
+    Parameters
+    ----------
+    subjects : LIST
+        people to evaluate on, separated by commas, or `all` (default: those the training kept
+        for the test)
+    figure : FILE
+        draw both matrices, as .png, .svg or .pdf
+    """
+
+
+@dataclass(frozen=True, kw_only=True)
 class Apply(SearchedMap, TrainedModel, Json):
     """Options of ``sd2 classify apply``.
 
@@ -65,20 +80,12 @@ class Apply(SearchedMap, TrainedModel, Json):
     merge_gap_s: NotNegative = 0.1
 
 
-def _add_model(parser: Options) -> None:
-    text = "classifier from `sd2 classify train`"
-    parser.add_value("--model", Path, "FILE", text, required=True)
-
-
 def add_eval(kinds: argparse._SubParsersAction) -> None:
     """Add ``eval``."""
-    parser = add_command(kinds, "eval", handler=_eval, description=DATA_HELP)
-    add_data(parser)
-    _add_model(parser)
-    add_judging(parser, "those the training kept for the test", "both matrices")
+    add_command(kinds, "eval", options=Evaluate, handler=_eval, description=DATA_HELP)
 
 
-def _eval(options: argparse.Namespace) -> None:
+def _eval(options: Evaluate) -> None:
     """Evaluate a classifier on people it was not trained on.
 
     Prints the confusion matrices of frames and of whole gestures, and the latency of a
@@ -93,7 +100,7 @@ def _eval(options: argparse.Namespace) -> None:
     from sd2core.files.figure_files import save_figure
 
     classifier = load_classifier(options.model)
-    maps = asked_maps(options)
+    maps = parsed_maps(options.maps)
     known = clips_of(options.data, maps, options.denoiser)
     clips = _judged(known, classifier.card, options)
     found = judge(classifier, clips, known)
@@ -124,7 +131,7 @@ def _eval(options: argparse.Namespace) -> None:
         save_figure(figure, options.figure)
 
 
-def _judged(known: ClipSet, card: ClassifierCard, options: argparse.Namespace) -> tuple[Clip, ...]:
+def _judged(known: ClipSet, card: ClassifierCard, options: Evaluate) -> tuple[Clip, ...]:
     kept = card.about.get("split", {}).get("test") or ()
     if options.subjects is not None:
         names = named_subjects(options.subjects, known.subjects)
