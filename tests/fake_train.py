@@ -13,16 +13,10 @@ import sys
 import time
 from pathlib import Path
 
+from sd2core.options.training import DataConfig, ModelConfig, TrainConfig, TrainingConfig
 from sd2core.runs.control import Control
 from sd2core.runs.progress import ProgressWriter
-from sd2core.train.config import (
-    DataConfig,
-    ModelConfig,
-    TrainConfig,
-    TrainingConfig,
-    config_text,
-    read_config,
-)
+from sd2core.train.config import config_text, read_config
 from sd2core.train.folder import TrainingFolder
 
 STEPS = 4

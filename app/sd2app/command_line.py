@@ -7,21 +7,89 @@ import os
 import signal
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 from sd2app.plain_imports import plain_imports
 from sd2app.system_libraries import explain_missing, missing_libraries
 from sd2core.cli import build_parser, run
 from sd2core.cli.command_parser import add_command
-from sd2core.cli.options import (
-    add_json,
-)
 from sd2core.errors import Sd2Error
+from sd2core.options.records import ARGUMENTS, OptionError, Place
+from sd2core.options.shared import Json, Overwrite
 
 _EXAMPLES = """\
   sd2 demo                                    look at the bundled sample recording
   sd2 open walk.sd2                           look at a recording, a video or a mesh
 """
+
+
+@dataclass(frozen=True, kw_only=True)
+class Screenshot(Overwrite):
+    """Picture of the window.
+
+    Parameters
+    ----------
+    screenshot : FILE.png
+        draw the window into a picture instead of on the screen
+    """
+
+    # Instead of the copy that `sd2 demo` can write.
+    screenshot: Annotated[Path | None, Place(one_of="instead", endings=(".png",))] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Open(Screenshot):
+    """Options of ``sd2 open``.
+
+    Parameters
+    ----------
+    paths : PATH
+        a recording; or a video, a mesh and a radar capture, each or together (default: an empty
+        window)
+    """
+
+    paths: Annotated[tuple[Path, ...], ARGUMENTS] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Demo(Screenshot):
+    """Options of ``sd2 demo``.
+
+    Parameters
+    ----------
+    out : NAME.sd2
+        write a copy of the sample with its files, and open no window
+    """
+
+    out: Annotated[Path | None, Place(one_of="instead")] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Doctor(Json):
+    """Options of ``sd2 doctor``.
+
+    Parameters
+    ----------
+    json
+        print JSON, for other programs; an error as well
+    clean
+        remove caches, after asking
+    yes
+        with --clean, do not ask
+    """
+
+    json: Annotated[bool, Place(one_of="instead")] = False
+    clean: Annotated[bool, Place(one_of="instead")] = False
+    yes: bool = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.yes and not self.clean:
+            raise OptionError(
+                "--yes is given without --clean", remedy="Add --clean, or leave it out"
+            )
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -38,91 +106,41 @@ def full_parser(typed: Sequence[str] = ()) -> argparse.ArgumentParser:
 
 
 def _add_window_commands(commands: argparse._SubParsersAction) -> None:
-    opening = add_command(
-        commands,
-        "open",
-        "open a recording, or a video, a mesh or a radar capture, in the window",
-        handler=_open,
-        examples=(
-            "  sd2 open walk.sd2\n"
-            "  sd2 open walk.mkv walk.npz capture/    (what belongs together)\n"
-            "  sd2 open walk.sd2 --screenshot window.png    (needs no display)"
-        ),
-    )
-    opening.add_argument(
-        "paths",
-        nargs="*",
-        type=Path,
-        metavar="PATH",
-        help="a recording; or a video, a mesh and a radar capture, each or together"
-        " (default: an empty window)",
-    )
-    demo = add_command(
-        commands,
-        "demo",
-        "open the bundled sample recording in the window",
-        handler=_demo,
-        description=(
-            "A simulated body makes eight swipes in front of a simulated radar. The bundled files\n"
-            "stay as they are; --out writes a copy to edit, export or train with."
-        ),
-        examples=(
-            "  sd2 demo\n"
-            "  sd2 demo --out sample.sd2            (a copy; opens no window)\n"
-            "  sd2 demo --screenshot window.png    (needs no display)"
-        ),
-    )
-    instead = demo.add_mutually_exclusive_group()
-    instead.add_argument(
-        "--out",
-        type=Path,
-        metavar="NAME.sd2",
-        help="write a copy of the sample with its files, and open no window",
-    )
-    for parser in (opening, instead):
-        parser.add_argument(
-            "--screenshot",
-            type=Path,
-            metavar="FILE.png",
-            help="draw the window into a picture instead of on the screen",
-        )
-    for parser in (opening, demo):
-        parser.add_overwrite()
-
-    examining = add_command(
-        commands,
-        "doctor",
-        "check the installation, and say how to mend it",
-        handler=_doctor,
-        description=(
-            "Looks at system libraries, display, OpenGL, fonts, compiled kernels, models, GPU and\n"
-            "room on the disk. The exit code is 1 where something must be mended.\n\n"
-            "--clean lists what the program keeps outside of recordings and can make again, such\n"
-            "as compiled kernels and landmark models, and removes it. Settings, trained models,\n"
-            "runs, and edits that were not saved stay."
-        ),
-        examples="  sd2 doctor\n  sd2 doctor --clean    (before pip uninstall sd2-studio)",
-    )
-    instead = examining.add_mutually_exclusive_group()
-    add_json(instead)
-    instead.add_argument("--clean", action="store_true", help="remove caches, after asking")
-    examining.add_argument("--yes", action="store_true", help="with --clean, do not ask")
+    add_command(commands, "open", options=Open, handler=_open)
+    add_command(commands, "demo", options=Demo, handler=_demo)
+    add_command(commands, "doctor", options=Doctor, handler=_doctor)
 
 
-def _doctor(options: argparse.Namespace) -> int:
+def _doctor(options: Doctor) -> int:
+    """Check the installation, and say how to mend it.
+
+    Looks at system libraries, display, OpenGL, fonts, compiled kernels, models, GPU and
+    room on the disk. The exit code is 1 where something must be mended.
+
+    --clean lists what the program keeps outside of recordings and can make again, such
+    as compiled kernels and landmark models, and removes it. Settings, trained models,
+    runs, and edits that were not saved stay.
+
+      sd2 doctor
+      sd2 doctor --clean    (before pip uninstall sd2-studio)
+    """
     if options.clean:
         from sd2core.cli.caches import remove_caches
 
         remove_caches(ask=not options.yes)
         return 0
-    if options.yes:
-        raise Sd2Error("--yes is given without --clean", remedy="Add --clean, or leave it out")
     from sd2app.doctor import report
 
     return report(options.json)
 
 
-def _open(options: argparse.Namespace) -> int:
+def _open(options: Open) -> int:
+    """Open a recording, or a video, a mesh or a radar capture, in the window.
+
+    sd2 open walk.sd2
+    sd2 open walk.mkv walk.npz capture/    (what belongs together)
+    sd2 open walk.sd2 --screenshot window.png    (needs no display)
+    """
     from sd2app.fit.request import read_request
     from sd2core.io.kinds import kind_of
     from sd2core.io.radar import without_companions
@@ -132,10 +150,19 @@ def _open(options: argparse.Namespace) -> int:
     for path in without_companions(options.paths):
         if read_request(path) is None:
             kind_of(path)
-    return _show(options.paths, options.screenshot)
+    return _show([*options.paths], options.screenshot)
 
 
-def _demo(options: argparse.Namespace) -> int:
+def _demo(options: Demo) -> int:
+    """Open the bundled sample recording in the window.
+
+    A simulated body makes eight swipes in front of a simulated radar. The bundled files
+    stay as they are; --out writes a copy to edit, export or train with.
+
+      sd2 demo
+      sd2 demo --out sample.sd2            (a copy; opens no window)
+      sd2 demo --screenshot window.png    (needs no display)
+    """
     from sd2core.cli.importing import copy_sample
     from sd2core.files.resources import resource_path
 
@@ -147,8 +174,6 @@ def _demo(options: argparse.Namespace) -> int:
 
 def _show(paths: Sequence[Path], screenshot: Path | None) -> int:
     if screenshot is not None:
-        if screenshot.suffix.lower() != ".png":
-            raise Sd2Error(f"The screenshot is to be {screenshot}", "a name that ends in .png")
         os.environ["QT_QPA_PLATFORM"] = "offscreen"
     elif not has_display(sys.platform, os.environ):
         raise Sd2Error(

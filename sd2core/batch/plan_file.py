@@ -2,26 +2,17 @@
 
 from __future__ import annotations
 
-import json
-import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TypeVar
-
-from pydantic import BaseModel, ValidationError
+from typing import Any
 
 from sd2core.batch.plan import STEPS, BatchPlan
-from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.paths import is_absolute, located_path, stored_path
-from sd2core.files.texts import UNKNOWN_KEY, parse_toml, read_text
+from sd2core.files.texts import read_text
 from sd2core.files.toml import toml_lines
+from sd2core.options.toml_files import parsed
 from sd2core.radar_profiles import RADARS
-
-Plan = TypeVar("Plan", bound=BaseModel)
-_HEADER = re.compile(r"\s*\[+\s*([^\[\]]+?)\s*\]+")
-_KEY = re.compile(r"""\s*([A-Za-z0-9_."'* /\\-]+?)\s*=""")
-_HINT = "docs/formats.md says what a plan holds"
 
 
 def read_plan(path: Path) -> BatchPlan:
@@ -43,21 +34,6 @@ def plan_from_text(text: str, folder: Path, source: str = "The plan") -> BatchPl
     return _with_paths(
         parsed(BatchPlan, text, source), lambda stored: str(located_path(stored, folder))
     )
-
-
-def parsed(kind: type[Plan], text: str, source: str) -> Plan:
-    """Check a plan of any kind in TOML; Sd2Error names source, line and key."""
-    try:
-        # Strict as JSON is: lists are lists and numbers are numbers. TOML's dates are neither.
-        content = json.dumps(parse_toml(text, source, "TOML", _HINT))
-    except TypeError as error:
-        raise Sd2Error(
-            f"{source} holds a date or a time ({error})", "texts, numbers, lists and tables", _HINT
-        ) from error
-    try:
-        return kind.model_validate_json(content)
-    except ValidationError as error:
-        raise _in_words(error, text, source) from error
 
 
 def plan_text(plan: BatchPlan, folder: Path) -> str:
@@ -108,44 +84,3 @@ def _with_paths(plan: BatchPlan, changed: Any) -> BatchPlan:
 def _is_path(model: str) -> bool:
     """Tell if a model is named by its file and not by the name of an installed one."""
     return is_absolute(model) or Path(model).name != model or model.endswith(".safetensors")
-
-
-def _in_words(error: ValidationError, text: str, source: str) -> Sd2Error:
-    first = error.errors()[0]
-    keys = tuple(str(part) for part in first["loc"])
-    line = line_of(text, keys)
-    where = source if line is None else f"{source}, line {line}"
-    name, kind = ".".join(keys), first["type"]
-    if kind == "missing":
-        return Sd2Error(f"{where}: {name} is missing", "it in the plan", _HINT)
-    if kind in UNKNOWN_KEY:
-        return Sd2Error(f"{where}: {name} is not known", "a key that a plan may hold", _HINT)
-    message = first["msg"].removeprefix("Value error, ")
-    if kind == "value_error":
-        return Sd2Error(f"{where}: {name}: {message}" if name else f"{where}: {message}", "", _HINT)
-    return Sd2Error(f"{where}: {name} is {first['input']!r:.80}", message, _HINT)
-
-
-def line_of(text: str, keys: tuple[str, ...]) -> int | None:
-    """Return the number, from 1, of the line of a TOML text that holds a key.
-
-    Where the key itself is not there, the line of the innermost table around it that is.
-    """
-    lines: dict[tuple[str, ...], int] = {}
-    table: tuple[str, ...] = ()
-    for number, line in enumerate(text.splitlines(), start=1):
-        if header := _HEADER.match(line):
-            table = _parts(header[1])
-            lines.setdefault(table, number)
-        elif key := _KEY.match(line):
-            lines.setdefault(table + _parts(key[1]), number)
-    for length in range(len(keys), 0, -1):
-        if keys[:length] in lines:
-            return lines[keys[:length]]
-    return None
-
-
-def _parts(name: str) -> tuple[str, ...]:
-    if name[:1] in "\"'":
-        return (name.strip("\"'"),)
-    return tuple(part.strip().strip("\"'") for part in name.split("."))

@@ -4,28 +4,43 @@ from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn
 
 from sd2core.cli import build_parser, run
-from sd2core.cli.command_parser import add_command
+from sd2core.cli.command_parser import add_command, add_options
 from sd2core.cli.importing import copy_sample
 from sd2core.errors import Sd2Error
+from sd2core.options.records import OptionRecord
+from sd2core.options.shared import Json
 
 _WINDOW_COMMANDS = ("open", "doctor")
 _EXAMPLES = "  sd2 demo --out sample.sd2                   a copy of the bundled sample recording\n"
 
 
+@dataclass(frozen=True, kw_only=True)
+class Demo(OptionRecord):
+    """Options of ``sd2 demo``.
+
+    Parameters
+    ----------
+    out : NAME.sd2
+        the copy to write; new
+    """
+
+    out: Path | None = None
+
+
 def main() -> int:
     """Run one of the library's commands and return its exit code."""
     parser, commands = build_parser(_EXAMPLES, sys.argv[1:])
-    demo = add_command(commands, "demo", handler=_demo)
-    demo.add_output("NAME.sd2", "the copy to write; new", required=False, goes_on=True)
+    demo = add_command(commands, "demo", options=Demo, handler=_demo)
     demo.add_argument("--screenshot", type=Path, help=argparse.SUPPRESS)
     for name in _WINDOW_COMMANDS:  # not listed
         absent = commands.add_parser(name)
         absent.set_defaults(handler=_absent, name=name)
-        absent.add_json()
+        add_options(absent, Json)
     words = sys.argv[1:]
     if words and words[0] in _WINDOW_COMMANDS:
         # Whatever else is asked of a command that is not there.
@@ -33,7 +48,7 @@ def main() -> int:
     return run(parser, words)
 
 
-def _demo(options: argparse.Namespace) -> None:
+def _demo(options: Demo) -> None:
     """Write a copy of the bundled sample recording.
 
     A simulated body makes eight swipes in front of a simulated radar.

@@ -3,30 +3,47 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from sd2core.cli.command_parser import add_command
-from sd2core.cli.options import positive_float
 from sd2core.cli.output import print_facts, print_json
 from sd2core.errors import Sd2Error
+from sd2core.options.kinds import Positive
+from sd2core.options.records import ARGUMENTS
+from sd2core.options.shared import Json
 
 if TYPE_CHECKING:
     from sd2core.doppler.alignment import Alignment
     from sd2core.recording.recording import Recording
 
 
+@dataclass(frozen=True, kw_only=True)
+class Align(Json):
+    """Options of ``sd2 align``.
+
+    Parameters
+    ----------
+    recordings : RECORDING
+        with a mesh and a radar
+    within : S
+        search so far before and after the recording's offset, 2 s at least (default: 5)
+    save
+        write what was found into the recordings
+    """
+
+    recordings: Annotated[tuple[Path, ...], ARGUMENTS]
+    within: Positive | None = None
+    save: bool = False
+
+
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``align``."""
-    parser = add_command(commands, "align", handler=_align)
-    parser.add_value("recordings", Path, "RECORDING", "with a mesh and a radar", nargs="+")
-    text = "search so far before and after the recording's offset, 2 s at least (default: 5)"
-    parser.add_value("--within", positive_float, "S", text)
-    parser.add_flag("--save", "write what was found into the recordings")
-    parser.add_json()
+    add_command(commands, "align", options=Align, handler=_align)
 
 
-def _align(options: argparse.Namespace) -> int:
+def _align(options: Align) -> int:
     """Find the time offset of video and radar from what both saw.
 
     Compares mean velocity and motion of the mesh's synthetic map with those of the
@@ -54,7 +71,7 @@ def _align(options: argparse.Namespace) -> int:
     return 1 if any(entry["problem"] for entry in entries) else 0
 
 
-def _aligned(recording: Recording, options: argparse.Namespace) -> dict[str, Any]:
+def _aligned(recording: Recording, options: Align) -> dict[str, Any]:
     """Entry of one recording; what cannot be aligned or saved is told in it, and others go on."""
     before_s = recording.radar_offset_s
     entry: dict[str, Any] = {

@@ -7,11 +7,11 @@ import json
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from sd2core.cli.command_parser import add_command
-from sd2core.cli.options import positive_int
 from sd2core.cli.output import (
     counted,
     duration,
@@ -22,6 +22,9 @@ from sd2core.cli.output import (
     progress_bar,
 )
 from sd2core.errors import Sd2Error
+from sd2core.options.kinds import Count
+from sd2core.options.records import ARGUMENT, OptionError, Place
+from sd2core.options.shared import JsonAndProgress
 from sd2core.processes import INTERRUPTED
 
 if TYPE_CHECKING:
@@ -34,25 +37,48 @@ _LISTED_FAILURES = 10
 _LISTED_UNUSABLE = 5
 
 
+@dataclass(frozen=True, kw_only=True)
+class Batch(JsonAndProgress):
+    """Options of ``sd2 batch``.
+
+    Parameters
+    ----------
+    plan : PLAN.toml
+        plan of the batch
+    workers : N
+        processes on this machine (default: one per core)
+    scheduler : ADDRESS
+        use the workers of this dask-scheduler
+    dry_run
+        print tasks, time and bytes, and do nothing
+    status : FOLDER
+        print the state of the batch in this folder
+    stop : FOLDER
+        stop the batch in this folder; the same command resumes it
+    """
+
+    plan: Annotated[Path | None, ARGUMENT] = None
+    workers: Annotated[Count | None, Place(one_of="where")] = None
+    scheduler: Annotated[str | None, Place(one_of="where")] = None
+    dry_run: Annotated[bool, Place(one_of="what")] = False
+    status: Annotated[Path | None, Place(one_of="what")] = None
+    stop: Annotated[Path | None, Place(one_of="what")] = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        elsewhere = self.status is not None or self.stop is not None
+        if self.plan is not None and elsewhere:
+            raise OptionError("A plan is given with --status or --stop", "only one of them")
+        if self.plan is None and not elsewhere:
+            raise OptionError("No plan is given", "PLAN.toml, or --status FOLDER")
+
+
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``batch``."""
-    parser = add_command(commands, "batch", handler=_batch)
-    parser.add_value("plan", Path, "PLAN.toml", "plan of the batch", nargs="?")
-    where = parser.add_mutually_exclusive_group()
-    where.add_value(
-        "--workers", positive_int, "N", "processes on this machine (default: one per core)"
-    )
-    where.add_value("--scheduler", str, "ADDRESS", "use the workers of this dask-scheduler")
-    what = parser.add_mutually_exclusive_group()
-    what.add_flag("--dry-run", "print tasks, time and bytes, and do nothing")
-    what.add_value("--status", Path, "FOLDER", "print the state of the batch in this folder")
-    what.add_value(
-        "--stop", Path, "FOLDER", "stop the batch in this folder; the same command resumes it"
-    )
-    parser.add_json_and_progress()
+    add_command(commands, "batch", options=Batch, handler=_batch)
 
 
-def _batch(options: argparse.Namespace) -> int:
+def _batch(options: Batch) -> int:
     """Fit, synthesise, denoise and export many recordings from many places.
 
     Runs a plan (TOML, see docs/formats.md) on all cores of this machine, or on the
@@ -69,16 +95,13 @@ def _batch(options: argparse.Namespace) -> int:
     """
     from sd2core.batch.folder import BatchFolder
 
-    if options.plan is not None and (options.status or options.stop):
-        raise Sd2Error("A plan is given with --status or --stop", "only one of them")
     if options.status is not None:
         return _show_status(options.status, options.json)
     if options.stop is not None:
         BatchFolder(options.stop).tell("stop")
         print(f"Stopping {options.stop}")
         return 0
-    if options.plan is None:
-        raise Sd2Error("No plan is given", "PLAN.toml, or --status FOLDER")
+    assert options.plan is not None
     from sd2core.batch.plan_file import read_plan
 
     plan = read_plan(options.plan)
@@ -87,7 +110,7 @@ def _batch(options: argparse.Namespace) -> int:
     return _run(plan, options)
 
 
-def _run(plan: BatchPlan, options: argparse.Namespace) -> int:
+def _run(plan: BatchPlan, options: Batch) -> int:
     from sd2core.batch.run import run_batch
     from sd2core.numerics.compiled import worker_count
 
@@ -109,7 +132,7 @@ def _run(plan: BatchPlan, options: argparse.Namespace) -> int:
 
 
 @contextmanager
-def _watching(options: argparse.Namespace) -> Iterator[Watch]:
+def _watching(options: Batch) -> Iterator[Watch]:
     """Show progress as JSON on standard output, or for people on standard error."""
     if options.progress_json:
         yield lambda event: print_event(**event)
@@ -196,7 +219,7 @@ def _times(status: BatchStatus) -> dict[str, str]:
     }
 
 
-def _dry_run(plan: BatchPlan, options: argparse.Namespace) -> int:
+def _dry_run(plan: BatchPlan, options: Batch) -> int:
     from sd2core.batch.estimate import estimate
     from sd2core.numerics.compiled import worker_count
 

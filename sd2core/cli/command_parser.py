@@ -5,10 +5,10 @@ from __future__ import annotations
 import argparse
 import inspect
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import MISSING
 from pathlib import Path
-from typing import Any, NoReturn, TypeVar
+from typing import Any, NamedTuple, NoReturn, TypeVar
 
 from sd2core.cli.options import (
     add_json,
@@ -21,8 +21,8 @@ from sd2core.cli.options import (
 )
 from sd2core.errors import Sd2Error
 from sd2core.files.figure_files import SUFFIXES as FIGURES
-from sd2core.options.records import Group, Option, OptionRecord, options_of
-from sd2core.options.shared import MapOutput
+from sd2core.options.records import Group, Option, OptionRecord, typed_options
+from sd2core.options.shared import ReplacesMaps
 
 Record = TypeVar("Record", bound=OptionRecord)
 
@@ -251,14 +251,15 @@ def add_options(parser: argparse._ActionsContainer, kind: type[OptionRecord]) ->
     """Add the options of a record to a parser, under their headings."""
     groups: dict[Group | None, argparse._ActionsContainer] = {None: parser}
     exclusive: dict[str, argparse._ActionsContainer] = {}
-    for option in options_of(kind):
+    for option in typed_options(kind):
         group = option.group
         if group is not None and group not in groups:
             groups[group] = parser.add_argument_group(group.title, group.text)
         holder = groups[group]
         if name := option.place.one_of:
             if name not in exclusive:
-                exclusive[name] = holder.add_mutually_exclusive_group()
+                needed = option.place.needed
+                exclusive[name] = holder.add_mutually_exclusive_group(required=needed)
             holder = exclusive[name]
         holder.add_argument(*_names(option), **_keywords(option))
         if option.place.endings:
@@ -296,10 +297,34 @@ def _keywords(option: Option) -> dict[str, Any]:
     return about
 
 
-def record_of(kind: type[Record], typed: argparse.Namespace) -> Record:
-    """Make the record of a command from what was typed."""
+class Command(NamedTuple):
+    """A command, or one of a group of commands."""
+
+    name: str  # as it is typed, without "sd2"
+    summary: str
+    record: type[OptionRecord]
+
+
+def commands_of(parser: argparse.ArgumentParser) -> Iterator[Command]:
+    """Yield the commands of a parser that have a record, in the order of the help."""
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for row in action._choices_actions:
+                command = action.choices[row.dest]
+                record = command.get_default("record")
+                if record is not None:
+                    name = command.prog.partition(" ")[2]
+                    yield Command(name, str(row.help), record)
+                yield from commands_of(command)
+
+
+def record_of(typed: argparse.Namespace) -> Any:
+    """Make the record of the command that was typed."""
+    if "record" not in typed:
+        return typed
+    kind: type[OptionRecord] = typed.record
     values: dict[str, Any] = {}
-    for option in options_of(kind):
+    for option in typed_options(kind):
         value = getattr(typed, option.dest)
         if option.section:
             section = values.setdefault(option.section, {})
@@ -343,9 +368,7 @@ def add_command(
     )
     if options is not None:
         add_options(parser, options)
-        parser.set_defaults(writes_map=issubclass(options, MapOutput))
-    if handler is not None and options is not None:
-        parser.set_defaults(handler=lambda typed: handler(record_of(options, typed)))
-    elif handler is not None:
+        parser.set_defaults(record=options, writes_map=issubclass(options, ReplacesMaps))
+    if handler is not None:
         parser.set_defaults(handler=handler)
     return parser

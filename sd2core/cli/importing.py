@@ -4,21 +4,31 @@ from __future__ import annotations
 
 import argparse
 import shutil
-from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from sd2core.cli.command_parser import Options, add_command
-from sd2core.cli.options import finite_float, flag, given, name_list, position, positive_float
+from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import print_json, progress_bar
 from sd2core.errors import Sd2Error
+from sd2core.options.kinds import Names, Positive, Vector
+from sd2core.options.records import (
+    ARGUMENT,
+    Group,
+    OptionError,
+    OptionRecord,
+    changed,
+    given,
+    given_flags,
+)
+from sd2core.options.shared import Channel, Json, MeshReading
 
 if TYPE_CHECKING:
     from sd2core.recording.recording import Recording
     from sd2core.sensor import VirtualSensor
 
 _CHANNEL = ("receiver", "transmitter")
+_ABOUT_THE_BODY = ("range_m", "azimuth_deg", "elevation_deg")
 _LEFT_OUT = {
     **{name: name for name in ("video", "mesh", "radar", "imu", "denoiser")},
     **{name: f"radar_{name}" for name in _CHANNEL},
@@ -26,53 +36,136 @@ _LEFT_OUT = {
 """What `sd2 set --without` names, and the fields that it empties."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Content(MeshReading, Channel):
+    """Files of a recording and what they do not say.
+
+    Parameters
+    ----------
+    video : FILE
+        video of the person
+    mesh : FILE
+        body mesh fitted to the video (.npz, .zarr, a folder of .obj/.ply/.glb, or the output of
+        VIBE, WHAM or 4D-Humans)
+    radar : CAPTURE
+        radar capture of the same scene
+    radar_offset_s : S
+        time in the video, in seconds, of the first radar frame (default: 0)
+    imu : FILE
+        samples of an inertial sensor (.csv, .sto, .npz)
+    imu_offset_s : S
+        time in the video, in seconds, of their first sample (default: 0)
+    title : TEXT
+        what to call it (default: its name)
+    """
+
+    video: Path | None = None
+    mesh: Path | None = None
+    radar: Path | None = None
+    radar_offset_s: float | None = None
+    imu: Path | None = None
+    imu_offset_s: float | None = None
+    title: str | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Import(Content, Json):
+    """Options of ``sd2 import``.
+
+    Parameters
+    ----------
+    out : NAME.sd2
+        the recording to make; new
+    sensor : X,Y,Z
+        where the radar is, in metres, as seen from the camera (default: the camera)
+    copy
+        copy the files into the recording
+    """
+
+    out: Path
+    sensor: Vector | None = None
+    copy: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class SensorPlace(OptionRecord):
+    """Where the radar is put.
+
+    Parameters
+    ----------
+    sensor : X,Y,Z
+        in metres, as seen from the camera
+    range_m : M
+        or its distance from the body, which keeps the angles that are not given
+    azimuth_deg : DEG
+        angle about the body, 0 towards the camera, positive to its right
+    elevation_deg : DEG
+        above the body's middle
+    """
+
+    GROUP = Group("sensor", "where the radar is")
+
+    sensor: Vector | None = None
+    range_m: Positive | None = None
+    azimuth_deg: float | None = None
+    elevation_deg: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Set(Content, SensorPlace, Json):
+    """Options of ``sd2 set``.
+
+    Parameters
+    ----------
+    recording : RECORDING
+        a recording (.sd2)
+    without : LIST
+        take out what is named, some of video, mesh, radar, imu, denoiser, receiver, transmitter
+    """
+
+    recording: Annotated[Path, ARGUMENT]
+    without: Names = ()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not {*changed(self)} - {"recording", "json"}:
+            raise OptionError("Nothing is to be set", "one option at least")
+        for name in self.without:
+            if name not in _LEFT_OUT:
+                raise OptionError(f"--without names {name!r}", f"some of {', '.join(_LEFT_OUT)}")
+        if self.sensor is not None:
+            self.refuse_place_about_body("beside --sensor")
+
+    def refuse_place_about_body(self, why: str) -> None:
+        """Refuse a distance and angles about the body."""
+        for name in given_flags(self, _ABOUT_THE_BODY):
+            raise OptionError(
+                f"{name} is given {why}",
+                "either --sensor, or a distance and angles about the body of a mesh",
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Relink(Json):
+    """Options of ``sd2 relink``.
+
+    Parameters
+    ----------
+    recording : RECORDING
+        a recording (.sd2)
+    folder : FOLDER
+        where to look, and in all folders below
+    """
+
+    recording: Annotated[Path, ARGUMENT]
+    folder: Annotated[Path, ARGUMENT]
+
+
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``import``, ``set`` and ``relink``."""
-    parser = add_command(commands, "import", handler=_import)
-    parser.add_output("NAME.sd2", "the recording to make; new", goes_on=True)
-    _add_content(parser)
-    text = "where the radar is, in metres, as seen from the camera (default: the camera)"
-    parser.add_value("--sensor", position, "X,Y,Z", text)
-    parser.add_flag("--copy", "copy the files into the recording")
-    parser.add_json()
-
-    parser = add_command(commands, "set", handler=_set)
-    parser.add_value("recording", Path, "RECORDING", "a recording (.sd2)")
-    _add_content(parser)
-    group = parser.add_argument_group("sensor", "where the radar is")
-    group.add_value("--sensor", position, "X,Y,Z", "in metres, as seen from the camera")
-    text = "or its distance from the body, which keeps the angles that are not given"
-    group.add_value("--range-m", positive_float, "M", text)
-    text = "angle about the body, 0 towards the camera, positive to its right"
-    group.add_value("--azimuth-deg", finite_float, "DEG", text)
-    group.add_value("--elevation-deg", finite_float, "DEG", "above the body's middle")
-    text = (
-        "take out what is named, some of video, mesh, radar, imu, denoiser, receiver, transmitter"
-    )
-    parser.add_value("--without", name_list, "LIST", text, ())
-    parser.add_json()
-
-    parser = add_command(commands, "relink", handler=_relink)
-    parser.add_value("recording", Path, "RECORDING", "a recording (.sd2)")
-    parser.add_value("folder", Path, "FOLDER", "where to look, and in all folders below")
-    parser.add_json()
-
-
-def _add_content(parser: Options) -> None:
-    """Add files of a recording and what they do not say."""
-    parser.add_value("--video", Path, "FILE", "video of the person")
-    text = "body mesh fitted to the video (.npz, .zarr, a folder of .obj/.ply/.glb, or the"
-    text += " output of VIBE, WHAM or 4D-Humans)"
-    parser.add_value("--mesh", Path, "FILE", text)
-    parser.add_mesh_reading()
-    parser.add_value("--radar", Path, "CAPTURE", "radar capture of the same scene")
-    text = "time in the video, in seconds, of the first radar frame (default: 0)"
-    parser.add_value("--radar-offset-s", finite_float, "S", text)
-    parser.add_channel()
-    parser.add_value("--imu", Path, "FILE", "samples of an inertial sensor (.csv, .sto, .npz)")
-    text = "time in the video, in seconds, of their first sample (default: 0)"
-    parser.add_value("--imu-offset-s", finite_float, "S", text)
-    parser.add_value("--title", str, "TEXT", "what to call it (default: its name)")
+    add_command(commands, "import", options=Import, handler=_import)
+    add_command(commands, "set", options=Set, handler=_set)
+    add_command(commands, "relink", options=Relink, handler=_relink)
 
 
 def copy_sample(out: Path) -> None:
@@ -86,7 +179,7 @@ def copy_sample(out: Path) -> None:
     print(f"Wrote {copy.folder}")
 
 
-def _import(options: argparse.Namespace) -> None:
+def _import(options: Import) -> None:
     """Make a recording from a video, a mesh and a radar capture.
 
     A recording is a folder NAME.sd2 that says what belongs together. The files stay
@@ -120,21 +213,20 @@ def _import(options: argparse.Namespace) -> None:
     show(describe_recording(recording, parts), as_json=options.json)
 
 
-def _content(options: argparse.Namespace) -> dict[str, Any]:
+def _content(options: Content) -> dict[str, Any]:
     """Fields of a recording that were given."""
     names = ("video", "mesh", "faces", "radar", "imu", "title", "radar_offset_s", "imu_offset_s")
     channel = {f"radar_{name}": value for name, value in given(options, _CHANNEL).items()}
     return given(options, names) | channel
 
 
-def _refuse_unused_channel(recording: Recording, options: argparse.Namespace) -> None:
-    chosen = given(options, _CHANNEL)
-    if chosen and (recording.radar is None or recording.holds_radar_map):
-        name = flag(next(iter(chosen)))
-        raise Sd2Error(f"{name} is given without raw samples", f"{name} with --radar CAPTURE")
+def _refuse_unused_channel(recording: Recording, options: Content) -> None:
+    if recording.radar is None or recording.holds_radar_map:
+        for name in given_flags(options, _CHANNEL):
+            raise Sd2Error(f"{name} is given without raw samples", f"{name} with --radar CAPTURE")
 
 
-def _set(options: argparse.Namespace) -> None:
+def _set(options: Set) -> None:
     """Change what a recording is made of: its files, its clocks, where its radar is.
 
     What is not named stays. Pairs, alignment, exports and the window use what is set.
@@ -154,16 +246,9 @@ def _set(options: argparse.Namespace) -> None:
     recording = open_recording(options.recording)
     if is_bundled(recording.folder):
         raise Sd2Error(f"{recording.folder} comes with the program", "a recording of your own")
-    content = _content(options)
-    reading = mesh_reading(options).options()
-    place = given(options, ("sensor", "range_m", "azimuth_deg", "elevation_deg"))
-    if not (content or reading or place or options.without):
-        raise Sd2Error("Nothing is to be set", "one option at least")
     for name in options.without:
-        if name not in _LEFT_OUT:
-            raise Sd2Error(f"--without names {name!r}", f"some of {', '.join(_LEFT_OUT)}")
         setattr(recording, _LEFT_OUT[name], None)
-    for name, value in content.items():
+    for name, value in _content(options).items():
         if isinstance(value, Path) and not value.exists():
             raise Sd2Error(f"The {name} {value} does not exist", "a file or folder")
         setattr(recording, name, plain_path(value) if isinstance(value, Path) else value)
@@ -173,42 +258,37 @@ def _set(options: argparse.Namespace) -> None:
         recording.faces = None
     refuse_unused_mesh_options(options, recording.folder, recording.mesh, but=("focal_px",))
     before = recording.mesh_reading if options.mesh is None else type(recording.mesh_reading)()
+    reading = mesh_reading(options).options()
     recording.mesh_reading = before.model_copy(update=reading)
     _refuse_unused_channel(recording, options)
     if options.video is not None or options.mesh is not None:
         recording.camera = None
         recording.learn_camera()
     parts = describe_parts(recording)
-    if place:
-        recording.sensor = _placed(recording, place)
+    recording.sensor = _placed(recording, options)
     recording.save()
     show(describe_recording(recording, parts), as_json=options.json)
 
 
-def _placed(recording: Recording, place: Mapping[str, Any]) -> VirtualSensor:
-    """Sensor of a recording at a place in the room, or about its body."""
+def _placed(recording: Recording, options: Set) -> VirtualSensor:
+    """Sensor of a recording at a place in the room, or about its body, or as it was."""
     from sd2core.placements.body_extent import BodyExtent
     from sd2core.sensor import position_from_spherical, spherical_from_position
 
-    position_m = place.get("sensor")
-    about = {name: value for name, value in place.items() if name != "sensor"}
-    if about:
-        if position_m is not None or recording.mesh is None:
-            raise Sd2Error(
-                f"{flag(next(iter(about)))} is given "
-                + ("beside --sensor" if position_m is not None else "without a mesh"),
-                "either --sensor, or a distance and angles about the body of a mesh",
-            )
+    position_m = options.sensor
+    if about := given(options, _ABOUT_THE_BODY):
+        if recording.mesh is None:
+            options.refuse_place_about_body("without a mesh")
         target_m = BodyExtent.of(recording.load_mesh()).target_m
         now = spherical_from_position(target_m, recording.sensor.position_m)
-        names = ("range_m", "azimuth_deg", "elevation_deg")
-        wanted = [about.get(name, value) for name, value in zip(names, now, strict=True)]
+        wanted = [about.get(name, value) for name, value in zip(_ABOUT_THE_BODY, now, strict=True)]
         position_m = position_from_spherical(target_m, *wanted)
-    assert position_m is not None
+    if position_m is None:
+        return recording.sensor
     return replace(recording.sensor, position_m=position_m)
 
 
-def _relink(options: argparse.Namespace) -> int:
+def _relink(options: Relink) -> int:
     """Find the missing files of a recording in another folder.
 
     Files that are not where the recording says are looked for by name in FOLDER and

@@ -3,61 +3,97 @@
 from __future__ import annotations
 
 import argparse
-import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sd2core.cli.command_parser import Options, add_command
-from sd2core.cli.options import not_negative_float, positive_float, vector
+from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import print_facts, print_json, progress_bar
 from sd2core.errors import Sd2Error
+from sd2core.options.kinds import NotNegative, Positive, Vector
+from sd2core.options.records import Group, OptionRecord, given
+from sd2core.options.shared import Json, MeshInput, Overwrite
 
 if TYPE_CHECKING:
     from sd2core.imu.sensor_errors import SensorErrors
 
 
+_ERRORS = {
+    "acc_bias": "acceleration_bias_mps2",
+    "acc_noise": "acceleration_noise",
+    "acc_range": "acceleration_range_mps2",
+    "gyr_bias": "turn_rate_bias_radps",
+    "gyr_noise": "turn_rate_noise",
+    "gyr_range": "turn_rate_range_radps",
+}
+"""What the library calls the errors of a sensor."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Errors(OptionRecord):
+    """Errors of the sensor.
+
+    Parameters
+    ----------
+    acc_bias : X,Y,Z
+        constant error of the accelerometer, in m/s²
+    acc_noise : DENSITY
+        density of its white noise, in m/s²/√Hz
+    acc_range : LARGEST
+        its range, plus and minus, in m/s²; what is beyond is clipped
+    gyr_bias : X,Y,Z
+        constant error of the gyroscope, in rad/s
+    gyr_noise : DENSITY
+        density of its white noise, in rad/s/√Hz
+    gyr_range : LARGEST
+        its range, plus and minus, in rad/s; what is beyond is clipped
+    seed : N
+        seed of the noise
+    """
+
+    GROUP = Group("sensor errors", "none by default")
+
+    acc_bias: Vector | None = None
+    acc_noise: NotNegative | None = None
+    acc_range: Positive | None = None
+    gyr_bias: Vector | None = None
+    gyr_noise: NotNegative | None = None
+    gyr_range: Positive | None = None
+    seed: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Imu(MeshInput, Overwrite, Errors, Json):
+    """Options of ``sd2 imu``.
+
+    Parameters
+    ----------
+    at : PLACE|VERTEX
+        where on the body, or which vertex
+    out : FILE
+        the samples to write (.csv, .sto or .npz)
+    rate : HZ
+        samples per second
+    cutoff : HZ
+        where the zero-phase low pass leaves half of the amplitude, in Hz (default: 6, or a
+        fifth of the mesh's frame rate if that is lower)
+    up : X,Y,Z
+        upwards in the mesh's frame (default: 0,-1,0, as for a camera held level)
+    """
+
+    at: str
+    out: Path
+    rate: Positive = 100.0
+    cutoff: Positive | None = None
+    up: Vector = (0.0, -1.0, 0.0)
+
+
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``imu``."""
-    parser = add_command(commands, "imu", handler=_imu)
-    parser.add_value("mesh", Path, "MESH", "a mesh, or a recording")
-    text = "where on the body, or which vertex"
-    parser.add_value("--at", str, "PLACE|VERTEX", text, required=True)
-    parser.add_output("FILE", "the samples to write (.csv, .sto or .npz)")
-    parser.add_value("--rate", positive_float, "HZ", "samples per second", 100.0)
-    text = "where the zero-phase low pass leaves half of the amplitude, in Hz (default: 6, or a"
-    text += " fifth of the mesh's frame rate if that is lower)"
-    parser.add_value("--cutoff", positive_float, "HZ", text)
-    text = "upwards in the mesh's frame (default: 0,-1,0, as for a camera held level)"
-    parser.add_value("--up", vector, "X,Y,Z", text, (0.0, -1.0, 0.0))
-    _add_errors(parser)
-    parser.add_mesh_reading()
-    parser.add_json()
-    parser.set_defaults(sensor=None)
+    add_command(commands, "imu", options=Imu, handler=_imu)
 
 
-def _add_errors(parser: Options) -> None:
-    group = parser.add_argument_group("sensor errors", "none by default")
-    for short, long, unit in (("acc", "accelerometer", "m/s²"), ("gyr", "gyroscope", "rad/s")):
-        text = f"constant error of the {long}, in {unit}"
-        group.add_value(f"--{short}-bias", vector, "X,Y,Z", text, (0.0, 0.0, 0.0))
-        group.add_argument(
-            f"--{short}-noise",
-            type=not_negative_float,
-            default=0.0,
-            metavar="DENSITY",
-            help=f"density of its white noise, in {unit}/√Hz",
-        )
-        group.add_argument(
-            f"--{short}-range",
-            type=positive_float,
-            default=math.inf,
-            metavar="LARGEST",
-            help=f"its range, plus and minus, in {unit}; what is beyond is clipped",
-        )
-    group.add_value("--seed", int, "N", "seed of the noise", 0)
-
-
-def _imu(options: argparse.Namespace) -> None:
+def _imu(options: Imu) -> None:
     """What an inertial sensor on the body would measure (simulated).
 
     Fixes an accelerometer and a gyroscope to the body and writes what they would feel:
@@ -74,13 +110,13 @@ def _imu(options: argparse.Namespace) -> None:
       sd2 imu walk.sd2 --at right-foot --acc-noise 0.002 --acc-range 20 --out foot.npz
     """
     from sd2core.cli.info.description import signals_data
-    from sd2core.cli.reading import mesh_and_sensor
+    from sd2core.cli.reading import mesh_and_its_sensor
     from sd2core.imu.files import write_signals
     from sd2core.imu.virtual import virtual_imu
 
     _check_output(options.out)
     errors = _errors(options)
-    mesh, _ = mesh_and_sensor(options)
+    mesh, _ = mesh_and_its_sensor(options)
     with progress_bar("Moving the sensor") as progress:
         signals = virtual_imu(
             mesh,
@@ -112,18 +148,11 @@ def _imu(options: argparse.Namespace) -> None:
     )
 
 
-def _errors(options: argparse.Namespace) -> SensorErrors | None:
+def _errors(options: Errors) -> SensorErrors | None:
     from sd2core.imu.sensor_errors import SensorErrors
 
-    errors = SensorErrors(
-        acceleration_bias_mps2=options.acc_bias,
-        turn_rate_bias_radps=options.gyr_bias,
-        acceleration_noise=options.acc_noise,
-        turn_rate_noise=options.gyr_noise,
-        acceleration_range_mps2=options.acc_range,
-        turn_rate_range_radps=options.gyr_range,
-        seed=options.seed,
-    )
+    stated = {_ERRORS[name]: value for name, value in given(options, _ERRORS).items()}
+    errors = SensorErrors(**stated, seed=options.seed)
     return None if errors == SensorErrors(seed=options.seed) else errors
 
 

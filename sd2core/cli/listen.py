@@ -9,13 +9,16 @@ import shutil
 import sys
 import threading
 import time
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from sd2core.cli.command_parser import add_command
-from sd2core.cli.options import positive_float
 from sd2core.cli.output import counted, print_event, print_facts
 from sd2core.errors import Sd2Error
+from sd2core.options.kinds import Positive
+from sd2core.options.records import OptionError, Place
+from sd2core.options.shared import Json
 from sd2core.runs.control import stop_signals
 
 if TYPE_CHECKING:
@@ -31,30 +34,58 @@ _BAR_DB = 5.0
 """Power of one step of a bar."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Listen(Json):
+    """Options of ``sd2 listen``.
+
+    Parameters
+    ----------
+    dca1000 : ADDRESS[:PORT]
+        listen to a DCA1000 on this address of this computer (default: 127.0.0.1, which only
+        programs on this computer reach; port 4098)
+    replay : CAPTURE
+        a capture, or the one of a recording, at its own rate
+    setup : FILE
+        the .cfg or .json that the radar runs with (with --dca1000)
+    out : NAME.sd2
+        the recording to write
+    classifier : FILE
+        a classifier of `sd2 classify train`
+    seconds : S
+        stop after so long (default: never)
+    columns
+        with --json, every column of the Doppler map as it comes, receding to approaching
+    """
+
+    dca1000: Annotated[str | None, Place(one_of="source", needed=True, bare="")] = None
+    replay: Annotated[Path | None, Place(one_of="source", needed=True)] = None
+    setup: Path | None = None
+    out: Path
+    classifier: Path | None = None
+    seconds: Positive | None = None
+    columns: bool = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.columns and not self.json:
+            raise OptionError(
+                "--columns is given without --json", "both, for a program that reads them"
+            )
+        if self.replay is not None and self.setup is not None:
+            raise OptionError("--setup is given with --replay", "--setup with --dca1000 only")
+        if self.replay is None and self.setup is None:
+            raise OptionError(
+                "--dca1000 is given without --setup",
+                "the .cfg or .json that the radar runs with: samples alone do not say their shape",
+            )
+
+
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``listen``."""
-    parser = add_command(commands, "listen", handler=_listen)
-    source = parser.add_mutually_exclusive_group(required=True)
-    text = "listen to a DCA1000 on this address of this computer (default: 127.0.0.1, which"
-    text += " only programs on this computer reach; port 4098)"
-    source.add_argument("--dca1000", nargs="?", const="", metavar="ADDRESS[:PORT]", help=text)
-    source.add_value(
-        "--replay", Path, "CAPTURE", "a capture, or the one of a recording, at its own rate"
-    )
-    parser.add_value(
-        "--setup", Path, "FILE", "the .cfg or .json that the radar runs with (with --dca1000)"
-    )
-    parser.add_output("NAME.sd2", "the recording to write", goes_on=True)
-    parser.add_value("--classifier", Path, "FILE", "a classifier of `sd2 classify train`")
-    parser.add_value("--seconds", positive_float, "S", "stop after so long (default: never)")
-    parser.add_json()
-    parser.add_flag(
-        "--columns",
-        "with --json, every column of the Doppler map as it comes, receding to approaching",
-    )
+    add_command(commands, "listen", options=Listen, handler=_listen)
 
 
-def _listen(options: argparse.Namespace) -> None:
+def _listen(options: Listen) -> None:
     """Record a radar while it runs, and follow its Doppler map.
 
     Frames go into a recording that can be opened at any moment. The status line shows
@@ -71,8 +102,6 @@ def _listen(options: argparse.Namespace) -> None:
     from sd2core.live.listening import Listening
     from sd2core.live.recording import GrowingRecording
 
-    if options.columns and not options.json:
-        raise Sd2Error("--columns is given without --json", "both, for a program that reads them")
     classifier = None
     if options.classifier is not None:
         from sd2core.classify.files import load_classifier
@@ -101,22 +130,17 @@ def _listen(options: argparse.Namespace) -> None:
     status.end(recording.folder)
 
 
-def _source(options: argparse.Namespace) -> Source:
+def _source(options: Listen) -> Source:
     """Source that the options name; Sd2Error where it is not to be had."""
     from sd2core.live.sources import DATA_PORT, LOOPBACK, Dca1000Source, ReplaySource
     from sd2core.recording.recording import is_recording, open_recording
 
     if options.replay is not None:
-        if options.setup is not None:
-            raise Sd2Error("--setup is given with --replay", "--setup with --dca1000 only")
         if is_recording(options.replay):
             return ReplaySource(open_recording(options.replay).load_capture())
         return ReplaySource(options.replay)
-    if options.setup is None:
-        raise Sd2Error(
-            "--dca1000 is given without --setup",
-            "the .cfg or .json that the radar runs with: samples alone do not say their shape",
-        )
+    assert options.dca1000 is not None
+    assert options.setup is not None
     address, _, port = options.dca1000.partition(":")
     if port and not (port.isascii() and port.isdigit()):
         raise Sd2Error(f"The port is {port!r}", "a number, as in 192.168.33.30:4098")

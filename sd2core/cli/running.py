@@ -8,7 +8,7 @@ import re
 import sys
 from collections.abc import Sequence
 
-from sd2core.cli.command_parser import UsageError
+from sd2core.cli.command_parser import UsageError, record_of
 from sd2core.cli.output_folders import output_folders
 from sd2core.errors import Sd2Error
 from sd2core.processes import INTERRUPTED
@@ -26,7 +26,7 @@ def run(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> int:
     try:
         options = parser.parse_args(attach_negative_values(arguments))
         with output_folders(options):
-            code = options.handler(options)
+            code = options.handler(record_of(options))
         _flush_output()
         return code or 0
     except KeyboardInterrupt:

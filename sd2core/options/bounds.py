@@ -37,7 +37,7 @@ class Bounds:
     @property
     def words(self) -> str:
         """What is allowed, as ``a whole number from 1 to 100``."""
-        low, high = f"{self.low:g}", f"{self.high:g}"
+        low, high = (f"{end:{',' if self.whole else 'g'}}" for end in (self.low, self.high))
         open_end = math.isinf(self.high)
         if math.isinf(self.low):
             span = "" if open_end else f" up to {high}"
@@ -49,11 +49,11 @@ class Bounds:
 
     def __get_pydantic_core_schema__(self, kind: Any, handler: Any) -> Any:
         """Check a field of a plan; pydantic asks for it."""
-        from pydantic_core import core_schema
+        from pydantic_core import PydanticCustomError, core_schema
 
         def check(value: float) -> float:
             if not math.isfinite(value) or value not in self:
-                raise ValueError(f"{value!r} is not {self.words}")
+                raise PydanticCustomError("bounds", "{words}", {"words": self.words})
             return value
 
         return core_schema.no_info_after_validator_function(check, handler(kind))

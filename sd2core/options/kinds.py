@@ -64,6 +64,11 @@ def name_list(text: str) -> tuple[str, ...]:
     return tuple(name.strip() for name in text.split(",") if name.strip())
 
 
+def word_list(text: str) -> tuple[str, ...]:
+    """Read ``anna,anna,ben``: words that each stand for something, in this order."""
+    return tuple(word.strip() for word in text.split(","))
+
+
 def bin_list(text: str) -> tuple[int, ...]:
     """Read ``14,15,16`` or ``none``."""
     if text == "none":
@@ -132,6 +137,7 @@ Vector = Annotated[tuple[float, float, float], Typed(vector, joined)]
 SpanM = Annotated[tuple[float, float], Typed(span_m, joined)]
 ImageSize = Annotated[tuple[int, int], Typed(image_size, lambda size: f"{size[0]}x{size[1]}")]
 Names = Annotated[tuple[str, ...], Typed(name_list, joined)]
+Words = Annotated[tuple[str, ...], Typed(word_list, joined)]
 Bins = Annotated[tuple[int, ...], Typed(bin_list, joined)]
 Paths = Annotated[tuple[Path, ...], Typed(Path)]
 Assignment = Annotated[tuple[str, Any], Typed(assignment, assigned)]

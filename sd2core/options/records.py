@@ -51,26 +51,32 @@ class Place:
         True if it has a place and no name.
     one_of : str
         Of the options with the same word here only one may be given.
+    needed : bool
+        True if one of these must be given.
     many : {"", "together", "again"}
         Of a field that is a tuple: its values stand after one another, or each after the option.
     bare : object
         Value of the option where it is typed without one; None: it needs one.
     endings : tuple of str
         Of a file that is written: how its name may end.
+    typed : bool
+        False if it is no option of a command.
     """
 
     flags: tuple[str, ...] = ()
     argument: bool = False
     one_of: str = ""
+    needed: bool = False
     many: Literal["", "together", "again"] = ""
     bare: Any = None
     endings: tuple[str, ...] = ()
+    typed: bool = True
 
 
 ARGUMENT = Place(argument=True)
 ARGUMENTS = Place(argument=True, many="together")
-NOT_TYPED = Place(flags=("",))
-"""Of a field for files and programs only."""
+NOT_TYPED = Place(typed=False)
+"""Of a field for files and programs."""
 
 
 @dataclass(frozen=True)
@@ -149,7 +155,9 @@ class Option:
 
     def written(self, value: Any) -> list[str]:
         """The words that say this value; of a value as it is by default there are none."""
-        if value is None or value is False or (value == self.default and not self.place.argument):
+        if not self.place.typed or value is None or value is False:
+            return []
+        if value == self.default and not (self.place.argument or self.section):
             return []
         if value is True and self.kind is bool:
             return [self.flags[0]]
@@ -159,6 +167,11 @@ class Option:
         if self.place.many == "again":
             return [word for text in texts for word in (self.flags[0], text)]
         return [self.flags[0], *texts]
+
+
+def typed_options(kind: type[OptionRecord]) -> tuple[Option, ...]:
+    """Options of a record that a command has."""
+    return tuple(one for one in options_of(kind) if one.place.typed)
 
 
 def flag(name: str) -> str:
@@ -193,6 +206,21 @@ def changed(record: OptionRecord) -> list[str]:
     """Names of the options that are not as by default."""
     options = [one for one in options_of(type(record)) if not one.section]
     return [one.name for one in options if one.of(record) != one.default]
+
+
+def given_of(record: OptionRecord) -> dict[str, Any]:
+    """The options that are not as by default, for a section of a command."""
+    return {name: getattr(record, name) for name in changed(record)}
+
+
+def changed_flags(record: OptionRecord) -> list[str]:
+    """Options that are not as by default, as they are typed."""
+    flags = []
+    for option in typed_options(type(record)):
+        value = option.of(record)
+        if value is not None and (option.section or value != option.default):
+            flags.append(option.flags[0])
+    return flags
 
 
 def check(record: OptionRecord) -> None:
@@ -236,8 +264,6 @@ def _options(kind: type, section: str = "") -> Iterator[Option]:
             yield from _options(inner.kind, name)
             continue
         place = _note(notes, Place) or Place()
-        if place is NOT_TYPED:
-            continue
         if place.many:
             plain, of_each = _unwrapped(get_args(plain)[0])
             notes += of_each

@@ -100,8 +100,8 @@ class MeshReading(OptionRecord):
 
 
 @dataclass(frozen=True, kw_only=True)
-class MeshAndSensor(Sensor, MeshReading):
-    """What is looked at, and from where.
+class MeshInput(MeshReading):
+    """What is looked at.
 
     Parameters
     ----------
@@ -113,8 +113,18 @@ class MeshAndSensor(Sensor, MeshReading):
 
 
 @dataclass(frozen=True, kw_only=True)
-class MapOutput(Overwrite):
-    """Doppler map to write, which replaces nothing but another one.
+class MeshAndSensor(Sensor, MeshInput):
+    """What is looked at, and from where."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReplacesMaps(Overwrite):
+    """What ``out`` may replace: nothing but a Doppler map."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MapOutput(ReplacesMaps):
+    """Doppler map to write.
 
     Parameters
     ----------

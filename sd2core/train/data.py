@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from sd2core.denoise.metrics import stands_out
 from sd2core.errors import Sd2Error
 from sd2core.maps import peak_velocity_mps
+from sd2core.options.training import DataConfig
 from sd2core.pairs.segments import cut, segment_starts
 from sd2core.pairs.store import PairSet, Take, read_pairs
 from sd2core.sensor import VelocityAxis
-from sd2core.train.config import DataConfig
 
 _LARGEST_WEIGHT, _LEAST_LEVEL = 8.0, 1e-3
 

@@ -11,12 +11,12 @@ import numpy as np
 import torch
 
 from sd2core.errors import Sd2Error
+from sd2core.options.training import TrainConfig
 from sd2core.runs.control import Control, Word
 from sd2core.runs.folder import State
 from sd2core.runs.pace import Pace
 from sd2core.runs.progress import ProgressWriter
 from sd2core.train.checkpoint import Checkpoint, moments_of, set_moments, write_checkpoint
-from sd2core.train.config import TrainConfig
 from sd2core.train.folder import TrainingFolder
 from sd2core.train.learner import Learner
 from sd2core.train.loop import Loop, Outcome

@@ -7,7 +7,7 @@ from torch import nn
 
 from sd2core.denoise.model import Denoiser
 from sd2core.mesh.vertex_parts import mirrored_columns
-from sd2core.train.config import TrainConfig
+from sd2core.options.training import TrainConfig
 from sd2core.train.data import Windows, frame_weights
 from sd2core.train.steps import Batch
 from sd2core.train.validate import Exam

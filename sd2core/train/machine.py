@@ -10,8 +10,8 @@ from typing import Any, Literal
 import torch
 
 from sd2core.errors import Sd2Error
+from sd2core.options.training import MachineConfig
 from sd2core.processes import processor_name
-from sd2core.train.config import MachineConfig
 
 Device = Literal["cpu", "cuda"]
 

@@ -22,11 +22,11 @@ from sd2core.denoise.registry import build, options
 from sd2core.denoise.scaling import Scaling, whole_map
 from sd2core.denoise.texture import Texture
 from sd2core.errors import Sd2Error
+from sd2core.options.training import TrainConfig
 from sd2core.processes import end_with_parent, lower_priority
 from sd2core.runs.control import Control
 from sd2core.runs.progress import ProgressWriter
 from sd2core.train.checkpoint import Checkpoint, Position, read_checkpoint
-from sd2core.train.config import TrainConfig
 from sd2core.train.data import Order, TrainingData, prepare, read_mixed
 from sd2core.train.denoiser_loop import DenoiserLoop
 from sd2core.train.evaluation import check_fits

@@ -20,9 +20,10 @@ from typing import TYPE_CHECKING, Any, Literal
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.lock import FileLock
+from sd2core.options.training import ModelConfig, TrainConfig
 from sd2core.runs.control import Control, signals_kept, write_control
 from sd2core.runs.progress import Event, ProgressWriter
-from sd2core.train.config import ModelConfig, TrainConfig, config_text, read_config
+from sd2core.train.config import config_text, read_config
 from sd2core.train.folder import TrainingFolder
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ import numpy as np
 import torch
 
 from sd2core.denoise.model import Denoiser
-from sd2core.train.config import TrainingConfig
+from sd2core.options.training import TrainingConfig
 from sd2core.train.data import Order, Windows
 
 

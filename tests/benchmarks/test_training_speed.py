@@ -13,14 +13,14 @@ from pytest_benchmark.fixture import BenchmarkFixture
 from small_pairs import write_pairs
 
 from sd2core.denoise.registry import build
-from sd2core.sensor import VelocityAxis
-from sd2core.train.config import (
+from sd2core.options.training import (
     DataConfig,
     MachineConfig,
     ModelConfig,
     TrainConfig,
     TrainingConfig,
 )
+from sd2core.sensor import VelocityAxis
 from sd2core.train.denoiser_loop import DenoiserLoop
 from sd2core.train.start import begin
 from sd2core.train.steps import optimiser_of

@@ -12,6 +12,7 @@ import numpy as np
 
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.plan_file import read_plan
+from sd2core.cli.command_parser import record_of
 from sd2core.cli.parser import build_parser
 from sd2core.errors import Sd2Error
 from sd2core.files.recording_json import CameraEntry
@@ -94,7 +95,7 @@ def _sd2(*command: object) -> None:
     parser, _ = build_parser()
     options = parser.parse_args(list(map(str, command)))
     with redirect_stdout(io.TextIOWrapper(io.BytesIO(), encoding="utf-8")):
-        options.handler(options)
+        options.handler(record_of(options))
 
 
 def _labels(name: str, format: str) -> Target:

@@ -32,6 +32,7 @@ HELP = {
     "Export figure": "how-to/figures-for-a-paper.md",
     "Export data set": "tutorials/video-to-data-set.md#6-export-the-data-set",
     "Batch": "how-to/many-recordings.md",
+    "Any command": "how-to/many-recordings.md",
     "Recover labels": "how-to/recover-after-a-crash.md",
     "Keys": "how-to/change-keys.md",
 }

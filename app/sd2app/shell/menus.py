@@ -21,7 +21,8 @@ LAYOUT: Mapping[str, tuple[str, ...]] = {
     "File": (
         "new_from_video", "listen", "open", "@recent", "add", "compare", "relink", "-", "save",
         "save_as", "export_map", "export_denoised", "export_maps", "export_inertial",
-        "export_strip", "export_dataset", "-", "batch", "-", "recover_labels", "-", "quit",
+        "export_strip", "export_dataset", "-", "batch", "any_command", "-",
+        "recover_labels", "-", "quit",
     ),
     "Edit": (
         "undo", "redo", "-", "sensor_to_camera", "aim_sensor", "placements", "-",

@@ -13,6 +13,7 @@ from sd2app.background.model_worker.client import ModelProcess
 from sd2app.background.model_worker.library import core_classifiers, core_denoisers
 from sd2app.batch.feature import BatchFeature
 from sd2app.classify.feature import ClassifyFeature
+from sd2app.commands.feature import CommandsFeature
 from sd2app.dataset_export.feature import DatasetExportFeature
 from sd2app.denoise.feature import DenoiseFeature
 from sd2app.denoise.text import track_words
@@ -114,6 +115,7 @@ class Features:
             parts.batch_command,
             parent,
         )
+        self.commands = CommandsFeature(session, shell, parent)
         self.figures = FiguresFeature(
             session,
             shell,
@@ -139,7 +141,7 @@ class Features:
         )
         self._in_order: tuple[Feature, ...] = (
             self.mesh_comparison, self.sensor, self.suggestions, self.agreement,
-            self.dataset_export, self.fit, self.batch, self.training, self.study,
+            self.dataset_export, self.fit, self.batch, self.commands, self.training, self.study,
             self.classify, self.denoise, self.maps, self.accuracy, self.video, self.labels,
             self.figures, self.live, self.playback, self.program, self.imu, self.files, self.scene,
         )  # fmt: skip

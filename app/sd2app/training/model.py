@@ -6,7 +6,6 @@ import shlex
 import subprocess
 import sys
 from collections.abc import Sequence
-from dataclasses import fields
 from pathlib import Path
 from typing import Literal
 
@@ -19,12 +18,14 @@ from sd2app.training.run import TrainingMonitor
 from sd2app.training.setup import TrainingSetupModel
 from sd2app.training.text import model_name
 from sd2app.widgets.text import clock_text
+from sd2core.cli.train import Train
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import user_data
+from sd2core.options.records import given_of, words_of
+from sd2core.options.training import TrainConfig
 from sd2core.processes import ONE_THREAD
 from sd2core.runs.command_folder import COMMAND, launch
 from sd2core.runs.folder import LIVE
-from sd2core.train.config import DataConfig, ModelConfig, TrainConfig, TrainingConfig
 from sd2core.train.folder import RunStatus, TrainingFolder, runs_in
 
 Closing = Literal["ask", "keep", "stop"]
@@ -37,8 +38,6 @@ _SENTENCES = Sentences(
     finished="{} is trained. The Train panel puts its model to use.",
     failed="{} could not be trained to its end. The Train panel says more.",
 )
-_OPTIONS = {"early_stopping_epochs": "--early-stopping"}
-"""Options whose names differ from their settings."""
 
 
 class TrainingModel(Runs[TrainingMonitor]):
@@ -178,22 +177,20 @@ class TrainingModel(Runs[TrainingMonitor]):
 
 
 def train_arguments(config: TrainConfig, run: Path) -> list[str]:
-    """Arguments of ``sd2 train`` for all that differs from the defaults."""
-    model = config.model
-    # The model is named even where it is the default: it is what one looks for.
-    kind = ["--model", model.name]
-    if model.start is not None:
-        kind = ["--from", str(model.start)]
-    elif model.inputs != ModelConfig().inputs:
-        kind += ["--inputs", model.inputs]
-    words = ["train", *map(str, config.data.pairs), *kind, "--background"]
-    for section, plain in (("data", DataConfig(config.data.pairs)), ("training", TrainingConfig())):
-        mine = getattr(config, section)
-        for one in fields(mine):
-            value = getattr(mine, one.name)
-            if value != getattr(plain, one.name):
-                words += [_OPTIONS.get(one.name, f"--{one.name.replace('_', '-')}"), f"{value}"]
-    return [*words, "--out", str(run)]
+    """Arguments of ``sd2 train`` for all that differs from the defaults, but for the machine."""
+    model, data = given_of(config.model), given_of(config.data)
+    if config.model.start is None:
+        # Named even where it is the default: it is what one looks for.
+        model["name"] = config.model.name
+    command = Train(
+        inputs=data.pop("pairs"),
+        model=model,
+        data=data,
+        training=given_of(config.training),
+        background=True,
+        out=run,
+    )
+    return ["train", *words_of(command)]
 
 
 def quoted(arguments: list[str]) -> str:

@@ -9,8 +9,9 @@ from typing import Any, ClassVar, Literal, NamedTuple, TypeVar, get_args
 
 from sd2app.background.run_monitor import History, RunMonitor, reason_in
 from sd2core.errors import Sd2Error
+from sd2core.options.training import TrainConfig
 from sd2core.runs.pace import Pace
-from sd2core.train.config import TrainConfig, read_config
+from sd2core.train.config import read_config
 from sd2core.train.folder import TrainingFolder
 
 Outcome = Literal["finished", "stopped", "cancelled", "failed"]

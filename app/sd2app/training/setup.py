@@ -13,9 +13,15 @@ from sd2app.widgets.text import counted, duration_text
 from sd2core.denoise.card import PARTS_OF, ModelCard
 from sd2core.denoise.files import available_models
 from sd2core.errors import Sd2Error
+from sd2core.options.training import (
+    DataConfig,
+    MachineConfig,
+    ModelConfig,
+    TrainConfig,
+    TrainingConfig,
+)
 from sd2core.pairs.summary import PairFacts, pair_facts
 from sd2core.runs.pace import known_pace_s
-from sd2core.train.config import DataConfig, MachineConfig, ModelConfig, TrainConfig, TrainingConfig
 from sd2core.train.data import Split, split_subjects
 
 INPUTS = ("map", "limbs", "kinematics")

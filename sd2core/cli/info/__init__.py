@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 from sd2core.cli.command_parser import add_command
 from sd2core.cli.info.description import (
@@ -17,20 +19,32 @@ from sd2core.cli.info.description import (
     describe_video,
     show,
 )
+from sd2core.options.records import ARGUMENT
+from sd2core.options.shared import Json, MeshReading
+
+
+@dataclass(frozen=True, kw_only=True)
+class Info(MeshReading, Json):
+    """Options of ``sd2 info``.
+
+    Parameters
+    ----------
+    path : PATH
+        what to describe
+    verify
+        read every chunk and compare it with its checksum; what is damaged is named
+    """
+
+    path: Annotated[Path, ARGUMENT]
+    verify: bool = False
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``info``."""
-    parser = add_command(commands, "info", handler=_info)
-    parser.add_value("path", Path, "PATH", "what to describe")
-    parser.add_flag(
-        "--verify", "read every chunk and compare it with its checksum; what is damaged is named"
-    )
-    parser.add_mesh_reading()
-    parser.add_json()
+    add_command(commands, "info", options=Info, handler=_info)
 
 
-def _info(options: argparse.Namespace) -> None:
+def _info(options: Info) -> None:
     """What is in a recording, video, mesh, radar or IMU file, map, pairs, data set or model.
 
     sd2 info walk.sd2
@@ -50,7 +64,7 @@ def _info(options: argparse.Namespace) -> None:
     show(description, as_json=options.json)
 
 
-def describe(path: Path, options: argparse.Namespace) -> Description:
+def describe(path: Path, options: MeshReading) -> Description:
     """Open whatever ``path`` is and describe it."""
     from sd2core.cli.reading import (
         load_mesh_from_options,

@@ -16,6 +16,7 @@ from sd2app.command_line import full_parser
 from sd2app.settings import Settings
 from sd2app.training.model import TrainingModel
 from sd2app.training.text import division_text
+from sd2core.cli.command_parser import record_of
 from sd2core.cli.train import _config
 from sd2core.errors import Sd2Error
 from sd2core.runs.command_folder import last_output, launch
@@ -311,8 +312,8 @@ def test_the_command_is_one_that_sd2_takes(made) -> None:
         model.setup.set_value(name, value)
     words = shlex.split(model.command)
     assert words[0] == "sd2"
-    options = full_parser().parse_args(words[1:])
-    assert _config(options) == model.setup.config
+    typed = record_of(full_parser().parse_args(words[1:]))
+    assert _config(typed) == model.setup.config
     # And what is kept is there at the next start.
     again = made(settings=model._settings)
     assert {name: again.setup.value(name) for name in chosen} == chosen

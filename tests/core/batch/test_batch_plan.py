@@ -9,10 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sd2core.batch.plan import BatchPlan, Denoise, Export, Fit, Recordings
-from sd2core.batch.plan_file import line_of, plan_from_text, plan_text, read_plan, write_plan
+from sd2core.batch.plan_file import plan_from_text, plan_text, read_plan, write_plan
 from sd2core.doppler.options import PRESETS, chosen_options
 from sd2core.errors import Sd2Error
 from sd2core.options.synthesis import Synthesis
+from sd2core.options.toml_files import line_of
 from sd2core.sensor import VirtualSensor
 
 FOLDER = Path("/data/study").absolute()

@@ -12,7 +12,6 @@ from cli_outcome import Sd2
 
 from sd2core.cli import build_parser
 from sd2core.cli.command_parser import record_of
-from sd2core.cli.synth import Synth
 from sd2core.doppler.options import chosen_options
 from sd2core.maps import DopplerMap
 from sd2core.recording.recording import MeshReading, Recording, open_recording
@@ -137,7 +136,7 @@ class TestReading:
 )
 def test_wide_bins_at_zero_are_nulled(bins: int, v_max_mps: float, nulled: tuple[int, ...]) -> None:
     arguments = ["synth", "a", "--out", "b.npz", "--bins", str(bins), "--v-max", str(v_max_mps)]
-    typed = record_of(Synth, build_parser()[0].parse_args(arguments))
+    typed = record_of(build_parser()[0].parse_args(arguments))
     assert chosen_options(typed).null_bins == nulled
 
 

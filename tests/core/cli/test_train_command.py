@@ -130,7 +130,6 @@ class TestTrain:
             (("PAIRS",), "No folder for the run is given"),
             (("PAIRS", "--model", "s5", "--out", "run"), "model.name is 's5'. Expected: one of s4"),
             (("PAIRS", "--set", "width=4", "--out", "run"), "no option 'width'"),
-            (("PAIRS", "--nice", "30", "--out", "run"), "machine.nice is 30. Expected: a whole"),
             (("PAIRS", "--out", "a.toml/run"), "a.toml is a file"),
             (("a.toml", "b.toml", "--out", "run"), "one file with settings"),
             (("--resume", "run", "PAIRS"), "--resume is given with"),

@@ -18,9 +18,9 @@ from sd2core.denoise.live import TrainedDenoiser
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap, LimbMaps
 from sd2core.mesh.vertex_parts import JOINTS, KINEMATICS, PARTS, QUANTITIES
+from sd2core.options.training import DataConfig, ModelConfig, TrainConfig, TrainingConfig
 from sd2core.pairs.store import read_pairs
 from sd2core.sensor import VelocityAxis
-from sd2core.train.config import DataConfig, ModelConfig, TrainConfig, TrainingConfig
 from sd2core.train.start import begin
 
 AXIS = VelocityAxis(32, 2.0)

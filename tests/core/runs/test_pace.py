@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from sd2core.options.training import DataConfig, MachineConfig, ModelConfig, TrainConfig
 from sd2core.runs import pace as module
 from sd2core.runs.pace import Pace, keep_pace, known_pace_s
-from sd2core.train.config import DataConfig, MachineConfig, ModelConfig, TrainConfig
 
 KIND = ("fit", "medium")
 

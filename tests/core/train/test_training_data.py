@@ -14,9 +14,9 @@ from small_pairs import write_pairs
 
 from sd2core.denoise.registry import MODELS, build
 from sd2core.errors import Sd2Error
+from sd2core.options.training import DataConfig, TrainingConfig
 from sd2core.pairs.store import read_pairs
 from sd2core.sensor import VelocityAxis
-from sd2core.train.config import DataConfig, TrainingConfig
 from sd2core.train.data import (
     Order,
     Windows,

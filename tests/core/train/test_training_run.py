@@ -22,18 +22,18 @@ from small_pairs import write_pairs
 from sd2core.denoise.files import describe_model, load_model
 from sd2core.errors import Sd2Error
 from sd2core.mesh.vertex_parts import KINEMATICS
-from sd2core.pairs.store import read_pairs
-from sd2core.runs import pace
-from sd2core.runs.control import write_control
-from sd2core.runs.progress import Event, ProgressTail, last_of, read_events, standing
-from sd2core.train.config import (
+from sd2core.options.training import (
     DataConfig,
     MachineConfig,
     ModelConfig,
     TrainConfig,
     TrainingConfig,
-    config_text,
 )
+from sd2core.pairs.store import read_pairs
+from sd2core.runs import pace
+from sd2core.runs.control import write_control
+from sd2core.runs.progress import Event, ProgressTail, last_of, read_events, standing
+from sd2core.train.config import config_text
 from sd2core.train.folder import TrainingFolder
 from sd2core.train.start import Ending, begin, go_on
 from sd2core.train.validate import Exam, Validation

@@ -1,0 +1,193 @@
+"""Forms of commands: what is typed into them, and the runs that they start."""
+
+from __future__ import annotations
+
+import shlex
+from argparse import ArgumentTypeError
+from collections.abc import Sequence
+from dataclasses import MISSING
+from functools import cached_property
+from pathlib import Path
+from typing import Any, ClassVar
+
+from PySide6.QtCore import QObject
+
+from sd2app.background.run_monitor import CommandRun, History
+from sd2app.background.runs import KnownRun, Runs, Sentences, free_folder
+from sd2app.settings import Settings
+from sd2app.training.command_runs import known_commands
+from sd2app.training.model import quoted
+from sd2core.cli import build_parser
+from sd2core.cli.command_parser import Command, commands_of
+from sd2core.errors import Sd2Error
+from sd2core.files.paths import user_data
+from sd2core.options.records import Option, OptionRecord, typed_options, words_of
+from sd2core.runs.command_folder import COMMAND_IN_FOLDER, CommandFolder, last_output
+
+_OF_TERMINALS = {"json", "progress_json"}
+_OPENED = ("recording", "recordings", "mesh", "path", "paths")
+"""Names of arguments that the open recording is for."""
+_SENTENCES = Sentences(
+    busy="{} is under way. Wait for it, or stop it.",
+    found="{} is under way. File → Any command… shows it.",
+    finished="{} is done. File → Any command… shows what it printed.",
+    failed="{} did not come to its end. File → Any command… says more.",
+)
+
+
+class ProgressHistory(History):
+    """Share that is done, where the command tells it."""
+
+    def _progress(self, event: dict[str, Any]) -> None:
+        self.share_done = event["done"] / event["total"] if event.get("total") else None
+
+    readers: ClassVar = {"progress": _progress}
+    share_done: float | None = None
+
+    @property
+    def share(self) -> float | None:
+        """Share of the work that is done."""
+        return self.share_done
+
+
+class AnyCommandRun(CommandRun):
+    """A command under way, or one that has ended."""
+
+    histories = ProgressHistory
+    facts = ""  # what it printed
+
+    def inspect(self) -> str:
+        """Read the end of what it printed, but for lines for programs."""
+        lines = last_output(self.folder.output).splitlines()
+        return "\n".join(line for line in lines if not line.startswith('{"event"'))
+
+
+class CommandForms(Runs[AnyCommandRun]):
+    """A command that is chosen, what is typed for it, and runs of commands.
+
+    ``command`` runs ``sd2`` commands in a folder. ``folder`` holds the runs.
+    """
+
+    def __init__(
+        self,
+        settings: Settings,
+        parent: QObject,
+        folder: Path | None = None,
+        command: Sequence[str] = COMMAND_IN_FOLDER,
+    ) -> None:
+        super().__init__(AnyCommandRun, settings, "commands/run", _SENTENCES, parent)
+        self._folder = folder or user_data("commands")
+        self._command = tuple(command)
+        self._texts: dict[str, dict[str, str]] = {}  # by the command's name
+        self._chosen = ""
+        self.opened: Path | None = None  # what is open in the window
+
+    # --- what is known ------------------------------------------------------------------------
+
+    @cached_property
+    def commands(self) -> dict[str, Command]:
+        """All commands, by their names."""
+        return {one.name: one for one in commands_of(build_parser()[0])}
+
+    @property
+    def chosen(self) -> Command:
+        """The command whose form is shown."""
+        return self.commands[self._chosen or next(iter(self.commands))]
+
+    @property
+    def options(self) -> tuple[Option, ...]:
+        """Options of the chosen command."""
+        every = typed_options(self.chosen.record)
+        return tuple(one for one in every if one.name not in _OF_TERMINALS)
+
+    def text(self, option: Option) -> str:
+        """What is typed for an option; empty: as by default. A switch that is on is ``yes``."""
+        return self._typed.get(option.dest, "")
+
+    @property
+    def problem(self) -> str:
+        """Why the command cannot be started as it stands; empty where it can."""
+        try:
+            self.record  # noqa: B018
+        except Sd2Error as error:
+            return str(error)
+        return ""
+
+    @property
+    def record(self) -> OptionRecord:
+        """The command as it is typed; Sd2Error where that is wrong, or something is missing."""
+        values: dict[str, Any] = {}
+        for option in self.options:
+            text = self.text(option)
+            if text:
+                place = values.setdefault(option.section, {}) if option.section else values
+                place[option.name] = _read(option, text)
+            elif option.default is MISSING and not option.section:
+                raise Sd2Error(f"{name_of(option)} is missing", option.words)
+        return self.chosen.record(**values)
+
+    @property
+    def words(self) -> list[str]:
+        """The command's words."""
+        return [*self.chosen.name.split(), *words_of(self.record)]
+
+    @property
+    def line(self) -> str:
+        """The command for a terminal; Sd2Error as :attr:`record`."""
+        return quoted(self.words)
+
+    # --- changes ------------------------------------------------------------------------------
+
+    def choose(self, name: str) -> None:
+        """Show the form of a command, with what was typed into it before."""
+        self._chosen = name
+        self.select(None)
+        for option in self.options:
+            wanted = option.place.argument and option.name in _OPENED and not self.text(option)
+            if self.opened is not None and wanted:
+                several = bool(option.place.many)
+                path = str(self.opened)
+                self._typed[option.dest] = shlex.quote(path) if several else path
+        self.changed.emit()
+
+    def set_text(self, option: Option, text: str) -> None:
+        """Type something for an option."""
+        self._typed[option.dest] = text
+        self.changed.emit()
+
+    def start(self) -> None:
+        """Start the command; Sd2Error if it cannot be, OSError if its folder cannot be made."""
+        if self.busy:
+            raise Sd2Error(self.busy)
+        words = self.words
+        if any(one.name == "progress_json" for one in typed_options(self.chosen.record)):
+            words.append("--progress-json")
+        path = free_folder(self._folder, self.chosen.name, ())
+        about = {"what": self.chosen.name}
+        self.follow_new(path, CommandFolder(path).start(words, about, self._command))
+
+    def find(self) -> Sequence[KnownRun]:
+        """Read the folder of commands."""
+        return known_commands(self._folder)
+
+    @property
+    def _typed(self) -> dict[str, str]:
+        return self._texts.setdefault(self.chosen.name, {})
+
+
+def name_of(option: Option) -> str:
+    """Name of an option in a form."""
+    name = option.name.replace("_", " ")
+    return f"{name[0].upper()}{name[1:]}"
+
+
+def _read(option: Option, text: str) -> Any:
+    """Value of what was typed; several are separated by spaces."""
+    if option.kind is bool:
+        return True
+    try:
+        texts = shlex.split(text) if option.place.many else [text]
+        values = tuple((option.read or str)(one) for one in texts)
+    except (ArgumentTypeError, ValueError) as error:
+        raise Sd2Error(f"{name_of(option)}: {error}") from None
+    return values if option.place.many else values[0]

@@ -1,0 +1,58 @@
+"""Window of commands: a form, or the run in view."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from PySide6.QtGui import QFontDatabase
+from PySide6.QtWidgets import QDialog, QPlainTextEdit, QWidget
+
+from sd2app.background.run_monitor import UNDER_WAY
+from sd2app.commands.form import CommandForm
+from sd2app.commands.model import AnyCommandRun, CommandForms
+from sd2app.feature import Shell
+from sd2app.manual.help import help_button
+from sd2app.widgets.layouts import column_of
+from sd2app.widgets.run_panel import RunPanel, RunView, RunWords
+from sd2app.widgets.run_text import PHASES
+
+
+class CommandRunView(RunView[AnyCommandRun]):
+    """Progress of a command, and what it printed."""
+
+    def __init__(self, forms: CommandForms, shell: Shell) -> None:
+        words = RunWords(
+            lambda run: f"sd2 {run.about.get('what', '')} · {PHASES[run.phase]}",
+            lambda run: "",
+            what="command",
+            stop_tip="End it now",
+        )
+        super().__init__(forms, shell, words, ())
+        self._printed = QPlainTextEdit()
+        self._printed.setReadOnly(True)
+        self._printed.setAccessibleName("What the command printed")
+        self._printed.setFont(QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont))
+        self.column.addWidget(self._printed, 1)
+        self.refresh()
+
+    def shown(self, run: AnyCommandRun) -> Collection[str]:
+        """Names of the buttons that are of use now."""
+        return ("stop", "delete") if run.phase in UNDER_WAY else ("delete",)
+
+    def show_made(self, run: AnyCommandRun) -> None:
+        """Show what it printed."""
+        if self._printed.toPlainText() != (run.facts or ""):
+            self._printed.setPlainText(run.facts or "")
+
+
+class CommandWindow(QDialog):
+    """A form, or the run in view; the rest of the program can be used meanwhile."""
+
+    def __init__(self, forms: CommandForms, shell: Shell, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Any command")
+        form, run = CommandForm(forms, shell, self), CommandRunView(forms, shell)
+        tip, guide = "Commands that were started here", help_button("Any command", self)
+        runs = RunPanel(forms, form, run, tip, new="New command", guide=guide)
+        self.setLayout(column_of((runs, 1), margins_px=(8, 8, 8, 10)))
+        self.resize(640, 680)
